@@ -1,0 +1,76 @@
+"""Every failure that cosim reports on purpose.
+
+    CosimError
+    ├── InputError        the user's input is refused: usage, scenario, FMU (exit code 2); carries all problems at once
+    ├── ComponentError    a component failed while it ran (exit code 1)
+    └── CheckError        a check, comparison or `build --check` was not met (exit code 3)
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+
+class CosimError(Exception):
+    """Base of all errors that are meant for the user; its text needs no traceback."""
+
+    exit_code = 70
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One refused thing: what is wrong, and where it stands (file, line, JSON path) as far as that is known."""
+
+    message: str
+    where: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.message}" if self.where else self.message
+
+
+class InputError(CosimError):
+    """Input was refused before anything ran; `problems` lists every reason, one line each."""
+
+    exit_code = 2
+
+    def __init__(self, problems: str | Problem | Iterable[str | Problem]):
+        if isinstance(problems, str | Problem):
+            problems = [problems]
+        self.problems: Sequence[Problem] = tuple(p if isinstance(p, Problem) else Problem(p) for p in problems)
+        super().__init__("\n".join(map(str, self.problems)))
+
+
+class ComponentError(CosimError):
+    """A component failed while it ran: says which one, in which function, at which time and why."""
+
+    exit_code = 1
+
+    def __init__(self, component: str, function: str, reason: str, time: float | None = None):
+        self.component, self.function, self.reason, self.time = component, function, reason, time
+        super().__init__(component, function, reason, time)
+
+    def __str__(self) -> str:
+        when = "" if self.time is None else f" at t = {self.time:.12g} s"
+        return f"{self.component}: {self.function} failed{when}: {self.reason}"
+
+
+class CheckError(CosimError):
+    """A result does not meet a check, a reference or a manifest."""
+
+    exit_code = 3
+
+
+def did_you_mean(name: str, valid: Iterable[str]) -> str:
+    """The nearest valid name as the end of a message, or the list of valid names when it is short, or nothing.
+
+    >>> did_you_mean("stop_tme", ["start_time", "stop_time"])
+    '; did you mean "stop_time"?'
+    """
+    names = list(valid)
+    if near := difflib.get_close_matches(name, names, n=1):
+        return f'; did you mean "{near[0]}"?'
+    if 0 < len(names) <= 8:
+        return f"; valid: {', '.join(names)}"
+    return ""
