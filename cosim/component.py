@@ -64,7 +64,7 @@ class Variable:
     description: str = ""
     minimum: float | None = None
     maximum: float | None = None
-    dtype: np.dtype[Any] = field(default=None)  # type: ignore[assignment]
+    dtype: np.dtype[Any] = field(default=None)  # type: ignore[arg-type]
 
     def __post_init__(self) -> None:
         if self.dtype is None:

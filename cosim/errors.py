@@ -1,9 +1,9 @@
 """Every failure that cosim reports on purpose.
 
-    CosimError
-    ├── InputError        the user's input is refused: usage, scenario, FMU (exit code 2); carries all problems at once
-    ├── ComponentError    a component failed while it ran (exit code 1)
-    └── CheckError        a check, comparison or `build --check` was not met (exit code 3)
+CosimError
+├── InputError        the user's input is refused: usage, scenario, FMU (exit code 2); carries all problems at once
+├── ComponentError    a component failed while it ran (exit code 1)
+└── CheckError        a check, comparison or `build --check` was not met (exit code 3)
 """
 
 from __future__ import annotations
@@ -21,10 +21,14 @@ class CosimError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One refused thing: what is wrong, and where it stands (file, line, JSON path) as far as that is known."""
+    """One refused thing: what is wrong, and where it stands (file, line, JSON path) as far as that is known.
+
+    `subject` names the setting that is wrong ("components", "usv", "period") for those who know where settings stand.
+    """
 
     message: str
     where: str = ""
+    subject: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         return f"{self.where}: {self.message}" if self.where else self.message

@@ -1,0 +1,28 @@
+"""cosim: FMI co-simulation of controllers and plants in lockstep.
+
+import cosim
+result = cosim.run("demo1_box")
+result["plant.uav.position.z"]
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .api import load, run
+    from .errors import CheckError, ComponentError, CosimError, InputError
+    from .results import Result
+
+__version__ = "0.1.0"
+__all__ = ["CheckError", "ComponentError", "CosimError", "InputError", "Result", "load", "run"]
+
+_HOMES = {"load": "api", "run": "api", "Result": "results"} | {
+    name: "errors" for name in ("CheckError", "ComponentError", "CosimError", "InputError")
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import public names when they are first used, so that `import cosim` costs nothing."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_HOMES[name]}", __name__), name)

@@ -1,0 +1,73 @@
+"""FMI 2.0 Co-Simulation."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numpy as np
+
+from ..component import StepResult
+from ..errors import ComponentError
+from .instance import DISCARD, FmuInstance, pointer
+
+_LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3
+
+
+class Fmi2Instance(FmuInstance):
+    """An instance of an FMI 2.0 FMU."""
+
+    prefix = "fmi2"
+    accessors = {"Float64": "Real", "Int32": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
+
+    def _prepare_step(self, do_step: Any) -> None:
+        self._do_step = do_step
+        self._time, self._step_size = ctypes.c_double(), ctypes.c_double()
+        self._step_arguments = (self._handle, self._time, self._step_size, ctypes.c_int(1))
+
+    def _slave(self, **arguments: Any) -> Any:
+        from fmpy.fmi2 import FMU2Slave
+
+        return FMU2Slave(**arguments)
+
+    def _instantiate(self) -> None:
+        from fmpy import calloc, fmi2, free
+
+        # fixed arity: the text is passed on as it is, printf directives in it are not expanded
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(lambda _, __, status, ___, text: self.log(status, text))
+        callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
+        callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
+        try:
+            self._fmu.instantiate(callbacks=callbacks, loggingOn=self._logging_on)
+        except Exception:
+            raise ComponentError(self.name, "fmi2Instantiate", self._message or "the FMU gave no reason") from None
+
+    def _access_arguments(self, references: Any, count: int, values: np.ndarray) -> tuple[Any, ...]:
+        return references, ctypes.c_size_t(count), pointer(values)
+
+    def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
+        self._now = start_time
+        self.call("setupExperiment", None, start_time, stop_time)
+        self.call("enterInitializationMode")
+
+    def do_step(self, time: float, step_size: float) -> StepResult | None:
+        self._time.value = self._now = time
+        self._step_size.value = step_size
+        status = self._do_step(*self._step_arguments)
+        return self._ended_early(status, time) if status > 1 else None
+
+    def _ended_early(self, status: int, time: float) -> StepResult:
+        """Discard with `terminated` ends the simulation; every other bad status is a failure (FMI 2.0 section 4.2.1)."""
+        if status == DISCARD and self.call("getBooleanStatus", _TERMINATED):
+            return StepResult(self.call("getRealStatus", _LAST_SUCCESSFUL_TIME), terminate_requested=True)
+        self.fail("fmi2DoStep", status)
+
+    def get_state(self) -> Any:
+        return self.call("getFMUstate")
+
+    def set_state(self, state: Any) -> None:
+        self.call("setFMUstate", state)
+
+    def free_state(self, state: Any) -> None:
+        self.call("freeFMUstate", state)

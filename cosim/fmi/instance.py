@@ -1,0 +1,220 @@
+"""An instance of an FMU as a component.
+
+FMPy loads the library and walks the life cycle; on the hot path the C functions are called directly, with arguments that
+were made beforehand (FMPy's own methods cost 3 to 30 times as much).
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any, NamedTuple, NoReturn
+
+import numpy as np
+
+from .. import log
+from ..component import Component, Ports, StepResult, Variable
+from ..errors import ComponentError, InputError
+from .file import FmuFile
+
+STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
+OK, WARNING, DISCARD, ERROR, FATAL = range(5)
+
+
+class Call(NamedTuple):
+    """A C function with its arguments made beforehand; it returns an FMI status."""
+
+    function: Callable[..., int]
+    arguments: tuple[Any, ...]
+    name: str
+
+
+def instantiate(file: FmuFile, instance_name: str, logging_on: bool = False) -> Component:
+    """A component for the FMU; no code of the FMU runs before `bind`.
+
+    Raises InputError when the FMU cannot run on this machine.
+    """
+    from .fmi2 import Fmi2Instance
+    from .fmi3 import Fmi3Instance
+
+    kind = Fmi2Instance if file.description.major == 2 else Fmi3Instance
+    return kind(file, instance_name, logging_on)
+
+
+class FmuInstance(Component):
+    """What FMI 2.0 and 3.0 have in common. Subclasses name the C functions and lay out their arguments."""
+
+    binds_everything = False
+    #: prefix of the C functions
+    prefix: str
+    #: cosim type -> the part of fmi*Get..., fmi*Set... after Get and Set
+    accessors: Mapping[str, str]
+
+    def __init__(self, file: FmuFile, instance_name: str, logging_on: bool):
+        self.name, self._file = instance_name, file
+        self.description = file.description
+        self.variables = self.description.variables
+        self.has_state = self.description.has_state
+        self._by_name = {variable.name: variable for variable in self.variables}
+        self._message = ""
+        self._now = 0.0
+        self._dead = False
+        self._logging_on = logging_on
+        self._fmu: Any = None
+        file.check_platform()
+
+    # -- what differs between the FMI versions -------------------------------------------------------------------------
+
+    def _slave(self, **arguments: Any) -> Any:
+        raise NotImplementedError
+
+    def _instantiate(self) -> None:
+        raise NotImplementedError
+
+    def _access_arguments(self, references: Any, count: int, values: np.ndarray) -> tuple[Any, ...]:
+        raise NotImplementedError
+
+    def _prepare_step(self, do_step: Any) -> None:
+        raise NotImplementedError
+
+    # -- life cycle ----------------------------------------------------------------------------------------------------
+
+    def _start(self) -> None:
+        """Load the library and instantiate the FMU. Raises InputError or ComponentError."""
+        folder = self._file.acquire()
+        try:
+            self._fmu = self._load(folder)
+            self._instantiate()
+        except BaseException:
+            self._dead = True
+            self._file.release()
+            raise
+        self._handle = ctypes.c_void_p(self._fmu.component)
+        self._library = ctypes.PyDLL(None, handle=self._fmu.dll._handle)
+        # doStep may take long: it is called without holding the interpreter lock
+        do_step = ctypes.CDLL(None, handle=self._fmu.dll._handle)[f"{self.prefix}DoStep"]
+        do_step.restype = ctypes.c_int
+        self._prepare_step(do_step)
+
+    def _load(self, folder: Path) -> Any:
+        description = self.description
+        try:
+            return self._slave(
+                guid=description.token,
+                modelIdentifier=description.identifier,
+                unzipDirectory=str(folder),
+                instanceName=self.name,
+            )
+        except Exception as error:
+            reason = str(error).replace(f"{folder}/", "")
+            raise InputError(f'the binary of "{self._file.path}" cannot be loaded: {reason}') from None
+
+    def call(self, function: str, *arguments: Any) -> Any:
+        """Call one of FMPy's methods; a bad status becomes a ComponentError with the FMU's own last message."""
+        from fmpy.fmi1 import FMICallException
+
+        try:
+            return getattr(self._fmu, function)(*arguments)
+        except FMICallException as error:
+            self.fail(error.function, error.status)
+
+    def fail(self, function: str, status: int) -> NoReturn:
+        """Raise the error for a status. After fatal nothing of this instance may be called any more."""
+        self._dead = self._dead or status == FATAL
+        label = STATUS[status] if 0 <= status < len(STATUS) else "not defined by FMI"
+        reason = f"status {status} ({label})" + (f": {self._message}" if self._message else "")
+        raise ComponentError(self.name, function, reason, self._now)
+
+    def log(self, status: int, text: bytes | None) -> None:
+        """A message from the FMU: kept as the reason of a later failure, and passed on to the user."""
+        self._message = (text or b"").decode("utf-8", "replace").strip()
+        level = log.INFO if status == OK else log.WARNING if status in (WARNING, DISCARD) else log.ERROR
+        log.message(self.name, level, self._message)
+
+    def exit_initialization_mode(self) -> None:
+        self.call("exitInitializationMode")
+
+    def terminate(self) -> None:
+        self.call("terminate")
+
+    def free(self) -> None:
+        if self._fmu is None or self._dead:
+            return
+        self._dead = True
+        self._fmu.freeInstance()
+        self._file.release()
+
+    # -- access off the hot path ---------------------------------------------------------------------------------------
+
+    def set(self, name: str, value: Any) -> None:
+        variable = self._by_name[name]
+        values = list(np.ravel(value)) if variable.shape else [value]
+        self.call(f"set{self.accessors[variable.type]}", [self.description.references[name]], values)
+
+    def get(self, name: str) -> Any:
+        variable = self._by_name[name]
+        reference = [self.description.references[name]]
+        count = (len(variable.slots),) if variable.shape else ()
+        values = self.call(f"get{self.accessors[variable.type]}", reference, *count)
+        values = [self._decode(value) for value in values]
+        return values if variable.shape else values[0]
+
+    @staticmethod
+    def _decode(value: Any) -> Any:
+        return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+
+    # -- the hot path --------------------------------------------------------------------------------------------------
+
+    def bind(self, inputs: Ports, outputs: Ports) -> None:
+        self._start()
+        self._sets, self._set_objects = self._calls("Set", inputs)
+        self._gets, self._get_objects = self._calls("Get", outputs)
+
+    def _calls(self, verb: str, ports: Ports) -> tuple[list[Call], list[tuple[str, np.ndarray, int]]]:
+        """One call for each run of variables with the same accessor; strings and binaries go one by one."""
+        calls: list[Call] = []
+        objects: list[tuple[str, np.ndarray, int]] = []
+        for dtype, array in ports.arrays.items():
+            place = 0
+            own = [variable for variable in ports.variables if variable.dtype == dtype]
+            for accessor, run in groupby(own, lambda variable: self.accessors[variable.type]):
+                variables = list(run)
+                size = sum(len(variable.slots) for variable in variables)
+                if dtype.hasobject:
+                    objects += [(variable.name, array, place + i) for i, variable in enumerate(variables)]
+                else:
+                    calls.append(self._access(f"{self.prefix}{verb}{accessor}", variables, array[place : place + size]))
+                place += size
+        return calls, objects
+
+    def _access(self, function: str, variables: Sequence[Variable], values: np.ndarray) -> Call:
+        references = (ctypes.c_uint32 * len(variables))(*(self.description.references[v.name] for v in variables))
+        bound = self._library[function]
+        bound.restype = ctypes.c_int
+        return Call(bound, (self._handle, *self._access_arguments(references, len(variables), values)), function)
+
+    def set_inputs(self) -> None:
+        for function, arguments, name in self._sets:
+            status = function(*arguments)
+            if status > WARNING:
+                self.fail(name, status)
+        for name, array, index in self._set_objects:
+            self.set(name, array[index])
+
+    def get_outputs(self) -> None:
+        for function, arguments, name in self._gets:
+            status = function(*arguments)
+            if status > WARNING:
+                self.fail(name, status)
+        for name, array, index in self._get_objects:
+            array[index] = self.get(name)
+
+    def do_step(self, time: float, step_size: float) -> StepResult | None:
+        raise NotImplementedError
+
+
+def pointer(values: np.ndarray) -> ctypes.c_void_p:
+    """The address of an array's data as an argument that needs no conversion when it is used."""
+    return ctypes.c_void_p(values.ctypes.data)

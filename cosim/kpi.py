@@ -1,0 +1,135 @@
+"""Key performance indicators: numbers taken from a result, and the limits they have to keep.
+
+A KPI is a plain function `function(result, **arguments)` that returns its numbers by name:
+
+    @units(lateral_error="m")
+    def landing(result: Result, vehicle: str, deck: str) -> dict[str, float]: ...
+"""
+
+from __future__ import annotations
+
+import inspect
+import operator
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from .errors import ComponentError, InputError, Problem, did_you_mean
+from .results import Result
+
+Number = float | int | bool
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+LIMITS: Mapping[str, Callable[[Any, Any], bool]] = {"min": operator.ge, "max": operator.le, "equals": operator.eq}
+
+
+class Evaluation(NamedTuple):
+    """A function of a result under the name that a scenario gives it, with its keyword arguments: a KPI or a figure."""
+
+    name: str
+    function: Callable[..., Any]
+    arguments: Mapping[str, Any]
+
+    def problems(self, kind: str) -> list[Problem]:
+        """What is wrong with the arguments; `kind` ("KPI", "figure") says in the messages what this is."""
+        signature = inspect.signature(self.function)
+        try:
+            signature.bind(None, **self.arguments)
+        except TypeError as error:
+            unknown = [name for name in self.arguments if name not in signature.parameters]
+            hint = did_you_mean(unknown[0], list(signature.parameters)[1:]) if unknown else ""
+            return [Problem(f"{error}{hint}", f'{kind} "{self.name}"')]
+        return []
+
+    def evaluate(self, kind: str, result: Result) -> Any:
+        """The function's value. Raises InputError for wrong arguments or signals, ComponentError when the function fails."""
+        if problems := self.problems(kind):
+            raise InputError(problems)
+        try:
+            return self.function(result, **self.arguments)
+        except InputError as error:
+            raise InputError([Problem(str(problem), f'{kind} "{self.name}"') for problem in error.problems]) from error
+        except Exception as error:
+            raise self.failure(kind, f"{type(error).__name__}: {error}") from error
+
+    def failure(self, kind: str, reason: str) -> ComponentError:
+        """The error that says this function is at fault."""
+        return ComponentError(f'{kind} "{self.name}"', self.function.__name__, reason)
+
+
+def units(**unit_of: str) -> Callable[[Function], Function]:
+    """Decorator: the units of a KPI's numbers in Modelica syntax; what is not named is a count or a Boolean."""
+
+    def declare(function: Function) -> Function:
+        function.units = unit_of  # type: ignore[attr-defined]
+        return function
+
+    return declare
+
+
+def evaluate_kpis(result: Result, kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]]) -> dict[str, Number]:
+    """The numbers of all KPIs, given as (name, function, arguments), as "name.key" in the order given.
+
+    Values may be NaN (not applicable to this run). Raises InputError or ComponentError that name the KPI.
+    """
+    values: dict[str, Number] = {}
+    for evaluation in map(Evaluation._make, kpis):
+        numbers = evaluation.evaluate("KPI", result)
+        if not isinstance(numbers, Mapping):
+            raise evaluation.failure("KPI", f"returned {type(numbers).__name__}, expected a mapping from names to numbers")
+        values |= {f"{evaluation.name}.{key}": _number(evaluation, key, value) for key, value in numbers.items()}
+    return values
+
+
+def _number(evaluation: Evaluation, key: str, value: Any) -> Number:
+    number = value.item() if isinstance(value, np.generic) else value
+    if not isinstance(number, Number):
+        raise evaluation.failure("KPI", f'"{key}" is {type(value).__name__}, expected a number or Boolean')
+    return number
+
+
+def kpi_units(kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]], names: Iterable[str]) -> dict[str, str]:
+    """The unit that a KPI's function declares (see `units`) for each of `names`, "" for none; "time[3]" is declared as "time"."""
+    declared = {f"{name}.{key}": unit for name, function, _ in kpis for key, unit in getattr(function, "units", {}).items()}
+    return {name: declared.get(name.partition("[")[0], "") for name in names}
+
+
+class CheckOutcome(NamedTuple):
+    """A check as the scenario states it, the value that was found, and whether it is within the limits."""
+
+    check: Mapping[str, Any]
+    value: Number
+    passed: bool
+
+    @property
+    def limits(self) -> str:
+        """The limits in words: "max 0.1"."""
+        return ", ".join(f"{key} {str(limit).lower()}" for key, limit in self.check.items() if key != "kpi")
+
+
+def evaluate_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, Any]]) -> list[CheckOutcome]:
+    """Hold `kpis` against checks such as {"kpi": "landing.lateral_error", "max": 0.1}; limits: "min", "max", "equals".
+
+    NaN keeps no limit. Raises InputError for KPIs that were not evaluated and limits that do not exist.
+    """
+    checks = list(checks)
+    if problems := [problem for check in checks for problem in _check_problems(kpis, check)]:
+        raise InputError(problems)
+    return [_outcome(check, kpis[check["kpi"]]) for check in checks]
+
+
+def _check_problems(kpis: Mapping[str, Number], check: Mapping[str, Any]) -> list[Problem]:
+    name, limits = check["kpi"], [key for key in check if key != "kpi"]
+    where = f'check of "{name}"'
+    problems = [Problem(f'unknown limit "{key}"{did_you_mean(key, LIMITS)}', where) for key in limits if key not in LIMITS]
+    if name not in kpis:
+        problems.append(Problem(f"no such KPI{did_you_mean(name, kpis)}", where))
+    if not limits:
+        problems.append(Problem(f"no limit given, expected one of {', '.join(LIMITS)}", where))
+    return problems
+
+
+def _outcome(check: Mapping[str, Any], value: Number) -> CheckOutcome:
+    passed = all(LIMITS[key](value, limit) for key, limit in check.items() if key != "kpi")
+    return CheckOutcome(check, value, passed)

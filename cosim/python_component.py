@@ -1,0 +1,186 @@
+"""PythonFMU classes as components: the same file runs in process or exported as an FMU."""
+
+from __future__ import annotations
+
+import importlib.util
+import inspect
+import sys
+from collections.abc import Callable, Mapping
+from hashlib import sha256
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from pythonfmu import Fmi2Slave
+from pythonfmu.enums import Fmi2Status
+from pythonfmu.variables import Boolean, Integer, Real, ScalarVariable, String
+
+from . import log
+from .component import Component, Ports, Variable
+from .errors import ComponentError, InputError, Problem, did_you_mean
+
+_TYPES = {Real: "Float64", Integer: "Int32", Boolean: "Boolean", String: "String"}
+_CASTS: Mapping[str, Callable[[Any], Any]] = {"Float64": float, "Int32": int, "Boolean": bool, "String": str}
+
+
+class PythonSlave(Component):
+    """A `pythonfmu.Fmi2Slave` that runs in process, without export.
+
+    Its state is what it registered as variables, as in an exported FMU.
+    """
+
+    binds_everything = False
+    has_state = True
+
+    def __init__(self, slave: Fmi2Slave, instance_name: str):
+        self._slave, self._name, self._time = slave, instance_name, 0.0
+        self._registered: dict[str, ScalarVariable] = {v.name: v for v in slave.vars.values()}
+        self.variables = [_variable(v) for v in slave.vars.values()]
+        self._setters: list[tuple[Callable[[Any], None], np.ndarray, int]] = []
+        self._getters: list[tuple[Callable[[], Any], np.ndarray, int]] = []
+
+    def set(self, name: str, value: Any) -> None:
+        registered = self._registered[name]
+        self._guard("set", registered.setter, _CASTS[_type(registered)](value))
+
+    def get(self, name: str) -> Any:
+        registered = self._registered[name]
+        return _CASTS[_type(registered)](self._guard("get", registered.getter))
+
+    def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
+        self._time = start_time
+        self._guard("setup_experiment", self._slave.setup_experiment, start_time, stop_time, None)
+        self._guard("enter_initialization_mode", self._slave.enter_initialization_mode)
+
+    def exit_initialization_mode(self) -> None:
+        self._guard("exit_initialization_mode", self._slave.exit_initialization_mode)
+
+    def bind(self, inputs: Ports, outputs: Ports) -> None:
+        self._setters = [(self._registered[v.name].setter, *place) for v, place in _places(inputs)]
+        self._getters = [(self._registered[v.name].getter, *place) for v, place in _places(outputs)]
+
+    def set_inputs(self) -> None:
+        for setter, array, index in self._setters:
+            setter(array.item(index))
+
+    def do_step(self, time: float, step_size: float) -> None:
+        self._time = time
+        if not self._guard("do_step", self._slave.do_step, time, step_size):
+            raise ComponentError(self._name, "do_step", "do_step returned False", time)
+
+    def get_outputs(self) -> None:
+        for getter, array, index in self._getters:
+            array[index] = getter()
+
+    def get_state(self) -> Any:
+        return self._slave._get_fmu_state()
+
+    def set_state(self, state: Any) -> None:
+        self._slave._set_fmu_state(state)
+
+    def free_state(self, state: Any) -> None: ...
+
+    def terminate(self) -> None:
+        self._guard("terminate", self._slave.terminate)
+
+    def free(self) -> None: ...
+
+    def _guard(self, function: str, call: Callable[..., Any], *arguments: Any) -> Any:
+        """Call user code; what it raises becomes a ComponentError, what it logged reaches the log."""
+        try:
+            return call(*arguments)
+        except Exception as error:
+            place = inspect.trace()[-1]
+            reason = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
+            raise ComponentError(self._name, function, reason, self._time) from error
+        finally:
+            if self._slave.log_queue:
+                self._forward_log()
+
+    def _forward_log(self) -> None:
+        for message in self._slave.log_queue:
+            level = {Fmi2Status.ok: log.INFO, Fmi2Status.warning: log.WARNING}.get(message.status, log.ERROR)
+            log.message(self._name, level, message.msg)
+        self._slave.log_queue.clear()
+
+
+def _type(registered: ScalarVariable) -> str:
+    return next(name for kind, name in _TYPES.items() if isinstance(registered, kind))
+
+
+def _variable(registered: ScalarVariable) -> Variable:
+    start = registered.getter() if registered.getter else getattr(registered, "start", None)
+    return Variable(
+        registered.name,
+        _type(registered),
+        registered.causality.name if registered.causality else "local",
+        registered.variability.name if registered.variability else "continuous",
+        start,
+        description=registered.description or "",
+    )
+
+
+def _places(ports: Ports) -> list[tuple[Variable, tuple[np.ndarray, int]]]:
+    filled = dict.fromkeys(ports.arrays, 0)
+    places = []
+    for variable in ports.variables:
+        places.append((variable, (ports.arrays[variable.dtype], filled[variable.dtype])))
+        filled[variable.dtype] += 1
+    return places
+
+
+def load_component(reference: str, folder: Path, instance_name: str, arguments: Mapping[str, Any]) -> Component:
+    """An instance of `file.py:Class`, a component or a PythonFMU class; relative paths start at `folder`.
+
+    Raises InputError when the file, the class or its arguments are not what they should be.
+    """
+    kind = load_object(reference, folder)
+    if inspect.isclass(kind) and issubclass(kind, Fmi2Slave):
+        return PythonSlave(_construct(kind, reference, instance_name=instance_name, **arguments), instance_name)
+    return _construct(kind, reference, instance_name, **arguments)
+
+
+def _construct(kind: Callable[..., Any], reference: str, *positional: Any, **named: Any) -> Any:
+    try:
+        inspect.signature(kind).bind(*positional, **named)
+    except TypeError as error:
+        raise InputError(f"{reference} does not accept these arguments: {error}") from None
+    try:
+        return kind(*positional, **named)
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"{reference} cannot be constructed: {type(error).__name__}: {error}") from error
+
+
+def load_object(reference: str, folder: Path) -> Any:
+    """What `file.py:name` refers to. Raises InputError with the nearest name when there is no such thing."""
+    file, separator, name = reference.rpartition(":")
+    if not separator or not file.endswith(".py") or not name.isidentifier():
+        raise InputError(f'expected "file.py:name", found "{reference}"')
+    path = (folder / file).resolve()
+    if not path.is_file():
+        raise InputError(f'file "{file}" does not exist')
+    module = _import(path)
+    if not hasattr(module, name):
+        public = [key for key in vars(module) if not key.startswith("_")]
+        raise InputError(Problem(f'"{file}" defines no "{name}"{did_you_mean(name, public)}'))
+    return getattr(module, name)
+
+
+def _import(path: Path) -> ModuleType:
+    """Import a file, as a member of its package if it is in one, under a name made unique by the root's path."""
+    root = path.parent
+    while (root / "__init__.py").is_file():
+        root = root.parent
+    unique = f"_cosim_{sha256(str(root).encode()).hexdigest()[:12]}"
+    if unique not in sys.modules:
+        namespace = ModuleType(unique)
+        namespace.__path__ = [str(root)]
+        sys.modules[unique] = namespace
+    name = ".".join((unique, *path.relative_to(root).with_suffix("").parts))
+    try:
+        return importlib.import_module(name)
+    except Exception as error:
+        raise InputError(f'"{path.name}" cannot be imported: {type(error).__name__}: {error}') from error

@@ -1,0 +1,121 @@
+"""From names in a scenario to components and their variables."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from ..component import Component, Variable
+from ..errors import did_you_mean
+from .tree import Node
+
+_PORT = re.compile(r"[^.\[]*")
+_REALS = ("Float64", "Float32")
+
+
+class Unknown(Exception):
+    """A name refers to nothing; the text says why. Empty when the reason was reported elsewhere."""
+
+
+class Target(NamedTuple):
+    """A variable, or a prefix of variables, of a component."""
+
+    component: str
+    prefix: str
+
+
+def resolve(node: Node, text: str, ports: Sequence[str], hidden: bool = False) -> list[Target]:
+    """What a name means in a system. Through a nested system it goes by its ports of the given kinds ("inputs", ...); with
+    `hidden`, inner components are reached by their own names too.
+
+    Raises Unknown.
+    """
+    component, _, rest = text.partition(".")
+    if component in node.broken:
+        raise Unknown
+    if component not in node.spec.components:
+        raise Unknown(f'unknown component "{component}"{did_you_mean(component, node.spec.components)}')
+    if not rest:
+        raise Unknown(f'"{text}" names a component, expected a variable or a prefix of its variables')
+    child = node.children.get(component)
+    if child is None:
+        return [Target(node.full_name(component), rest)]
+    match = _PORT.match(rest)
+    port = match.group() if match else ""
+    shown = _ports(child, ports)
+    if port in shown:
+        return [target for inner in shown[port] for target in resolve(child, inner + rest[len(port) :], ports, hidden)]
+    if hidden and port in {*child.spec.components, *child.broken}:
+        return resolve(child, rest, ports, hidden)
+    valid = [*shown, *(child.spec.components if hidden else ())]
+    raise Unknown(f'nested system "{component}" has no {ports[0].rstrip("s")} port "{port}"{did_you_mean(port, valid)}')
+
+
+def _ports(node: Node, kinds: Sequence[str]) -> Mapping[str, Sequence[str]]:
+    declared = getattr(node.spec, "ports", None)
+    shown: dict[str, Sequence[str]] = {}
+    for kind in kinds if declared else ():
+        for name, inner in getattr(declared, kind).items():
+            shown[name] = [inner] if isinstance(inner, str) else inner
+    return shown
+
+
+def under(component: Component, prefix: str, causality: str) -> dict[str, str]:
+    """Slots of a component below a prefix, by the rest of their names ("" for the prefix itself)."""
+    return {
+        slot[len(prefix) :]: slot
+        for variable in component.variables
+        if variable.causality == causality
+        for slot in variable.slots
+        if slot == prefix or slot.startswith((prefix + ".", prefix + "["))
+    }
+
+
+def assign(name: str, component: Component, text: str, value: Any) -> dict[str, Any]:
+    """Values by variable name for `text` = value; a list sets an array, or the scalars text[1], text[2], ...
+
+    Raises Unknown when there is no such variable, ValueError when it does not take the value.
+    """
+    variables = {variable.name: variable for variable in component.variables}
+    if text in variables:
+        return {text: _checked(variables[text], value)}
+    if isinstance(value, list) and f"{text}[1]" in variables:
+        names = [f"{text}[{i}]" for i in range(1, len(value) + 1)]
+        if names[-1] not in variables:
+            size = sum(other.startswith(f"{text}[") for other in variables)
+            raise ValueError(f"{len(value)} values for {text}[1..{size}]")
+        return {each: _checked(variables[each], element) for each, element in zip(names, value, strict=True)}
+    settable = [v.name for v in component.variables if v.causality in ("parameter", "input")]
+    raise Unknown(f'component "{name}" has no variable "{text}"{did_you_mean(text, settable)}')
+
+
+def _checked(variable: Variable, value: Any) -> Any:
+    if variable.causality not in ("parameter", "structuralParameter", "input") and variable.start is None:
+        raise ValueError(f'"{variable.name}" is of causality {variable.causality} and cannot be set')
+    if not variable.shape:
+        return _scalar(variable, value)
+    size = len(variable.slots)
+    if not isinstance(value, list) or len(value) > size:
+        raise ValueError(f'"{variable.name}" takes a list of at most {size} values, found {value!r}')
+    start = variable.start if isinstance(variable.start, tuple) else (variable.start or 0,) * size
+    return [*(_scalar(variable, element) for element in value), *start[len(value) :]]
+
+
+def _scalar(variable: Variable, value: Any) -> Any:
+    """The value as the variable's type. Raises ValueError when it is not of that type or out of range."""
+    if not _accepts(variable.type, value):
+        raise ValueError(f'"{variable.name}" is a {variable.type}, found {value!r}')
+    low, high = variable.minimum, variable.maximum
+    if (low is not None and value < low) or (high is not None and value > high):
+        span = f"{'-inf' if low is None else low} ... {'inf' if high is None else high}"
+        raise ValueError(f'"{variable.name}" must lie in {span}, found {value!r}')
+    return float(value) if variable.type in _REALS else value
+
+
+def _accepts(kind: str, value: Any) -> bool:
+    if kind == "Boolean" or isinstance(value, bool):
+        return kind == "Boolean" and isinstance(value, bool)
+    if kind in ("String", "Binary"):
+        return isinstance(value, str)
+    return isinstance(value, int | float if kind in _REALS else int)

@@ -1,0 +1,235 @@
+"""The scenario format: what a scenario or nested-system JSON may contain. `cosim schema` prints it as JSON Schema."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    WithJsonSchema,
+    model_validator,
+)
+
+from ..timing import exact
+
+S = TypeVar("S")
+SOURCES = ("fmu", "python", "modelica", "system")
+
+
+def _time(value: Any) -> Fraction:
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError('expected seconds as a number or as a fraction in text such as "1/60"')
+    try:
+        return exact(value)
+    except (ValueError, ZeroDivisionError):
+        raise ValueError('expected seconds as a number or as a fraction in text such as "1/60"') from None
+
+
+def _positive(value: Fraction) -> Fraction:
+    if value <= 0:
+        raise ValueError("expected a positive number of seconds")
+    return value
+
+
+def _assignable(value: Any) -> Any:
+    values = value if isinstance(value, list) else [value]
+    if not values or not all(isinstance(v, bool | int | float | str) for v in values):
+        raise ValueError("expected a number, true, false, a text, or a list of these")
+    return value
+
+
+def _names(value: Any) -> Any:
+    return [value] if isinstance(value, str) else value
+
+
+Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+Seconds = Annotated[
+    Fraction,
+    BeforeValidator(_time),
+    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^\d+/\d+$"}]}),
+]
+Period = Annotated[Seconds, AfterValidator(_positive)]
+_scalar = [{"type": kind} for kind in ("number", "boolean", "string")]
+Value = Annotated[
+    Any,
+    BeforeValidator(_assignable),
+    WithJsonSchema({"anyOf": [*_scalar, {"type": "array", "items": {"anyOf": _scalar}, "minItems": 1}]}),
+]
+Names = Annotated[
+    list[str],
+    BeforeValidator(_names),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
+]
+
+
+class Cut:
+    """Stands for a list element that was refused, so that its neighbours keep their indices."""
+
+
+CUT: Any = Cut()
+
+
+class Spec(BaseModel):
+    """Base of everything in a scenario: unknown keys and loose types are refused."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, arbitrary_types_allowed=True)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _pass_cut(cls, value: Any, handler: Any) -> Any:
+        return value if value is CUT else handler(value)
+
+
+def kept(specs: Iterable[S]) -> Iterator[tuple[int, S]]:
+    """(index, spec) of those list elements that were not refused."""
+    return ((i, spec) for i, spec in enumerate(specs) if spec is not CUT)
+
+
+class ComponentSpec(Spec):
+    """One component: exactly one source, and what it is started with."""
+
+    fmu: str | None = Field(None, description="path of an FMU")
+    python: str | None = Field(None, description='"file.py:Class", a PythonFMU class or a cosim component')
+    modelica: str | None = Field(None, description='"file.mo:Model", built when needed (extra "build")')
+    system: str | None = Field(None, description="path of a nested system's JSON")
+    arguments: dict[str, Any] = Field({}, description="for the constructor of a Python component")
+    parameters: dict[str, Value] = Field({}, description="parameters and start values by variable name")
+    period: Period | None = Field(None, description="seconds between two steps; default: every macro step")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> ComponentSpec:
+        given = [source for source in SOURCES if getattr(self, source) is not None]
+        if len(given) != 1:
+            raise ValueError(f"expected exactly one of {', '.join(SOURCES)}; found {' and '.join(given) or 'none'}")
+        if self.arguments and self.python is None:
+            raise ValueError('"arguments" are for components with "python"; variables are set with "parameters"')
+        return self
+
+
+class ConnectionSpec(Spec):
+    """Output to input: two variables, or two prefixes whose variables are matched by the rest of their names."""
+
+    source: str = Field(alias="from")
+    target: str = Field(alias="to")
+    delay: int = Field(0, ge=0, description="macro steps; until then the initial output arrives")
+
+
+class AlgorithmSpec(Spec):
+    """Stages step one after the other, the components of a stage side by side."""
+
+    kind: Literal["staged"] = "staged"
+    stages: list[list[Name]]
+
+
+class RecordSpec(Spec):
+    """Which outputs are kept ("*" also matches dots) and how often."""
+
+    signals: list[str] = ["*"]
+    interval: Period | None = None
+
+
+class EventSpec(Spec):
+    """At a communication point, before the step that starts there, variables are set."""
+
+    time: Seconds
+    values: dict[str, Value] = Field(alias="set")
+
+
+class InputSpec(Spec):
+    """A profile over time from a CSV file (first column "time"), each named column to one or more inputs."""
+
+    file: str
+    to: dict[str, Names]
+    interpolation: Literal["linear", "hold"] = "linear"
+
+
+class FunctionSpec(Spec):
+    """A Python function of the result: a KPI (returns numbers) or a figure (returns a matplotlib Figure)."""
+
+    name: Name
+    python: str = Field(description='"file.py:function"')
+    arguments: dict[str, Any] = {}
+
+
+class CheckSpec(Spec):
+    """A KPI and what it must be for the run to pass."""
+
+    kpi: str
+    min: float | None = None
+    max: float | None = None
+    equals: bool | int | float | None = None
+
+    @model_validator(mode="after")
+    def _bounded(self) -> CheckSpec:
+        if self.min is None and self.max is None and self.equals is None:
+            raise ValueError('expected at least one of "min", "max", "equals"')
+        return self
+
+
+class ToleranceSpec(Spec):
+    """Half width of the tube around a reference, in value and in time (s)."""
+
+    absolute: float = Field(0.0, ge=0)
+    relative: float = Field(0.0, ge=0)
+    time: float = Field(0.0, ge=0)
+
+
+class ReferenceSpec(Spec):
+    """A recorded trajectory to compare with; only signals that match a pattern are compared."""
+
+    file: str
+    tolerances: dict[str, ToleranceSpec]
+
+
+class PortsSpec(Spec):
+    """What a nested system shows to the outside: each port is one or more inner variables or prefixes."""
+
+    inputs: dict[Name, Names] = {}
+    outputs: dict[Name, str] = {}
+    parameters: dict[Name, Names] = {}
+
+
+class SystemSpec(Spec):
+    """Components and how they are connected: the core of scenarios and nested systems."""
+
+    schema_: str | None = Field(None, alias="$schema")
+    name: str = ""
+    description: str = ""
+    components: Annotated[dict[Name, ComponentSpec], Field(min_length=1)]
+    connections: list[ConnectionSpec] = []
+    algorithm: AlgorithmSpec | None = Field(None, description="default: one component per stage in the listed order")
+
+
+class NestedSpec(SystemSpec):
+    """A nested system: a system without times that shows ports."""
+
+    ports: PortsSpec = PortsSpec()
+
+
+class ScenarioSpec(SystemSpec):
+    """A whole scenario: a system, its times, and what to keep, compute, check and draw."""
+
+    name: Annotated[str, StringConstraints(min_length=1)]
+    start_time: Seconds = Fraction(0)
+    stop_time: Seconds
+    step_size: Period
+    record: RecordSpec = RecordSpec()
+    events: list[EventSpec] = []
+    inputs: list[InputSpec] = []
+    kpis: list[FunctionSpec] = []
+    checks: list[CheckSpec] = []
+    figures: list[FunctionSpec] = []
+    reference: ReferenceSpec | None = None
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema (2020-12) of a scenario file."""
+    schema = ScenarioSpec.model_json_schema(by_alias=True)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

@@ -1,0 +1,63 @@
+"""The kinds of components a scenario can name, and how each is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from ..component import Component
+from ..errors import InputError
+from ..fmi import FmuFile, instantiate
+from .schema import ComponentSpec
+from .tree import Node
+
+
+class Workshop:
+    """Makes components; every FMU file is read once, however many components use it."""
+
+    def __init__(self) -> None:
+        self.fmus: dict[Path, FmuFile] = {}
+        self._users: dict[Path, str] = {}
+
+    def make(self, node: Node, name: str) -> Component:
+        """The component `name` of a system. Raises InputError."""
+        spec = node.spec.components[name]
+        source = next(source for source in _MAKERS if getattr(spec, source) is not None)
+        return _MAKERS[source](self, node.folder, spec, node.full_name(name))
+
+    def from_fmu(self, folder: Path, spec: ComponentSpec, name: str) -> Component:
+        assert spec.fmu is not None
+        return self._instance(folder / spec.fmu, name)
+
+    def from_modelica(self, folder: Path, spec: ComponentSpec, name: str) -> Component:
+        """Built on demand: the FMU comes from the per-user cache when source and tools are unchanged."""
+        from ..export.build import cached_fmu
+
+        assert spec.modelica is not None
+        file, _, model = spec.modelica.rpartition(":")
+        if not file.endswith(".mo"):
+            raise InputError(f'expected "file.mo:Model", found "{spec.modelica}"')
+        if not (folder / file).is_file():
+            raise InputError(f'file "{file}" does not exist')
+        return self._instance(cached_fmu(folder / file, model), name)
+
+    def from_python(self, folder: Path, spec: ComponentSpec, name: str) -> Component:
+        from ..python_component import load_component
+
+        assert spec.python is not None
+        return load_component(spec.python, folder, name, spec.arguments)
+
+    def _instance(self, path: Path, name: str) -> Component:
+        file = self.fmus.setdefault(path.resolve(), FmuFile(path))
+        component = instantiate(file, name)
+        first = self._users.setdefault(path.resolve(), name)
+        if first != name and file.description.only_once_per_process:
+            raise InputError(f'"{path}" allows one instance per process only, which "{first}" already is')
+        return component
+
+
+_MAKERS: Mapping[str, Callable[[Workshop, Path, ComponentSpec, str], Component]] = {
+    "fmu": Workshop.from_fmu,
+    "python": Workshop.from_python,
+    "modelica": Workshop.from_modelica,
+}

@@ -1,0 +1,156 @@
+"""A scenario file and the nested systems it uses, as a tree."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from .. import resources
+from ..errors import InputError, Problem, did_you_mean
+from .document import Document, read_document
+from .schema import NestedSpec, ScenarioSpec, SystemSpec
+from .validate import validate
+
+
+@dataclass
+class Node:
+    """One system: the scenario itself (prefix ""), or a nested system (prefix "uav").
+
+    `broken` holds the names of components whose description was refused; nothing more is said about them.
+    """
+
+    document: Document
+    spec: SystemSpec
+    prefix: str = ""
+    children: dict[str, Node] = field(default_factory=dict)
+    broken: set[str] = field(default_factory=set)
+
+    @property
+    def folder(self) -> Path:
+        """Where relative paths start."""
+        return self.document.file.parent
+
+    def full_name(self, component: str) -> str:
+        return f"{self.prefix}.{component}" if self.prefix else component
+
+    def where(self, *path: str | int) -> str:
+        return self.document.where(path)
+
+    def walk(self) -> Iterator[Node]:
+        """Nested systems first, then this one."""
+        for child in self.children.values():
+            yield from child.walk()
+        yield self
+
+
+@dataclass
+class Scenario:
+    """A scenario with everything that is wrong with it so far, and the variables set from outside."""
+
+    root: Node
+    problems: list[Problem]
+    assignments: Mapping[str, Any]
+
+    @property
+    def spec(self) -> ScenarioSpec:
+        assert isinstance(self.root.spec, ScenarioSpec)
+        return self.root.spec
+
+
+def find(scenario: str | Path) -> Path:
+    """A path as it is, or the file of a shipped scenario given by its name."""
+    path = Path(scenario)
+    shipped = resources.root() / "scenarios"
+    if path.suffix == ".json" or path.is_file():
+        return path
+    names = sorted(file.stem for file in shipped.glob("*.json"))
+    if str(scenario) not in names:
+        raise InputError(f'no scenario file and no shipped scenario "{scenario}"{did_you_mean(str(scenario), names)}')
+    return shipped / f"{scenario}.json"
+
+
+def load(scenario: str | Path, settings: Mapping[str, Any] | None = None) -> Scenario:
+    """Read a scenario and its nested systems.
+
+    `settings` are changes from outside: names that start with "/" are JSON pointers into the scenario file, "stop_time" and
+    "step_size" its times, all others variables. Raises InputError when there is no file, or no JSON in it.
+    """
+    document = read_document(find(scenario))
+    problems: list[Problem] = []
+    variables: dict[str, Any] = {}
+    for name, value in (settings or {}).items():
+        if name.startswith("/"):
+            problems += _set_pointer(document, name, value)
+        else:
+            variables[name] = value
+    spec, found = validate(document, ScenarioSpec)
+    root = Node(document, spec)
+    problems += found + _load_children(root, (document.file.resolve(),))
+    return Scenario(root, problems, variables)
+
+
+def _load_children(node: Node, ancestors: tuple[Path, ...]) -> list[Problem]:
+    problems: list[Problem] = []
+    raw = node.document.value.get("components") if isinstance(node.document.value, dict) else None
+    node.broken |= set(raw if isinstance(raw, dict) else {}) - set(node.spec.components)
+    for name, component in node.spec.components.items():
+        if component.system is None:
+            continue
+        try:
+            file = node.folder / component.system
+            if file.resolve() in ancestors:
+                raise InputError(f'the nested system "{component.system}" contains itself')
+            document = read_document(file)
+        except InputError as error:
+            node.broken.add(name)
+            problems += [Problem(p.message, p.where or node.where("components", name, "system")) for p in error.problems]
+            continue
+        spec, found = validate(document, NestedSpec)
+        node.children[name] = Node(document, spec, node.full_name(name))
+        problems += found + _load_children(node.children[name], (*ancestors, file.resolve()))
+    return problems
+
+
+def _set_pointer(document: Document, pointer: str, value: Any) -> list[Problem]:
+    """Change the JSON value before it is read; the last step may be new."""
+    keys = [key.replace("~1", "/").replace("~0", "~") for key in pointer[1:].split("/")]
+    target, where = document.value, f"--set {pointer}"
+    for depth, key in enumerate(keys[:-1]):
+        target = _child(target, key)
+        if target is None:
+            return [Problem(f'the scenario has no "/{"/".join(keys[: depth + 1])}"', where)]
+    if isinstance(target, dict):
+        target[keys[-1]] = value
+    elif isinstance(target, list) and keys[-1].isdigit() and int(keys[-1]) < len(target):
+        target[int(keys[-1])] = value
+    else:
+        return [Problem(f'the scenario has no "{pointer}"', where)]
+    return []
+
+
+def _child(value: Any, key: str) -> Any:
+    if isinstance(value, dict):
+        return value.get(key)
+    if isinstance(value, list) and key.isdigit() and int(key) < len(value):
+        return value[int(key)]
+    return None
+
+
+def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
+    """The values of `NAME=value` texts: JSON where it is JSON, else text.
+
+    Raises InputError for texts without "=".
+    """
+    parsed: dict[str, Any] = {}
+    for text in settings:
+        name, separator, value = text.partition("=")
+        if not separator or not name:
+            raise InputError(f'expected NAME=value, found "{text}"')
+        try:
+            parsed[name] = json.loads(value)
+        except ValueError:
+            parsed[name] = value
+    return parsed

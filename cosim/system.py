@@ -1,0 +1,158 @@
+"""A system: components, the connections between their variables, and the order in which they step.
+
+Pure data, checked as a whole: `System.problems` finds everything that is wrong with the wiring in one go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .component import Component, Variable
+from .errors import Problem, did_you_mean
+
+INTEGERS = frozenset({"Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64"})
+FLOATS = frozenset({"Float64", "Float32"})
+
+
+class Endpoint(NamedTuple):
+    """One scalar variable (or array element) of one component."""
+
+    component: str
+    slot: str
+
+    def __str__(self) -> str:
+        return f"{self.component}.{self.slot}"
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """The value of an output goes to an input, `delay` macro steps late; `where` says who asked for it."""
+
+    source: Endpoint
+    target: Endpoint
+    delay: int = 0
+    where: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Components that step in stages of their own inside one place of an outer stage (a nested system)."""
+
+    name: str
+    stages: tuple[Stage, ...]
+
+
+Stage = tuple["str | Group", ...]
+
+
+def members(stages: Iterable[Stage]) -> Iterator[str]:
+    """Names of all components in the stages, groups opened."""
+    for stage in stages:
+        for member in stage:
+            if isinstance(member, Group):
+                yield from members(member.stages)
+            else:
+                yield member
+
+
+class Place(NamedTuple):
+    """The variable a slot belongs to, and the element's index in it (row-major)."""
+
+    variable: Variable
+    element: int
+
+
+@dataclass(frozen=True)
+class System:
+    """What is simulated. Stages step one after the other; the components of a stage step side by side.
+
+    `start_values` holds parameters and start values by component and variable name; `periods` the components that step
+    less often than every macro step (s); `aliases` further names under which outputs are recorded.
+    """
+
+    components: Mapping[str, Component]
+    connections: Sequence[Connection] = ()
+    stages: Sequence[Stage] = ()
+    periods: Mapping[str, Fraction] = field(default_factory=dict)
+    start_values: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    aliases: Mapping[str, Endpoint] = field(default_factory=dict)
+
+    @cached_property
+    def slots(self) -> Mapping[str, Mapping[str, Place]]:
+        """Every slot of every component, by component and slot name."""
+        return {
+            name: {slot: Place(variable, i) for variable in component.variables for i, slot in enumerate(variable.slots)}
+            for name, component in self.components.items()
+        }
+
+    def place(self, endpoint: Endpoint) -> Place:
+        return self.slots[endpoint.component][endpoint.slot]
+
+    def problems(self) -> list[Problem]:
+        """Everything that is wrong with connections and stages; empty when the system can run."""
+        return [*self._stage_problems(), *self._connection_problems()]
+
+    def _stage_problems(self) -> Iterator[Problem]:
+        seen: set[str] = set()
+        subject = ("algorithm", "stages")
+        for name in members(self.stages):
+            if name not in self.components:
+                yield Problem(f'unknown component "{name}"{did_you_mean(name, self.components)}', subject=subject)
+            elif name in seen:
+                yield Problem(f'component "{name}" stands in the stages twice', subject=subject)
+            seen.add(name)
+        for name in self.components:
+            if name not in seen:
+                yield Problem(f'component "{name}" is in no stage, so it would never step', subject=subject)
+
+    def _connection_problems(self) -> Iterator[Problem]:
+        fed: dict[Endpoint, Connection] = {}
+        for connection in self.connections:
+            source = self._end_problem(connection.source, "output")
+            target = self._end_problem(connection.target, "input")
+            if source or target:
+                yield from (Problem(text, connection.where) for text in (source, target) if text)
+                continue
+            if connection.target in fed:
+                first = fed[connection.target].source
+                yield Problem(f"input {connection.target} is connected twice: it is already fed by {first}", connection.where)
+            fed.setdefault(connection.target, connection)
+            if text := incompatibility(self.place(connection.source).variable, self.place(connection.target).variable):
+                yield Problem(f"{connection.source} cannot feed {connection.target}: {text}", connection.where)
+
+    def _end_problem(self, end: Endpoint, causality: str) -> str:
+        if end.component not in self.components:
+            return f'unknown component "{end.component}"{did_you_mean(end.component, self.components)}'
+        slots = self.slots[end.component]
+        if end.slot not in slots:
+            valid = (name for name, place in slots.items() if place.variable.causality == causality)
+            return f'component "{end.component}" has no variable "{end.slot}"{did_you_mean(end.slot, valid)}'
+        if (found := slots[end.slot].variable.causality) != causality:
+            return f"{end} is of causality {found}, expected an {causality}"
+        return ""
+
+
+def incompatibility(source: Variable, target: Variable) -> str:
+    """Why a value of `source` cannot become one of `target`; "" when it can, if necessary with conversion."""
+    if not _converts(source, target):
+        return f"type {source.type} does not become {target.type}"
+    if source.unit and target.unit and not source.unit.converts_to(target.unit):
+        return f'units "{source.unit.name}" and "{target.unit.name}" measure different quantities'
+    return ""
+
+
+def _converts(source: Variable, target: Variable) -> bool:
+    if source.type == target.type:
+        return source.type != "Clock"
+    integral = INTEGERS | {"Enumeration"}
+    if target.type in FLOATS:
+        return source.type in FLOATS | integral
+    if target.type == "Enumeration" or source.type == "Enumeration":
+        return {source.type, target.type} <= integral
+    return {source.type, target.type} <= INTEGERS and bool(np.can_cast(source.dtype, target.dtype, "safe"))
