@@ -66,29 +66,34 @@ KNOWN = {
         _unit("T", kg=1, s=-2, A=-1),
     )
 }
-_TOKEN = re.compile(r"\s*([()./]|1|[A-Za-z%]+)([+-]?\d+)?")
+_FACTOR = re.compile(r"(1|[A-Za-z%]+)([+-]?\d+)?")
 
 
 def parse(text: str) -> Unit:
-    """The unit written in `text` in Modelica syntax: factors joined by ".", one "/" before the denominator, "m2", "s-1".
+    """The unit written in `text` in Modelica syntax: "kg.m/s2", "m.s-1", "W/(m2.K)".
 
     Raises ValueError when the text cannot be read or holds an unknown unit.
     """
     if text in KNOWN:
         return KNOWN[text]
-    exponents, factor, position, sign = [0] * len(BASE), 1.0, 0, 1
-    while position < len(text):
-        token = _TOKEN.match(text, position)
-        if token is None:
-            raise ValueError(f'cannot read the unit "{text}" at "{text[position:]}"')
-        symbol, power = token.group(1), int(token.group(2) or 1)
-        position = token.end()
-        if symbol == "/":
-            sign = -1
-        elif symbol not in (".", "(", ")"):
-            known = KNOWN.get(symbol)
-            if known is None or known.offset:
-                raise ValueError(f'unknown unit "{symbol}" in "{text}"')
-            factor *= known.factor ** (sign * power)
-            exponents = [e + sign * power * k for e, k in zip(exponents, known.exponents, strict=True)]
-    return Unit(text, tuple(exponents), factor)
+    above, slash, below = text.partition("/")
+    if slash and below.startswith("(") and below.endswith(")"):
+        below = below[1:-1]
+    factors = [(_factor(part, text), 1) for part in above.split(".")]
+    factors += [(_factor(part, text), -1) for part in below.split(".")] if slash else []
+    exponents, scale = [0] * len(BASE), 1.0
+    for (unit, power), sign in factors:
+        scale *= unit.factor ** (sign * power)
+        exponents = [e + sign * power * k for e, k in zip(exponents, unit.exponents, strict=True)]
+    return Unit(text, tuple(exponents), scale)
+
+
+def _factor(text: str, whole: str) -> tuple[Unit, int]:
+    """One factor of a unit, "m2", as known unit and power."""
+    match = _FACTOR.fullmatch(text)
+    if match is None:
+        raise ValueError(f'cannot read the unit "{whole}" at "{text}"')
+    unit = KNOWN.get(match.group(1))
+    if unit is None or unit.offset:
+        raise ValueError(f'unknown unit "{match.group(1)}" in "{whole}"')
+    return unit, int(match.group(2) or 1)

@@ -61,6 +61,7 @@ class Executor:
                 component.set(variable, value)
         for component in system.components.values():
             component.enter_initialization_mode(start, stop)
+            component.get_outputs()
         self._take_start_values()
         self._propagate(start)
         for component in system.components.values():

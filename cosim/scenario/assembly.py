@@ -5,22 +5,26 @@ from __future__ import annotations
 import ast
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ..component import Component
 from ..errors import InputError, Problem, did_you_mean
+from ..python_component import load_object
 from ..simulate import Event, Settings, problems
 from ..system import Endpoint, Group, Stage, System
 from ..table import read_table
 from ..timing import exact
+from .document import Document
 from .names import Unknown, assign, resolve
 from .schema import FunctionSpec, ScenarioSpec, kept
 from .sources import Workshop
 from .tree import Node, Scenario, load
 from .wiring import Wiring
+
+Function = tuple[str, Callable[..., Any], Mapping[str, Any]]
 
 #: full name of the components made from input profiles: PROFILES.1, PROFILES.2, ...
 PROFILES = "inputs"
@@ -30,15 +34,44 @@ PROFILES = "inputs"
 class Assembly:
     """A scenario ready to run. Its components live until `simulate` or `free`."""
 
-    file: Path
+    root: Node
     spec: ScenarioSpec
     system: System
     settings: Settings
     workshop: Workshop
 
     @property
-    def folder(self) -> Path:
-        return self.file.parent
+    def document(self) -> Document:
+        """The scenario file, with the changes from outside in its value."""
+        return self.root.document
+
+    @property
+    def checks(self) -> list[dict[str, Any]]:
+        """The scenario's checks as `cosim.kpi.evaluate_checks` takes them."""
+        return [check.model_dump(exclude_none=True) for check in self.spec.checks]
+
+    def kpis(self) -> list[Function]:
+        """(name, function, arguments) of every KPI."""
+        return self._functions(self.spec.kpis)
+
+    def figures(self) -> list[Function]:
+        """(name, function, arguments) of every figure."""
+        return self._functions(self.spec.figures)
+
+    def _functions(self, specs: Sequence[FunctionSpec]) -> list[Function]:
+        return [(spec.name, load_object(spec.python, self.root.folder), spec.arguments) for spec in specs]
+
+    def files(self) -> list[Path]:
+        """The scenario, its nested systems and its FMUs."""
+        return [*(node.document.file for node in self.root.walk()), *self.workshop.fmus]
+
+    def origin(self, name: str) -> str:
+        """Where a component comes from, in words."""
+        for node in self.root.walk():
+            for own, spec in node.spec.components.items():
+                if node.full_name(own) == name:
+                    return spec.fmu or spec.python or spec.modelica or ""
+        return self.spec.inputs[int(name.rpartition(".")[2])].file
 
     def free(self) -> None:
         for component in self.system.components.values():
@@ -60,7 +93,7 @@ def assemble(scenario: str | Path, settings: Mapping[str, Any] | None = None) ->
         for component in assembler.components.values():
             component.free()
         raise
-    return Assembly(loaded.root.document.file, loaded.spec, assembler.system, assembler.settings, assembler.workshop)
+    return Assembly(loaded.root, loaded.spec, assembler.system, assembler.settings, assembler.workshop)
 
 
 class _Assembler:
@@ -101,8 +134,8 @@ class _Assembler:
 
     def _make_components(self) -> None:
         for node in self.root.walk():
-            for name, spec in node.spec.components.items():
-                if spec.system is not None or name in node.broken:
+            for name, component in node.spec.components.items():
+                if component.system is not None or name in node.broken:
                     continue
                 try:
                     self.components[node.full_name(name)] = self.workshop.make(node, name)

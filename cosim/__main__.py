@@ -1,0 +1,5 @@
+"""`python -m cosim`."""
+
+from .cli import main
+
+main()

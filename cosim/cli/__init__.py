@@ -1,0 +1,83 @@
+"""The command line. Each command imports what it needs when it runs, so that `cosim --help` is quick."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from typing import Any
+
+import click
+
+from .. import __version__
+from ..errors import CosimError
+
+#: command -> (module in this package, what it does)
+COMMANDS = {
+    "run": ("run", "Run a scenario; write results and figures."),
+    "check": ("check", "Load, wire and validate a scenario; print the expanded system."),
+    "simulate": ("simulate", "Simulate one FMU alone."),
+    "info": ("info", "Print what an FMU says about itself."),
+    "build": ("build", "Export controllers and plants to fmus/."),
+    "schema": ("schema", "Print the JSON Schema of scenarios."),
+}
+
+
+class _Commands(click.Group):
+    """Knows its commands by name and imports them when they are used."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        if name not in COMMANDS:
+            return None
+        command: click.Command = import_module(f".{COMMANDS[name][0]}", __name__).command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+
+
+@click.command(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--debug", is_flag=True, help="Show tracebacks.")
+@click.version_option(__version__, package_name="cosim", message="cosim %(version)s")
+def cli(debug: bool) -> None:
+    """FMI co-simulation of controllers and plants in lockstep."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point of the command `cosim`; ends the process with the exit code of the outcome."""
+    sys.exit(_code(sys.argv[1:] if arguments is None else arguments))
+
+
+def _code(arguments: list[str]) -> int:
+    debug = "--debug" in arguments
+    try:
+        return _outcome(cli.main(arguments, prog_name="cosim", standalone_mode=False))
+    except click.exceptions.Abort:
+        click.echo("interrupted", err=True)
+        return 130
+    except KeyboardInterrupt:
+        click.echo("interrupted", err=True)
+        return 130
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except CosimError as error:
+        if debug:
+            raise
+        click.echo(str(error), err=True)
+        return error.exit_code
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 0
+    except Exception as error:
+        if debug:
+            raise
+        click.echo(f"internal error: {type(error).__name__}: {error}  (cosim --debug shows where)", err=True)
+        return 70
+
+
+def _outcome(value: Any) -> int:
+    return value if isinstance(value, int) else 0

@@ -1,0 +1,75 @@
+"""`cosim check`: what a scenario becomes before it runs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from ..system import Group, Stage
+
+if TYPE_CHECKING:
+    from ..scenario import Assembly
+
+
+@click.command()
+@click.argument("scenario")
+@click.option("--set", "settings", multiple=True, metavar="NAME=value", help="As for `cosim run`.")
+@click.option("--connections/--no-connections", default=True, help="List every connection.")
+def command(scenario: str, settings: tuple[str, ...], connections: bool) -> None:
+    """Load, wire and validate SCENARIO without running it; print components, stages, connections and conversions."""
+    from ..api import load
+    from ..scenario.tree import parse_settings
+
+    assembly = load(scenario, parse_settings(settings))
+    try:
+        _components(assembly)
+        _stages(assembly)
+        if connections:
+            _connections(assembly)
+        times = assembly.settings
+        click.echo(
+            f"\n{assembly.spec.name}: {float(times.start_time):g} s ... {float(times.stop_time):g} s in steps of "
+            f"{float(times.step_size):g} s, {len(times.columns)} signals recorded. All is well."
+        )
+    finally:
+        assembly.free()
+
+
+def _components(assembly: Assembly) -> None:
+    click.echo("components")
+    width = max(map(len, assembly.system.components))
+    for name, component in assembly.system.components.items():
+        counts = {kind: sum(len(v.slots) for v in component.variables if v.causality == kind) for kind in ("input", "output")}
+        period = assembly.system.periods.get(name)
+        every = f", every {float(period):g} s" if period else ""
+        click.echo(f"  {name:{width}}  {assembly.origin(name)}, {counts['input']} inputs, {counts['output']} outputs{every}")
+
+
+def _stages(assembly: Assembly) -> None:
+    click.echo("\nstages, in order (components of one line step side by side)")
+    _list_stages(assembly.system.stages, "  ")
+
+
+def _list_stages(stages: tuple[Stage, ...] | object, indent: str) -> None:
+    for i, stage in enumerate(stages, 1):  # type: ignore[var-annotated,arg-type]
+        names = ", ".join(member.name if isinstance(member, Group) else member for member in stage)
+        click.echo(f"{indent}{i}. {names}")
+        for member in stage:
+            if isinstance(member, Group):
+                _list_stages(member.stages, indent + "   ")
+
+
+def _connections(assembly: Assembly) -> None:
+    from ..engine.plan import conversion
+
+    system = assembly.system
+    click.echo(f"\nconnections ({len(system.connections)})")
+    for connection in system.connections:
+        source, target = system.place(connection.source).variable, system.place(connection.target).variable
+        notes = [f"delay {connection.delay}"] if connection.delay else []
+        if conversion(source, target) != (1.0, 0.0) and source.unit and target.unit:
+            notes.append(f"{source.unit.name} to {target.unit.name}")
+        if source.type != target.type:
+            notes.append(f"{source.type} to {target.type}")
+        click.echo(f"  {connection.source} -> {connection.target}" + (f"  ({', '.join(notes)})" if notes else ""))

@@ -1,0 +1,111 @@
+"""`cosim simulate`: one FMU alone."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from ..component import Component
+    from ..simulate import Settings
+    from ..system import System
+
+NAME, PROFILE = "fmu", "profile"
+
+
+@click.command()
+@click.argument("fmu", type=click.Path(path_type=Path))
+@click.option("--output-file", type=click.Path(path_type=Path), help="CSV file for the outputs; default: print final values.")
+@click.option("--stop-time", help="Stop time in s; default: the FMU's, else 1.")
+@click.option("--step-size", help="Communication step in s; default: the FMU's, else a hundredth of the duration.")
+@click.option("--start-value", "start_values", multiple=True, metavar="name=value", help="Set a parameter or start value.")
+@click.option("--input-file", type=click.Path(path_type=Path), help='CSV file with "time" and columns named as inputs.')
+def command(
+    fmu: Path,
+    output_file: Path | None,
+    stop_time: str | None,
+    step_size: str | None,
+    start_values: tuple[str, ...],
+    input_file: Path | None,
+) -> None:
+    """Simulate FMU (FMI 2.0 or 3.0 Co-Simulation) from its default start time."""
+    from ..results import Result
+    from ..scenario.tree import parse_settings
+    from ..simulate import simulate
+    from . import messages
+
+    messages.show()
+    system, settings = _prepare(fmu, stop_time, step_size, parse_settings(start_values), input_file)
+    run = simulate(system, settings)
+    result = Result(run.recording)
+    if output_file:
+        result.to_csv(output_file)
+        click.echo(f"{len(result.time)} rows in {output_file}")
+    if run.failure is not None:
+        raise run.failure
+    if not output_file:
+        click.echo(f"time = {result.time[-1]!r} s")
+        for name in result:
+            click.echo(f"{name} = {result[name][-1].item()!r} {result.units[name]}".rstrip())
+
+
+def _prepare(
+    fmu: Path, stop_time: str | None, step_size: str | None, start_values: dict[str, Any], input_file: Path | None
+) -> tuple[System, Settings]:
+    """The FMU, and the profile if there is one, as a system of their own."""
+    from ..fmi import FmuFile, instantiate
+    from ..scenario.assembly import seconds
+    from ..simulate import Settings
+    from ..system import Connection, Endpoint, System
+
+    file = FmuFile(fmu)
+    experiment = file.description.default_experiment
+    start = experiment.start_time or Fraction(0)
+    stop = seconds(stop_time) if stop_time else experiment.stop_time or start + 1
+    step = seconds(step_size) if step_size else experiment.step_size or (stop - start) / 100
+    components: dict[str, Component] = {NAME: instantiate(file, file.description.model_name)}
+    connections, stages = [], [(NAME,)]
+    if input_file:
+        components[PROFILE] = _profile(input_file, components[NAME])
+        stages.append((PROFILE,))
+        connections = [Connection(Endpoint(PROFILE, v.name), Endpoint(NAME, v.name)) for v in components[PROFILE].variables]
+    assigned = _assigned(components[NAME], start_values)
+    outputs = [slot for v in components[NAME].variables if v.causality == "output" for slot in v.slots]
+    columns = {slot: Endpoint(NAME, slot) for slot in outputs}
+    return System(components, connections, stages, start_values={NAME: assigned}), Settings(start, stop, step, columns)
+
+
+def _profile(path: Path, component: Component) -> Component:
+    import csv
+
+    from ..errors import InputError, Problem, did_you_mean
+    from ..table import read_table
+
+    if not path.is_file():
+        raise InputError(f'input file "{path}" does not exist')
+    with path.open(newline="") as file:
+        columns = next(csv.reader(file), ["time"])[1:]
+    inputs = [slot for v in component.variables if v.causality == "input" for slot in v.slots]
+    unknown = [column for column in columns if column not in inputs]
+    if unknown:
+        raise InputError(Problem(f'the FMU has no input "{column}"{did_you_mean(column, inputs)}', str(path)) for column in unknown)
+    return read_table(path, columns, "linear")
+
+
+def _assigned(component: Component, start_values: dict[str, Any]) -> dict[str, Any]:
+    from ..errors import InputError, Problem
+    from ..scenario.names import Unknown, assign
+
+    values: dict[str, Any] = {}
+    problems = []
+    for name, value in start_values.items():
+        try:
+            values |= assign(NAME, component, name, value)
+        except (Unknown, ValueError) as error:
+            problems.append(Problem(str(error), f"--start-value {name}"))
+    if problems:
+        raise InputError(problems)
+    return values
