@@ -61,6 +61,9 @@ class PythonSlave(Component):
         self._getters = [(self._registered[v.name].getter, *place) for v, place in _places(outputs)]
 
     def set_inputs(self) -> None:
+        self._guard("set_inputs", self._set_all)
+
+    def _set_all(self) -> None:
         for setter, array, index in self._setters:
             setter(array.item(index))
 
@@ -70,6 +73,9 @@ class PythonSlave(Component):
             raise ComponentError(self._name, "do_step", "do_step returned False", time)
 
     def get_outputs(self) -> None:
+        self._guard("get_outputs", self._get_all)
+
+    def _get_all(self) -> None:
         for getter, array, index in self._getters:
             array[index] = getter()
 
@@ -110,13 +116,13 @@ def _type(registered: ScalarVariable) -> str:
 
 
 def _variable(registered: ScalarVariable) -> Variable:
-    start = registered.getter() if registered.getter else getattr(registered, "start", None)
+    causality = registered.causality.name if registered.causality else "local"
     return Variable(
         registered.name,
         _type(registered),
-        registered.causality.name if registered.causality else "local",
+        causality,
         registered.variability.name if registered.variability else "continuous",
-        start,
+        registered.getter() if causality in ("parameter", "input") else None,
         description=registered.description or "",
     )
 

@@ -47,9 +47,9 @@ def command(
     if run.failure is not None:
         raise run.failure
     if not output_file:
-        click.echo(f"time = {result.time[-1]!r} s")
+        click.echo(f"time = {result.time.tolist()[-1]!r} s")
         for name in result:
-            click.echo(f"{name} = {result[name][-1].item()!r} {result.units[name]}".rstrip())
+            click.echo(f"{name} = {result[name].tolist()[-1]!r} {result.units[name]}".rstrip())
 
 
 def _prepare(

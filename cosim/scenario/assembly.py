@@ -254,7 +254,10 @@ class _Assembler:
         return {name: end for name, end in {**outputs, **others}.items() if name in chosen}
 
     def _concerns_broken(self, pattern: str) -> bool:
-        return any(node.broken for node in self.root.walk())
+        """Whether a pattern may mean variables of a component that was refused."""
+        head = pattern.partition("*")[0]
+        broken = [node.full_name(name) for node in self.root.walk() for name in node.broken]
+        return any(head.startswith(name) or name.startswith(head) for name in broken)
 
     def _events(self) -> Iterator[Event]:
         for i, spec in kept(self.spec.events):

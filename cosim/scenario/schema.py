@@ -168,7 +168,7 @@ class CheckSpec(Spec):
 
     @model_validator(mode="after")
     def _bounded(self) -> CheckSpec:
-        if self.min is None and self.max is None and self.equals is None:
+        if self is not CUT and self.min is None and self.max is None and self.equals is None:
             raise ValueError('expected at least one of "min", "max", "equals"')
         return self
 

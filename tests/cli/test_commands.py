@@ -1,0 +1,191 @@
+"""The command line as a user meets it: real processes, exit codes, what is printed."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+BLOCKS = Path(__file__).parents[1] / "scenario" / "blocks.py"
+
+
+def cosim(*arguments, cwd=None, **more):
+    command = [sys.executable, "-m", "cosim", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False, **more)
+
+
+def scenario(folder, block="Gain", **more):
+    content = {
+        "name": "small",
+        "stop_time": 3,
+        "step_size": 1,
+        "components": {"a": {"python": f"{BLOCKS}:{block}"}},
+        **more,
+    }
+    path = folder / "small.json"
+    path.write_text(json.dumps(content))
+    return path
+
+
+def test_help_names_every_command():
+    done = cosim("--help")
+    assert done.returncode == 0
+    for command in ("run", "check", "simulate", "info", "build", "schema"):
+        assert f"  {command} " in done.stdout
+        assert cosim(command, "--help").returncode == 0
+
+
+def test_run_writes_results_that_can_be_read_back(tmp_path):
+    done = cosim("run", scenario(tmp_path), "--set", "a.u=1.5", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "3 s simulated" in done.stdout
+    lines = (tmp_path / "runs/small/result.csv").read_text().splitlines()
+    assert lines == ['"time","a.y"', "0.0,0.0", "1.0,3.0", "2.0,3.0", "3.0,3.0"]
+    run = json.loads((tmp_path / "runs/small/run.json").read_text())
+    assert run["scenario"]["name"] == "small"
+    assert run["failure"] is None
+    assert run["timing"]["loop_seconds"] > 0
+    assert run["versions"]["numpy"]
+    assert json.loads((tmp_path / "runs/small/kpis.json").read_text()) == {}
+
+
+def test_output_goes_where_it_is_told_and_times_can_be_changed(tmp_path):
+    done = cosim("run", scenario(tmp_path), "--output-dir", "there", "--stop-time", "1", "--step-size", "1/4", cwd=tmp_path)
+    assert done.returncode == 0
+    assert len((tmp_path / "there/result.csv").read_text().splitlines()) == 6
+
+
+KPIS = """
+def last(result, signal):
+    return {"value": float(result[signal][-1])}
+"""
+
+
+def test_checks_decide_the_exit_code(tmp_path):
+    (tmp_path / "kpis.py").write_text(KPIS)
+    more = {"kpis": [{"name": "end", "python": "kpis.py:last", "arguments": {"signal": "a.y"}}]}
+    file = scenario(tmp_path, **more, checks=[{"kpi": "end.value", "max": 1}])
+    good = cosim("run", file, cwd=tmp_path)
+    assert good.returncode == 0
+    bad = cosim("run", file, "--set", "a.u=5", cwd=tmp_path)
+    assert bad.returncode == 3
+    assert "end.value" in bad.stdout
+    assert "max 1.0" in bad.stdout
+    assert json.loads((tmp_path / "runs/small/kpis.json").read_text()) == {"end.value": 10.0}
+
+
+def test_a_failing_component_ends_with_one_and_keeps_the_rows(tmp_path):
+    done = cosim("run", scenario(tmp_path, "Broken"), cwd=tmp_path)
+    assert done.returncode == 1
+    assert "INFO a: about to fail" in done.stderr
+    assert "a: do_step failed at t = 2 s: ValueError: tilt beyond limit" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert len((tmp_path / "runs/small/result.csv").read_text().splitlines()) == 4
+    assert "tilt beyond limit" in json.loads((tmp_path / "runs/small/run.json").read_text())["failure"]
+
+
+def test_a_refused_scenario_ends_with_two_one_line_per_problem(tmp_path):
+    done = cosim("run", scenario(tmp_path, colour="red", stop_time=2.5), cwd=tmp_path)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 2
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize("arguments", [["run"], ["fly"], ["run", "x.json", "--sett", "a=1"], ["run", "x.json", "--set", "a"]])
+def test_wrong_usage_ends_with_two(arguments, tmp_path):
+    done = cosim(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+
+
+def test_check_prints_the_expanded_system(tmp_path):
+    components = {"a": {"python": f"{BLOCKS}:Gain"}, "b": {"python": f"{BLOCKS}:Gain", "period": 3}}
+    wires = [{"from": "a.y", "to": "b.u", "delay": 2}]
+    done = cosim("check", scenario(tmp_path, components=components, connections=wires))
+    assert done.returncode == 0, done.stderr
+    assert "a.y -> b.u  (delay 2)" in done.stdout
+    assert "1. a" in done.stdout
+    assert "every 3 s" in done.stdout
+
+
+def test_simulate_runs_one_fmu(probe, tmp_path):
+    done = cosim("simulate", probe, "--output-file", tmp_path / "y.csv", "--start-value", "y_start=2", "--stop-time", "0.02")
+    assert done.returncode == 0, done.stderr
+    header, *rows = (tmp_path / "y.csv").read_text().splitlines()
+    y = header.split(",").index('"y"')
+    assert [float(row.split(",")[y]) for row in rows] == [2.0, 2.0 * 0.98, pytest.approx(2.0 * 0.98**2)]
+
+
+def test_simulate_takes_inputs_from_a_file(probe, tmp_path):
+    (tmp_path / "u.csv").write_text("time,u\n0,5\n1,5\n")
+    done = cosim("simulate", probe, "--input-file", tmp_path / "u.csv", "--stop-time", "0.01")
+    assert done.returncode == 0, done.stderr
+    assert "y = 1.08 m" in done.stdout
+
+
+def test_simulate_refuses_unknown_names(probe, tmp_path):
+    (tmp_path / "u.csv").write_text("time,uu\n0,5\n")
+    done = cosim("simulate", probe, "--input-file", tmp_path / "u.csv")
+    assert (done.returncode, 'the FMU has no input "uu"; did you mean "u"?' in done.stderr) == (2, True)
+    done = cosim("simulate", probe, "--start-value", "y_strt=1")
+    assert (done.returncode, 'did you mean "y_start"?' in done.stderr) == (2, True)
+
+
+def test_a_failing_fmu_ends_with_one_and_keeps_its_rows(probe, tmp_path):
+    done = cosim("simulate", probe, "--start-value", "fail_time=0.025", "--output-file", tmp_path / "y.csv")
+    assert done.returncode == 1
+    assert "status 3 (error): told to fail" in done.stderr
+    assert len((tmp_path / "y.csv").read_text().splitlines()) == 4
+
+
+def test_info_tells_what_an_fmu_is(probe):
+    done = cosim("info", probe)
+    assert done.returncode == 0
+    assert "Co-Simulation" in done.stdout
+    assert "y_start" in done.stdout
+    assert cosim("info", "missing.fmu").returncode == 2
+
+
+def test_schema_describes_scenarios():
+    schema = json.loads(cosim("schema").stdout)
+    assert schema["additionalProperties"] is False
+    assert {"name", "stop_time", "step_size", "components"} <= set(schema["required"])
+
+
+SLOW = """
+import time
+from pathlib import Path
+
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+
+class Slow(Fmi2Slave):
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        self.y = 0.0
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+
+    def do_step(self, current_time, step_size):
+        time.sleep(0.05)
+        if current_time > 2:
+            Path("started").touch()
+        return True
+"""
+
+
+def test_an_interrupt_ends_with_130_and_keeps_the_rows(tmp_path):
+    (tmp_path / "slow.py").write_text(SLOW)
+    file = scenario(tmp_path, components={"a": {"python": "slow.py:Slow"}}, stop_time=1000)
+    process = subprocess.Popen([sys.executable, "-m", "cosim", "run", file], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 30
+    while not (tmp_path / "started").exists() and time.monotonic() < until:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert "interrupted" in errors
+    assert len((tmp_path / "runs/small/result.csv").read_text().splitlines()) > 2

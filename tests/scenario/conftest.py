@@ -1,0 +1,38 @@
+"""Scenario files written on the fly beside the blocks they use."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+BLOCKS = Path(__file__).parent / "blocks.py"
+
+
+class Folder:
+    """A temporary folder with scenario files."""
+
+    def __init__(self, path: Path):
+        self.path = path
+
+    def write(self, content: dict[str, Any] | str, name: str = "scenario.json") -> Path:
+        file = self.path / name
+        file.write_text(content if isinstance(content, str) else json.dumps(content))
+        return file
+
+    @staticmethod
+    def block(name: str, **more: Any) -> dict[str, Any]:
+        return {"python": f"{BLOCKS}:{name}", **more}
+
+    def scenario(self, components: dict[str, Any], connections: list[dict[str, Any]] | None = None, **more: Any) -> Path:
+        content = {"name": "test", "stop_time": 3, "step_size": 1, "components": components}
+        return self.write({**content, "connections": connections or [], **more})
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Folder:
+    return Folder(tmp_path)
+
+

@@ -1,0 +1,214 @@
+"""Bad scenarios: every problem at once, each with file, line and JSON path, before the first step."""
+
+import pytest
+from helpers import wire
+
+import cosim
+
+
+def lines(file, **more):
+    with pytest.raises(cosim.InputError) as refusal:
+        cosim.run(file, **more)
+    return [str(problem).replace(f"{file.parent}/", "") for problem in refusal.value.problems]
+
+
+def refused(folder, components, connections=(), **more):
+    return lines(folder.scenario(components, list(connections), **more))
+
+
+def test_everything_that_is_wrong_is_said_at_once(folder):
+    gain = folder.block("Gain")["python"]
+    file = folder.write(
+        f"""{{"name": "bad", "stop_time": 3, "stop_time": 3.5, "step_size": 1, "colour": "red",
+ "components": {{
+  "a": {{"parameters": {{"kk": 1, "k": "x", "u": NaN}}, "python": "{gain}"}},
+  "b": {{"python": "{gain}"}},
+  "c": {{"fmu": "missing.fmu"}}}},
+ "connections": [
+  {{"from": "a.y", "to": "b.u"}}, {{"from": "b.y", "to": "b.u"}},
+  {{"from": "a.u", "to": "b.u"}}, {{"from": "d.y", "to": "a.u"}},
+  {{"from": "a.y", "too": "b.u"}}],
+ "algorithm": {{"stages": [["a", "e"]]}}, "record": {{"signals": ["a.z"]}},
+ "kpis": [{{"name": "k", "python": "none.py:f"}}], "checks": [{{"kpi": "kk.x", "max": 1}}],
+ "events": [{{"time": 0.5, "set": {{"a.q": 1}}}}]}}"""
+    )
+    assert [line.removeprefix("scenario.json:") for line in lines(file)] == [
+        "1:33: $.stop_time: duplicate key",
+        "3:48: $.components.a.parameters.u: NaN is not allowed, expected a finite number",
+        '9:3: $.connections[4].to: the key "to" is missing',
+        '9:19: $.connections[4].too: unknown key; did you mean "to"?',
+        "1:67: $.colour: unknown key",
+        '5:3: $.components.c: FMU "missing.fmu" does not exist',
+        '3:24: $.components.a.parameters.kk: component "a" has no variable "kk"; did you mean "k"?',
+        '3:33: $.components.a.parameters.k: "k" is a Float64, found \'x\'',
+        "7:33: $.connections[1]: input b.u is connected twice: it is already fed by a.y",
+        "8:4: $.connections[2].from: a.u is an input, expected an output",
+        '8:34: $.connections[3].from: unknown component "d"; valid: a, b, c',
+        '10:64: $.record.signals[0]: no output matches "a.z"; did you mean "a.y"?',
+        '12:35: $.events[0].set["a.q"]: component "a" has no variable "q"; valid: u, k',
+        '10:16: $.algorithm.stages: unknown component "e"; valid: a, b',
+        '10:16: $.algorithm.stages: component "b" is in no stage, so it would never step',
+        "1:33: $.stop_time: 3.5 s is no multiple of the step size 1.0 s",
+        '11:25: $.kpis[0].python: file "none.py" does not exist',
+        '11:62: $.checks[0].kpi: no KPI "kk.x"; did you mean "k"?',
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        ({"stop_tme": 1}, '$.stop_tme: unknown key; did you mean "stop_time"?'),
+        ({"step_size": 0}, "$.step_size: expected a positive number of seconds; found 0"),
+        ({"step_size": "fast"}, 'expected seconds as a number or as a fraction in text such as "1/60"; found "fast"'),
+        ({"stop_time": 2.5}, "$.stop_time: 2.5 s is no multiple of the step size 1.0 s"),
+        ({"record": {"signals": ["a.z"]}}, '$.record.signals[0]: no output matches "a.z"; did you mean "a.y"?'),
+        ({"record": {"interval": 1.5}}, "$.record.interval: recording interval 1.5 s is no multiple of the step size 1.0 s"),
+        ({"events": [{"time": 0.5, "set": {"a.u": 1}}]}, "$.events[0]: event time 0.5 s lies between two"),
+        ({"events": [{"time": 1, "set": {"a.q": 1}}]}, '$.events[0].set["a.q"]: component "a" has no variable "q"'),
+        ({"algorithm": {"stages": [["a"], ["b"]]}}, '$.algorithm.stages: unknown component "b"; valid: a'),
+        ({"algorithm": {"stages": []}}, '$.algorithm.stages: component "a" is in no stage'),
+        ({"algorithm": {"kind": "magic", "stages": [["a"]]}}, "$.algorithm.kind: expected 'staged'"),
+        ({"connections": [wire("a.y", "a.u", delay=-1)]}, "$.connections[0].delay: expected greater than or equal to 0"),
+        ({"connections": [wire("a.y", "a.u", delay=1.5)]}, "$.connections[0].delay: expected a valid integer"),
+        ({"connections": [wire("a.y", "a")]}, '$.connections[0].to: "a" names a component, expected a variable'),
+        ({"connections": [wire("a.u", "a.u")]}, "$.connections[0].from: a.u is an input, expected an output"),
+        ({"connections": [wire("a.y", "a.y")]}, "$.connections[0].to: a.y is an output, expected an input"),
+        ({"connections": [wire("a.yy", "a.u")]}, 'component "a" has no output "yy"; did you mean "y"?'),
+        ({"connections": [wire("aa.y", "a.u")]}, 'unknown component "aa"; did you mean "a"?'),
+        ({"connections": [wire("a.y", "a.u")] * 2}, "input a.u is connected twice: it is already fed by a.y"),
+        ({"kpis": [{"name": "k", "python": "none.py:f"}]}, '$.kpis[0].python: file "none.py" does not exist'),
+        ({"checks": [{"kpi": "k.x", "max": 1}]}, '$.checks[0].kpi: no KPI "k.x"'),
+        ({"checks": [{"kpi": "k.x"}]}, 'expected at least one of "min", "max", "equals"'),
+        ({"inputs": [{"file": "no.csv", "to": {"x": "a.u"}}]}, "cannot read profile"),
+    ],
+)
+def test_one_wrong_thing_is_one_line(folder, change, line):
+    found = refused(folder, {"a": folder.block("Gain")}, **change)
+    assert len(found) == 1
+    assert found[0].startswith("scenario.json:1:")
+    assert line in found[0]
+
+
+@pytest.mark.parametrize(
+    ("component", "line"),
+    [
+        ({"fmuu": "x.fmu"}, '$.components.a.fmuu: unknown key; did you mean "fmu"?'),
+        ({}, "expected exactly one of fmu, python, modelica, system; found none"),
+        ({"fmu": "x.fmu", "python": "y.py:Y"}, "found fmu and python"),
+        ({"fmu": "missing.fmu"}, 'missing.fmu" does not exist'),
+        ({"python": "missing.py:X"}, 'file "missing.py" does not exist'),
+        ({"python": "x"}, 'expected "file.py:name", found "x"'),
+        ({"system": "missing.json"}, "No such file or directory"),
+        ({"modelica": "missing.mo:X"}, 'file "missing.mo" does not exist'),
+    ],
+)
+def test_a_component_without_a_sound_source_is_one_line_and_nothing_else_is_said_about_it(folder, component, line):
+    found = refused(folder, {"a": component, "b": folder.block("Gain")}, [wire("a.y", "b.u"), wire("b.y", "a.u")])
+    assert len(found) == 1
+    assert line in found[0]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "line"),
+    [
+        ({"number": 1.5}, '"number" is a Int32, found 1.5'),
+        ({"flag": 1}, '"flag" is a Boolean, found 1'),
+        ({"text": 3}, '"text" is a String, found 3'),
+        ({"out": True}, '"out" is of causality output and cannot be set'),
+        ({"numbr": 1}, 'component "a" has no variable "numbr"; did you mean "number"?'),
+        ({"number": {"x": 1}}, "expected a number, true, false, a text, or a list of these"),
+    ],
+)
+def test_values_must_suit_their_variables(folder, parameters, line):
+    found = refused(folder, {"a": folder.block("Typed", parameters=parameters)})
+    assert len(found) == 1
+    assert line in found[0]
+
+
+def test_ranges_of_an_fmu_are_respected(folder, probes):
+    found = refused(folder, {"a": {"fmu": str(probes[2]), "parameters": {"y_start": 11}}})
+    assert len(found) == 1
+    assert '"y_start" must lie in -10.0 ... 10.0, found 11' in found[0]
+
+
+def test_a_list_that_is_too_long_says_how_long_it_may_be(folder):
+    found = refused(folder, {"a": folder.block("Controller", parameters={"gain": [1, 2, 3]})})
+    assert found == [f'{found[0].split(": $")[0]}: $.components.a.parameters.gain: 3 values for gain[1..2]']
+
+
+def test_periods_must_fit(folder):
+    found = refused(folder, {"a": folder.block("Gain", period=1.5), "b": folder.block("Gain", period=2)})
+    assert [line.split(": $.")[1] for line in found] == [
+        "components.a.period: period 1.5 s is no multiple of the step size 1.0 s",
+        "components.b.period: the duration 3.0 s is no multiple of the period 2.0 s",
+    ]
+
+
+def test_incompatible_units_and_types_are_refused(folder, probes):
+    xml = {"a": {"fmu": str(probes[2])}, "b": {"fmu": str(probes[3])}}
+    found = refused(folder, xml, [wire("a.s_out", "b.u"), wire("a.b_out", "b.int8_in")])
+    assert [line.split(": ", 2)[2] for line in found] == [
+        "a.s_out cannot feed b.u: type String does not become Float64",
+        "a.b_out cannot feed b.int8_in: type Boolean does not become Int8",
+    ]
+
+
+def test_a_prefix_without_a_matching_output_names_the_input(folder):
+    components = {"pilot": folder.block("Controller"), "gain": folder.block("Gain")}
+    (line,) = refused(folder, {**components, "plant": folder.block("Plant")}, [wire("plant.ship.position", "pilot.vehicle")])
+    assert "input pilot.vehicle.position.x has no matching output plant.ship.position.position.x" in line
+
+
+def test_a_nested_file_is_named_in_its_own_problems(folder):
+    folder.write({"components": {"g": folder.block("Gain", parameters={"kk": 1})}, "ports": {"outputs": {"y": "h.y"}}}, "n.json")
+    found = refused(folder, {"a": {"system": "n.json"}})
+    assert [line.split(":")[0] for line in found] == ["n.json", "n.json"]
+    assert 'component "a.g" has no variable "kk"' in found[0]
+    assert 'unknown component "h"' in found[1]
+
+
+def test_a_system_that_contains_itself_is_refused(folder):
+    folder.write({"components": {"again": {"system": "n.json"}}}, "n.json")
+    (line,) = refused(folder, {"a": {"system": "n.json"}})
+    assert 'the nested system "n.json" contains itself' in line
+
+
+def test_a_port_that_does_not_exist_is_refused_with_the_nearest(folder):
+    folder.write({"components": {"g": folder.block("Gain")}, "ports": {"inputs": {"command": "g.u"}}}, "n.json")
+    components = {"a": {"system": "n.json"}, "b": folder.block("Gain")}
+    (line,) = refused(folder, components, [wire("b.y", "a.comand")])
+    assert 'nested system "a" has no input port "comand"; did you mean "command"?' in line
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("", "expected a JSON value"),
+        ('{"name": "x",}', "expected a key in double quotes"),
+        ('{"name": "x"} x', "expected the end of the file"),
+        ('{"name" "x"}', "expected ':'"),
+        ("[" * 200, "nested more than 100 levels deep"),
+        ('{"name": tru}', "expected a JSON value"),
+        ('{"name": "x', "Unterminated string"),
+    ],
+)
+def test_what_is_no_json_says_where(folder, text, line):
+    (found,) = lines(folder.write(text))
+    assert found.startswith("scenario.json:1:")
+    assert line in found
+
+
+def test_numbers_beyond_a_double_are_refused(folder):
+    found = lines(folder.write('{"name": "x", "stop_time": 1e400, "step_size": 1, "components": {"a": {"fmu": "x.fmu"}}}'))
+    assert "$.stop_time: 1e400 is not allowed, expected a finite number" in found[0]
+
+
+def test_unknown_scenarios_name_the_nearest_shipped_one():
+    with pytest.raises(cosim.InputError, match='no shipped scenario "demo1_bx"; did you mean "demo1_box"'):
+        cosim.load("demo1_bx")
+
+
+def test_settings_from_outside_are_checked_too(folder):
+    file = folder.scenario({"a": folder.block("Gain")})
+    assert lines(file, parameters={"a.kk": 1}) == ['--set a.kk: component "a" has no variable "kk"; did you mean "k"?']
+    assert lines(file, parameters={"/components/b/period": 1}) == ['--set /components/b/period: the scenario has no "/components/b"']
