@@ -1,0 +1,39 @@
+"""FMU archives that are the same bytes whenever they are written, and the token that identifies their contents."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from hashlib import sha256
+from io import BytesIO
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+
+_DATE = (1980, 1, 1, 0, 0, 0)
+_UNIX, _REGULAR_FILE = 3, 0o100644 << 16
+
+
+def write_archive(files: Mapping[str, bytes], target: Path) -> Path:
+    """Write `files` (names inside the archive -> contents) to `target`, in order of their names and all at once."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    content = BytesIO()
+    with ZipFile(content, "w") as archive:
+        for name in sorted(files):
+            archive.writestr(_member(name), files[name])
+    with NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as temporary:
+        temporary.write(content.getvalue())
+    path = Path(temporary.name)
+    path.chmod(0o644)
+    return path.replace(target)
+
+
+def _member(name: str) -> ZipInfo:
+    member = ZipInfo(name, _DATE)
+    member.create_system, member.external_attr, member.compress_type = _UNIX, _REGULAR_FILE, ZIP_DEFLATED
+    return member
+
+
+def content_token(parts: Iterable[bytes]) -> str:
+    """GUID (FMI 2.0) or instantiation token (FMI 3.0) that is a hash of the FMU's contents: equal contents have equal tokens."""
+    digest = sha256(b"\0".join(parts)).hexdigest()
+    return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"

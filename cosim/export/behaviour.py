@@ -1,0 +1,174 @@
+"""Whether two FMUs behave alike: the same variables, and the same outputs under random inputs and parameters.
+
+Bytes are no measure: another compiler makes other bytes of the same model.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+
+from ..component import Component, Ports, Variable
+from ..errors import ComponentError
+
+STEPS, STEP_SIZE, STEPS_PER_INPUT = 300, 0.01, 15
+RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-9, 1e-12
+_NUMBERS = ("Float64", "Int32", "Boolean", "Enumeration")
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What an FMU did: its outputs after initialization and each step (rows), and why it stopped early, if it did."""
+
+    variables: Sequence[Variable]
+    outputs: Sequence[str]
+    values: np.ndarray
+    failure: str = ""
+
+
+def compare(first: Sequence[Path], second: Sequence[Path], seed: int = 1) -> dict[Path, str]:
+    """How FMUs of `second` differ from their counterparts in `first`; those that behave alike are left out.
+
+    Each side runs in one process of its own, so that an FMU that crashes is named instead of taking this process along.
+    """
+    if not first:
+        return {}
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, context) as one, ProcessPoolExecutor(1, context) as other:
+        left = [one.submit(traces, path, seed) for path in first]
+        right = [other.submit(traces, path, seed) for path in second]
+        outcomes = {path: _difference(a, b) for path, a, b in zip(second, left, right, strict=True)}
+    return {path: difference for path, difference in outcomes.items() if difference}
+
+
+def _difference(first: Future[list[Trace]], second: Future[list[Trace]]) -> str:
+    try:
+        pairs = zip(first.result(), second.result(), strict=True)
+    except BrokenProcessPool:
+        return "the process that ran it, or one before it, died"
+    except Exception as error:
+        return f"cannot be run: {error}"
+    return next((text for a, b in pairs if (text := difference(a, b))), "")
+
+
+def difference(first: Trace, second: Trace) -> str:
+    """The first thing in which two traces differ; empty when they agree within the tolerances."""
+    ours, theirs = ({variable.name: variable for variable in trace.variables} for trace in (first, second))
+    for name in sorted(ours.keys() | theirs.keys()):
+        if ours.get(name) != theirs.get(name):
+            return f'variable "{name}" {_declarations(ours.get(name), theirs.get(name))}'
+    if first.failure != second.failure:
+        return f'outcome differs: "{first.failure or "no failure"}" and "{second.failure or "no failure"}"'
+    for name, a, b in zip(first.outputs, first.values.T, second.values.T, strict=True):
+        scale = np.nanmax(np.abs([*a, *b, 0.0]))
+        wrong = ~np.isclose(a, b, rtol=0, atol=RELATIVE_TOLERANCE * scale + ABSOLUTE_TOLERANCE, equal_nan=True)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            return f'output "{name}" differs at t = {row * STEP_SIZE:.12g} s: {a[row]!r} and {b[row]!r}'
+    return ""
+
+
+def _declarations(ours: Variable | None, theirs: Variable | None) -> str:
+    if ours is None or theirs is None:
+        return f"exists only in the {'rebuilt' if ours is None else 'present'} FMU"
+    changed = [key for key in Variable.__slots__ if getattr(ours, key) != getattr(theirs, key)]
+    return "; ".join(f"has {key} {getattr(ours, key)!r} and {getattr(theirs, key)!r}" for key in changed)
+
+
+def traces(path: Path, seed: int) -> list[Trace]:
+    """Two runs of an FMU: with its own parameters, and with random ones. The name of the file goes into the seed."""
+    return [_trace(path, np.random.default_rng([seed, crc32(path.name.encode())]), vary) for vary in (False, True)]
+
+
+def _trace(path: Path, random: np.random.Generator, vary_parameters: bool) -> Trace:
+    from ..fmi import FmuFile, instantiate
+
+    component = instantiate(FmuFile(path), path.stem)
+    variables = [variable for variable in component.variables if variable.type in _NUMBERS]
+    inputs = _ports([variable for variable in variables if variable.causality == "input"])
+    outputs = _ports([variable for variable in variables if variable.causality == "output"])
+    rows: list[np.ndarray] = []
+    failure = ""
+    try:
+        component.bind(inputs, outputs)
+        if vary_parameters:
+            _set_parameters(component, random, ("fixed", "tunable"))
+        for _ in _run(component, inputs, random):
+            component.get_outputs()
+            rows.append(_flat(outputs))
+            if vary_parameters and len(rows) == STEPS // 2:
+                _set_parameters(component, random, ("tunable",))
+    except ComponentError as error:
+        failure = str(error)
+    finally:
+        component.free()
+    names = [slot for variable in _ordered(outputs) for slot in variable.slots]
+    return Trace(component.variables, names, np.array(rows).reshape(len(rows), len(names)), failure)
+
+
+def _run(component: Component, inputs: Ports, random: np.random.Generator) -> Iterator[None]:
+    """Walk through the life cycle; yields wherever outputs can be read."""
+    component.enter_initialization_mode(0.0, STEPS * STEP_SIZE)
+    _draw_inputs(inputs, random)
+    component.set_inputs()
+    component.exit_initialization_mode()
+    yield
+    for step in range(STEPS):
+        if step % STEPS_PER_INPUT == 0:
+            _draw_inputs(inputs, random)
+        component.set_inputs()
+        component.do_step(step * STEP_SIZE, STEP_SIZE)
+        yield
+    component.terminate()
+
+
+def _ports(variables: Sequence[Variable]) -> Ports:
+    sizes: dict[np.dtype, int] = {}
+    for variable in variables:
+        sizes[variable.dtype] = sizes.get(variable.dtype, 0) + len(variable.slots)
+    return Ports(variables, {dtype: np.zeros(size, dtype) for dtype, size in sizes.items()})
+
+
+def _ordered(ports: Ports) -> list[Variable]:
+    """The variables in the order in which their values lie in the arrays, one array after the other."""
+    return [variable for dtype in ports.arrays for variable in ports.variables if variable.dtype == dtype]
+
+
+def _flat(ports: Ports) -> np.ndarray:
+    return np.concatenate([np.empty(0), *(array.astype(float) for array in ports.arrays.values())])
+
+
+def _draw_inputs(inputs: Ports, random: np.random.Generator) -> None:
+    for dtype, array in inputs.arrays.items():
+        array[:] = np.concatenate([_draw(variable, random) for variable in inputs.variables if variable.dtype == dtype])
+
+
+def _set_parameters(component: Component, random: np.random.Generator, variabilities: Sequence[str]) -> None:
+    for variable in component.variables:
+        if variable.causality == "parameter" and variable.variability in variabilities and variable.type in _NUMBERS:
+            values = _draw(variable, random).tolist()
+            component.set(variable.name, values if variable.shape else values[0])
+
+
+def _draw(variable: Variable, random: np.random.Generator) -> np.ndarray:
+    """Random values: inputs all over their declared limits, else, like parameters, about the start value."""
+    size = len(variable.slots)
+    start = np.resize(np.array(variable.start if variable.start is not None else 0, float), size)
+    low, high = (np.nan if limit is None else limit for limit in (variable.minimum, variable.maximum))
+    bounded = np.isfinite(high - low)
+    if variable.type == "Boolean":
+        return random.integers(0, 2, size).astype(variable.dtype)
+    if variable.type != "Float64":
+        return (random.integers(int(low), int(high) + 1, size) if bounded else start).astype(variable.dtype)
+    if variable.causality == "input" and bounded:
+        return random.uniform(low, high, size)
+    least, share = (0.1, 0.2) if variable.causality == "parameter" else (2.0, 2.0)
+    values = start + np.where(start == 0, least, share * np.abs(start)) * random.uniform(-1, 1, size)
+    return np.fmin(np.fmax(values, low), high)

@@ -1,0 +1,253 @@
+"""Equations written with CasADi -> C -> a `Block`.
+
+A `ContinuousModel` describes x' = f(x, u, p) with y = g(x, u, p). The generated `model_step` integrates it with the classical
+Runge-Kutta method of fourth order in sub-steps of at most `max_sub_step`. Further CasADi functions can be exported from the
+same binary, for programs that use the equations without FMI: each becomes
+
+    void NAME(const double *const in[], double *const out[]);
+
+where `in[i]` and `out[i]` point to the elements of the i-th argument and result (column-major; no aliasing between them).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import casadi as ca
+
+from ..component import Variable
+from .block import Block, BlockVariable
+from .equations_c import c_function
+
+Expression = ca.SX
+_SIGNATURE = "void {}(const double *const in[], double *const out[])"
+
+
+@dataclass(frozen=True)
+class ContinuousModel:
+    """A continuous model with held inputs.
+
+    `variables` are its parameters, inputs and outputs. Vectors passed to the callables hold the slots of all variables of
+    that causality in this order; `outputs` returns them likewise, Boolean outputs as 0 or 1. `states` names the elements of
+    the state for messages. `project` is applied after each sub-step (to normalise a quaternion).
+    """
+
+    identifier: str
+    description: str
+    variables: Sequence[Variable]
+    states: Sequence[str]
+    #: parameters -> state at the start
+    initial_state: Callable[[Expression], Expression]
+    #: state, inputs, parameters -> time derivative of the state
+    rate: Callable[[Expression, Expression, Expression], Expression]
+    #: state, inputs, parameters -> outputs
+    outputs: Callable[[Expression, Expression, Expression], Expression]
+    project: Callable[[Expression], Expression] = lambda state: state
+    step_size: float = 0.01
+    max_sub_step: float = 0.005
+    resources: Mapping[str, Path] = field(default_factory=dict)
+
+    def advance(
+        self, state: Expression, inputs: Expression, parameters: Expression, step: Expression, sub_steps: int = 1
+    ) -> Expression:
+        """The state after `step` (s) with held inputs, in `sub_steps` equal Runge-Kutta steps."""
+        for _ in range(sub_steps):
+            derivative = lambda x: self.rate(x, inputs, parameters)  # noqa: E731
+            state = self.project(runge_kutta_4(derivative, state, step / sub_steps))
+        return state
+
+    def slots(self, causality: str) -> list[Variable]:
+        """Variables of a causality, repeated for each of their elements."""
+        return [variable for variable in self.variables if variable.causality == causality for _ in variable.slots]
+
+
+def runge_kutta_4(rate: Callable[[Expression], Expression], state: Expression, step: Expression) -> Expression:
+    """One step of the classical Runge-Kutta method of fourth order for x' = rate(x)."""
+    k1 = rate(state)
+    k2 = rate(state + step / 2 * k1)
+    k3 = rate(state + step / 2 * k2)
+    k4 = rate(state + step * k3)
+    return state + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+
+
+def block(model: ContinuousModel, exported: Sequence[ca.Function] = ()) -> Block:
+    """The model as a block of C code, with further functions exported from its binary; equal models give equal text."""
+    return Block(
+        model.identifier,
+        model.description,
+        [_block_variable(variable, member) for variable, member in _members(model)],
+        model.step_size,
+        {"model.h": _header(model), "model.c": _source(model, exported)},
+        model.resources,
+    )
+
+
+def _members(model: ContinuousModel) -> Iterator[tuple[Variable, str]]:
+    """Every variable with the member of `Model` where its first element lies."""
+    filled: dict[str, int] = {}
+    for variable in model.variables:
+        array = "flag" if variable.type == "Boolean" else variable.causality
+        first = filled.get(array, 0)
+        filled[array] = first + len(variable.slots)
+        yield variable, f"{array}[{first}]"
+
+
+def _block_variable(variable: Variable, member: str) -> BlockVariable:
+    return BlockVariable(
+        variable.name,
+        member,
+        variable.type,
+        variable.causality,
+        variable.variability,
+        variable.start,
+        variable.unit.name if variable.unit else "",
+        variable.shape,
+        variable.description,
+        variable.minimum,
+        variable.maximum,
+    )
+
+
+def _header(model: ContinuousModel) -> str:
+    flags = _flags(model)
+    sizes = {
+        "parameter": len(model.slots("parameter")),
+        "input": len(model.slots("input")),
+        "state": len(model.states),
+        "output": len(flags) - sum(flags),
+    }
+    members = [f"double {name}[{size}]" for name, size in sizes.items() if size]
+    if any(flags):
+        members.append(f"bool flag[{sum(flags)}]")
+    lines = "\n".join(f"    {member};" for member in members)
+    return f"/* {model.description} */\n#include <stdbool.h>\n\ntypedef struct {{\n{lines}\n}} Model;\n"
+
+
+def _flags(model: ContinuousModel) -> list[bool]:
+    """For each output slot whether it is Boolean."""
+    return [variable.type == "Boolean" for variable in model.slots("output")]
+
+
+def _source(model: ContinuousModel, exported: Sequence[ca.Function]) -> str:
+    """The text of model.c."""
+    functions = [f"static {_SIGNATURE.format(f.name())}\n{c_function(f)}" for f in _functions(model)]
+    functions += [f"MODEL_EXPORT {_SIGNATURE.format(f.name())}\n{c_function(f)}" for f in exported]
+    return "\n".join([_INCLUDES, *functions, _glue(model)])
+
+
+def _functions(model: ContinuousModel) -> list[ca.Function]:
+    parameters = ca.SX.sym("parameters", len(model.slots("parameter")))
+    inputs = ca.SX.sym("inputs", len(model.slots("input")))
+    state = ca.SX.sym("state", len(model.states))
+    step = ca.SX.sym("step")
+    outputs = ca.vertsplit(model.outputs(state, inputs, parameters))
+    flags = _flags(model)
+    numbers = ca.vertcat(*(y for y, flag in zip(outputs, flags, strict=True) if not flag))
+    truths = ca.vertcat(*(y for y, flag in zip(outputs, flags, strict=True) if flag))
+    return [
+        ca.Function("initial_state", [parameters], [model.initial_state(parameters)]),
+        ca.Function("sub_step", [state, inputs, parameters, step], [model.advance(state, inputs, parameters, step)]),
+        ca.Function("observe", [state, inputs, parameters], [numbers, truths]),
+    ]
+
+
+def _glue(model: ContinuousModel) -> str:
+    """The functions of the block's interface, around the generated ones."""
+    messages = ",\n".join(f'    "the state {name} is not finite"' for name in model.states)
+    member = {kind: f"m->{kind}" if model.slots(kind) else "NULL" for kind in ("parameter", "input")}
+    flags = sum(_flags(model))
+    numbers = "m->output" if flags < len(_flags(model)) else "NULL"
+    return _GLUE % {
+        "messages": messages,
+        "states": len(model.states),
+        "parameter": member["parameter"],
+        "input": member["input"],
+        "output": numbers,
+        "flag_slots": max(flags, 1),
+        "take_flags": f"    for (int i = 0; i < {flags}; ++i) m->flag[i] = flags[i] != 0;\n" if flags else "",
+        "starts": _starts(model),
+        "max_sub_step": repr(model.max_sub_step),
+    }
+
+
+def _starts(model: ContinuousModel) -> str:
+    """Assignments of the start values that differ from zero; the rest of the structure is cleared before."""
+    lines = []
+    for kind in ("parameter", "input"):
+        values = [start for v in model.variables if v.causality == kind for start in _start(v)]
+        lines += [f"    m->{kind}[{k}] = {value!r};\n" for k, value in enumerate(values) if value != 0]
+    return "".join(lines)
+
+
+def _start(variable: Variable) -> Sequence[float]:
+    count = math.prod(variable.shape)
+    if variable.start is None:
+        return [0.0] * count
+    return [float(value) for value in variable.start] if variable.shape else [float(variable.start)]
+
+
+_INCLUDES = """#include <math.h>
+#include <stddef.h>
+
+#include "export.h"
+#include "model.h"
+"""
+
+_GLUE = """static const char *const FAILURES[] = {
+%(messages)s
+};
+
+static void publish(Model *m)
+{
+    double flags[%(flag_slots)d];
+    const double *in[] = {m->state, %(input)s, %(parameter)s};
+    double *out[] = {%(output)s, flags};
+    observe(in, out);
+%(take_flags)s}
+
+static const char *failure(const Model *m)
+{
+    for (int i = 0; i < %(states)d; ++i)
+        if (!isfinite(m->state[i])) return FAILURES[i];
+    return NULL;
+}
+
+void model_start(Model *m)
+{
+    *m = (Model){0};
+%(starts)s}
+
+void model_parameters(Model *m)
+{
+    (void)m; /* nothing depends on parameters before initialization */
+}
+
+const char *model_initialize(Model *m, double time)
+{
+    const double *in[] = {%(parameter)s};
+    double *out[] = {m->state};
+    (void)time;
+    initial_state(in, out);
+    publish(m);
+    return failure(m);
+}
+
+const char *model_step(Model *m, double time, double step_size)
+{
+    const long count = (long)fmax(1.0, ceil(step_size / %(max_sub_step)s - 1e-9));
+    const double sub_step_size = step_size / (double)count;
+    double next[%(states)d];
+    const double *in[] = {m->state, %(input)s, %(parameter)s, &sub_step_size};
+    double *out[] = {next};
+    (void)time;
+    for (long k = 0; k < count; ++k) {
+        sub_step(in, out);
+        for (int i = 0; i < %(states)d; ++i) m->state[i] = next[i];
+    }
+    publish(m);
+    return failure(m);
+}
+"""

@@ -1,0 +1,122 @@
+"""From a Modelica file to a Block: which variables the FMU shows, and how."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...component import Causality, Variability
+from ..block import Block, BlockVariable
+from .emit import emit
+from .flat import Expression, Model, Variable, refuse
+from .front import Sources, flatten
+from .header import members
+from .interpret import Interpreter
+from .matching import is_input
+from .reader import Reader
+
+_FMI_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
+_DEFAULT_STEP = 0.01
+
+
+def load(path: Path, model: str | None = None) -> Block:
+    """The Modelica model `model` (default: named as the file) of a file as C code with described variables.
+
+    The file may use the packages in folders beside it. Raises InputError, with file and line, for everything that is wrong or
+    not supported; nothing is ever left out.
+    """
+    defaults, sources = _open(path, model)
+    folder = _root(sources.files)
+    names = {str(file.relative_to(folder)): file for file in sources.files}
+    return Block(
+        identifier=re.sub(r"\W", "_", defaults.model.name.rpartition(".")[2]),
+        description=defaults.model.description,
+        variables=_variables(defaults),
+        step_size=min((float(defaults.evaluate(clock.period)) for clock in defaults.plan.clocks), default=_DEFAULT_STEP),
+        files=emit(defaults, sorted(names)),
+        resources=names,
+    )
+
+
+def interpreter(path: Path, model: str | None = None) -> Interpreter:
+    """The same model in plain Python, with default parameters."""
+    return _open(path, model)[0]
+
+
+def _open(path: Path, model: str | None) -> tuple[Interpreter, Sources]:
+    json, sources = flatten(Path(path), model)
+    flat = Reader(json, sources).model(model or Path(path).stem)
+    _check_types(flat)
+    return Interpreter(flat), sources
+
+
+def _check_types(model: Model) -> None:
+    for variable in model.variables.values():
+        if variable.type not in _FMI_TYPES:
+            refuse(f"{variable.name}: variables of type {variable.type} are not supported", variable.where)
+
+
+def _root(files: Sequence[Path]) -> Path:
+    """The folder that holds the model's file, or the outermost package."""
+    return min((file.parent.parent if file.name == "package.mo" else file.parent for file in files), key=lambda f: len(f.parts))
+
+
+def _variables(defaults: Interpreter) -> list[BlockVariable]:
+    names = members(defaults.model)
+    shown = ((v, _role(v, defaults)) for v in defaults.model.variables.values())
+    return [_described(v, names[v.name], *role, defaults) for v, role in shown if role]
+
+
+def _role(variable: Variable, defaults: Interpreter) -> tuple[Causality, Variability] | None:
+    """Causality and variability of a variable that the FMU shows; inner ones and what has another owner stay hidden."""
+    roles = defaults.roles
+    if variable.name in roles.settable:
+        return "parameter", "fixed" if variable.name in roles.timing else "tunable"
+    if variable.variability == "parameter":
+        return None if variable.protected or variable.bound_by_modifier else ("calculatedParameter", "tunable")
+    continuous = variable.type == "Real" and not defaults.plan.clocks
+    if is_input(variable):
+        return "input", "continuous" if variable.type == "Real" else "discrete"
+    if variable.causality == "output" and variable.top_level:
+        return "output", "continuous" if continuous else "discrete"
+    return None
+
+
+def _described(
+    variable: Variable, member: str, causality: Causality, variability: Variability, defaults: Interpreter
+) -> BlockVariable:
+    return BlockVariable(
+        name=variable.name,
+        member=member,
+        type=_FMI_TYPES[variable.type],
+        causality=causality,
+        variability=variability,
+        start=_plain(defaults.get(variable.name)),
+        unit=variable.unit,
+        shape=variable.shape,
+        description=variable.description,
+        minimum=_limit(variable.minimum, defaults),
+        maximum=_limit(variable.maximum, defaults),
+        enumeration=tuple((literal, "") for literal in _literals(variable, defaults.model)),
+    )
+
+
+def _literals(variable: Variable, model: Model) -> tuple[str, ...]:
+    """The literals of the variable's enumeration type, which may be named without its package."""
+    name = variable.enumeration
+    found = {literals for owner, literals in model.enumerations.items() if name and f".{owner}".endswith(f".{name}")}
+    if len(found) > 1:
+        refuse(f'{variable.name}: several enumerations are named "{name}"; give them different names', variable.where)
+    return next(iter(found), ())
+
+
+def _plain(value: Any) -> Any:
+    return tuple(value.flat if isinstance(value, np.ndarray) else value) if np.ndim(value) else value
+
+
+def _limit(limit: Expression | None, defaults: Interpreter) -> float | None:
+    return None if limit is None else float(np.max(defaults.evaluate(limit)))

@@ -1,0 +1,216 @@
+"""model.c: a flat model in C that is meant to be read; together with model.h and runtime.h a complete Block."""
+
+from __future__ import annotations
+
+import json
+import re
+import textwrap
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from .flat import Body, Name, Place, Statement, Variable, base_name
+from .functions import Functions
+from .header import Header, member, members, remembered_inputs
+from .interpret import Interpreter
+from .matching import is_input
+from .sort import finite, memory, start_value
+from .statements import Statements
+from .values import C_TYPES, Text, Value, number, scalar
+from .visit import targets
+
+_WIDTH = 118
+#: in the order of the enum in runtime.h, from 1
+_STANDARD_REASONS = ("Integer overflow", "division by zero in div(), mod() or rem()", "the period of sample() must be positive")
+
+
+def emit(defaults: Interpreter, sources: Sequence[str]) -> dict[str, str]:
+    """The C files by name; `defaults` holds the model with its default values, `sources` are named in a comment.
+
+    Raises InputError for what cannot be translated.
+    """
+    runtime = resources.files(__package__ or "").joinpath("runtime.h").read_text(encoding="utf-8")
+    header = Header(defaults.model, defaults.plan, defaults.roles, sources).text()
+    return {"model.c": _Emitter(defaults).source(), "model.h": header, "runtime.h": runtime}
+
+
+@dataclass
+class _Emitter:
+    defaults: Interpreter
+    reasons: list[str] = field(default_factory=lambda: list(_STANDARD_REASONS))
+
+    def __post_init__(self) -> None:
+        self.model, self.plan, self.roles = self.defaults.model, self.defaults.plan, self.defaults.roles
+        self.members = members(self.model)
+        self.functions = Functions(dict(self.model.functions), self._failure)
+
+    def source(self) -> str:
+        event = self._event()
+        wanted = {"m": "Model *m"} | {
+            k: v for k, v in (("time", "double time"), ("due", "const bool *due")) if _mentions(k, event)
+        }
+        call = f"event({', '.join(wanted).replace('time', 'now')});"
+        definitions = [
+            _function("static void start_variables(Model *m)", self._start_variables()),
+            _function("void model_parameters(Model *m)", self._parameters()),
+            _function("void model_start(Model *m)", self._start()),
+            _function(f"static void event({', '.join(wanted.values())})", event),
+            _function("const char *model_initialize(Model *m, double time)", self._initialize()),
+            _function("const char *model_step(Model *m, double time, double step_size)", self._step(call)),
+        ]
+        reasons = ",\n".join(["    NULL", *(f"    {json.dumps(reason, ensure_ascii=False)}" for reason in self.reasons)])
+        table = f"/* Why a step can fail: m->failure is a place in this list. */\nstatic const char *const REASONS[] = {{\n{reasons},\n}};"
+        return "\n\n".join(['#include "model.h"\n#include "runtime.h"', table, *self.functions.texts, *definitions]) + "\n"
+
+    def _failure(self, reason: str, where: Place | None) -> str:
+        text = f"{reason} ({where.short})" if where else reason
+        if text not in self.reasons:
+            self.reasons.append(text)
+        return str(self.reasons.index(text) + 1)
+
+    def _lowering(self, initial: bool = False) -> Statements:
+        """The scope of the model: variables are members of the struct, old values are locals or members `pre_...`."""
+        scope = {v.name: member(v, f"m->{self.members[v.name]}") for v in self.model.variables.values()}
+        scope["time"] = scalar("Real", Text("time"), simple=True)
+        before = {v.name: member(v, self._before(v, initial)) for v in self.model.variables.values()}
+        return Statements(self.functions, scope, before, initial=initial)
+
+    def _before(self, variable: Variable, initial: bool = False) -> str:
+        prefix = "m->pre_" if is_input(variable) and not initial else "pre_"
+        return prefix + self.members[variable.name]
+
+    # start values and parameters
+
+    def _start(self) -> list[str]:
+        lines = ["memset(m, 0, sizeof *m);"]
+        constants = [self.model.variables[name] for name in (*self.roles.settable, *self.roles.fixed)]
+        for variable in [*constants, *filter(is_input, self.model.variables.values())]:
+            lines += _constant(member(variable, f"m->{self.members[variable.name]}"), self.defaults.get(variable.name))
+        return [*lines, "model_parameters(m);", "start_variables(m);"]
+
+    def _start_variables(self) -> list[str]:
+        lowering = self._lowering()
+        for variable in self.model.variables.values():
+            if variable.variability not in ("parameter", "constant") and not is_input(variable):
+                lowering.store(lowering.scope[variable.name], start_value(self.model, variable.name), Name(variable.name))
+        return lowering.out or ["(void)m;"]
+
+    def _parameters(self) -> list[str]:
+        lowering = self._lowering()
+        for name in self.roles.dependent:
+            binding = self.model.variables[name].binding
+            lowering.store(lowering.scope[name], binding if binding is not None else start_value(self.model, name), Name(name))
+        return lowering.out or ["(void)m;"]
+
+    # events
+
+    def _body(self, body: Body, initial: bool) -> list[str]:
+        """The statements with the values that pre() needs in front, and a comment where another component begins."""
+        lowering = self._lowering(initial)
+        for name in memory(self.model, body):
+            variable = self.model.variables[name]
+            if initial or not is_input(variable):
+                lowering.out += _copied(variable, self._before(variable, initial), f"m->{self.members[name]}")
+        owner = ""
+        lowering.out += [""] * bool(lowering.out)
+        for statement in body:
+            if (new := _owner(statement)) != owner:
+                lowering.out += ["", f"/* {new or 'the model itself'} */"]
+                owner = new
+            lowering.statement(statement)
+        return lowering.out
+
+    def _event(self) -> list[str]:
+        lines = self._body(self.plan.event, initial=False)
+        lines += [""] * bool(finite(self.model, self.plan))
+        for name in finite(self.model, self.plan):
+            lines += self._finite_check(self.model.variables[name])
+        if self.plan.watches:
+            lines.insert(0, f"bool risen[{self.plan.watches}];")
+        return [*lines, *self._keep_inputs()] or ["(void)m;"]
+
+    def _finite_check(self, variable: Variable) -> list[str]:
+        value = member(variable, f"m->{self.members[variable.name]}")
+        test = (
+            f"if (!isfinite({value.at('each').code})) fail(m, {self._failure(f'{variable.name} is not a finite number', None)});"
+        )
+        return [f"for (int each = 0; each < {value.size}; each++) {test}"] if variable.shape else [test]
+
+    def _keep_inputs(self) -> list[str]:
+        kept = remembered_inputs(self.model, self.plan)
+        return [
+            line
+            for v in kept
+            for line in _copied(v, f"m->pre_{self.members[v.name]}", f"m->{self.members[v.name]}", declare=False)
+        ]
+
+    def _initialize(self) -> list[str]:
+        lowering = self._lowering()
+        for k, clock in enumerate(self.plan.clocks):
+            start, period = lowering.scalar_of(clock.start).code, lowering.scalar_of(clock.period).code
+            lowering.out.append(f"set_clock(m, &m->clock[{k}], {start}, {period}, time);")
+        lines = [*lowering.out, *self._body(self.plan.initialization, initial=True), *self._keep_inputs()]
+        unused = [] if _mentions("time", lines) else ["(void)time;"]
+        return [*unused, "m->failure = 0;", "start_variables(m);", *lines, "return REASONS[m->failure];"]
+
+    def _step(self, event: str) -> list[str]:
+        """The loop over the ticks of a communication step; `event` calls the function of that name at the time `now`."""
+        count = len(self.plan.clocks)
+        if count == 0:
+            unused = [] if "now" in event else ["(void)time;", "(void)step_size;"]
+            now = ["const double now = time + step_size;"] if "now" in event else []
+            return [*unused, *now, "m->failure = 0;", event, "return REASONS[m->failure];"]
+        if count == 1:
+            once = [
+                "double now;",
+                "while (m->failure == 0 && (now = next_tick(m->clock)) < time + step_size - TOLERANCE * m->clock->period) {",
+            ]
+            return ["m->failure = 0;", *once, f"    {event}", "    m->clock->ticks++;", "}", "return REASONS[m->failure];"]
+        loop = [
+            f"bool due[{count}];",
+            f"const double now = next_event(m->clock, {count}, due);",
+            f"if (m->failure != 0 || now >= time + step_size - TOLERANCE * shortest_period(m->clock, {count})) break;",
+            event,
+            f"for (int k = 0; k < {count}; k++) m->clock[k].ticks += due[k];",
+        ]
+        return ["m->failure = 0;", "for (;;) {", *("    " + line for line in loop), "}", "return REASONS[m->failure];"]
+
+
+def _function(head: str, body: Sequence[str]) -> str:
+    return "\n".join([head, "{", *(wrapped for line in body for wrapped in _wrapped("    " + line if line else "")), "}"])
+
+
+def _wrapped(line: str) -> list[str]:
+    indent = " " * (len(line) - len(line.lstrip()) + 4)
+    return textwrap.wrap(line, _WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False) or [""]
+
+
+def _mentions(name: str, lines: Iterable[str]) -> bool:
+    return any(re.search(rf"(?<![\w>.]){name}\b", line) for line in lines)
+
+
+def _owner(statement: Statement) -> str:
+    """The component whose variable a statement assigns first."""
+    return next((base_name(target).rpartition(".")[0] for target in targets(statement)), "")
+
+
+def _copied(variable: Variable, target: str, source: str, declare: bool = True) -> list[str]:
+    kind = C_TYPES[variable.type]
+    if not variable.shape:
+        return [f"const {kind} {target} = {source};" if declare else f"{target} = {source};"]
+    size = member(variable, source).size
+    return [f"{kind} {target}[{size}];"] * declare + [f"memcpy({target}, {source}, sizeof {target});"]
+
+
+def _constant(target: Value, value: Any) -> list[str]:
+    """Gives a variable a value that is known now."""
+    numbers = [number(x, target.type).code for x in np.asarray(value).flat]
+    if target.size > 4:
+        while len(numbers) > 1 and numbers[-1] in ("0.0", "0", "false"):
+            numbers.pop()  # C fills up with zeros
+        table = f"(const {C_TYPES[target.type]}[{target.size}]){{{', '.join(numbers)}}}"
+        return [f"memcpy({target.pointer}, {table}, sizeof {target.pointer});"]
+    return [f"{target.at(k).code} = {x};" for k, x in enumerate(numbers)]

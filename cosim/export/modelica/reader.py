@@ -1,0 +1,162 @@
+"""Reads rumoca's JSON of a flat model into `flat.Model`. What is not known here is refused, never dropped."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from . import flat
+from .flat import Body, Expression, Place, Statement, refuse
+from .read_expressions import Json, only
+from .read_statements import StatementReader
+
+
+class Reader(StatementReader):
+    """Reads one flat model; `json` is the whole document."""
+
+    def model(self, name: str) -> flat.Model:
+        self._check_document()
+        names = self.json["variables"]
+        return flat.Model(
+            name=name,
+            description=self.json["model_description"] or "",
+            variables={key: self.variable(key) for key in names},
+            equations=(*self.equations("equations"), *self._declaration_equations()),
+            whens=tuple(self.when_chain(chain) for chain in self.json["when_chains"]),
+            algorithms=tuple(self.body(algorithm["statements"]) for algorithm in self.json["algorithms"]),
+            asserts=tuple(self._assert(node) for node in self.json["assert_equations"]),
+            initial_equations=self.equations("initial_equations"),
+            initial_algorithms=tuple(self.body(algorithm["statements"]) for algorithm in self.json["initial_algorithms"]),
+            functions={key: self.function(node) for key, node in self.json["functions"].items() if not node["is_constructor"]},
+            enumerations=self._enumerations(),
+            structural=tuple(
+                flat.Structural(node["kind"], tuple(name for names in node["references"] for name in names))
+                for node in self.json.get("parameter_branch_selections", ())
+            ),
+        )
+
+    def _check_document(self) -> None:
+        if self.json["is_partial"]:
+            refuse("the model is partial", None)
+        for kind in ("initial_assert_equations", "definite_roots", "branches", "optional_edges", "potential_roots"):
+            if self.json.get(kind):
+                refuse(f"{kind.replace('_', ' ')} are not supported", None)
+        if not all(node["interiors_materialized"] for node in self.json["structured_equations"]):
+            refuse("a for-equation was not unrolled by the front end", None)
+
+    # variables
+
+    def variable(self, name: str) -> flat.Variable:
+        node = self.json["variables"][name]
+        type_name = self.json["variable_type_names"][name]
+        kind = self._type(self.json["effective_types"][str(node["type_id"])]["canonical_type"])
+        return flat.Variable(
+            name=name,
+            type=kind,
+            shape=tuple(node["dims"]),
+            variability=self._variability(node),
+            causality=self._causality(node),
+            start=self._optional(node["start"]),
+            binding=self._optional(node["binding"]),
+            bound_by_modifier=node["binding_from_modification"],
+            final=bool(self.json["variable_final_flags"].get(name)),
+            protected=node["is_protected"],
+            top_level=self._is_top_level(name),
+            unit=self._text(node["unit"]),
+            description=self._text(node["description"]),
+            minimum=self._optional(node["min"]),
+            maximum=self._optional(node["max"]),
+            enumeration=type_name if kind == "Enumeration" else "",
+            where=self.place(node),
+        )
+
+    def _variability(self, node: Json) -> Any:
+        kind = node["variability"]
+        word = (kind if isinstance(kind, str) else only(kind)[0]).lower()
+        if word == "empty":
+            return "discrete" if node["is_discrete_type"] else "continuous"
+        return word
+
+    def _causality(self, node: Json) -> Any:
+        kind = node["causality"]
+        word = (kind if isinstance(kind, str) else only(kind)[0]).lower()
+        return "local" if word == "empty" else word
+
+    def _is_top_level(self, name: str) -> bool:
+        """Whether a name is the model's own, if need be as a field of its own records or connectors."""
+        parts = name.split(".")
+        owners = (".".join(parts[:depth]) for depth in range(1, len(parts)))
+        return parts[0] in self.json["top_level_connectors"] or all(owner in self.json["record_instances"] for owner in owners)
+
+    def _text(self, node: Any) -> str:
+        if node is None or isinstance(node, str):
+            return node or ""
+        literal = self.expression(node)
+        return str(literal.value) if isinstance(literal, flat.Literal) else refuse("a text literal is expected", self.place(node))
+
+    def _enumerations(self) -> dict[str, tuple[str, ...]]:
+        types: dict[str, dict[int, str]] = {}
+        for key, ordinal in self.json["enum_literal_ordinals"].items():
+            owner, _, literal = key.rpartition(".")
+            if not literal.startswith("'"):
+                types.setdefault(owner, {})[ordinal] = literal
+        return {owner: tuple(literals[k] for k in sorted(literals)) for owner, literals in types.items()}
+
+    # equations
+
+    def equations(self, section: str) -> tuple[flat.Equation, ...]:
+        return tuple(pair for node in self.json[section] for pair in self._equation(node))
+
+    def _equation(self, node: Json) -> list[flat.Equation]:
+        kind, residual = only(node["residual"])
+        if kind != "Binary" or residual["op"] != "Sub":
+            refuse("an equation that is not of the form a = b", self.place(node))
+        left, right, where = self.expression(residual["lhs"]), self.expression(residual["rhs"]), self.place(node)
+        return [flat.Equation(a, b, where) for a, b in self._fields(left, right)]
+
+    def _fields(self, left: Expression, right: Expression) -> list[tuple[Expression, Expression]]:
+        """The pairs of fields when two records are equated, else the pair itself."""
+        records = self.json["record_instances"]
+        if not (isinstance(left, flat.Name) and left.name in records):
+            return [(left, right)]
+        if not (isinstance(right, flat.Name) and right.name in records):
+            refuse("a record can only be equated with a record variable; write one equation for each field", left.where)
+        names = [name for name in self.json["variables"] if name.startswith(left.name + ".")]
+        return [(flat.Name(n, left.where), flat.Name(right.name + n.removeprefix(left.name), right.where)) for n in names]
+
+    def _declaration_equations(self) -> list[flat.Equation]:
+        """`Real y = 2*u;` of a variable that is no parameter."""
+        variables = [self.variable(name) for name in self.json["variables"]]
+        return [
+            flat.Equation(flat.Name(v.name, v.where), v.binding, v.where)
+            for v in variables
+            if v.binding is not None and v.variability not in ("constant", "parameter")
+        ]
+
+    def when_chain(self, chain: Json) -> flat.When:
+        blocks = [chain["first"], *chain["else_when"]]
+        branches = tuple((self.expression(block["condition"]), self._when_body(block["equations"])) for block in blocks)
+        return flat.When(branches, self.place(chain))
+
+    def _when_body(self, nodes: list[Json]) -> Body:
+        return tuple(self._when_equation(*only(node)) for node in nodes)
+
+    def _when_equation(self, kind: str, node: Json) -> Statement:
+        if kind == "Assign":
+            where = self.place(node)
+            return flat.Assign(self._target_text(node["target"], where), self.expression(node["value"]), where)
+        if kind == "Conditional":
+            branches = tuple((self.expression(condition), self._when_body(body)) for condition, body in node["branches"])
+            return flat.IfStatement(branches, self._when_body(node["else_branch"] or []), self.place(node))
+        if kind == "Assert":
+            return self._assert(node)
+        refuse(f"{kind} in a when-equation is not supported", self.place(node))
+
+    def _target_text(self, target: str, where: Place | None) -> flat.Name | flat.Index:
+        """A target of a when-equation comes as text: a name, perhaps with constant subscripts."""
+        if target in self.json["variables"]:
+            return flat.Name(target, where)
+        base, bracket, subscripts = target.rpartition("[")
+        if not bracket or base not in self.json["variables"]:
+            refuse(f'cannot assign "{target}" in a when-equation; write one equation for each variable', where)
+        numbers = subscripts.rstrip("]").split(",")
+        return flat.Index(flat.Name(base, where), tuple(flat.Literal(int(k), "Integer") for k in numbers), where)

@@ -1,0 +1,83 @@
+"""Block -> .fmu: sources, description, binary and resources in one archive."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from ..errors import InputError
+from .archive import content_token, write_archive
+from .block import Block
+from .compiler import compile_library
+from .description import build_description, model_description
+from .interface import c_table, check_block
+
+SHELL = Path(__file__).parent / "shell"
+_SHELL_FILES = {2: ("fmi2.c", "common.h", "export.h"), 3: ("fmi3.c", "common.h", "export.h")}
+_FMI_HEADERS = {
+    2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
+    3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
+}
+
+
+def write_fmu(block: Block, fmi_version: int, target: Path) -> Path:
+    """Write the Co-Simulation FMU of a block for FMI 2.0 or 3.0 (`fmi_version` 2 or 3) to `target`.
+
+    The same block and compiler give the same bytes. Raises InputError when the block or its C code is faulty, or there is
+    no C compiler.
+    """
+    if fmi_version not in _SHELL_FILES:
+        raise InputError(f"found FMI version {fmi_version}, expected 2 or 3")
+    check_block(block)
+    files = _with_token(block, fmi_version)
+    files |= {f"resources/{name}": path.read_bytes() for name, path in block.resources.items()}
+    files |= _binary(block, fmi_version, files)
+    return write_archive(files, target)
+
+
+def _with_token(block: Block, fmi_version: int) -> dict[str, bytes]:
+    """Description and sources; the token that ties them together is a hash of both."""
+    sources = _sources(block, fmi_version)
+    c_files = _c_files(sources)
+    token = content_token([model_description(block, fmi_version, "", c_files), *(sources[name] for name in sorted(sources))])
+    sources["variables.h"] += f'\n#define TOKEN "{token}"\n'.encode()
+    if fmi_version == 3:
+        sources["buildDescription.xml"] = build_description(block, c_files)
+    description = model_description(block, fmi_version, token, c_files)
+    return {"modelDescription.xml": description} | {f"sources/{name}": text for name, text in sources.items()}
+
+
+def _sources(block: Block, fmi_version: int) -> dict[str, bytes]:
+    """All that is needed to compile the FMU anywhere, FMI's own headers included."""
+    headers = _fmi_header_folder()
+    sources = {name: text.encode() for name, text in block.files.items()}
+    sources |= {name: (SHELL / name).read_bytes() for name in _SHELL_FILES[fmi_version]}
+    sources |= {name: (headers / name).read_bytes() for name in _FMI_HEADERS[fmi_version]}
+    sources["variables.h"] = c_table(block, fmi_version).encode()
+    return sources
+
+
+def _fmi_header_folder() -> Path:
+    fmpy = find_spec("fmpy")
+    if fmpy is None or fmpy.origin is None:
+        raise InputError('exporting takes the FMI headers from FMPy, which is missing: pip install "fmi-cosim[build]"')
+    return Path(fmpy.origin).parent / "c-code"
+
+
+def _c_files(sources: Mapping[str, bytes]) -> list[str]:
+    return sorted(name for name in sources if name.endswith(".c"))
+
+
+def _binary(block: Block, fmi_version: int, files: Mapping[str, bytes]) -> dict[str, bytes]:
+    from fmpy import platform, platform_tuple, sharedLibraryExtension
+
+    sources = {name.removeprefix("sources/"): text for name, text in files.items() if name.startswith("sources/")}
+    name = f"{block.identifier}{sharedLibraryExtension}"
+    with TemporaryDirectory(prefix="cosim-build-") as temporary:
+        folder = Path(temporary)
+        for source, text in sources.items():
+            (folder / source).write_bytes(text)
+        compile_library(folder, _c_files(sources), folder / name)
+        return {f"binaries/{platform if fmi_version == 2 else platform_tuple}/{name}": (folder / name).read_bytes()}

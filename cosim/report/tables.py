@@ -1,0 +1,69 @@
+"""The table of KPIs and checks that ends a run on the terminal."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, TextIO
+
+from ..kpi import CheckOutcome, Number
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+LONGEST_LINE = 1000  # characters, where nothing but the reader's patience limits it
+
+
+def print_kpis(
+    kpis: Mapping[str, Number],
+    outcomes: Sequence[CheckOutcome] = (),
+    units: Mapping[str, str] | None = None,
+    file: TextIO | None = None,
+) -> None:
+    """Print all KPIs with their units (`cosim.kpi.kpi_units`), and beside them their checks and whether they are met.
+
+    Colours only where rich sees a terminal and no NO_COLOR; elsewhere lines are as long as they need to be. Prints nothing
+    when there are no KPIs.
+    """
+    from rich.console import Console
+
+    if not kpis:
+        return
+    console = Console(file=file or sys.stdout, highlight=False)
+    table = _table(kpis, outcomes, units or {}, plain=console.options.ascii_only)
+    if not console.is_terminal:
+        console.width = LONGEST_LINE
+    console.print(table)
+
+
+def _table(kpis: Mapping[str, Number], outcomes: Sequence[CheckOutcome], units: Mapping[str, str], plain: bool) -> Table:
+    from rich import box
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    table.add_column("KPI", overflow="fold")
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    if outcomes:
+        table.add_column("check", no_wrap=True)
+        table.add_column("", no_wrap=True)
+    for name, value in kpis.items():
+        own = [outcome for outcome in outcomes if outcome.check["kpi"] == name]
+        limits, marks = "\n".join(outcome.limits for outcome in own), "\n".join(_mark(outcome.passed, plain) for outcome in own)
+        table.add_row(escape(name), number_text(value), escape(units.get(name, "")), *([limits, marks] if outcomes else []))
+    return table
+
+
+def _mark(passed: bool, plain: bool) -> str:
+    if passed:
+        return f"[green]{'ok' if plain else '✓'}[/]"
+    return f"[bold red]{'failed' if plain else '✗ failed'}[/]"
+
+
+def number_text(value: Number) -> str:
+    """A number as people read it: four significant digits, "yes" and "no", "-" for NaN."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "-" if math.isnan(value) else f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,85 @@
+"""`Result`: everything that is known about one finished run."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, did_you_mean
+from ..recording import Recording
+from .csv_files import read_csv, write_csv
+from .files import write_json
+
+
+class SignalError(InputError, KeyError):
+    """A signal was asked for that was not recorded."""
+
+    __str__ = Exception.__str__  # KeyError would print the repr
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """A recorded run; `result["plant.uav.position.z"]` are the values of one signal, shape (rows,).
+
+    `kpis` maps "landing.lateral_error" to a number or Boolean, `timing` names of durations to wall time in s
+    ("loop_seconds": the stepping loop alone), `metadata` whatever describes the run: versions, hashes, seeds.
+    """
+
+    recording: Recording
+    kpis: Mapping[str, float | int | bool] = field(default_factory=dict)
+    timing: dict[str, float] = field(default_factory=dict)
+    metadata: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def time(self) -> np.ndarray:
+        """Time of each row in s, shape (rows,)."""
+        return self.recording.time
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Unit of each signal in Modelica syntax, "" where it is unknown."""
+        return self.recording.units
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Values of one signal; raises SignalError (an InputError and a KeyError) for a name that was not recorded."""
+        try:
+            return self.recording.columns[name]
+        except KeyError:
+            raise SignalError(f'no signal "{name}" was recorded{did_you_mean(name, self)}') from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.recording.columns
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.recording.columns)
+
+    def __len__(self) -> int:
+        """Number of signals."""
+        return len(self.recording.columns)
+
+    def signals(self, pattern: str = "*") -> list[str]:
+        """Names that match `pattern`, in recorded order; `*` stands for any text, dots and brackets included."""
+        matches = re.compile(".*".join(map(re.escape, pattern.split("*")))).fullmatch
+        return [name for name in self if matches(name)]
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write all signals to a CSV file (see `cosim.results.csv_files`)."""
+        write_csv(self.recording, path)
+
+    @classmethod
+    def from_csv(cls, path: str | Path) -> Result:
+        """A result with the signals of a CSV file and nothing else; raises InputError when it cannot be read."""
+        return cls(read_csv(path))
+
+
+def write_run(result: Result, directory: str | Path) -> None:
+    """Write `result.csv`, `kpis.json` and `run.json` (metadata and timing) to `directory`, each of them atomically."""
+    directory = Path(directory)
+    result.to_csv(directory / "result.csv")
+    write_json(result.kpis, directory / "kpis.json")
+    write_json({**result.metadata, "timing": result.timing}, directory / "run.json")

@@ -1,0 +1,181 @@
+"""Figures of a mission: the paths in the horizontal plane, and the landing over time.
+
+They show what figures 14 and 16 of the paper show. Every function takes a result and names of things in it, as the KPIs do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle
+from matplotlib.patheffects import withStroke
+from matplotlib.text import Text
+
+from cosim.results import Result
+
+from .kpis import horizontal_distance, touchdown_row
+
+FLYING, SAILING, REFERENCE, TOUCHDOWN = "#0072B2", "#D55E00", "#444444", "#111111"
+TINTS = ("#F4F4F4", "#FFF8E1", "#EAF2FA", "#EDF6E8", "#FDEFE7", "#F2EDF8")
+STAR: Mapping[str, Any] = {"color": TOUCHDOWN, "linestyle": "", "marker": "*", "markersize": 9, "markeredgecolor": "white"}
+LEGEND: Mapping[str, Any] = {"ncols": 4, "columnspacing": 0.7, "handlelength": 1.4, "handletextpad": 0.4, "borderaxespad": 0.2}
+AFTER_TOUCHDOWN = 4.0  # s shown of the time after it
+SMALLEST_ERROR = 1e-3  # m; the axis is logarithmic
+COLUMN = 3.5  # in, width of a column in a two-column paper
+
+
+def paths(
+    result: Result,
+    vehicle: str,
+    deck: str,
+    x: Sequence[float] = (),
+    y: Sequence[float] = (),
+    radius: float = 0.0,
+    platforms: Mapping[str, Mapping[str, Sequence[float]]] | None = None,
+) -> Figure:
+    """Paths of `vehicle` ("plant.uav") and of the vessel with the landing deck `deck` ("plant.usv.deck"), seen from above.
+
+    `x`, `y` (m, world) are the vessel's waypoints, `radius` (m) that of their circles of acceptance; `platforms` are those of
+    the plant: {"start": {"size": [x, y, z], "position": [x, y, z]}} in m, position of the centre. Dots mark the starts.
+    """
+    figure = Figure()
+    axes = figure.add_subplot(aspect="equal", xlabel="x / m", ylabel="y / m")
+    for name, platform in (platforms or {}).items():
+        _draw_platform(axes, name, platform)
+    _draw_waypoints(axes, x, y, radius)
+    _draw_path(axes, result, deck.removesuffix(".deck"), color=SAILING, label="vessel")
+    _draw_path(axes, result, vehicle, color=FLYING, label="quadcopter", linestyle=(0, (1.2, 1.0)))
+    row = touchdown_row(result, vehicle)
+    if row is not None:
+        axes.plot(*(result[f"{vehicle}.position.{axis}"][row] for axis in "xy"), **STAR, label="touchdown", zorder=6)
+    figure.legend(loc="upper center", **LEGEND)
+    _fit_height(figure, axes)
+    return figure
+
+
+def _draw_platform(axes: Axes, name: str, platform: Mapping[str, Sequence[float]]) -> None:
+    (width, height), (x, y) = platform["size"][:2], platform["position"][:2]
+    corner = (x - width / 2, y - height / 2)
+    axes.add_patch(Rectangle(corner, width, height, facecolor="#F0EAE0", edgecolor="#C8B89A", linewidth=0.6, zorder=1))
+    _write(axes, name, corner, offset=(3, 3), color="#8A7650")
+
+
+def _draw_waypoints(axes: Axes, x: Sequence[float], y: Sequence[float], radius: float) -> None:
+    if len(x):
+        axes.plot(x, y, "+", color="#555555", markersize=5, label="waypoints", zorder=2)
+    for number, (east, north) in enumerate(zip(x, y, strict=True), start=1):
+        axes.add_patch(Circle((east, north), radius, fill=False, color="#888888", linestyle="--", linewidth=0.7, zorder=2))
+        _write(axes, str(number), (east + 0.7 * radius, north + 0.7 * radius), offset=(1, 1), color="#333333")
+
+
+def _draw_path(axes: Axes, result: Result, vehicle: str, **line: Any) -> None:
+    x, y = (result[f"{vehicle}.position.{axis}"] for axis in "xy")
+    axes.plot(x, y, **line, linewidth=1.4, zorder=3)
+    axes.plot(x[:1], y[:1], "o", color=line["color"], markersize=4.5, markeredgecolor="white", zorder=4)
+
+
+def _fit_height(figure: Figure, axes: Axes) -> None:
+    """Give the figure the height that equal axes of column width need."""
+    left, right, below, above, most = 0.45, 0.08, 0.4, 0.27, 6.0  # in
+    axes.margins(0.05)
+    (x_first, x_last), (y_first, y_last) = axes.get_xlim(), axes.get_ylim()
+    width = COLUMN - left - right
+    height = min(most, max(1.0, width * (y_last - y_first) / (x_last - x_first)))
+    total = below + height + above
+    figure.set_size_inches(COLUMN, total)
+    axes.set_position((left / COLUMN, below / total, width / COLUMN, height / total))
+
+
+def landing(
+    result: Result,
+    vehicle: str,
+    deck: str,
+    altitude_reference: str | None = None,
+    mode: str | None = None,
+    phases: Sequence[str] = (),
+    limit: float | None = None,
+    start: float = 0.0,
+    stop: float | None = None,
+) -> Figure:
+    """Altitude of `vehicle` and of the deck it lands on, and their horizontal distance (logarithmic), over time.
+
+    `altitude_reference` names the commanded altitude (m), `mode` the signal whose values 1, 2, ... are called `phases`;
+    `limit` (m) marks a horizontal error. Shown are `start` to `stop` (s), without a stop until some seconds after touchdown.
+    """
+    row = touchdown_row(result, vehicle)
+    if stop is None:
+        stop = result.time[-1] if row is None else min(result.time[-1], result.time[row] + AFTER_TOUCHDOWN)
+    shown = slice(*np.searchsorted(result.time, (start, stop + 1e-9)))
+    figure = Figure(figsize=(COLUMN, 3.4))
+    figure.subplots_adjust(left=0.185, right=0.965, bottom=0.11, top=0.88, hspace=0.1)
+    above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
+    for name, line in _altitudes(vehicle, deck, altitude_reference):
+        above.plot(result.time[shown], result[name][shown], **line)
+    _draw_error(below, result.time[shown], horizontal_distance(result, vehicle, deck)[shown], limit)
+    above.set(ylabel="z / m", xlim=(start, stop))
+    below.set(xlabel="t / s")
+    if mode is not None:
+        _shade_phases(figure, result.time[shown], result[mode][shown], phases)
+    if row is not None:
+        _mark_touchdown(figure, result.time[row], result[f"{vehicle}.position.z"][row])
+    lowest, highest = above.get_ylim()
+    above.set_ylim(lowest, highest + 0.12 * (highest - lowest))  # room for the legend
+    above.legend(loc="upper right", **LEGEND)
+    figure.align_ylabels()
+    return figure
+
+
+def _altitudes(vehicle: str, deck: str, reference: str | None) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    yield f"{deck}.position.z", {"color": SAILING, "label": "deck"}
+    yield f"{vehicle}.position.z", {"color": FLYING, "label": "quadcopter"}
+    if reference is not None:
+        yield reference, {"color": REFERENCE, "label": "reference", "linestyle": "--", "linewidth": 0.9}
+
+
+def _draw_error(axes: Axes, time: np.ndarray, error: np.ndarray, limit: float | None) -> None:
+    axes.plot(time, np.maximum(error, SMALLEST_ERROR), color=FLYING)
+    axes.set(yscale="log", ylabel="horizontal\nerror / m")
+    axes.yaxis.set_major_formatter("{x:g}")
+    if limit is not None:
+        axes.axhline(limit, color=REFERENCE, linestyle="--", linewidth=0.9, label=f"limit {limit:g} m")
+        axes.legend(loc="upper right")
+
+
+def _shade_phases(figure: Figure, time: np.ndarray, mode: np.ndarray, phases: Sequence[str]) -> None:
+    """A tint per phase in all axes, and the phase's name above the first where there is room for it."""
+    changes = [0, *(np.flatnonzero(np.diff(mode)) + 1), len(time) - 1]
+    for first, last in pairwise(changes):
+        value = int(mode[first])
+        for axes in figure.axes:
+            axes.axvspan(time[first], time[last], color=TINTS[value % len(TINTS)], linewidth=0, zorder=0)
+        name = phases[value - 1] if 0 < value <= len(phases) else str(value)
+        _name_span(figure.axes[0], time[first], time[last], name)
+
+
+def _name_span(axes: Axes, first: float, last: float, name: str) -> None:
+    """Write `name` above a span of time: upright where it would not fit, not at all where not even that would."""
+    left, right = axes.get_xlim()
+    room = (last - first) / (right - left) * 0.78 * COLUMN * 72  # pt
+    if room < 6:
+        return
+    text = axes.text((first + last) / 2, 1.02, name, transform=axes.get_xaxis_transform(), fontsize=6.5, color="#444444")
+    text.set(ha="center", va="bottom", rotation=90 if room < 3.6 * len(name) else 0)
+
+
+def _mark_touchdown(figure: Figure, time: float, altitude: float) -> None:
+    for axes, top in zip(figure.axes, (0.88, 1.0), strict=True):
+        axes.axvline(time, ymax=top, color=TOUCHDOWN, linewidth=0.8, linestyle=":")
+    figure.axes[0].plot(time, altitude, **STAR, label="touchdown", zorder=5)
+
+
+def _write(axes: Axes, text: str, place: tuple[float, float], offset: tuple[float, float], color: str) -> Text:
+    """A small text beside a place (m), `offset` in pt, readable on top of lines."""
+    halo = withStroke(linewidth=2, foreground="white")
+    return axes.annotate(
+        text, place, offset, textcoords="offset points", fontsize=6.5, color=color, path_effects=[halo], zorder=5
+    )

@@ -1,0 +1,1 @@
+"""The vehicles, one folder each, and what they have in common."""

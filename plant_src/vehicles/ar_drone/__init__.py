@@ -1,0 +1,1 @@
+"""The AR.Drone 2.0 quadcopter."""

@@ -1,0 +1,29 @@
+"""What Bullet knows of the quadcopter, in the principal-axis frame at the centre of mass (Bullet wants a diagonal inertia)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..shapes import Body, Box, quaternion
+from .parameters import CENTRE_OF_MASS, MASS, principal_axes
+
+#: bottom of the motor cylinders, on which the vehicle stands, and top of the hull, from the origin of the model's frame (m)
+FEET_HEIGHT, TOP_HEIGHT = -0.0566, 0.03
+
+#: edge of the square whose corners are the feet, 0.1612 m from its centre (m)
+EDGE = 0.228
+
+def _box() -> Box:
+    """One box: its corners are the feet at the ends of the arms, so it stands at a diagonal to the body axes."""
+    to_body = principal_axes()[1]
+    centre = to_body.T @ (np.array([0.0, 0.0, (TOP_HEIGHT + FEET_HEIGHT) / 2]) - CENTRE_OF_MASS)
+    half = math.sqrt(0.5)
+    diagonal = np.array([[half, half, 0.0], [-half, half, 0.0], [0.0, 0.0, 1.0]])
+    half_extents = (EDGE / 2, EDGE / 2, (TOP_HEIGHT - FEET_HEIGHT) / 2)
+    return Box(half_extents, tuple(centre.tolist()), quaternion(to_body.T @ diagonal))
+
+
+#: one box: four spheres or a hull of the same size creep more, and their contact cannot be restored bit for bit
+BODY = Body(MASS, tuple(principal_axes()[0].tolist()), (_box(),))

@@ -1,0 +1,60 @@
+"""Numbers of the quadcopter, SI units, body frame x forward, y left, z up.
+
+Sources: [model] the simulation model published with the paper "An Open Simulation Strategy for Rapid Control Design in Aerial
+and Maritime Drone Teams" (github.com/OmarVelascoAnrar/UAV_USV_Simulator, commit 1eee757), converted from its body frame
+x forward, y right, z down: y and z of vectors and the products of inertia Ixy, Ixz change their sign. "Forward" is the arm
+of rotor 1; the hull lies along the diagonal between two arms, hence the large Ixy.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+#: body and four propellers [model]: 0.4038924 kg + 4 * 0.010 kg, as summed there (kg)
+MASS = 0.443892
+
+#: about the centre of mass, propellers locked [model] (kg m2)
+INERTIA = np.array(
+    [
+        [0.002835, 0.000978, 0.000116],
+        [0.000978, 0.002821, -0.000111],
+        [0.000116, -0.000111, 0.005131],
+    ]
+)
+
+#: centre of mass from the origin of the model's body frame [model] (m)
+CENTRE_OF_MASS = np.array([-0.003329, 0.001981, -0.000577])
+
+#: rotors front, left, rear, right from the centre of mass [model] (m)
+ROTORS = np.array(
+    [
+        [0.181777, -0.000828, 0.006153],
+        [0.000096, 0.181531, 0.006153],
+        [-0.181505, 0.000016, 0.006153],
+        [0.000096, -0.181499, 0.006153],
+    ]
+)
+
+#: sense of the reaction torque of each rotor on the body about its z axis [model]
+ROTOR_SENSES = (1.0, -1.0, 1.0, -1.0)
+
+#: thrust = THRUST_COEFFICIENT * speed^2 [model; Table 2 of the paper misprints the power] (N s2/rad2)
+THRUST_COEFFICIENT = 9.148e-6
+
+#: torque = TORQUE_COEFFICIENT * speed^2 [model; the paper's 2.38e-9 cannot turn the vehicle] (N m s2/rad2)
+TORQUE_COEFFICIENT = 2.38e-7
+
+#: 5000 revolutions per minute, rounded as in the model [model, paper] (rad/s)
+MAX_ROTOR_SPEED = 5000 * 0.10471976
+
+#: [model] (m/s2)
+GRAVITY = 9.81
+
+
+def principal_axes() -> tuple[np.ndarray, np.ndarray]:
+    """Principal moments of inertia (3,), ascending, and the rotation (3, 3) from the principal-axis frame to the body frame."""
+    moments, axes = np.linalg.eigh(INERTIA)
+    axes = axes * np.sign(np.diag(axes))
+    if np.linalg.det(axes) < 0:
+        axes[:, 0] = -axes[:, 0]
+    return moments, axes

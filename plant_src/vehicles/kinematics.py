@@ -1,0 +1,64 @@
+"""Rotations as CasADi expressions. Quaternions are (w, x, y, z) and turn body vectors into world vectors."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+
+def product(a: ca.SX, b: ca.SX) -> ca.SX:
+    """Quaternion product: the rotation b, then the rotation a."""
+    w, v = a[0], a[1:4]
+    return ca.vertcat(w * b[0] - ca.dot(v, b[1:4]), w * b[1:4] + b[0] * v + ca.cross(v, b[1:4]))
+
+
+def conjugate(q: ca.SX) -> ca.SX:
+    """The inverse rotation of a unit quaternion."""
+    return ca.vertcat(q[0], -q[1:4])
+
+
+def normalised(q: ca.SX) -> ca.SX:
+    """The unit quaternion of the same direction."""
+    return q / ca.norm_2(q)
+
+
+def matrix(q: ca.SX) -> ca.SX:
+    """Rotation matrix (3, 3) of a unit quaternion."""
+    w, x, y, z = ca.vertsplit(q)
+    return ca.vertcat(
+        ca.horzcat(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        ca.horzcat(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        ca.horzcat(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+
+
+def rate(q: ca.SX, rates: ca.SX) -> ca.SX:
+    """Time derivative of the quaternion for the angular velocity `rates` in the body frame."""
+    return product(q, ca.vertcat(0, rates)) / 2
+
+
+def about_z(angle: ca.SX) -> ca.SX:
+    """The rotation by an angle about the z axis."""
+    return ca.vertcat(ca.cos(angle / 2), 0, 0, ca.sin(angle / 2))
+
+
+def euler_angles(q: ca.SX) -> ca.SX:
+    """Roll, pitch and yaw of the sequence yaw, pitch, roll (ZYX), rad."""
+    r = matrix(q)
+    return ca.vertcat(
+        ca.atan2(r[2, 1], r[2, 2]), ca.asin(ca.fmin(1, ca.fmax(-1, -r[2, 0]))), ca.atan2(r[1, 0], r[0, 0])
+    )
+
+
+def rotation_vector(q: ca.SX) -> ca.SX:
+    """Axis times angle (rad) of a unit quaternion, by the shorter way; a series where the angle is tiny."""
+    shorter = ca.if_else(q[0] < 0, -1, 1) * q
+    sine_squared = ca.dot(shorter[1:4], shorter[1:4])
+    sine = ca.sqrt(sine_squared + 1e-300)
+    factor = ca.if_else(sine_squared < 1e-12, 2 * (1 + sine_squared / 6), 2 * ca.atan2(sine, shorter[0]) / sine)
+    return factor * shorter[1:4]
+
+
+def motion(position: ca.SX, orientation: ca.SX, velocity: ca.SX, rates: ca.SX) -> ca.SX:
+    """The published motion of a vehicle (the order of `interface.MOTION`) from world velocity and body rates."""
+    velocity_body = ca.mtimes(matrix(orientation).T, velocity)
+    return ca.vertcat(position, orientation, euler_angles(orientation), velocity, velocity_body, rates)

@@ -1,0 +1,38 @@
+"""What Bullet knows of a vehicle: mass, inertia and collision shapes."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+
+class Box(NamedTuple):
+    """A box in the frame of its body: half of its edges (m), its centre (m) and its orientation (x, y, z, w)."""
+
+    half_extents: Vector
+    position: Vector
+    orientation: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+
+class Body(NamedTuple):
+    """A rigid body in a frame at its centre of mass: mass (kg), moments of inertia (kg m2) about the frame's axes, shapes.
+
+    `height` (m) is that of the centre of mass of a vessel that moves in the plane.
+    """
+
+    mass: float
+    inertia: Vector
+    boxes: tuple[Box, ...]
+    height: float = 0.0
+
+
+def quaternion(rotation: np.ndarray) -> Quaternion:
+    """The unit quaternion (x, y, z, w) of a rotation matrix (3, 3) that turns by clearly less than half a turn."""
+    w = math.sqrt(1 + np.trace(rotation)) / 2
+    x, y, z = (rotation[k - 1, k - 2] - rotation[k - 2, k - 1] for k in range(3))
+    return float(x / (4 * w)), float(y / (4 * w)), float(z / (4 * w)), w

@@ -1,0 +1,1 @@
+"""The Strider V1.0 catamaran with a landing deck."""

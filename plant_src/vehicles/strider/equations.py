@@ -1,0 +1,86 @@
+"""Equations of motion of the catamaran in the horizontal plane: surge, sway and yaw.
+
+Equations 9, 12 and 13 of the paper; README.md has them in our notation.
+"""
+
+from __future__ import annotations
+
+import math
+
+import casadi as ca
+
+from cosim.export.block import Block
+from cosim.export.equations import ContinuousModel
+from cosim.export.equations import block as as_block
+
+from .. import kinematics, shadow_maps
+from . import parameters as p
+from .geometry import DECK_CENTRE
+from .interface import STATES, VARIABLES
+
+def rate(state: ca.SX, inputs: ca.SX) -> ca.SX:
+    """Time derivative of (x, y, yaw, surge, sway, yaw rate)."""
+    yaw, u, v, r = ca.vertsplit(state[2:6])
+    thrust, rudder_angle = inputs[0], inputs[1]
+    external_force, external_torque = inputs[2:5], inputs[5:8]
+    cos, sin = ca.cos(yaw), ca.sin(yaw)
+    loads = hull_loads(v, r) + air_drag(u, v) + rudder_loads(u, v, r, rudder_angle)
+    surge_force = loads[0] + thrust + cos * external_force[0] + sin * external_force[1]
+    side_force = loads[1] - sin * external_force[0] + cos * external_force[1]
+    moment = loads[2] + external_torque[2]
+    kinematic = (cos * u - sin * v, sin * u + cos * v, r)
+    dynamic = (surge_force / p.MASS + v * r, side_force / p.MASS - u * r, moment / p.INERTIA[2])
+    return ca.vertcat(*kinematic, *dynamic)
+
+
+def hull_loads(v: ca.SX, r: ca.SX) -> ca.SX:
+    """X, Y (N) and N (N m) of the water on the hulls."""
+    return p.HULLS * ca.vertcat(0, p.Y_V * v + p.Y_R * r, p.N_V * v + p.N_R * r)
+
+
+def air_drag(u: ca.SX, v: ca.SX) -> ca.SX:
+    """X, Y (N) and N (N m) of still air."""
+    return -p.AIR_DRAG * ca.vertcat(ca.fabs(u) * u, ca.fabs(v) * v, 0)
+
+
+def rudder_loads(u: ca.SX, v: ca.SX, r: ca.SX, rudder_angle: ca.SX) -> ca.SX:
+    """X, Y (N) and N (N m) of the rudder; lift grows as a sine up to the stall angle. Going astern the lift changes its sign."""
+    ahead = ca.sign(u)
+    inflow_angle = ca.atan2(ahead * (v - p.RUDDER_ARM * r), ca.fabs(u))
+    attack = ca.fmin(1, ca.fmax(-1, (rudder_angle - inflow_angle) / p.STALL_ANGLE))
+    largest = p.WATER_DENSITY / 2 * p.RUDDER_MAX_LIFT_COEFFICIENT * p.RUDDER_AREA * ahead * u**2
+    lift = largest * ca.sin(math.pi / 2 * attack)
+    side_force = lift * ca.cos(rudder_angle)
+    return ca.vertcat(-lift * ca.sin(rudder_angle), side_force, -p.RUDDER_ARM * side_force)
+
+
+def initial_state(parameters: ca.SX) -> ca.SX:
+    """The state from initial position, yaw, body velocity and yaw rate: they are the state."""
+    return parameters
+
+
+def observe(state: ca.SX) -> ca.SX:
+    """The published motion of the vessel and of its landing deck."""
+    position = ca.vertcat(state[0:2], p.CENTRE_OF_MASS_HEIGHT)
+    orientation = kinematics.about_z(state[2])
+    to_world = kinematics.matrix(orientation)
+    rates = ca.vertcat(0, 0, state[5])
+    velocity = to_world @ ca.vertcat(state[3:5], 0)
+    to_deck = to_world @ ca.SX(DECK_CENTRE)
+    deck = ca.vertcat(position + to_deck, velocity + ca.cross(rates, to_deck))
+    return ca.vertcat(kinematics.motion(position, orientation, velocity, rates), deck)
+
+
+def block() -> Block:
+    """The catamaran on open water."""
+    model = ContinuousModel(
+        "strider",
+        "Strider V1.0 catamaran on calm water",
+        VARIABLES,
+        STATES,
+        initial_state,
+        lambda state, inputs, parameters: rate(state, inputs),
+        lambda state, inputs, parameters: ca.vertcat(observe(state), ca.SX.zeros(3)),
+    )
+    shadow = shadow_maps.PlanarChain(model, p.MASS, p.INERTIA[2], observe)
+    return as_block(model, shadow.functions())

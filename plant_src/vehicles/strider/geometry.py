@@ -1,0 +1,33 @@
+"""What Bullet knows of the catamaran, in its body frame."""
+
+from __future__ import annotations
+
+from ..shapes import Body, Box
+from .parameters import CENTRE_OF_MASS_HEIGHT, DECK_TOP, DECK_X, DECK_Y, INERTIA, MASS
+
+#: centre of the top of the landing deck (m)
+DECK_CENTRE = (sum(DECK_X) / 2, sum(DECK_Y) / 2, DECK_TOP)
+
+#: from the public simulation model (m)
+PLATE_THICKNESS = 0.023
+HOUSING = (0.30, 0.30, 0.05)  # edges of the box under the deck plate
+HULL_LENGTH, HULL_BEAM, HULL_DISTANCE = 0.979, 0.126, 0.533  # distance of each hull's centre line from the middle
+HULL_BOTTOM, HULL_TOP = -0.144, -0.109
+
+
+def _hull(side: float) -> Box:
+    half_extents = (HULL_LENGTH / 2, HULL_BEAM / 2, (HULL_TOP - HULL_BOTTOM) / 2)
+    return Box(half_extents, (0.0, side * HULL_DISTANCE, (HULL_TOP + HULL_BOTTOM) / 2))
+
+
+def _plate() -> Box:
+    half_extents = ((DECK_X[1] - DECK_X[0]) / 2, (DECK_Y[1] - DECK_Y[0]) / 2, PLATE_THICKNESS / 2)
+    return Box(half_extents, (DECK_CENTRE[0], DECK_CENTRE[1], DECK_TOP - PLATE_THICKNESS / 2))
+
+
+def _housing() -> Box:
+    x, y, z = HOUSING
+    return Box((x / 2, y / 2, z / 2), (DECK_CENTRE[0], DECK_CENTRE[1], DECK_TOP - PLATE_THICKNESS - z / 2))
+
+
+BODY = Body(MASS, INERTIA, (_plate(), _hull(+1.0), _hull(-1.0), _housing()), CENTRE_OF_MASS_HEIGHT)

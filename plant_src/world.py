@@ -1,0 +1,226 @@
+"""The PyBullet world as one component: all vehicles, the platforms, and contact between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pybullet
+
+from cosim.component import DTYPES, Component, Ports, Variable
+from cosim.errors import ComponentError, InputError, Problem, did_you_mean
+
+from . import arguments
+from .arguments import Arguments, Platform
+from .contacts import Contacts
+from .shadow import Shadow, UnsoundError, compound, set_dynamics
+from .vehicles.shapes import Box
+
+#: a step of Bullet is at most this long (s); a longer do_step is split into equal ones
+LONGEST_STEP = 0.01
+
+#: vehicles and platforms may not overlap deeper than this at the start (m)
+LARGEST_OVERLAP = 1e-3
+
+_FLOAT, _FLAG = DTYPES["Float64"], DTYPES["Boolean"]
+_BODY_A, _BODY_B, _DISTANCE = 1, 2, 8  # fields of Bullet's contact points
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The state of a world: Bullet's, which Bullet keeps under a number, and ours."""
+
+    bullet: int
+    memories: Sequence[bytes]
+    flags: np.ndarray
+
+
+class World(Component):
+    """Vehicles and fixed platforms in one PyBullet client.
+
+    `vehicles`: name -> {"model": "ar_drone" or "strider", "position": [x, y, z] or [x, y] (m, centre of mass), "yaw": rad,
+    "velocity_body": [u, v, w] (m/s), "rates": [p, q, r] (rad/s)}; all but model and position are zero if not given.
+    `platforms`: name -> {"size": [x, y, z] (m, edges), "position": [x, y, z] (m, centre)}.
+    `environment`: {"seed": integer}; nothing in the world is random so far.
+
+    The variables of vehicle V are those of its model with the prefix "V.". Raises InputError with all problems.
+    """
+
+    binds_everything = True
+    has_state = True
+
+    def __init__(
+        self,
+        instance_name: str,
+        vehicles: Mapping[str, Any],
+        platforms: Mapping[str, Any] | None = None,
+        environment: Mapping[str, Any] | None = None,
+    ):
+        read = arguments.read(vehicles, {} if platforms is None else platforms, {} if environment is None else environment)
+        self._name = instance_name
+        self._step, self._step_size, self._step_count = np.zeros(1), math.nan, 1
+        self._flags = np.zeros((len(read.vehicles), 2), _FLAG)
+        self._incoming: list[tuple[memoryview, memoryview]] = []
+        self._outgoing: list[tuple[memoryview, memoryview]] = []
+        self._bound_inputs: dict[str, np.ndarray] = {}
+        self._client = pybullet.connect(pybullet.DIRECT)
+        try:
+            self._populate(read)
+        except BaseException:
+            self.free()
+            raise
+        self._places = {variable.name: (variable, values) for variable, values in self._lay_out()}
+        self.variables = [variable for variable, _ in self._places.values()]
+
+    def _populate(self, read: Arguments) -> None:
+        names = {self._add_platform(platform): f"platforms.{platform.name}" for platform in read.platforms}
+        self._shadows: list[Shadow] = [
+            spawn.model.shadow(self._client, spawn.name, spawn.model, spawn.initial, self._step) for spawn in read.vehicles
+        ]
+        names |= {shadow.body: f"vehicles.{shadow.name}" for shadow in self._shadows}
+        self._refuse_overlaps(names)
+        self._contacts = Contacts(self._client, self._shadows, self._flags)
+
+    def _add_platform(self, platform: Platform) -> int:
+        x, y, z = platform.size
+        shape = compound([Box((x / 2, y / 2, z / 2), (0.0, 0.0, 0.0))], self._client)
+        body = pybullet.createMultiBody(0, shape, -1, platform.position, physicsClientId=self._client)
+        set_dynamics(self._client, body, -1)
+        return body
+
+    def _refuse_overlaps(self, names: Mapping[int, str]) -> None:
+        pybullet.performCollisionDetection(self._client)
+        depths: dict[tuple[str, str], float] = {}
+        for point in pybullet.getContactPoints(physicsClientId=self._client):
+            pair = names[point[_BODY_A]], names[point[_BODY_B]]
+            depths[pair] = max(depths.get(pair, 0.0), -point[_DISTANCE])
+        problems = [
+            Problem(f"{b} overlaps {a} by {depth:.3g} m", subject=("arguments", *b.split("."), "position"))
+            for (a, b), depth in depths.items()
+            if depth > LARGEST_OVERLAP
+        ]
+        if problems:
+            raise InputError(problems)
+
+    # -- values --------------------------------------------------------------------------------------------------------
+
+    def _lay_out(self) -> Iterator[tuple[Variable, np.ndarray]]:
+        """Every variable and where its values lie."""
+        for shadow, flags in zip(self._shadows, self._flags, strict=True):
+            prefixed = [replace(variable, name=f"{shadow.name}.{variable.name}") for variable in shadow.model.variables]
+            yield from _views([v for v in prefixed if v.causality == "input"], {_FLOAT: shadow.inputs})
+            yield from _views([v for v in prefixed if v.causality == "output"], {_FLOAT: shadow.outputs, _FLAG: flags})
+
+    def set(self, name: str, value: Any) -> None:
+        variable, values = self._variable(name, "set")
+        if variable.causality != "input":
+            raise ComponentError(self._name, "set", f"{name} is an output")
+        values[:] = value
+        if name in self._bound_inputs:
+            self._bound_inputs[name][:] = value
+
+    def get(self, name: str) -> Any:
+        variable, values = self._variable(name, "get")
+        return values.tolist() if variable.shape else values.item()
+
+    def _variable(self, name: str, function: str) -> tuple[Variable, np.ndarray]:
+        if name not in self._places:
+            raise ComponentError(self._name, function, f'no variable "{name}"{did_you_mean(name, self._places)}')
+        return self._places[name]
+
+    def bind(self, inputs: Ports, outputs: Ports) -> None:
+        self._bound_inputs = {variable.name: values for variable, values in _views(inputs.variables, inputs.arrays)}
+        own_inputs, own_outputs = ([getattr(s, kind) for s in self._shadows] for kind in ("inputs", "outputs"))
+        self._incoming = list(zip(map(memoryview, own_inputs), _chunks(inputs.arrays[_FLOAT], own_inputs), strict=True))
+        self._outgoing = list(zip(_chunks(outputs.arrays[_FLOAT], own_outputs), map(memoryview, own_outputs), strict=True))
+        self._outgoing.append((memoryview(outputs.arrays[_FLAG]), memoryview(self._flags.reshape(-1))))
+
+    def set_inputs(self) -> None:
+        for own, given in self._incoming:
+            own[:] = given
+
+    def get_outputs(self) -> None:
+        for wanted, own in self._outgoing:
+            wanted[:] = own
+
+    # -- life cycle ----------------------------------------------------------------------------------------------------
+
+    def enter_initialization_mode(self, start_time: float, stop_time: float) -> None: ...
+
+    def exit_initialization_mode(self) -> None: ...
+
+    def do_step(self, time: float, step_size: float) -> None:
+        if step_size != self._step_size:
+            self._set_step_size(time, step_size)
+        if self._flags.any():
+            self._contacts.clear()
+        try:
+            for _ in range(self._step_count):
+                self._advance()
+        except UnsoundError as error:
+            raise ComponentError(self._name, "do_step", str(error), time) from None
+
+    def _set_step_size(self, time: float, step_size: float) -> None:
+        """Split the component's step into equal steps of Bullet."""
+        if not 0 < step_size < math.inf:
+            raise ComponentError(self._name, "do_step", f"found step size {step_size}, expected a positive number", time)
+        self._step_count = max(1, math.ceil(step_size / LONGEST_STEP - 1e-9))
+        self._step[0] = step_size / self._step_count
+        pybullet.setPhysicsEngineParameter(fixedTimeStep=self._step[0], physicsClientId=self._client)
+        self._step_size = step_size
+
+    def _advance(self) -> None:
+        """One step of Bullet; nothing has moved when a vehicle is unsound before it."""
+        for shadow in self._shadows:
+            shadow.predict()
+        for shadow in self._shadows:
+            shadow.push()
+        pybullet.stepSimulation(self._client)
+        touched = False
+        for shadow in self._shadows:
+            if shadow.correct():
+                touched = True
+        if touched:
+            self._contacts.add(1 / self._step_count)
+
+    def terminate(self) -> None: ...
+
+    def free(self) -> None:
+        if self._client >= 0:
+            pybullet.disconnect(self._client)
+            self._client = -1
+
+    # -- state ---------------------------------------------------------------------------------------------------------
+
+    def get_state(self) -> Snapshot:
+        memories = [bytes(shadow.memory) for shadow in self._shadows]
+        return Snapshot(pybullet.saveState(self._client), memories, self._flags.copy())
+
+    def set_state(self, state: Snapshot) -> None:
+        pybullet.restoreState(state.bullet, physicsClientId=self._client)
+        for shadow, memory in zip(self._shadows, state.memories, strict=True):
+            shadow.memory[:] = memory
+        self._flags[:] = state.flags
+
+    def free_state(self, state: Snapshot) -> None:
+        pybullet.removeState(state.bullet, physicsClientId=self._client)
+
+
+def _views(variables: Sequence[Variable], arrays: Mapping[np.dtype[Any], np.ndarray]) -> Iterator[tuple[Variable, np.ndarray]]:
+    """Each variable with its part of the array of its dtype, in which the variables lie in order."""
+    filled = dict.fromkeys(arrays, 0)
+    for variable in variables:
+        first = filled[variable.dtype]
+        filled[variable.dtype] = first + len(variable.slots)
+        yield variable, arrays[variable.dtype][first : filled[variable.dtype]]
+
+
+def _chunks(array: np.ndarray, like: Sequence[np.ndarray]) -> Iterator[memoryview]:
+    """Consecutive parts of an array, as long as those of `like`."""
+    first = 0
+    for part in like:
+        yield memoryview(array[first : first + len(part)])
+        first += len(part)

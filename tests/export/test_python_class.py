@@ -1,0 +1,127 @@
+"""PythonFMU classes as FMUs."""
+
+from __future__ import annotations
+
+from zipfile import ZipFile
+
+import pytest
+from fmpy import read_model_description, simulate_fmu
+from fmpy.validation import validate_fmu
+
+from cosim.component import Ports
+from cosim.errors import InputError
+from cosim.export.python_class import write_python_fmu
+from cosim.fmi import FmuFile, instantiate
+
+SOURCE = '''
+from types import SimpleNamespace
+
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
+
+
+class LeakyIntegrator(Fmi2Slave):
+    """y' = gain (x - y), explicit Euler."""
+
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.gain, self.y, self.steps, self.moving = 2.0, 0.0, 0, False
+        self.vehicle = SimpleNamespace(x=1.0)
+        self.register_variable(Real("vehicle.x", causality=Fmi2Causality.input))
+        self.register_variable(Real("gain", causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+        self.register_variable(Integer("steps", causality=Fmi2Causality.output))
+        self.register_variable(Boolean("moving", causality=Fmi2Causality.local))
+
+    def do_step(self, time, step_size):
+        rate = self.gain * (self.vehicle.x - self.y)
+        self.y += step_size * rate
+        self.steps += 1
+        self.moving = rate != 0
+        return True
+'''
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory):
+    path = tmp_path_factory.mktemp("python") / "leaky_integrator.py"
+    path.write_text(SOURCE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def python_fmu(source):
+    return write_python_fmu(source, source.with_suffix(".fmu"))
+
+
+def test_it_validates_without_problems(python_fmu):
+    assert validate_fmu(str(python_fmu)) == []
+
+
+def test_it_computes_what_the_class_computes(python_fmu):
+    result = simulate_fmu(str(python_fmu), stop_time=1.0, output_interval=0.1, start_values={"vehicle.x": 3.0})
+    y = 0.0
+    for row in result:
+        assert row["y"] == pytest.approx(y, rel=1e-12)
+        y += 0.1 * (2.0 * (3.0 - y))
+    assert result["steps"][-1] == 10
+
+
+def test_the_same_source_gives_the_same_bytes(source, python_fmu, tmp_path):
+    assert write_python_fmu(source, tmp_path / "again.fmu").read_bytes() == python_fmu.read_bytes()
+
+
+def test_another_source_has_another_guid(python_fmu, tmp_path):
+    other = tmp_path / "leaky_integrator.py"
+    other.write_text(SOURCE.replace("!= 0", "> 0"))
+    assert read_model_description(write_python_fmu(other, tmp_path / "o.fmu")).guid != read_model_description(python_fmu).guid
+
+
+def test_the_description_is_completed(python_fmu):
+    model = read_model_description(python_fmu)
+    assert [unknown.variable.name for unknown in model.initialUnknowns] == ["y", "steps"]
+    assert {v.name: v.variability for v in model.modelVariables}["moving"] == "discrete"
+    assert model.generationDateAndTime is None
+    assert model.coSimulation.canGetAndSetFMUstate
+
+
+def test_its_state_can_be_restored(python_fmu):
+    component = instantiate(FmuFile(python_fmu), "one")
+    try:
+        component.bind(Ports((), {}), Ports((), {}))
+        component.enter_initialization_mode(0.0, 1.0)
+        component.exit_initialization_mode()
+        component.do_step(0.0, 0.1)
+        state = component.get_state()
+        component.do_step(0.1, 0.1)
+        onwards = component.get("y")
+        component.set_state(state)
+        assert component.get("y") == 0.1 * 2.0
+        component.do_step(0.1, 0.1)
+        assert component.get("y") == onwards
+        component.free_state(state)
+    finally:
+        component.free()
+
+
+def test_it_runs_on_linux_and_windows(python_fmu):
+    with ZipFile(python_fmu) as archive:
+        binaries = [name for name in archive.namelist() if name.startswith("binaries/")]
+    assert binaries == ["binaries/linux64/LeakyIntegrator.so", "binaries/win64/LeakyIntegrator.dll"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x = 1\n", r"empty\.py: cannot be exported: .*No child class of Fmi2Slave"),
+        ("import no_such_package\n", "No module named 'no_such_package'"),
+        (
+            SOURCE.replace('Integer("steps",', 'Integer("no way", getter=lambda: 1,'),
+            r'empty\.py: .*"no way".* is not a legal variable name',
+        ),
+    ],
+)
+def test_a_class_that_cannot_be_exported_is_refused(tmp_path, text, message):
+    path = tmp_path / "empty.py"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message):
+        write_python_fmu(path, tmp_path / "empty.fmu")

@@ -1,0 +1,109 @@
+"""Figures become files: the same bytes for the same result, in one style, and their failures are named."""
+
+import hashlib
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from cosim.errors import ComponentError, InputError
+from cosim.recording import Recording
+from cosim.report.figures import STYLE, draw, draw_figures, save
+from cosim.results import Result
+
+TIME = np.arange(200) / 100
+RESULT = Result(Recording(TIME, {"x": np.sin(TIME)}, {"x": "m"}))
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def curve(result, signal):
+    figure = Figure()
+    axes = figure.add_subplot(xlabel="t / s", ylabel=signal)
+    axes.plot(result.time, result[signal], "--", label=signal)
+    axes.legend()
+    return figure
+
+
+def test_each_figure_is_a_png_and_an_svg(tmp_path):
+    files = draw_figures(RESULT, [("curve", curve, {"signal": "x"})], tmp_path / "run")
+    assert [file.name for file in files] == ["curve.png", "curve.svg"]
+    assert sorted((tmp_path / "run").iterdir()) == files
+    assert files[0].read_bytes().startswith(PNG)
+    assert files[1].read_text().startswith("<?xml")
+
+
+FRESH = """
+import hashlib, json, pathlib, sys
+sys.path.insert(0, {tests!r})
+import matplotlib
+matplotlib.rcParams.update({{"lines.linewidth": 7, "axes.facecolor": "red", "savefig.dpi": 30}})
+from test_figure_files import RESULT, curve
+from cosim.report.figures import draw_figures
+files = draw_figures(RESULT, [("curve", curve, {{"signal": "x"}})], {folder!r})
+print(json.dumps([hashlib.sha256(file.read_bytes()).hexdigest() for file in files]))
+print("matplotlib.pyplot" in sys.modules)
+"""
+
+
+def test_another_process_with_other_settings_writes_the_same_bytes_without_pyplot(tmp_path):
+    here = draw_figures(RESULT, [("curve", curve, {"signal": "x"})], tmp_path / "here")
+    script = FRESH.format(tests=str(Path(__file__).parent), folder=str(tmp_path / "there"))
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)  # noqa: S603
+    hashes, pyplot = run.stdout.split("\n")[:2]
+    assert json.loads(hashes) == [hashlib.sha256(file.read_bytes()).hexdigest() for file in here]
+    assert pyplot == "False"
+
+
+def test_files_carry_neither_date_nor_version(tmp_path):
+    png, svg = draw_figures(RESULT, [("curve", curve, {"signal": "x"})], tmp_path)
+    assert b"Software" not in png.read_bytes()
+    assert "<dc:date>" not in svg.read_text()
+    assert matplotlib.__version__ not in svg.read_text()
+
+
+def test_the_style_holds_while_drawing_and_is_gone_afterwards():
+    before = dict(matplotlib.rcParams)
+    figure = draw(RESULT, "curve", curve, {"signal": "x"})
+    assert figure.axes[0].xaxis.label.get_size() == STYLE["axes.labelsize"]
+    assert figure.axes[0].lines[0].get_color().upper() in ("0072B2", "#0072B2")
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_a_failing_figure_is_named():
+    def broken(result):
+        raise ValueError("no such thing")
+
+    with pytest.raises(ComponentError, match=r'^figure "paths": broken failed: ValueError: no such thing$'):
+        draw(RESULT, "paths", broken, {})
+
+
+def test_wrong_arguments_are_refused():
+    with pytest.raises(InputError, match=r'figure "curve": .*; did you mean "signal"\?'):
+        draw(RESULT, "curve", curve, {"signals": "x"})
+
+
+def test_something_that_is_no_figure_is_refused():
+    with pytest.raises(ComponentError, match=r'figure "curve": .* returned NoneType, expected a matplotlib.figure.Figure'):
+        draw(RESULT, "curve", lambda result: None, {})
+
+
+def test_a_failed_write_leaves_the_former_file(tmp_path):
+    path = tmp_path / "curve.png"
+    path.write_bytes(b"former")
+    figure = draw(RESULT, "curve", curve, {"signal": "x"})
+    figure.axes[0].lines[0].set_linestyle((0, (1.0, -1.0, 0.0, 0.0)))
+    with pytest.raises(ValueError, match="non-negative"):
+        save(figure, path)
+    assert path.read_bytes() == b"former"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_matplotlib_is_imported_late():
+    code = "import sys, cosim.report.figures, cosim.report.tables; print({'matplotlib', 'rich'} & set(sys.modules))"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)  # noqa: S603
+    assert run.stdout == "set()\n"
