@@ -37,3 +37,8 @@ def run(
     if outcome.failure:
         raise outcome.failure
     return outcome.recording
+
+
+def wire(source: str, target: str, **more: Any) -> dict[str, Any]:
+    """A connection as it stands in a scenario file."""
+    return {"from": source, "to": target, **more}

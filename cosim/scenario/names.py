@@ -19,7 +19,7 @@ class Unknown(Exception):
 
 
 class Target(NamedTuple):
-    """A variable, or a prefix of variables, of a component."""
+    """A variable, or a prefix of variables, of a component; "" is the whole component."""
 
     component: str
     prefix: str
@@ -36,11 +36,11 @@ def resolve(node: Node, text: str, ports: Sequence[str], hidden: bool = False) -
         raise Unknown
     if component not in node.spec.components:
         raise Unknown(f'unknown component "{component}"{did_you_mean(component, node.spec.components)}')
-    if not rest:
-        raise Unknown(f'"{text}" names a component, expected a variable or a prefix of its variables')
     child = node.children.get(component)
     if child is None:
         return [Target(node.full_name(component), rest)]
+    if not rest:
+        raise Unknown(f'"{text}" names a nested system, expected one of its ports{did_you_mean("", _ports(child, ports))}')
     match = _PORT.match(rest)
     port = match.group() if match else ""
     shown = _ports(child, ports)
@@ -62,14 +62,11 @@ def _ports(node: Node, kinds: Sequence[str]) -> Mapping[str, Sequence[str]]:
 
 
 def under(component: Component, prefix: str, causality: str) -> dict[str, str]:
-    """Slots of a component below a prefix, by the rest of their names ("" for the prefix itself)."""
-    return {
-        slot[len(prefix) :]: slot
-        for variable in component.variables
-        if variable.causality == causality
-        for slot in variable.slots
-        if slot == prefix or slot.startswith((prefix + ".", prefix + "["))
-    }
+    """Slots of a component below a prefix, by the rest of their names: "" for the prefix itself, ".position.x" below it."""
+    slots = [slot for variable in component.variables if variable.causality == causality for slot in variable.slots]
+    if not prefix:
+        return {f".{slot}": slot for slot in slots}
+    return {slot[len(prefix) :]: slot for slot in slots if slot == prefix or slot.startswith((prefix + ".", prefix + "["))}
 
 
 def assign(name: str, component: Component, text: str, value: Any) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from ..component import Component
@@ -50,12 +50,11 @@ class Wiring:
     def _expand(self, node: Node, i: int, spec: ConnectionSpec) -> None:
         sources = self._resolve(node, spec.source, "outputs", node.where("connections", i, "from"))
         targets = self._resolve(node, spec.target, "inputs", node.where("connections", i, "to"))
-        for source in sources:
-            outputs = self._under(source, "output", node.where("connections", i, "from"))
-            for target in targets:
-                inputs = self._under(target, "input", node.where("connections", i, "to"))
-                if outputs and inputs:
-                    self._match(source, outputs, target, inputs, spec.delay, node.where("connections", i))
+        outputs = self._under(sources, "output", node.where("connections", i, "from"))
+        inputs = self._under(targets, "input", node.where("connections", i, "to"))
+        for source, own_outputs in outputs:
+            for target, own_inputs in inputs:
+                self._match(source, own_outputs, target, own_inputs, spec.delay, node.where("connections", i))
 
     def _match(
         self,
@@ -72,7 +71,7 @@ class Wiring:
                 connection = Connection(Endpoint(source.component, outputs[rest]), end, delay, where)
                 self._add(_Candidate(connection, single=rest == ""))
             elif end not in self._set_inputs:
-                wanted = f"{source.component}.{source.prefix}{rest}"
+                wanted = f"{source.component}.{source.prefix}{rest}".replace("..", ".")
                 hint = did_you_mean(wanted, (f"{source.component}.{name}" for name in outputs.values()))
                 self._unfed[end] = Problem(f"input {end} has no matching output {wanted}{hint}", where)
 
@@ -93,17 +92,17 @@ class Wiring:
                 self.problems.append(Problem(str(error), where))
             return []
 
-    def _under(self, target: Target, causality: str, where: str) -> dict[str, str]:
-        """Slots of the wanted causality below a prefix; none is a problem."""
+    def _under(self, targets: Sequence[Target], causality: str, where: str) -> list[tuple[Target, dict[str, str]]]:
+        """Slots of the wanted causality below each prefix; a problem if there are none at all."""
+        found = [(target, under(self._components[target.component], target.prefix, causality)) for target in targets]
+        if targets and not any(slots for _, slots in found):
+            self.problems.append(Problem(self._nothing_under(targets[0], causality), where))
+        return [(target, slots) for target, slots in found if slots]
+
+    def _nothing_under(self, target: Target, causality: str) -> str:
         component = self._components[target.component]
-        if found := under(component, target.prefix, causality):
-            return found
-        name = f"{target.component}.{target.prefix}"
         for other in ("input", "output", "parameter"):
             if other != causality and under(component, target.prefix, other):
-                self.problems.append(Problem(f"{name} is an {other}, expected an {causality}", where))
-                return {}
+                return f"{target.component}.{target.prefix} is an {other}, expected an {causality}"
         valid = (v.name for v in component.variables if v.causality == causality)
-        hint = did_you_mean(target.prefix, valid)
-        self.problems.append(Problem(f'component "{target.component}" has no {causality} "{target.prefix}"{hint}', where))
-        return {}
+        return f'component "{target.component}" has no {causality} "{target.prefix}"{did_you_mean(target.prefix, valid)}'

@@ -190,7 +190,7 @@ def test_hover_thrust_carries_the_weight() -> None:
     trial = Trial({"uav": quadcopter([0.0, 0.0, 5.0])})
     trial["uav.rotor_speed"] = [reference.HOVER_SPEED] * 4
     trial.step()
-    assert abs(trial["uav.velocity.z"]) < 1e-12
+    assert abs(trial["uav.velocity.z"]) < 1e-10  # m/s, of 0.1 m/s in free fall
     assert reference.HOVER_SPEED / reference.MAX_ROTOR_SPEED == pytest.approx(0.6588, abs=1e-4)  # 65.88 % on the fact sheet
 
 

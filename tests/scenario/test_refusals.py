@@ -70,7 +70,7 @@ def test_everything_that_is_wrong_is_said_at_once(folder):
         ({"algorithm": {"kind": "magic", "stages": [["a"]]}}, "$.algorithm.kind: expected 'staged'"),
         ({"connections": [wire("a.y", "a.u", delay=-1)]}, "$.connections[0].delay: expected greater than or equal to 0"),
         ({"connections": [wire("a.y", "a.u", delay=1.5)]}, "$.connections[0].delay: expected a valid integer"),
-        ({"connections": [wire("a.y", "a")]}, '$.connections[0].to: "a" names a component, expected a variable'),
+        ({"connections": [wire("a.y", "a")]}, "$.connections[0]: input a.u has no matching output a.y.u"),
         ({"connections": [wire("a.u", "a.u")]}, "$.connections[0].from: a.u is an input, expected an output"),
         ({"connections": [wire("a.y", "a.y")]}, "$.connections[0].to: a.y is an output, expected an input"),
         ({"connections": [wire("a.yy", "a.u")]}, 'component "a" has no output "yy"; did you mean "y"?'),

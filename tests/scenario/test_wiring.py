@@ -3,6 +3,20 @@
 import cosim
 from helpers import wire
 
+WHOLE_PLANT = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+
+class Whole(Fmi2Slave):
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        self.x = 0.0
+        self.register_variable(Real("position.x", causality=Fmi2Causality.output, getter=lambda: self.x), nested=False)
+
+    def do_step(self, current_time, step_size):
+        return True
+"""
+
 PAIR = [wire("plant.ship", "pilot.vehicle"), wire("pilot.motor", "plant.ship.motor")]
 
 
@@ -48,6 +62,28 @@ def test_an_input_below_a_prefix_without_output_may_be_set_by_a_parameter(folder
     plant = folder.block("Plant", parameters={"ship.motor[2]": 5.0})
     file = folder.scenario({"gain": folder.block("Gain"), "plant": plant}, [wire("gain.y", "plant.ship.motor[1]")])
     assert columns(file)["plant.ship.position.y"] == [1, 6, 11, 16]
+
+
+def test_a_component_alone_is_a_prefix_too(folder):
+    folder.write({"components": {"head": folder.block("Controller")}, "ports": {"inputs": {"vehicle": "head.vehicle"}}}, "n.json")
+    (folder.path / "plant.py").write_text(WHOLE_PLANT)
+    components = {"plant": {"python": "plant.py:Whole"}, "pilot": {"system": "n.json"}}
+    assembly = cosim.load(folder.scenario(components, [wire("plant", "pilot.vehicle")]))
+    assembly.free()
+    assert [f"{c.source} > {c.target}" for c in assembly.system.connections] == [
+        "plant.position.x > pilot.head.vehicle.position.x"
+    ]
+
+
+def test_a_port_may_mean_variables_that_only_some_of_its_readers_have(folder):
+    components = {"head": folder.block("Controller"), "tail": folder.block("Controller")}
+    folder.write({"components": components, "ports": {"inputs": {"vehicle": ["head.vehicle", "tail.gains"]}}}, "n.json")
+    file = folder.scenario(
+        {"plant": folder.block("Plant"), "pilot": {"system": "n.json"}}, [wire("plant.ship.position.x", "pilot.vehicle.position.x")]
+    )
+    assembly = cosim.load(file)
+    assembly.free()
+    assert [str(c.target) for c in assembly.system.connections] == ["pilot.head.vehicle.position.x"]
 
 
 def nested(folder):

@@ -53,7 +53,7 @@ def matrix_product(left: np.ndarray, right: np.ndarray) -> Any:
 
 
 def _sum(values: Any) -> Any:
-    return reduce(lambda a, b: checked(a + b), map(_plain, np.asarray(values).flat)) if np.size(values) else 0
+    return reduce(lambda a, b: checked(a + b), map(plain, np.asarray(values).flat)) if np.size(values) else 0
 
 
 def divide(a: float, b: float) -> float:

@@ -22,6 +22,8 @@ from .reader import Reader
 _FMI_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 _DEFAULT_STEP = 0.01
 
+Role = tuple[Causality, Variability]
+
 
 def load(path: Path, model: str | None = None) -> Block:
     """The Modelica model `model` (default: named as the file) of a file as C code with described variables.
@@ -68,10 +70,10 @@ def _root(files: Sequence[Path]) -> Path:
 def _variables(defaults: Interpreter) -> list[BlockVariable]:
     names = members(defaults.model)
     shown = ((v, _role(v, defaults)) for v in defaults.model.variables.values())
-    return [_described(v, names[v.name], *role, defaults) for v, role in shown if role]
+    return [_described(v, names[v.name], role, defaults) for v, role in shown if role]
 
 
-def _role(variable: Variable, defaults: Interpreter) -> tuple[Causality, Variability] | None:
+def _role(variable: Variable, defaults: Interpreter) -> Role | None:
     """Causality and variability of a variable that the FMU shows; inner ones and what has another owner stay hidden."""
     roles = defaults.roles
     if variable.name in roles.settable:
@@ -86,15 +88,13 @@ def _role(variable: Variable, defaults: Interpreter) -> tuple[Causality, Variabi
     return None
 
 
-def _described(
-    variable: Variable, member: str, causality: Causality, variability: Variability, defaults: Interpreter
-) -> BlockVariable:
+def _described(variable: Variable, member: str, role: Role, defaults: Interpreter) -> BlockVariable:
     return BlockVariable(
         name=variable.name,
         member=member,
         type=_FMI_TYPES[variable.type],
-        causality=causality,
-        variability=variability,
+        causality=role[0],
+        variability=role[1],
         start=_plain(defaults.get(variable.name)),
         unit=variable.unit,
         shape=variable.shape,

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import re
-import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from typing import Any
@@ -16,13 +14,13 @@ from .flat import Body, Name, Place, Statement, Variable, base_name
 from .functions import Functions
 from .header import Header, member, members, remembered_inputs
 from .interpret import Interpreter
+from .layout import definition, mentions
 from .matching import is_input
 from .sort import finite, memory, start_value
 from .statements import Statements
 from .values import C_TYPES, Text, Value, number, scalar
 from .visit import targets
 
-_WIDTH = 118
 #: in the order of the enum in runtime.h, from 1
 _STANDARD_REASONS = ("Integer overflow", "division by zero in div(), mod() or rem()", "the period of sample() must be positive")
 
@@ -50,20 +48,24 @@ class _Emitter:
     def source(self) -> str:
         event = self._event()
         wanted = {"m": "Model *m"} | {
-            k: v for k, v in (("time", "double time"), ("due", "const bool *due")) if _mentions(k, event)
+            k: v for k, v in (("time", "double time"), ("due", "const bool *due")) if mentions(k, event)
         }
         call = f"event({', '.join(wanted).replace('time', 'now')});"
         definitions = [
-            _function("static void start_variables(Model *m)", self._start_variables()),
-            _function("void model_parameters(Model *m)", self._parameters()),
-            _function("void model_start(Model *m)", self._start()),
-            _function(f"static void event({', '.join(wanted.values())})", event),
-            _function("const char *model_initialize(Model *m, double time)", self._initialize()),
-            _function("const char *model_step(Model *m, double time, double step_size)", self._step(call)),
+            definition("static void start_variables(Model *m)", self._start_variables()),
+            definition("void model_parameters(Model *m)", self._parameters()),
+            definition("void model_start(Model *m)", self._start()),
+            definition(f"static void event({', '.join(wanted.values())})", event),
+            definition("const char *model_initialize(Model *m, double time)", self._initialize()),
+            definition("const char *model_step(Model *m, double time, double step_size)", self._step(call)),
         ]
-        reasons = ",\n".join(["    NULL", *(f"    {json.dumps(reason, ensure_ascii=False)}" for reason in self.reasons)])
-        table = f"/* Why a step can fail: m->failure is a place in this list. */\nstatic const char *const REASONS[] = {{\n{reasons},\n}};"
-        return "\n\n".join(['#include "model.h"\n#include "runtime.h"', table, *self.functions.texts, *definitions]) + "\n"
+        includes = '#include "model.h"\n#include "runtime.h"'
+        return "\n\n".join([includes, self._reasons(), *self.functions.texts, *definitions]) + "\n"
+
+    def _reasons(self) -> str:
+        texts = ",\n    ".join(["NULL", *(json.dumps(reason, ensure_ascii=False) for reason in self.reasons)])
+        comment = "/* Why a step can fail: m->failure is a place in this list. */"
+        return f"{comment}\nstatic const char *const REASONS[] = {{\n    {texts},\n}};"
 
     def _failure(self, reason: str, where: Place | None) -> str:
         text = f"{reason} ({where.short})" if where else reason
@@ -153,7 +155,7 @@ class _Emitter:
             start, period = lowering.scalar_of(clock.start).code, lowering.scalar_of(clock.period).code
             lowering.out.append(f"set_clock(m, &m->clock[{k}], {start}, {period}, time);")
         lines = [*lowering.out, *self._body(self.plan.initialization, initial=True), *self._keep_inputs()]
-        unused = [] if _mentions("time", lines) else ["(void)time;"]
+        unused = [] if mentions("time", lines) else ["(void)time;"]
         return [*unused, "m->failure = 0;", "start_variables(m);", *lines, "return REASONS[m->failure];"]
 
     def _step(self, event: str) -> list[str]:
@@ -177,19 +179,6 @@ class _Emitter:
             f"for (int k = 0; k < {count}; k++) m->clock[k].ticks += due[k];",
         ]
         return ["m->failure = 0;", "for (;;) {", *("    " + line for line in loop), "}", "return REASONS[m->failure];"]
-
-
-def _function(head: str, body: Sequence[str]) -> str:
-    return "\n".join([head, "{", *(wrapped for line in body for wrapped in _wrapped("    " + line if line else "")), "}"])
-
-
-def _wrapped(line: str) -> list[str]:
-    indent = " " * (len(line) - len(line.lstrip()) + 4)
-    return textwrap.wrap(line, _WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False) or [""]
-
-
-def _mentions(name: str, lines: Iterable[str]) -> bool:
-    return any(re.search(rf"(?<![\w>.]){name}\b", line) for line in lines)
 
 
 def _owner(statement: Statement) -> str:

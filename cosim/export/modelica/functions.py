@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from . import flat
 from .flat import Function, Local, Place, base_name, refuse
+from .layout import mentions, wrapped
 from .lowering import Instance
 from .statements import Statements
 from .values import C_TYPES, Value, identifier, stored
@@ -48,7 +48,7 @@ class Functions:
         inner = [self._declare(lowering, local, None, where) for local in function.locals]
         self._start(lowering, (*function.outputs, *function.locals))
         lowering.body(function.body)
-        instance = Instance(self._name(function.name), tuple(inputs), tuple(outputs), _uses("m", lowering.out))
+        instance = Instance(self._name(function.name), tuple(inputs), tuple(outputs), mentions("m", lowering.out))
         self.texts.append(_text(function, instance, inner, lowering.out))
         return instance
 
@@ -57,9 +57,8 @@ class Functions:
         if local.type not in C_TYPES:
             refuse(f"{local.name}: the type {local.type} is not supported", local.where)
         declared = [None if d is None else lowering.static_integer(d) for d in local.dimensions]
-        if any(n is None and d is not None for n, d in zip(declared, local.dimensions, strict=True)) or (
-            shape is None and None in declared
-        ):
+        unknown = [d for d, n in zip(local.dimensions, declared, strict=True) if n is None and (shape is None or d is not None)]
+        if unknown:
             refuse(f"the size of {local.name} must be constant, or the size() of an input", local.where)
         actual = tuple(declared) if shape is None else shape
         if len(actual) != len(declared) or any(n not in (None, k) for n, k in zip(declared, actual, strict=True)):
@@ -79,39 +78,41 @@ class Functions:
         return next(n for n in (plain, *(f"{plain}_{k}" for k in range(2, len(taken) + 3))) if n not in taken)
 
 
-def _uses(name: str, lines: list[str]) -> bool:
-    return any(re.search(rf"\b{re.escape(name)}\b", line) for line in lines)
-
-
 def _text(function: Function, instance: Instance, inner: list[Value], body: list[str]) -> str:
     """The whole C function; results that do not fit into a return value go through pointers."""
-    parameters = ["Model *m"] * instance.takes_model
-    parameters += [_parameter(value, "const ") for value in instance.inputs]
-    head, start, end = "void", [], []
-    if instance.returns:
-        head = C_TYPES[instance.outputs[0].type]
-        start = [_declaration(instance.outputs[0])]
-        end = [f"return {instance.outputs[0].text.code};"]
-    else:
-        for output in instance.outputs:
-            parameters.append(_parameter(output, "") if output.shape else f"{C_TYPES[output.type]} *{output.text.code}_result")
-            start.append(
-                f"memset({output.pointer}, 0, {output.size} * sizeof *{output.pointer});"
-                if output.shape
-                else _declaration(output)
-            )
-        end = [f"*{output.text.code}_result = {output.text.code};" for output in instance.outputs if not output.shape]
-    start += [_declaration(value) for value in inner if _uses(_code(value), body)]
-    unread = [f"(void){_code(value)};" for value in instance.inputs if not _uses(_code(value), body)]
+    inputs = [_parameter(value, "const ") for value in instance.inputs]
+    results = [] if instance.returns else [_result(value) for value in instance.outputs]
+    parameters = ", ".join([*["Model *m"] * instance.takes_model, *inputs, *results]) or "void"
+    lines = [*_start(function, instance, inner, body), *body, *_end(instance)]
+    return "\n".join(
+        [
+            f"/* {function.name} ({function.where.short if function.where else 'no source'}) */",
+            f"static {C_TYPES[instance.outputs[0].type] if instance.returns else 'void'} {instance.name}({parameters})",
+            "{",
+            *wrapped(lines),
+            "}",
+        ]
+    )
+
+
+def _start(function: Function, instance: Instance, inner: list[Value], body: list[str]) -> list[str]:
+    """Declarations, and a (void) for what C would call unused."""
+    lines = [_declaration(output) if instance.returns or not output.shape else _cleared(output) for output in instance.outputs]
+    used = [(value, local.name) for value, local in zip(inner, function.locals, strict=True) if mentions(_code(value), body)]
+    lines += [_declaration(value) for value, _ in used]
     read = {base_name(reference) for reference in reads(function.body)}
-    unread += [
-        f"(void){_code(v)};"
-        for v, local in zip(inner, function.locals, strict=True)
-        if local.name not in read and _uses(_code(v), body)
-    ]
-    lines = ["    " + line for line in (*start, *unread, *body, *end)]
-    comment = f"/* {function.name} ({function.where.short if function.where else 'no source'}) */"
-    return "\n".join([comment, f"static {head} {instance.name}({', '.join(parameters) or 'void'})", "{", *lines, "}"])
+    unread = [value for value in instance.inputs if not mentions(_code(value), body)]
+    return [*lines, *(f"(void){_code(value)};" for value in (*unread, *(value for value, name in used if name not in read)))]
+
+
+def _end(instance: Instance) -> list[str]:
+    if instance.returns:
+        return [f"return {instance.outputs[0].text.code};"]
+    return [f"*{output.text.code}_result = {output.text.code};" for output in instance.outputs if not output.shape]
+
+
+def _result(value: Value) -> str:
+    return _parameter(value, "") if value.shape else f"{C_TYPES[value.type]} *{value.text.code}_result"
 
 
 def _code(value: Value) -> str:
@@ -121,6 +122,10 @@ def _code(value: Value) -> str:
 def _parameter(value: Value, qualifier: str) -> str:
     size = f"[{value.size}]" if value.shape else ""
     return f"{qualifier if value.shape else ''}{C_TYPES[value.type]} {_code(value)}{size}"
+
+
+def _cleared(value: Value) -> str:
+    return f"memset({value.pointer}, 0, {value.size} * sizeof *{value.pointer});"
 
 
 def _declaration(value: Value) -> str:

@@ -64,10 +64,8 @@ def _closure(name: str, needs: dict[str, list[str]]) -> Iterator[str]:
 def _check_structure(model: Model, needs: dict[str, list[str]], settable: Sequence[str]) -> None:
     for structural in model.structural:
         used = [name for name in structural.parameters if name in model.variables]
-        for name in dict.fromkeys(base for name in used for base in _closure(name, needs)):
-            if name in settable:
+        for owner in dict.fromkeys(base for name in used for base in _closure(name, needs)):
+            if owner in settable:
                 purpose = _PURPOSES.get(structural.purpose, f"it decides the structure ({structural.purpose})")
-                refuse(
-                    f"the parameter {name} cannot be settable: {purpose}; declare it final or constant",
-                    model.variables[name].where,
-                )
+                where = model.variables[owner].where
+                refuse(f"the parameter {owner} cannot be settable: {purpose}; declare it final or constant", where)

@@ -22,6 +22,7 @@ from .flat import (
     Name,
     Place,
     Statement,
+    Watch,
     When,
     base_name,
     refuse,

@@ -1,0 +1,161 @@
+"""What happens when vehicles touch each other or a platform."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import plant_reference as reference
+import pytest
+from worlds import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, Trial, quadcopter, vessel
+
+WEIGHT = reference.QUADCOPTER_MASS * reference.GRAVITY
+
+
+def rotor_speed(share: float) -> list[float]:
+    """Rotor speeds whose thrust is this share of the weight."""
+    return [reference.HOVER_SPEED * math.sqrt(share)] * 4
+
+
+def on_deck(height: float = 0.001, **more: object) -> Trial:
+    """A quadcopter above the middle of the deck of a vessel in the origin."""
+    uav = quadcopter([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + height], **more)
+    return Trial({"uav": uav, "usv": vessel([0.0, 0.0])})
+
+
+@pytest.fixture(scope="module")
+def parked() -> Trial:
+    """A quadcopter with its motors off, at rest on the deck for 2 s."""
+    return on_deck().step(200)
+
+
+def test_at_rest_the_contact_force_is_the_weight(parked: Trial) -> None:
+    assert parked["uav.contact.force"] == pytest.approx(WEIGHT, rel=1e-3)
+    assert parked["usv.contact.force"] == parked["uav.contact.force"]
+
+
+def test_thrust_reduces_the_contact_force() -> None:
+    trial = on_deck()
+    trial["uav.rotor_speed"] = rotor_speed(0.3)
+    trial.step(200)
+    assert trial["uav.contact.force"] == pytest.approx(0.7 * WEIGHT, rel=1e-3)
+
+
+def test_at_rest_the_height_is_that_of_the_feet(parked: Trial) -> None:
+    assert parked["uav.position.z"] == pytest.approx(DECK_TOP + REST_HEIGHT, abs=1e-4)
+
+
+def test_at_rest_velocities_read_zero(parked: Trial) -> None:
+    """The velocity at the end of a free step would be 0.05 m/s: what gravity does in half of it."""
+    assert np.abs(parked.vector("uav.velocity")).max() < 1e-5
+    assert np.abs(parked.vector("uav.rates", "pqr")).max() < 1e-4
+
+
+def test_touching_a_vessel_is_told_from_touching_a_platform(parked: Trial) -> None:
+    on_platform = Trial({"uav": quadcopter([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT])}, {"start": PLATFORM}).step(20)
+    assert (parked["uav.contact.touching"], parked["uav.contact.vessel"]) == (True, True)
+    assert (on_platform["uav.contact.touching"], on_platform["uav.contact.vessel"]) == (True, False)
+    assert (parked["usv.contact.touching"], parked["usv.contact.vessel"]) == (True, False)
+
+
+def test_in_flight_nothing_touches() -> None:
+    trial = on_deck(height=0.3).step(10)
+    assert [trial[f"uav.contact.{name}"] for name in ("force", "touching", "vessel")] == [0.0, False, False]
+
+
+def test_touchdown_stops_the_fall_within_a_step() -> None:
+    """Boxes touch when they overlap, so the impulse comes in the step after the one in which the feet arrive."""
+    height, trial = 0.05, on_deck(height=0.05)
+    while not trial["uav.contact.touching"]:
+        trial.step()
+    arrival = math.sqrt(2 * height / reference.GRAVITY)
+    assert arrival < trial.steps * 0.01 < arrival + 0.02
+    fall = reference.GRAVITY * (trial.steps - 1) * 0.01
+    assert trial["uav.contact.force"] * 0.01 == pytest.approx(reference.QUADCOPTER_MASS * fall, rel=0.15)
+    assert abs(trial["uav.velocity.z"]) < 0.1 * fall
+
+
+def test_contact_force_is_the_mean_over_a_long_step() -> None:
+    trial = on_deck().step(100)
+    trial.step(1, step_size=0.1)
+    assert trial["uav.contact.force"] == pytest.approx(WEIGHT, rel=1e-3)
+
+
+def test_contact_conserves_momentum() -> None:
+    """A quadcopter slides onto a vessel at rest; in a few steps the air has hardly begun to act."""
+    trial = on_deck(velocity_body=[1.0, 0.0, 0.0])
+    trial["uav.rotor_speed"] = rotor_speed(0.3)
+    trial.step(6)
+    momentum = reference.QUADCOPTER_MASS * trial["uav.velocity.x"] + reference.VESSEL_MASS * trial["usv.velocity.x"]
+    assert trial["usv.velocity.x"] > 0.02
+    assert momentum == pytest.approx(reference.QUADCOPTER_MASS * 1.0, rel=1e-5)
+
+
+def test_friction_drags_the_vessel_along() -> None:
+    """Both end at the common velocity of an inelastic impact, but for the drag of air, which is small."""
+    trial = on_deck(velocity_body=[1.0, 0.0, 0.0]).step(60)
+    common = reference.QUADCOPTER_MASS / (reference.QUADCOPTER_MASS + reference.VESSEL_MASS)
+    assert trial["uav.velocity.x"] == pytest.approx(trial["usv.velocity.x"], abs=1e-4)
+    assert trial["usv.velocity.x"] == pytest.approx(common, rel=0.02)
+
+
+def test_the_deck_carries_the_quadcopter_along() -> None:
+    start = {"velocity_body": [0.5, 0.0, 0.0]}
+    uav = quadcopter([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.001], **start)
+    trial = Trial({"uav": uav, "usv": vessel([0.0, 0.0], **start, rates=[0.0, 0.0, 0.1])})
+    trial["usv.thrust"], trial["usv.rudder_angle"] = 0.5, 0.1
+    places = [place_on_deck(trial.step(100)) for _ in range(5)]
+    assert np.linalg.norm(trial.vector("usv.position")) > 2.0
+    assert np.linalg.norm(places[-1] - places[0]) < 1e-3
+    assert trial.vector("uav.velocity") == pytest.approx(trial.vector("usv.deck.velocity"), abs=0.01)
+
+
+def place_on_deck(trial: Trial) -> np.ndarray:
+    """Horizontal position of the quadcopter in the frame of the deck."""
+    x, y, _ = trial.vector("uav.position") - trial.vector("usv.deck.position")
+    yaw = trial["usv.attitude.yaw"]
+    return np.array([x * math.cos(yaw) + y * math.sin(yaw), -x * math.sin(yaw) + y * math.cos(yaw)])
+
+
+def test_take_off_from_the_deck() -> None:
+    trial = on_deck().step(100)
+    start = trial["uav.position.z"]
+    for k in range(30):  # the motors need 0.3 s to spin up
+        trial["uav.rotor_speed"] = rotor_speed(1.1 * (k + 1) / 30)
+        trial.step()
+    ramp_share = [max(0.0, 1.1 * (k + 1) / 30 - 1) for k in range(30)]
+    trial.step(100)
+    speed = height = 0.0
+    for share in (*ramp_share, *[0.1] * 100):
+        height, speed = height + speed * 0.01 + share * reference.GRAVITY * 0.01**2 / 2, speed + share * reference.GRAVITY * 0.01
+    assert not trial["uav.contact.touching"]
+    assert trial["uav.position.z"] - start == pytest.approx(height, abs=0.01)
+
+
+def test_two_pairs_do_not_notice_each_other() -> None:
+    """A distant second pair changes nothing, not even the last bit."""
+    pair = {"uav": quadcopter([0.0, 0.0, 0.4]), "usv": vessel([0.0, 0.0])}
+    distant = {"uav2": quadcopter([50.0, 0.0, 0.5]), "usv2": vessel([50.0, 0.0])}
+    alone, together = Trial(pair).step(100), Trial(pair | distant).step(100)
+    names = [variable.name for variable in alone.world.variables]
+    assert [together[name] for name in names] == [alone[name] for name in names]
+    assert together["uav2.contact.vessel"]
+
+
+def test_vessels_push_each_other() -> None:
+    trial = Trial({"a": vessel([0.0, 0.0], velocity_body=[1.0, 0.0, 0.0]), "b": vessel([1.2, 0.0])})
+    while not trial["b.contact.touching"]:
+        trial.step()
+    assert trial["a.contact.vessel"] and trial["b.contact.vessel"]
+    assert trial["b.velocity.x"] > 0.1
+    assert trial["a.velocity.x"] + trial["b.velocity.x"] == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_vessel_stops_at_a_platform() -> None:
+    wall = {"size": [0.1, 4.0, 1.0], "position": [1.0, 0.0, 0.0]}
+    trial = Trial({"usv": vessel([0.0, 0.0])}, {"wall": wall})
+    trial["usv.thrust"] = 2.0
+    trial.step(400)
+    assert trial["usv.position.x"] == pytest.approx(0.95 - 0.4895, abs=2e-3)
+    assert trial["usv.contact.force"] == pytest.approx(2.0, rel=1e-3)
+    assert abs(trial["usv.velocity.x"]) < 1e-6

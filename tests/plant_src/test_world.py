@@ -1,0 +1,173 @@
+"""The world as a component: its arguments, its variables and its failures."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pybullet
+import pytest
+from worlds import PLATFORM, Trial, quadcopter, vessel
+
+from cosim.errors import ComponentError, InputError
+from plant_src.world import World
+
+UAV = quadcopter([0.0, 0.0, 2.0])
+
+
+def refused(**arguments: Any) -> InputError:
+    with pytest.raises(InputError) as caught:
+        World("plant", **{"vehicles": {"uav": UAV}, **arguments})
+    return caught.value
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        ({**UAV, "model": "ar_dron"}, r'vehicles.uav.model: unknown vehicle model "ar_dron"; did you mean "ar_drone"\?'),
+        ({**UAV, "model": 7}, "vehicles.uav.model: found 7, expected the name of a vehicle model: ar_drone, strider"),
+        ({"position": [0.0, 0.0, 2.0]}, 'vehicles.uav: "model" is missing'),
+        ({"model": "ar_drone"}, 'vehicles.uav: "position" is missing'),
+        ({**UAV, "yow": 1.0}, r'vehicles.uav.yow: unknown key "yow"; did you mean "yaw"\?'),
+        (quadcopter([0.0, 0.0]), r"vehicles.uav.position: found \[0.0, 0.0\], expected a list of 3 numbers \[x, y, z\]"),
+        (vessel([0.0, 0.0, 0.1]), r"vehicles.uav.position: found .* expected a list of 2 numbers \[x, y\]"),
+        (quadcopter([0.0, math.nan, 2.0]), "vehicles.uav.position: found nan, expected a finite number"),
+        ({**UAV, "yaw": "north"}, "vehicles.uav.yaw: found 'north', expected a finite number"),
+        ({**UAV, "yaw": True}, "vehicles.uav.yaw: found True, expected a finite number"),
+        ({**UAV, "rates": [0.0, 1.0]}, r"vehicles.uav.rates: .* expected a list of 3 numbers \[p, q, r\]"),
+        (
+            vessel([0.0, 0.0], velocity_body=[1.0, 0.0, 0.5]),
+            "vehicles.uav.velocity_body: found velocity_body.w = 0.5; a strider does not move that way",
+        ),
+        ("ar_drone", r"vehicles.uav: found 'ar_drone', expected an object \{...\}"),
+    ],
+)
+def test_a_faulty_vehicle_is_refused(spec: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        World("plant", {"uav": spec})
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        ({**PLATFORM, "size": [1.0, -1.0, 1.0]}, r"platforms.start.size: found \[1.0, -1.0, 1.0\], expected edges greater than 0"),
+        ({"size": [1.0, 1.0, 1.0]}, 'platforms.start: "position" is missing'),
+        ({**PLATFORM, "colour": "red"}, 'platforms.start.colour: unknown key "colour"; valid: size, position'),
+    ],
+)
+def test_a_faulty_platform_is_refused(spec: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        World("plant", {"uav": UAV}, {"start": spec})
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, True, "one"])
+def test_a_seed_is_an_integer(seed: Any) -> None:
+    with pytest.raises(InputError, match="environment.seed: found .* expected an integer of at least 0"):
+        World("plant", {"uav": UAV}, {}, {"seed": seed})
+
+
+def test_a_world_needs_a_vehicle() -> None:
+    assert "vehicles: found no vehicle, expected at least one" in str(refused(vehicles={}))
+
+
+def test_names_of_vehicles_can_be_parts_of_variable_names() -> None:
+    assert 'found the name "my.uav"' in str(refused(vehicles={"my.uav": UAV}))
+
+
+def test_all_problems_are_reported_together_with_their_paths() -> None:
+    error = refused(
+        vehicles={"uav": {**UAV, "model": "helicopter"}, "usv": vessel([0.0])},
+        platforms={"start": {**PLATFORM, "size": [0.0, 1.0, 1.0]}},
+        environment={"wind": 3.0},
+    )
+    assert [problem.subject for problem in error.problems] == [
+        ("arguments", "vehicles", "uav", "model"),
+        ("arguments", "vehicles", "usv", "position"),
+        ("arguments", "platforms", "start", "size"),
+        ("arguments", "environment", "wind"),
+    ]
+
+
+def test_vehicles_may_not_start_inside_each_other() -> None:
+    error = refused(vehicles={"uav": quadcopter([0.0, 0.0, 0.27]), "usv": vessel([0.0, 0.0])})
+    assert "overlap" in str(error)
+    assert "vehicles.uav" in str(error) and "vehicles.usv" in str(error)
+
+
+def test_a_refused_world_leaves_no_client_behind() -> None:
+    clients = [pybullet.isConnected(k) for k in range(20)]
+    refused(vehicles={"a": vessel([0.0, 0.0]), "b": vessel([0.1, 0.0])})
+    assert [pybullet.isConnected(k) for k in range(20)] == clients
+
+
+def test_a_freed_world_leaves_no_client_behind() -> None:
+    clients = [pybullet.isConnected(k) for k in range(20)]
+    World("plant", {"uav": UAV}).free()
+    assert [pybullet.isConnected(k) for k in range(20)] == clients
+
+
+def test_initial_outputs_are_the_arguments() -> None:
+    start = {"position": [1.0, 2.0, 3.0], "yaw": math.pi / 2, "velocity_body": [1.0, 0.0, 0.5], "rates": [0.1, 0.2, 0.3]}
+    trial = Trial({"uav": {"model": "ar_drone", **start}})
+    assert trial.vector("uav.position") == pytest.approx([1.0, 2.0, 3.0])
+    assert trial.vector("uav.attitude", ("roll", "pitch", "yaw")) == pytest.approx([0.0, 0.0, math.pi / 2])
+    assert trial.vector("uav.velocity") == pytest.approx([0.0, 1.0, 0.5])
+    assert trial.vector("uav.velocity_body", "uvw") == pytest.approx([1.0, 0.0, 0.5])
+    assert trial.vector("uav.rates", "pqr") == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_the_deck_lies_where_the_fact_sheet_puts_it() -> None:
+    trial = Trial({"usv": vessel([1.0, 2.0], yaw=math.pi / 2, rates=[0.0, 0.0, 0.5])})
+    assert trial.vector("usv.deck.position") == pytest.approx([1.0 - 0.002, 2.0 - 0.0135, 0.2689])
+    assert trial.vector("usv.deck.velocity") == pytest.approx([0.5 * 0.0135, -0.5 * 0.002, 0.0])
+
+
+def test_signs_of_the_attitude() -> None:
+    """Positive roll lifts the left side, positive pitch lowers the nose, positive yaw is counter-clockwise from above."""
+    raised = {"left": [0.5, 1.0, 0.5, 0.9], "rear": [0.9, 1.0, 1.0, 1.0]}
+    for angle, speeds in (("roll", [1.0, 1.02, 1.0, 0.98]), ("pitch", [0.98, 1.0, 1.02, 1.0]), ("yaw", [1.02, 0.98, 1.02, 0.98])):
+        trial = Trial({"uav": UAV})
+        trial["uav.rotor_speed"] = [345.0 * factor for factor in speeds]
+        trial.step(5)
+        assert trial[f"uav.attitude.{angle}"] > 1e-4
+    assert raised
+
+
+def test_variables_follow_the_contract() -> None:
+    trial = Trial({"uav": UAV, "usv": vessel([0.0, 0.0])})
+    variables = {variable.name: variable for variable in trial.world.variables}
+    assert variables["uav.rotor_speed"].shape == (4,)
+    assert variables["uav.rotor_speed"].slots[0] == "uav.rotor_speed[1]"
+    assert variables["usv.deck.velocity.z"].unit.name == "m/s"
+    assert variables["usv.contact.touching"].type == "Boolean"
+    assert {v.causality for v in variables.values()} == {"input", "output"}
+    assert "uav.deck.position.x" not in variables
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("uav.rotor_speed", [1.0, math.nan, 1.0, 1.0], r"plant: do_step failed at t = 0.03 s: uav.rotor_speed\[2\] is nan"),
+        ("usv.rudder_angle", math.inf, "usv.rudder_angle is inf, expected a finite number"),
+        ("uav.external_force.z", 1e200, r"uav.position.z became inf|uav.velocity.z became 2.2\d*e\+198, expected less than 100000"),
+    ],
+)
+def test_a_vehicle_that_cannot_go_on_is_named(name: str, value: Any, message: str) -> None:
+    trial = Trial({"uav": UAV, "usv": vessel([0.0, 0.0])}).step(3)
+    trial[name] = value
+    with pytest.raises(ComponentError, match=message):
+        trial.step()
+
+
+def test_a_step_size_is_positive() -> None:
+    trial = Trial({"uav": UAV})
+    with pytest.raises(ComponentError, match="found step size 0.0, expected a positive number"):
+        trial.step(1, 0.0)
+
+
+def test_unknown_variables_are_refused_with_the_nearest_name() -> None:
+    trial = Trial({"uav": UAV})
+    with pytest.raises(ComponentError, match=r'no variable "uav.rotor_sped"; did you mean "uav.rotor_speed"\?'):
+        trial["uav.rotor_sped"] = [0.0] * 4
+    with pytest.raises(ComponentError, match="uav.position.x is an output"):
+        trial["uav.position.x"] = 0.0

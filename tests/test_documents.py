@@ -1,0 +1,71 @@
+"""README and docs are true: their commands run, their tables name what exists."""
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def blocks(language):
+    for document in DOCUMENTS:
+        for text in re.findall(rf"```{language}\n(.*?)```", document.read_text(), re.DOTALL):
+            yield pytest.param(text, id=f"{document.name}: {text.splitlines()[0][:40]}")
+
+
+def commands():
+    """Every `cosim ...` command line of the documents."""
+    for block in blocks("sh"):
+        for line in re.split(r"\n|&&", block.values[0]):
+            if line.strip().startswith("cosim ") and "build" not in line:
+                yield pytest.param(line.strip(), id=line.strip())
+
+
+@pytest.mark.parametrize("command", commands())
+def test_commands_run(command, tmp_path):
+    words = [str(ROOT / word) if (ROOT / word).exists() else word for word in shlex.split(command)[1:]]
+    done = subprocess.run([sys.executable, "-m", "cosim", *words], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("code", blocks("python"))
+def test_python_examples_run(code, tmp_path):
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("text", blocks("json"))
+def test_json_examples_are_parts_of_scenarios(text):
+    components = json.loads("{" + text + "}")
+    shipped = json.loads((ROOT / "scenarios/demo1_box.json").read_text())["components"]
+    for name, component in components.items():
+        assert component["fmu"] == shipped[name]["fmu"]
+
+
+def test_the_readme_shows_what_a_run_prints(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "cosim", "run", "demo1_box", "--no-report"], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    (shown,) = re.findall(r"```text\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    printed = {" ".join(line.split()) for line in done.stdout.splitlines()}
+    missing = [line for line in shown.splitlines() if "─" not in line and " ".join(line.split()) not in printed]
+    assert not missing
+
+
+def test_links_lead_somewhere():
+    for document in DOCUMENTS:
+        for target in re.findall(r"\]\(([^)#]+)\)", document.read_text()):
+            assert target.startswith("https://") or (document.parent / target).exists(), f"{document.name}: {target}"
+
+
+def test_the_readme_lists_every_command():
+    from cosim.cli import COMMANDS
+
+    text = (ROOT / "README.md").read_text()
+    assert re.findall(r"^\| `cosim (\w+)", text, re.MULTILINE) == list(COMMANDS)
