@@ -14,13 +14,15 @@ Values travel in typed arrays ("ports") that the engine owns: on the hot path no
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
+from .errors import ComponentError
 from .units import Unit
 
 Causality = Literal["parameter", "calculatedParameter", "structuralParameter", "input", "output", "local", "independent"]
@@ -87,6 +89,14 @@ class StepResult(NamedTuple):
     terminate_requested: bool = False
 
 
+class Call(NamedTuple):
+    """A call made ready beforehand: a function that returns an FMI status (0 OK, 1 warning), and its arguments."""
+
+    function: Callable[..., int]
+    arguments: tuple[Any, ...]
+    name: str
+
+
 class Ports(NamedTuple):
     """Variables in order, and one contiguous array per dtype in which their values lie in that order."""
 
@@ -127,6 +137,17 @@ class Component(Protocol):
 
     def get_outputs(self) -> None:
         """Write the present values into the bound output arrays."""
+
+    def turn(self, clock: ctypes.c_double, step_size: float) -> Sequence[Call] | None:
+        """set_inputs, do_step and get_outputs as calls that need nothing but to be made, for a step from the time in `clock`.
+
+        None: the component offers no such calls. Asked for once, in step mode.
+        """
+        return None
+
+    def failed(self, name: str, status: int) -> StepResult:
+        """What a call of `turn` means that returned a status worse than a warning. Raises ComponentError for a failure."""
+        raise ComponentError(type(self).__name__, name, f"status {status}")
 
     def get_state(self) -> Any:
         """A snapshot that only this component can read."""

@@ -116,7 +116,7 @@ def _type(registered: ScalarVariable) -> str:
 
 
 def _variable(registered: ScalarVariable) -> Variable:
-    causality = registered.causality.name if registered.causality else "local"
+    causality: Any = registered.causality.name if registered.causality else "local"
     return Variable(
         registered.name,
         _type(registered),

@@ -65,8 +65,6 @@ def simulate(system: System, settings: Settings, observers: Sequence[Observer] =
             raise InputError(found)
         grid = Grid.of(settings.start_time, settings.stop_time, settings.step_size)
         plan = compile_plan(system, grid, settings.columns.values())
-        for name, component in system.components.items():
-            component.bind(*plan.ports[name])
         recorder = Recorder(plan, settings.columns, int((settings.record_interval or grid.step) / grid.step))
         executor = Executor(plan, recorder)
         events = {grid.index(event.time): [] for event in settings.events}  # type: dict[int, list[Event]]

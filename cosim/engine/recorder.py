@@ -22,13 +22,13 @@ class Recorder:
         capacity = plan.grid.count // every + 1
         names: dict[np.dtype[Any], list[str]] = defaultdict(list)
         for name, endpoint in columns.items():
-            names[plan.places[endpoint].dtype].append(name)
+            names[plan.signals.places[endpoint].dtype].append(name)
         self._names = dict(names)
         self._blocks = {dtype: np.empty((capacity, len(group)), dtype) for dtype, group in names.items()}
         self._takes = [
             (
-                plan.signals[dtype].take,
-                np.array([plan.places[columns[name]].offset for name in group], np.intp),
+                plan.signals.arrays[dtype].take,
+                np.array([plan.signals.places[columns[name]].offset for name in group], np.intp),
                 self._blocks[dtype],
             )
             for dtype, group in names.items()

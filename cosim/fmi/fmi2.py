@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..component import StepResult
+from ..component import Call, StepResult
 from ..errors import ComponentError
 from .instance import DISCARD, FmuInstance, pointer
 
@@ -19,11 +19,6 @@ class Fmi2Instance(FmuInstance):
 
     prefix = "fmi2"
     accessors = {"Float64": "Real", "Int32": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
-
-    def _prepare_step(self, do_step: Any) -> None:
-        self._do_step = do_step
-        self._time, self._step_size = ctypes.c_double(), ctypes.c_double()
-        self._step_arguments = (self._handle, self._time, self._step_size, ctypes.c_int(1))
 
     def _slave(self, **arguments: Any) -> Any:
         from fmpy.fmi2 import FMU2Slave
@@ -47,21 +42,18 @@ class Fmi2Instance(FmuInstance):
         return references, ctypes.c_size_t(count), pointer(values)
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
-        self._now = start_time
+        self._clock.value = start_time
         self.call("setupExperiment", None, start_time, stop_time)
         self.call("enterInitializationMode")
 
-    def do_step(self, time: float, step_size: float) -> StepResult | None:
-        self._time.value = self._now = time
-        self._step_size.value = step_size
-        status = self._do_step(*self._step_arguments)
-        return self._ended_early(status, time) if status > 1 else None
+    def _step_calls(self, step_size: ctypes.c_double) -> list[Call]:
+        return [Call(self._do_step, (self._handle, self._clock, step_size, ctypes.c_int(1)), "fmi2DoStep")]
 
-    def _ended_early(self, status: int, time: float) -> StepResult:
+    def failed(self, name: str, status: int) -> StepResult:
         """Discard with `terminated` ends the simulation; every other bad status is a failure (FMI 2.0 section 4.2.1)."""
-        if status == DISCARD and self.call("getBooleanStatus", _TERMINATED):
+        if name == "fmi2DoStep" and status == DISCARD and self.call("getBooleanStatus", _TERMINATED):
             return StepResult(self.call("getRealStatus", _LAST_SUCCESSFUL_TIME), terminate_requested=True)
-        self.fail("fmi2DoStep", status)
+        self.fail(name, status)
 
     def get_state(self) -> Any:
         return self.call("getFMUstate")

@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..component import DTYPES, StepResult
+from ..component import DTYPES, Call, StepResult
 from ..errors import ComponentError
-from .instance import FmuInstance, pointer
+from .instance import DISCARD, OK, FmuInstance, pointer
+
+_ENDED = "how fmi3DoStep ended"
 
 
 class Fmi3Instance(FmuInstance):
@@ -17,15 +19,6 @@ class Fmi3Instance(FmuInstance):
 
     prefix = "fmi3"
     accessors = {name: name for name in DTYPES} | {"Enumeration": "Int64"}
-
-    def _prepare_step(self, do_step: Any) -> None:
-        self._do_step = do_step
-        self._time, self._step_size = ctypes.c_double(), ctypes.c_double()
-        self._event, self._terminate, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
-        self._reached = ctypes.c_double()
-        flags = [ctypes.byref(flag) for flag in (self._event, self._terminate, self._early)]
-        held = (self._handle, self._time, self._step_size, ctypes.c_bool(True))
-        self._step_arguments = (*held, *flags, ctypes.byref(self._reached))
 
     def _slave(self, **arguments: Any) -> Any:
         from fmpy.fmi3 import FMU3Slave
@@ -43,18 +36,24 @@ class Fmi3Instance(FmuInstance):
         return references, ctypes.c_size_t(count), pointer(values), ctypes.c_size_t(len(values))
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
-        self._now = start_time
+        self._clock.value = start_time
         self.call("enterInitializationMode", None, start_time, stop_time)
 
-    def do_step(self, time: float, step_size: float) -> StepResult | None:
-        self._time.value = self._now = time
-        self._step_size.value = step_size
-        status = self._do_step(*self._step_arguments)
-        if status > 1:
-            self.fail("fmi3DoStep", status)
-        if self._terminate or self._early or self._event:
+    def _step_calls(self, step_size: ctypes.c_double) -> list[Call]:
+        self._event, self._terminate, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
+        self._reached = ctypes.c_double()
+        results = (self._event, self._terminate, self._early, self._reached)
+        arguments = (self._handle, self._clock, step_size, ctypes.c_bool(True), *map(_reference, results))
+        return [Call(self._do_step, arguments, "fmi3DoStep"), Call(self._ended, (), _ENDED)]
+
+    def _ended(self) -> int:
+        """Discard stands for a step that is to be looked at: it ended early, met an event or asks to terminate."""
+        return DISCARD if self._terminate or self._early or self._event else OK
+
+    def failed(self, name: str, status: int) -> StepResult:
+        if name == _ENDED:
             return StepResult(self._reached.value, self._event.value, self._terminate.value)
-        return None
+        self.fail(name, status)
 
     def get_state(self) -> Any:
         return self.call("getFMUState")
@@ -64,3 +63,7 @@ class Fmi3Instance(FmuInstance):
 
     def free_state(self, state: Any) -> None:
         self.call("freeFMUState", state)
+
+
+def _reference(result: Any) -> Any:
+    return ctypes.byref(result)

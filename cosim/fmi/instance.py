@@ -7,28 +7,20 @@ were made beforehand (FMPy's own methods cost 3 to 30 times as much).
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
 from .. import log
-from ..component import Component, Ports, StepResult, Variable
+from ..component import Call, Component, Ports, StepResult, Variable
 from ..errors import ComponentError, InputError
 from .file import FmuFile
 
 STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
-
-
-class Call(NamedTuple):
-    """A C function with its arguments made beforehand; it returns an FMI status."""
-
-    function: Callable[..., int]
-    arguments: tuple[Any, ...]
-    name: str
 
 
 def instantiate(file: FmuFile, instance_name: str, logging_on: bool = False) -> Component:
@@ -59,7 +51,7 @@ class FmuInstance(Component):
         self.has_state = self.description.has_state
         self._by_name = {variable.name: variable for variable in self.variables}
         self._message = ""
-        self._now = 0.0
+        self._clock = ctypes.c_double()
         self._dead = False
         self._logging_on = logging_on
         self._fmu: Any = None
@@ -76,7 +68,8 @@ class FmuInstance(Component):
     def _access_arguments(self, references: Any, count: int, values: np.ndarray) -> tuple[Any, ...]:
         raise NotImplementedError
 
-    def _prepare_step(self, do_step: Any) -> None:
+    def _step_calls(self, step_size: ctypes.c_double) -> list[Call]:
+        """doStep from the time in `self._clock`."""
         raise NotImplementedError
 
     # -- life cycle ----------------------------------------------------------------------------------------------------
@@ -94,9 +87,10 @@ class FmuInstance(Component):
         self._handle = ctypes.c_void_p(self._fmu.component)
         self._library = ctypes.PyDLL(None, handle=self._fmu.dll._handle)
         # doStep may take long: it is called without holding the interpreter lock
-        do_step = ctypes.CDLL(None, handle=self._fmu.dll._handle)[f"{self.prefix}DoStep"]
-        do_step.restype = ctypes.c_int
-        self._prepare_step(do_step)
+        self._do_step = ctypes.CDLL(None, handle=self._fmu.dll._handle)[f"{self.prefix}DoStep"]
+        self._do_step.restype = ctypes.c_int
+        self._clock, self._step_size = ctypes.c_double(), ctypes.c_double()
+        self._steps = self._step_calls(self._step_size)
 
     def _load(self, folder: Path) -> Any:
         description = self.description
@@ -125,7 +119,7 @@ class FmuInstance(Component):
         self._dead = self._dead or status == FATAL
         label = STATUS[status] if 0 <= status < len(STATUS) else "not defined by FMI"
         reason = f"status {status} ({label})" + (f": {self._message}" if self._message else "")
-        raise ComponentError(self.name, function, reason, self._now)
+        raise ComponentError(self.name, function, reason, self._clock.value)
 
     def log(self, status: int, text: bytes | None) -> None:
         """A message from the FMU: kept as the reason of a later failure, and passed on to the user."""
@@ -169,13 +163,12 @@ class FmuInstance(Component):
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         self._start()
-        self._sets, self._set_objects = self._calls("Set", inputs)
-        self._gets, self._get_objects = self._calls("Get", outputs)
+        self._sets, self._gets = self._calls("Set", inputs), self._calls("Get", outputs)
 
-    def _calls(self, verb: str, ports: Ports) -> tuple[list[Call], list[tuple[str, np.ndarray, int]]]:
+    def _calls(self, verb: str, ports: Ports) -> list[Call]:
         """One call for each run of variables with the same accessor; strings and binaries go one by one."""
         calls: list[Call] = []
-        objects: list[tuple[str, np.ndarray, int]] = []
+        move = self._set_object if verb == "Set" else self._get_object
         for dtype, array in ports.arrays.items():
             place = 0
             own = [variable for variable in ports.variables if variable.dtype == dtype]
@@ -183,11 +176,19 @@ class FmuInstance(Component):
                 variables = list(run)
                 size = sum(len(variable.slots) for variable in variables)
                 if dtype.hasobject:
-                    objects += [(variable.name, array, place + i) for i, variable in enumerate(variables)]
+                    calls += [Call(move, (v.name, array, place + i), verb) for i, v in enumerate(variables)]
                 else:
                     calls.append(self._access(f"{self.prefix}{verb}{accessor}", variables, array[place : place + size]))
                 place += size
-        return calls, objects
+        return calls
+
+    def _set_object(self, name: str, array: np.ndarray, index: int) -> int:
+        self.set(name, array[index])
+        return OK
+
+    def _get_object(self, name: str, array: np.ndarray, index: int) -> int:
+        array[index] = self.get(name)
+        return OK
 
     def _access(self, function: str, variables: Sequence[Variable], values: np.ndarray) -> Call:
         references = (ctypes.c_uint32 * len(variables))(*(self.description.references[v.name] for v in variables))
@@ -195,24 +196,29 @@ class FmuInstance(Component):
         bound.restype = ctypes.c_int
         return Call(bound, (self._handle, *self._access_arguments(references, len(variables), values)), function)
 
-    def set_inputs(self) -> None:
-        for function, arguments, name in self._sets:
-            status = function(*arguments)
-            if status > WARNING:
-                self.fail(name, status)
-        for name, array, index in self._set_objects:
-            self.set(name, array[index])
+    def turn(self, clock: ctypes.c_double, step_size: float) -> Sequence[Call]:
+        self._clock = clock
+        return [*self._sets, *self._step_calls(ctypes.c_double(step_size)), *self._gets]
 
-    def get_outputs(self) -> None:
-        for function, arguments, name in self._gets:
-            status = function(*arguments)
-            if status > WARNING:
-                self.fail(name, status)
-        for name, array, index in self._get_objects:
-            array[index] = self.get(name)
+    def set_inputs(self) -> None:
+        self._make(self._sets)
 
     def do_step(self, time: float, step_size: float) -> StepResult | None:
-        raise NotImplementedError
+        self._clock.value, self._step_size.value = time, step_size
+        return self._make(self._steps)
+
+    def get_outputs(self) -> None:
+        self._make(self._gets)
+
+    def _make(self, calls: Sequence[Call]) -> StepResult | None:
+        for function, arguments, name in calls:
+            status = function(*arguments)
+            if status > WARNING:
+                return self.failed(name, status)
+        return None
+
+    def failed(self, name: str, status: int) -> StepResult:
+        self.fail(name, status)
 
 
 def pointer(values: np.ndarray) -> ctypes.c_void_p:

@@ -122,8 +122,6 @@ def test_a_snapshot_brings_everything_back_bit_for_bit(probe):
 
     built = system(copies(probe, "a", "b"), "a.y > b.u", start_values={"a": {"u": 3.0}})
     plan = compile_plan(built, Grid.of(exact(0), exact(2), exact(0.01)), [end("b.y")])
-    for name, component in built.components.items():
-        component.bind(*plan.ports[name])
     recorder = Recorder(plan, {"b.y": end("b.y")})
     executor = Executor(plan, recorder)
     executor.initialize()
