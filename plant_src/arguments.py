@@ -12,7 +12,7 @@ from cosim.errors import InputError, Problem, did_you_mean
 
 from .catalogue import MODELS, Model
 
-Path = tuple[str, ...]
+Keys = tuple[str, ...]
 Numbers = tuple[float, ...]
 
 
@@ -52,16 +52,16 @@ def read(vehicles: Any, platforms: Any, environment: Any) -> Arguments:
         reader.complain(("vehicles",), "found no vehicle, expected at least one")
     if reader.problems:
         raise InputError(reader.problems)
-    return Arguments([spawn for spawn in spawns if spawn], [box for box in boxes if box])
+    return Arguments([spawn for spawn in spawns if spawn], boxes)
 
 
 class _Reader:
-    """Collects problems while it reads; a faulty value is replaced by None."""
+    """Collects problems while it reads; faulty values are replaced, so that reading goes on."""
 
     def __init__(self) -> None:
         self.problems: list[Problem] = []
 
-    def complain(self, path: Path, text: str) -> None:
+    def complain(self, path: Keys, text: str) -> None:
         where = ".".join(path)
         self.problems.append(Problem(f"{where}: {text}", subject=("arguments", *path)))
 
@@ -82,14 +82,14 @@ class _Reader:
                 self.complain((*path, key.partition(".")[0]), f"found {key} = {value}; a {model.name} does not move that way")
         return Spawn(name, model, tuple(initial))
 
-    def model(self, name: Any, path: Path) -> Model | None:
+    def model(self, name: Any, path: Keys) -> Model | None:
         if isinstance(name, str) and name not in MODELS:
             self.complain(path, f'unknown vehicle model "{name}"{did_you_mean(name, MODELS)}')
         elif name is not None and not isinstance(name, str):
             self.complain(path, f"found {name!r}, expected the name of a vehicle model: {', '.join(MODELS)}")
         return MODELS.get(name) if isinstance(name, str) else None
 
-    def platform(self, name: str, spec: Any) -> Platform | None:
+    def platform(self, name: str, spec: Any) -> Platform:
         path = ("platforms", name)
         spec = self.keys(spec, path, ("size", "position"), ())
         size = self.vector(spec.get("size", [1.0] * 3), (*path, "size"), "xyz")
@@ -102,14 +102,14 @@ class _Reader:
         if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
             self.complain(("environment", "seed"), f"found {seed!r}, expected an integer of at least 0")
 
-    def named(self, value: Any, path: Path) -> Mapping[str, Any]:
+    def named(self, value: Any, path: Keys) -> Mapping[str, Any]:
         """An object whose keys name things that variables are named after."""
         for name in (found := self.mapping(value, path)):
             if not re.fullmatch(r"[A-Za-z_]\w*", name):
                 self.complain((*path, name), f'found the name "{name}", expected letters, digits and underscores')
         return found
 
-    def keys(self, value: Any, path: Path, required: Sequence[str], optional: Sequence[str]) -> Mapping[str, Any]:
+    def keys(self, value: Any, path: Keys, required: Sequence[str], optional: Sequence[str]) -> Mapping[str, Any]:
         """An object with these keys and no others."""
         found = self.mapping(value, path)
         for key in found:
@@ -121,19 +121,19 @@ class _Reader:
                     self.complain(path, f'"{key}" is missing')
         return found
 
-    def mapping(self, value: Any, path: Path) -> Mapping[str, Any]:
+    def mapping(self, value: Any, path: Keys) -> Mapping[str, Any]:
         if isinstance(value, Mapping):
             return value
         self.complain(path, f"found {value!r}, expected an object {{...}}")
         return {}
 
-    def vector(self, value: Any, path: Path, axes: Sequence[str]) -> Numbers:
+    def vector(self, value: Any, path: Keys, axes: Sequence[str]) -> Numbers:
         if not isinstance(value, list | tuple) or len(value) != len(axes):
             self.complain(path, f"found {value!r}, expected a list of {len(axes)} numbers [{', '.join(axes)}]")
             return (1.0,) * len(axes)
         return tuple(self.number(number, path) for number in value)
 
-    def number(self, value: Any, path: Path) -> float:
+    def number(self, value: Any, path: Keys) -> float:
         if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
             return float(value)
         self.complain(path, f"found {value!r}, expected a finite number")

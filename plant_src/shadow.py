@@ -18,9 +18,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-import pybullet
 
 from .binary import bound, load
+from .bullet import pybullet
 from .vehicles.shapes import Body, Box
 
 if TYPE_CHECKING:
@@ -35,6 +35,8 @@ FRICTION = 1.0
 _MAX_VELOCITY = 1e6  # Bullet limits velocities silently, by default at 100 m/s and rad/s
 _DOUBLE = struct.calcsize("d")
 _vector = struct.Struct("3d").unpack_from
+_write_body = struct.Struct("13d").pack_into
+_write_joints = struct.Struct("6d").pack_into
 
 Names = tuple[Sequence[str], Sequence[str]]  # of the arguments and of the results of a compiled function
 
@@ -121,10 +123,9 @@ class Shadow(ABC):
         for name, value in zip(self.model.slots("input"), self.inputs, strict=True):
             if not math.isfinite(value):
                 return f"{self.name}.{name} is {value}, expected a finite number"
-        for name, value in zip(self.model.states, self._arrays["predicted"], strict=True):
-            if not abs(value) < LARGEST_STATE:
-                return f"{self.name}.{name} became {value:g}, expected less than {LARGEST_STATE:g}"
-        return f"{self.name}: the motion became too large"
+        sizes = np.nan_to_num(np.abs(self._arrays["predicted"]), nan=np.inf)
+        worst = int(np.argmax(sizes))
+        return f"{self.name}.{self.model.states[worst]} became {self._arrays['predicted'][worst]:g}: the motion has exploded"
 
 
 class FreeBody(Shadow):
@@ -157,10 +158,10 @@ class FreeBody(Shadow):
         pybullet.resetBaseVelocity(self.body, _vector(memory, self._linear), _vector(memory, self._angular), client)
         pybullet.applyExternalTorque(self.body, -1, _vector(memory, self._torque), pybullet.WORLD_FRAME, client)
 
-    def _measure(self, write: Callable[..., None] = struct.Struct("13d").pack_into) -> None:
+    def _measure(self) -> None:
         position, orientation = pybullet.getBasePositionAndOrientation(self.body, self._client)
         linear, angular = pybullet.getBaseVelocity(self.body, self._client)
-        write(self.memory, 0, *position, *orientation, *linear, *angular)
+        _write_body(self.memory, 0, *position, *orientation, *linear, *angular)
 
 
 class PlanarChain(Shadow):
@@ -217,9 +218,9 @@ class PlanarChain(Shadow):
             physicsClientId=self._client,
         )
 
-    def _measure(self, write: Callable[..., None] = struct.Struct("6d").pack_into) -> None:
+    def _measure(self) -> None:
         x, y, yaw = pybullet.getJointStates(self.body, self._JOINTS, self._client)
-        write(self.memory, 0, x[0], y[0], yaw[0], x[1], y[1], yaw[1])
+        _write_joints(self.memory, 0, x[0], y[0], yaw[0], x[1], y[1], yaw[1])
 
 
 def compound(boxes: Sequence[Box], client: int) -> int:

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import pybullet
 
 from cosim.component import DTYPES, Component, Ports, Variable
 from cosim.errors import ComponentError, InputError, Problem, did_you_mean
 
 from . import arguments
 from .arguments import Arguments, Platform
+from .bullet import pybullet
 from .contacts import Contacts
 from .shadow import Shadow, UnsoundError, compound, set_dynamics
 from .vehicles.shapes import Box
@@ -133,17 +133,16 @@ class World(Component):
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         self._bound_inputs = {variable.name: values for variable, values in _views(inputs.variables, inputs.arrays)}
-        own_inputs, own_outputs = ([getattr(s, kind) for s in self._shadows] for kind in ("inputs", "outputs"))
-        self._incoming = list(zip(map(memoryview, own_inputs), _chunks(inputs.arrays[_FLOAT], own_inputs), strict=True))
-        self._outgoing = list(zip(_chunks(outputs.arrays[_FLOAT], own_outputs), map(memoryview, own_outputs), strict=True))
-        self._outgoing.append((memoryview(outputs.arrays[_FLAG]), memoryview(self._flags.reshape(-1))))
+        self._incoming = _pairs([shadow.inputs for shadow in self._shadows], inputs.arrays[_FLOAT])
+        self._outgoing = _pairs([shadow.outputs for shadow in self._shadows], outputs.arrays[_FLOAT])
+        self._outgoing += _pairs(list(self._flags), outputs.arrays[_FLAG])
 
     def set_inputs(self) -> None:
         for own, given in self._incoming:
             own[:] = given
 
     def get_outputs(self) -> None:
-        for wanted, own in self._outgoing:
+        for own, wanted in self._outgoing:
             wanted[:] = own
 
     # -- life cycle ----------------------------------------------------------------------------------------------------
@@ -155,7 +154,7 @@ class World(Component):
     def do_step(self, time: float, step_size: float) -> None:
         if step_size != self._step_size:
             self._set_step_size(time, step_size)
-        if self._flags.any():
+        if self._contacts.any:
             self._contacts.clear()
         try:
             for _ in range(self._step_count):
@@ -204,6 +203,7 @@ class World(Component):
         for shadow, memory in zip(self._shadows, state.memories, strict=True):
             shadow.memory[:] = memory
         self._flags[:] = state.flags
+        self._contacts.any = bool(state.flags.any())
 
     def free_state(self, state: Snapshot) -> None:
         pybullet.removeState(state.bullet, physicsClientId=self._client)
@@ -218,9 +218,7 @@ def _views(variables: Sequence[Variable], arrays: Mapping[np.dtype[Any], np.ndar
         yield variable, arrays[variable.dtype][first : filled[variable.dtype]]
 
 
-def _chunks(array: np.ndarray, like: Sequence[np.ndarray]) -> Iterator[memoryview]:
-    """Consecutive parts of an array, as long as those of `like`."""
-    first = 0
-    for part in like:
-        yield memoryview(array[first : first + len(part)])
-        first += len(part)
+def _pairs(own: Sequence[np.ndarray], array: np.ndarray) -> list[tuple[memoryview, memoryview]]:
+    """Arrays of vehicles, and the consecutive parts of a bound array that belong to them."""
+    ends = np.cumsum([len(part) for part in own])
+    return [(part.data, array[end - len(part) : end].data) for part, end in zip(own, ends, strict=True)]

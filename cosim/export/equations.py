@@ -22,7 +22,6 @@ from ..component import Variable
 from .block import Block, BlockVariable
 from .equations_c import c_function
 
-Expression = ca.SX
 _SIGNATURE = "void {}(const double *const in[], double *const out[])"
 
 
@@ -40,23 +39,20 @@ class ContinuousModel:
     variables: Sequence[Variable]
     states: Sequence[str]
     #: parameters -> state at the start
-    initial_state: Callable[[Expression], Expression]
+    initial_state: Callable[[ca.SX], ca.SX]
     #: state, inputs, parameters -> time derivative of the state
-    rate: Callable[[Expression, Expression, Expression], Expression]
+    rate: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
     #: state, inputs, parameters -> outputs
-    outputs: Callable[[Expression, Expression, Expression], Expression]
-    project: Callable[[Expression], Expression] = lambda state: state
+    outputs: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
+    project: Callable[[ca.SX], ca.SX] = lambda state: state
     step_size: float = 0.01
     max_sub_step: float = 0.005
     resources: Mapping[str, Path] = field(default_factory=dict)
 
-    def advance(
-        self, state: Expression, inputs: Expression, parameters: Expression, step: Expression, sub_steps: int = 1
-    ) -> Expression:
+    def advance(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1) -> ca.SX:
         """The state after `step` (s) with held inputs, in `sub_steps` equal Runge-Kutta steps."""
         for _ in range(sub_steps):
-            derivative = lambda x: self.rate(x, inputs, parameters)  # noqa: E731
-            state = self.project(runge_kutta_4(derivative, state, step / sub_steps))
+            state = self.project(runge_kutta_4(lambda x: self.rate(x, inputs, parameters), state, step / sub_steps))
         return state
 
     def slots(self, causality: str) -> list[Variable]:
@@ -64,7 +60,7 @@ class ContinuousModel:
         return [variable for variable in self.variables if variable.causality == causality for _ in variable.slots]
 
 
-def runge_kutta_4(rate: Callable[[Expression], Expression], state: Expression, step: Expression) -> Expression:
+def runge_kutta_4(rate: Callable[[ca.SX], ca.SX], state: ca.SX, step: ca.SX) -> ca.SX:
     """One step of the classical Runge-Kutta method of fourth order for x' = rate(x)."""
     k1 = rate(state)
     k2 = rate(state + step / 2 * k1)

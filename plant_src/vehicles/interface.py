@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cosim.component import Causality, Variable
+from cosim.component import Causality, Variability, Variable
 from cosim.units import parse
 
 
-def vector(
-    name: str, axes: Sequence[str], unit: str, description: str, causality: Causality = "output"
-) -> tuple[Variable, ...]:
+def vector(name: str, axes: Sequence[str], unit: str, description: str, causality: Causality = "output") -> tuple[Variable, ...]:
     """Scalar variables `name.axis`, one for each axis."""
-    variability = "fixed" if causality == "parameter" else "continuous"
+    variability: Variability = "fixed" if causality == "parameter" else "continuous"
     start = None if causality == "output" else 0.0
     return tuple(
         Variable(f"{name}.{axis}", "Float64", causality, variability, start, parse(unit), description=f"{description}: {axis}")
@@ -26,7 +24,7 @@ def vector(
 
 def scalar(name: str, unit: str, description: str, causality: Causality = "input") -> Variable:
     """One real variable that starts at zero."""
-    variability = "fixed" if causality == "parameter" else "continuous"
+    variability: Variability = "fixed" if causality == "parameter" else "continuous"
     return Variable(name, "Float64", causality, variability, 0.0, parse(unit), description=description)
 
 

@@ -44,9 +44,7 @@ def about_z(angle: ca.SX) -> ca.SX:
 def euler_angles(q: ca.SX) -> ca.SX:
     """Roll, pitch and yaw of the sequence yaw, pitch, roll (ZYX), rad."""
     r = matrix(q)
-    return ca.vertcat(
-        ca.atan2(r[2, 1], r[2, 2]), ca.asin(ca.fmin(1, ca.fmax(-1, -r[2, 0]))), ca.atan2(r[1, 0], r[0, 0])
-    )
+    return ca.vertcat(ca.atan2(r[2, 1], r[2, 2]), ca.asin(ca.fmin(1, ca.fmax(-1, -r[2, 0]))), ca.atan2(r[1, 0], r[0, 0]))
 
 
 def rotation_vector(q: ca.SX) -> ca.SX:

@@ -5,7 +5,8 @@ Each vehicle exports three functions beside its FMU:
     shadow_spawn   initial parameters -> where Bullet has to place the body, state
     shadow_before  what Bullet measures, own velocity, inputs, step
                    -> state after a free step, the constant motion that leads there, what Bullet needs to make it
-    shadow_after   what Bullet measures after the step -> own velocity, contact impulse (zero for a free step), published variables
+    shadow_after   what Bullet measures after the step
+                   -> own velocity, contact impulse (zero for a free step), published variables
 
 Bullet's solver changes the velocity when something is in the way. That change times Bullet's inertia is the contact impulse;
 divided by the vehicle's inertia it is added to the velocity that the equations predicted. The published velocity is that
@@ -30,7 +31,6 @@ SUB_STEPS = 2
 
 #: below this contact impulse (N s) a step was free; rounding leaves less than 1e-14
 FREE_IMPULSE = 1e-12
-
 
 
 @dataclass(frozen=True)

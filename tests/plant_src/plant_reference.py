@@ -24,7 +24,12 @@ _INERTIA = np.array(
     ]
 )
 _ROTORS = np.array(
-    [[0.181777, 0.000828, -0.006153], [0.000096, -0.181531, -0.006153], [-0.181505, -0.000016, -0.006153], [0.000096, 0.181499, -0.006153]]
+    [
+        [0.181777, 0.000828, -0.006153],
+        [0.000096, -0.181531, -0.006153],
+        [-0.181505, -0.000016, -0.006153],
+        [0.000096, 0.181499, -0.006153],
+    ]
 )
 _UP_TORQUE = (1, -1, 1, -1)
 MAX_ROTOR_SPEED = 5000 * 0.10471976
@@ -83,4 +88,6 @@ def vessel_rate(state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     side_force = side - 0.1 * np.sign(v) * v**2 + 2 * (-3.899501881 * v + 1.774273356 * r) + abeam @ inputs[2:4]
     moment = -0.34727 * side + 2 * (-1.774273356 * v - 0.807294377 * r) + inputs[7]
     x_rate, y_rate = u * heading + v * abeam
-    return np.array([x_rate, y_rate, r, surge_force / VESSEL_MASS + v * r, side_force / VESSEL_MASS - u * r, moment / VESSEL_MOMENT])
+    return np.array(
+        [x_rate, y_rate, r, surge_force / VESSEL_MASS + v * r, side_force / VESSEL_MASS - u * r, moment / VESSEL_MOMENT]
+    )

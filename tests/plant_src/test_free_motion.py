@@ -1,4 +1,4 @@
-"""Without contact vehicles move as their equations say: in the world and in the plant FMUs, against an independent integration."""
+"""Without contact vehicles move as their equations say: in the world and as plant FMUs, against an independent integration."""
 
 from __future__ import annotations
 
@@ -176,9 +176,7 @@ def test_fmu_publishes_no_contact() -> None:
 
 
 def test_vessel_going_astern_is_pushed_to_the_other_side_by_its_rudder() -> None:
-    ahead, astern = (
-        Trial({"usv": vessel([0.0, 0.0], velocity_body=[speed, 0.0, 0.0])}) for speed in (1.0, -1.0)
-    )
+    ahead, astern = (Trial({"usv": vessel([0.0, 0.0], velocity_body=[speed, 0.0, 0.0])}) for speed in (1.0, -1.0))
     for trial in (ahead, astern):
         trial["usv.rudder_angle"] = 0.2
         trial.step(10)
@@ -191,7 +189,8 @@ def test_hover_thrust_carries_the_weight() -> None:
     trial["uav.rotor_speed"] = [reference.HOVER_SPEED] * 4
     trial.step()
     assert abs(trial["uav.velocity.z"]) < 1e-10  # m/s, of 0.1 m/s in free fall
-    assert reference.HOVER_SPEED / reference.MAX_ROTOR_SPEED == pytest.approx(0.6588, abs=1e-4)  # 65.88 % on the fact sheet
+    throttle = reference.HOVER_SPEED / reference.MAX_ROTOR_SPEED
+    assert throttle == pytest.approx(0.6588, abs=1e-4)  # of the fact sheet
 
 
 def test_a_step_longer_than_10_ms_is_split() -> None:

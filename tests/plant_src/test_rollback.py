@@ -10,6 +10,8 @@ import plant_reference as reference
 import pytest
 from worlds import DECK_TOP, REST_HEIGHT, Trial, quadcopter, vessel
 
+from cosim.errors import ComponentError
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -49,7 +51,7 @@ def test_a_state_saved_before_a_failure_can_be_restored() -> None:
     expected = trial.step(10).bytes
     trial.world.set_state(state)
     trial["usv.thrust"] = float("nan")
-    with pytest.raises(Exception, match="usv.thrust is nan"):
+    with pytest.raises(ComponentError, match=r"usv.thrust is nan"):
         trial.step()
     trial.world.set_state(state)
     trial["usv.thrust"] = 1.0

@@ -50,7 +50,10 @@ def test_a_faulty_vehicle_is_refused(spec: Any, message: str) -> None:
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
-        ({**PLATFORM, "size": [1.0, -1.0, 1.0]}, r"platforms.start.size: found \[1.0, -1.0, 1.0\], expected edges greater than 0"),
+        (
+            {**PLATFORM, "size": [1.0, -1.0, 1.0]},
+            r"platforms.start.size: found \[1.0, -1.0, 1.0\], expected edges greater than 0",
+        ),
         ({"size": [1.0, 1.0, 1.0]}, 'platforms.start: "position" is missing'),
         ({**PLATFORM, "colour": "red"}, 'platforms.start.colour: unknown key "colour"; valid: size, position'),
     ],
@@ -62,7 +65,7 @@ def test_a_faulty_platform_is_refused(spec: Any, message: str) -> None:
 
 @pytest.mark.parametrize("seed", [-1, 1.5, True, "one"])
 def test_a_seed_is_an_integer(seed: Any) -> None:
-    with pytest.raises(InputError, match="environment.seed: found .* expected an integer of at least 0"):
+    with pytest.raises(InputError, match=r"environment.seed: found .* expected an integer of at least 0"):
         World("plant", {"uav": UAV}, {}, {"seed": seed})
 
 
@@ -122,15 +125,16 @@ def test_the_deck_lies_where_the_fact_sheet_puts_it() -> None:
     assert trial.vector("usv.deck.velocity") == pytest.approx([0.5 * 0.0135, -0.5 * 0.002, 0.0])
 
 
-def test_signs_of_the_attitude() -> None:
+@pytest.mark.parametrize(
+    ("angle", "faster", "slower"),
+    [("roll", (2,), (4,)), ("pitch", (3,), (1,)), ("yaw", (1, 3), (2, 4))],
+)
+def test_signs_of_the_attitude(angle: str, faster: tuple[int, ...], slower: tuple[int, ...]) -> None:
     """Positive roll lifts the left side, positive pitch lowers the nose, positive yaw is counter-clockwise from above."""
-    raised = {"left": [0.5, 1.0, 0.5, 0.9], "rear": [0.9, 1.0, 1.0, 1.0]}
-    for angle, speeds in (("roll", [1.0, 1.02, 1.0, 0.98]), ("pitch", [0.98, 1.0, 1.02, 1.0]), ("yaw", [1.02, 0.98, 1.02, 0.98])):
-        trial = Trial({"uav": UAV})
-        trial["uav.rotor_speed"] = [345.0 * factor for factor in speeds]
-        trial.step(5)
-        assert trial[f"uav.attitude.{angle}"] > 1e-4
-    assert raised
+    trial = Trial({"uav": UAV})
+    trial["uav.rotor_speed"] = [345.0 + 7.0 * (k in faster) - 7.0 * (k in slower) for k in (1, 2, 3, 4)]
+    trial.step(5)
+    assert trial[f"uav.attitude.{angle}"] > 1e-4
 
 
 def test_variables_follow_the_contract() -> None:
@@ -149,7 +153,7 @@ def test_variables_follow_the_contract() -> None:
     [
         ("uav.rotor_speed", [1.0, math.nan, 1.0, 1.0], r"plant: do_step failed at t = 0.03 s: uav.rotor_speed\[2\] is nan"),
         ("usv.rudder_angle", math.inf, "usv.rudder_angle is inf, expected a finite number"),
-        ("uav.external_force.z", 1e200, r"uav.position.z became inf|uav.velocity.z became 2.2\d*e\+198, expected less than 100000"),
+        ("uav.external_force.z", 1e200, r"uav.velocity.z became 2.\d+e\+198: the motion has exploded"),
     ],
 )
 def test_a_vehicle_that_cannot_go_on_is_named(name: str, value: Any, message: str) -> None:
@@ -161,7 +165,7 @@ def test_a_vehicle_that_cannot_go_on_is_named(name: str, value: Any, message: st
 
 def test_a_step_size_is_positive() -> None:
     trial = Trial({"uav": UAV})
-    with pytest.raises(ComponentError, match="found step size 0.0, expected a positive number"):
+    with pytest.raises(ComponentError, match=r"found step size 0.0, expected a positive number"):
         trial.step(1, 0.0)
 
 
@@ -169,5 +173,5 @@ def test_unknown_variables_are_refused_with_the_nearest_name() -> None:
     trial = Trial({"uav": UAV})
     with pytest.raises(ComponentError, match=r'no variable "uav.rotor_sped"; did you mean "uav.rotor_speed"\?'):
         trial["uav.rotor_sped"] = [0.0] * 4
-    with pytest.raises(ComponentError, match="uav.position.x is an output"):
+    with pytest.raises(ComponentError, match=r"uav.position.x is an output"):
         trial["uav.position.x"] = 0.0

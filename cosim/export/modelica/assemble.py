@@ -13,6 +13,7 @@ from ...component import Causality, Variability
 from ..block import Block, BlockVariable
 from .emit import emit
 from .flat import Expression, Model, Variable, refuse
+from .folded import check_folding
 from .front import Sources, flatten
 from .header import members
 from .interpret import Interpreter
@@ -51,6 +52,7 @@ def interpreter(path: Path, model: str | None = None) -> Interpreter:
 
 def _open(path: Path, model: str | None) -> tuple[Interpreter, Sources]:
     json, sources = flatten(Path(path), model)
+    check_folding(json, sources)
     flat = Reader(json, sources).model(model or Path(path).stem)
     _check_types(flat)
     return Interpreter(flat), sources

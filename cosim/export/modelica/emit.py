@@ -12,7 +12,7 @@ import numpy as np
 
 from .flat import Body, Name, Place, Statement, Variable, base_name
 from .functions import Functions
-from .header import Header, member, members, remembered_inputs
+from .header import Header, member, members
 from .interpret import Interpreter
 from .layout import definition, mentions
 from .matching import is_input
@@ -74,15 +74,11 @@ class _Emitter:
         return str(self.reasons.index(text) + 1)
 
     def _lowering(self, initial: bool = False) -> Statements:
-        """The scope of the model: variables are members of the struct, old values are locals or members `pre_...`."""
+        """The scope of the model: variables are members of the struct, their values before the event are locals `pre_...`."""
         scope = {v.name: member(v, f"m->{self.members[v.name]}") for v in self.model.variables.values()}
         scope["time"] = scalar("Real", Text("time"), simple=True)
-        before = {v.name: member(v, self._before(v, initial)) for v in self.model.variables.values()}
+        before = {v.name: member(v, f"pre_{self.members[v.name]}") for v in self.model.variables.values()}
         return Statements(self.functions, scope, before, initial=initial)
-
-    def _before(self, variable: Variable, initial: bool = False) -> str:
-        prefix = "m->pre_" if is_input(variable) and not initial else "pre_"
-        return prefix + self.members[variable.name]
 
     # start values and parameters
 
@@ -113,9 +109,7 @@ class _Emitter:
         """The statements with the values that pre() needs in front, and a comment where another component begins."""
         lowering = self._lowering(initial)
         for name in memory(self.model, body):
-            variable = self.model.variables[name]
-            if initial or not is_input(variable):
-                lowering.out += _copied(variable, self._before(variable, initial), f"m->{self.members[name]}")
+            lowering.out += _remember(self.model.variables[name], self.members[name])
         owner = ""
         lowering.out += [""] * bool(lowering.out)
         for statement in body:
@@ -132,7 +126,7 @@ class _Emitter:
             lines += self._finite_check(self.model.variables[name])
         if self.plan.watches:
             lines.insert(0, f"bool risen[{self.plan.watches}];")
-        return [*lines, *self._keep_inputs()] or ["(void)m;"]
+        return lines or ["(void)m;"]
 
     def _finite_check(self, variable: Variable) -> list[str]:
         value = member(variable, f"m->{self.members[variable.name]}")
@@ -141,20 +135,12 @@ class _Emitter:
         )
         return [f"for (int each = 0; each < {value.size}; each++) {test}"] if variable.shape else [test]
 
-    def _keep_inputs(self) -> list[str]:
-        kept = remembered_inputs(self.model, self.plan)
-        return [
-            line
-            for v in kept
-            for line in _copied(v, f"m->pre_{self.members[v.name]}", f"m->{self.members[v.name]}", declare=False)
-        ]
-
     def _initialize(self) -> list[str]:
         lowering = self._lowering()
         for k, clock in enumerate(self.plan.clocks):
             start, period = lowering.scalar_of(clock.start).code, lowering.scalar_of(clock.period).code
             lowering.out.append(f"set_clock(m, &m->clock[{k}], {start}, {period}, time);")
-        lines = [*lowering.out, *self._body(self.plan.initialization, initial=True), *self._keep_inputs()]
+        lines = [*lowering.out, *self._body(self.plan.initialization, initial=True)]
         unused = [] if mentions("time", lines) else ["(void)time;"]
         return [*unused, "m->failure = 0;", "start_variables(m);", *lines, "return REASONS[m->failure];"]
 
@@ -186,12 +172,12 @@ def _owner(statement: Statement) -> str:
     return next((base_name(target).rpartition(".")[0] for target in targets(statement)), "")
 
 
-def _copied(variable: Variable, target: str, source: str, declare: bool = True) -> list[str]:
+def _remember(variable: Variable, name: str) -> list[str]:
+    """Copies a variable to a local, from which pre() reads."""
     kind = C_TYPES[variable.type]
     if not variable.shape:
-        return [f"const {kind} {target} = {source};" if declare else f"{target} = {source};"]
-    size = member(variable, source).size
-    return [f"{kind} {target}[{size}];"] * declare + [f"memcpy({target}, {source}, sizeof {target});"]
+        return [f"const {kind} pre_{name} = m->{name};"]
+    return [f"{kind} pre_{name}[{member(variable, name).size}];", f"memcpy(pre_{name}, m->{name}, sizeof pre_{name});"]
 
 
 def _constant(target: Value, value: Any) -> list[str]:

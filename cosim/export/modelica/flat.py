@@ -233,6 +233,7 @@ class Structural(NamedTuple):
 
     purpose: str
     parameters: tuple[str, ...]
+    where: Place | None
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from .flat import Place
 RUMOCA_VERSION = "0.10.2"
 _WITHIN = re.compile(r"^\s*within\s+([\w.]+)\s*;", re.MULTILINE)
 _QUOTED = re.compile(r"'([\w.]+)'")
+_ENDING = re.compile(r"\[(?P<file>[^\[\]]+):(?P<line>\d+):\d+\]$")
 _SYNTAX = re.compile(r"×\s*(?P<what>.+?)\n.*?\[[^\]]*:(?P<line>\d+):\d+\]", re.DOTALL)
 
 
@@ -32,6 +33,10 @@ class Sources:
     @classmethod
     def of(cls, files: Sequence[Path]) -> Sources:
         return cls(files, {_fnv1a(name): file for file in files for name in (str(file), _alias(file))})
+
+    def named(self, name: str) -> Path | None:
+        """The file of this name, as the front end writes it."""
+        return self._by_hash.get(_fnv1a(name))
 
     def place(self, span: Mapping[str, int] | None) -> Place | None:
         """The line at which a span starts; None for what the front end made itself."""
@@ -116,7 +121,15 @@ def _explain(error: BaseException, name: str, path: Path, sources: Sources) -> l
     specific = [line for line in reasons if " could not be compiled: " not in line] or reasons
     if not specific or not isinstance(error, Exception):
         specific = [f"the Modelica front end failed on the model {name}: {' '.join(lines) or type(error).__name__}"]
-    return [Problem(reason, str(_mention(reason, sources) or path)) for reason in specific]
+    return [_located(reason, path, sources) for reason in specific]
+
+
+def _located(reason: str, path: Path, sources: Sources) -> Problem:
+    """A reason with the place that it ends with or, since most have none, with the line that holds the name it quotes."""
+    if ending := _ENDING.search(reason):
+        where = Place(sources.named(ending["file"]) or path, int(ending["line"]))
+        return Problem(reason[: ending.start()].rstrip(), str(where))
+    return Problem(reason, str(_mention(reason, sources) or path))
 
 
 def _mention(reason: str, sources: Sources) -> Place | None:

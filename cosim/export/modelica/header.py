@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from .flat import Model, Variable
 from .matching import is_input
 from .roles import Roles
-from .sort import Plan, memory
+from .sort import Plan
 from .values import C_TYPES, Value, identifier, stored
 
 
@@ -23,11 +23,6 @@ def members(model: Model) -> dict[str, str]:
         result[name] = member
         taken.add(member)
     return result
-
-
-def remembered_inputs(model: Model, plan: Plan) -> list[Variable]:
-    """Inputs change between events, so the values that pre() needs of them are kept aside, in members `pre_...`."""
-    return [variable for name in memory(model, plan.event) if is_input(variable := model.variables[name])]
 
 
 def member(variable: Variable, name: str) -> Value:
@@ -89,7 +84,6 @@ class Header:
             yield from [f"/* {title} */"] * bool(chosen)
             yield from (_declared(variable, names[variable.name]) + _note(variable) for variable in chosen)
         yield "/* bookkeeping */"
-        yield from (_declared(v, f"pre_{names[v.name]}") for v in remembered_inputs(self.model, self.plan))
         yield from [f"Clock clock[{len(self.plan.clocks)}];"] * bool(self.plan.clocks)
         yield from [f"bool held[{self.plan.watches}];"] * bool(self.plan.watches)
         yield "int32_t failure;"

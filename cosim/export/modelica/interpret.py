@@ -14,8 +14,7 @@ from .evaluate import Evaluator, typed
 from .flat import Model
 from .matching import is_input
 from .roles import roles
-from .sort import finite, plan, start_value
-from .visit import remembered
+from .sort import finite, memory, plan, start_value
 
 _TOLERANCE = 1e-6
 
@@ -30,6 +29,8 @@ class Interpreter:
         self.model = model
         self.plan = plan(model)
         self.roles = roles(model, self.plan)
+        self._remembered = {"step": memory(model, self.plan.event), "initialize": memory(model, self.plan.initialization)}
+        self._finite = finite(model, self.plan)
         self.values: dict[str, Any] = {}
         self.evaluate = Evaluator(model.functions, self.values)
         for variable in model.variables.values():
@@ -93,20 +94,18 @@ class Interpreter:
                 self._give(variable.name, self.evaluate(start_value(self.model, variable.name)))
 
     def _compute(self, function: str, time: float) -> None:
-        """One event, or the initialization; afterwards the values of inputs are kept for the pre() of the next event."""
+        """One event, or the initialization."""
         body = self.plan.event if function == "step" else self.plan.initialization
         self.values["time"] = time
-        kept = getattr(self, "_inputs", {}) if function == "step" else {}
-        self.evaluate.memory = {**{name: deepcopy(self.values[name]) for name, _ in remembered(body)}, **kept}
+        self.evaluate.memory = {name: deepcopy(self.values[name]) for name in self._remembered[function]}
         try:
             self.evaluate.run(body)
             if function == "step":
                 self._check_finite()
         except Failure as failure:
             raise ComponentError(self.model.name, function, str(failure), time) from None
-        self._inputs = {v.name: deepcopy(self.values[v.name]) for v in self.model.variables.values() if is_input(v)}
 
     def _check_finite(self) -> None:
-        for name in finite(self.model, self.plan):
+        for name in self._finite:
             if not np.all(np.isfinite(self.values[name])):
                 raise Failure(f"{name} is not a finite number")

@@ -66,7 +66,7 @@ class StatementReader(ExpressionReader):
         return cast(flat.For, body[0])
 
     def _assert(self, node: Json) -> flat.Assert:
-        message, where = self.expression(node["message"]), self.place(node) or self.place(only(node["condition"])[1])
+        message, where = self.expression(node["message"]), self.place(only(node["condition"])[1])
         if node["level"] is not None and self.expression(node["level"]) != flat.Literal(2, "Integer"):
             refuse("assert() with a level below error is not supported", where)
         return flat.Assert(self.expression(node["condition"]), self._joined(message, where), where)

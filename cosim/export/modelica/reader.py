@@ -29,7 +29,7 @@ class Reader(StatementReader):
             functions={key: self.function(node) for key, node in self.json["functions"].items() if not node["is_constructor"]},
             enumerations=self._enumerations(),
             structural=tuple(
-                flat.Structural(node["kind"], tuple(name for names in node["references"] for name in names))
+                flat.Structural(node["kind"], tuple(name for names in node["references"] for name in names), self.place(node))
                 for node in self.json.get("parameter_branch_selections", ())
             ),
         )

@@ -12,7 +12,7 @@ from .visit import names
 
 _PURPOSES = {
     "ArrayDimension": "it decides the size of an array",
-    "BranchSelection": "it selects equations (write an if-expression, or the if inside the when-clause)",
+    "BranchSelection": "it selects equations (an if-expression would not)",
     "ForRange": "it decides the range of a for-loop",
 }
 
@@ -67,5 +67,4 @@ def _check_structure(model: Model, needs: dict[str, list[str]], settable: Sequen
         for owner in dict.fromkeys(base for name in used for base in _closure(name, needs)):
             if owner in settable:
                 purpose = _PURPOSES.get(structural.purpose, f"it decides the structure ({structural.purpose})")
-                where = model.variables[owner].where
-                refuse(f"the parameter {owner} cannot be settable: {purpose}; declare it final or constant", where)
+                refuse(f"the parameter {owner} cannot be settable: {purpose}; declare it final or constant", structural.where)

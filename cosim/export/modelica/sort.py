@@ -125,7 +125,7 @@ def _event_nodes(model: Model, triggers: Triggers) -> Iterator[_Node]:
     for when in model.whens:
         yield from _split(model, (triggers.at_event(when),))
     for body in model.algorithms:
-        yield _algorithm(model, (*_resets(model, body), *(triggers.at_event(s) if isinstance(s, When) else s for s in body)))
+        yield _algorithm(model, tuple(triggers.at_event(s) if isinstance(s, When) else s for s in body))
     yield from (_node(model, (statement,)) for statement in model.asserts)
 
 
@@ -135,32 +135,12 @@ def _initial_nodes(model: Model, triggers: Triggers) -> Iterator[_Node]:
     for body in (*model.algorithms, *model.initial_algorithms):
         active = tuple(t for s in body for t in (triggers.at_initialization(s) if isinstance(s, When) else (s,)))
         if active:
-            yield _algorithm(model, (*_resets(model, body), *active))
+            yield _algorithm(model, active)
     yield from (_node(model, (statement,)) for statement in model.asserts)
 
 
 def _algorithm(model: Model, statements: Body) -> _Node:
     return _node(model, statements, {base_name(target) for target in targets(statements)})
-
-
-def _resets(model: Model, body: Body) -> Body:
-    """A continuous variable that an algorithm does not assign in every case begins each evaluation with its start value."""
-    open_statements = tuple(s for s in body if not isinstance(s, When))
-    names = dict.fromkeys(base_name(target) for target in targets(open_statements))
-    return tuple(
-        Assign(Name(name), start_value(model, name), body[0].where)
-        for name in names
-        if model.variables[name].variability == "continuous" and not _assigned_first(name, open_statements)
-    )
-
-
-def _assigned_first(name: str, body: Body) -> bool:
-    first = next(s for s in body if any(isinstance(item, Name) and item.name == name for item in walk(s)))
-    return isinstance(first, Assign) and first.target == Name(name) and not has_name(first.value, name)
-
-
-def has_name(node: Expression, name: str) -> bool:
-    return any(isinstance(item, Name) and item.name == name for item in walk(node))
 
 
 def _split(model: Model, statements: Body) -> Iterator[_Node]:

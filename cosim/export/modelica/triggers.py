@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from .flat import Array, Binary, Body, Builtin, Expression, IfStatement, Literal, Model, Place, Watch, When, refuse
-from .visit import MEMORY, has_builtin, names
+from .visit import MEMORY, has_builtin
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,10 +63,6 @@ class Triggers:
     def _clock(self, sample: Builtin, where: Place | None) -> Clock:
         if len(sample.arguments) != 2:
             refuse("sample() needs a start and a period", where)
-        for name in sorted(names(sample.arguments)):
-            variable = self._model.variables.get(name)
-            if variable is None or variable.variability not in ("parameter", "constant"):
-                refuse(f"the start and the period of sample() must be parameters, but {name} is not", where)
         start, period = map(_real, sample.arguments)
         return Clock(start, period, where)
 

@@ -15,6 +15,7 @@ from .. import kinematics, shadow_maps
 from . import parameters as p
 from .interface import STATES, VARIABLES
 
+
 def rate(state: ca.SX, inputs: ca.SX) -> ca.SX:
     """Time derivative of (position, orientation, world velocity, body rates)."""
     orientation, velocity, rates = state[3:7], state[7:10], state[10:13]

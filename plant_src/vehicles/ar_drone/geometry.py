@@ -15,6 +15,7 @@ FEET_HEIGHT, TOP_HEIGHT = -0.0566, 0.03
 #: edge of the square whose corners are the feet, 0.1612 m from its centre (m)
 EDGE = 0.228
 
+
 def _box() -> Box:
     """One box: its corners are the feet at the ends of the arms, so it stands at a diagonal to the body axes."""
     to_body = principal_axes()[1]

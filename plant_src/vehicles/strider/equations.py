@@ -18,6 +18,7 @@ from . import parameters as p
 from .geometry import DECK_CENTRE
 from .interface import STATES, VARIABLES
 
+
 def rate(state: ca.SX, inputs: ca.SX) -> ca.SX:
     """Time derivative of (x, y, yaw, surge, sway, yaw rate)."""
     yaw, u, v, r = ca.vertsplit(state[2:6])

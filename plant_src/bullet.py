@@ -1,0 +1,23 @@
+"""PyBullet, imported without the line about its build date that it writes to the standard error stream."""
+
+from __future__ import annotations
+
+import os
+from types import ModuleType
+
+_STANDARD_ERROR = 2
+
+
+def _import_quietly() -> ModuleType:
+    kept, nowhere = os.dup(_STANDARD_ERROR), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, _STANDARD_ERROR)
+    try:
+        import pybullet
+    finally:
+        os.dup2(kept, _STANDARD_ERROR)
+        os.close(kept)
+        os.close(nowhere)
+    return pybullet
+
+
+pybullet = _import_quietly()

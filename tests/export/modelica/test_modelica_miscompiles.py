@@ -1,0 +1,183 @@
+"""Ordinary Modelica that rumoca's own code generator gets wrong without a word; here it must be right, tick by tick."""
+
+from __future__ import annotations
+
+import pytest
+
+from cosim.errors import InputError
+from cosim.export.modelica import load
+
+TICKS = 500
+
+
+def test_a_discrete_equation_uses_the_condition_of_the_same_tick(twins):
+    model = twins("""model M
+  input Real x;
+  output Boolean b(start = false, fixed = true);
+  output Integer k(start = 0, fixed = true);
+equation
+  when sample(0, 0.01) then
+    k = if b then pre(k) + 1 else pre(k);
+    b = x > 1;
+  end when;
+end M;""")
+    model.initialize()
+    count = 0
+    for _, inputs in model.run(TICKS):
+        count += inputs["x"] > 1
+        assert model.get("k") == count
+
+
+def test_b_a_parameter_in_the_condition_of_an_if_expression_is_not_folded(twins):
+    model = twins("""model M
+  parameter Boolean hold = false;
+  parameter Real level = 1;
+  input Real x;
+  output Real y(start = 0, fixed = true);
+  output Real z(start = 0, fixed = true);
+equation
+  when sample(0, 0.01) then
+    y = if hold then pre(y) + x else x;
+  end when;
+algorithm
+  when sample(0, 0.01) then
+    if level > 2 then
+      z := pre(z) + x;
+    else
+      z := 2*x;
+    end if;
+  end when;
+end M;""")
+    model.set(hold=True, level=3.0)
+    model.initialize()
+    total = 0.0
+    for _, inputs in model.run(TICKS):
+        total += inputs["x"]
+        assert (model.get("y"), model.get("z")) == (total, total)
+
+
+FOLDED = """model M
+  parameter Boolean hold = false;
+  input Real x;
+  output Real y(start = 0, fixed = true);
+equation
+  when sample(0, 0.01) then
+    {}
+  end when;
+end M;"""
+
+
+@pytest.mark.parametrize(
+    "equations",
+    [
+        "if hold then y = pre(y) + x; else y = x; end if;",
+        "if hold and x > 0 then y = 1; else y = x; end if;",
+        "if x > 0 then if not hold then y = x; else y = pre(y); end if; else y = 0; end if;",
+        'y = x; if hold then assert(x < 1, "large"); end if;',
+    ],
+)
+def test_b_an_if_equation_that_the_front_end_decides_by_a_default_is_refused(write, equations):
+    with pytest.raises(InputError, match=r"M.mo:7: the front end would decide this if-equation by the default of hold"):
+        load(write(FOLDED.format(equations)))
+
+
+@pytest.mark.parametrize(
+    "equations",
+    [
+        "if hold or x > 0 then y = pre(y) + x; else y = x; end if;",
+        "if x > (if x > 2 then 1 else 0) then y = if hold then 1 else 2; else y = x; end if; // if hold then",
+    ],
+)
+def test_b_other_if_equations_on_parameters_are_not_refused(write, equations):
+    assert load(write(FOLDED.format(equations))).identifier == "M"
+
+
+def test_b_an_if_equation_on_a_constant_may_be_decided(twins):
+    text = FOLDED.replace("parameter Boolean hold = false", "constant Boolean hold = true")
+    model = twins(text.format("if hold then y = 2*x; else y = x; end if;"))
+    model.set(x=3.0)
+    model.initialize()
+    model.step(0.0)
+    assert model.get("y") == 6.0
+
+
+def test_c_the_last_of_two_assignments_counts(twins):
+    model = twins("""model M
+  input Real x;
+  output Integer k(start = 0, fixed = true);
+  output Boolean b(start = false, fixed = true);
+algorithm
+  when sample(0, 0.01) then
+    k := 1;
+    b := false;
+    if x > 0 then
+      k := 2;
+      b := true;
+    end if;
+    k := k + 10;
+  end when;
+end M;""")
+    model.initialize()
+    for _, inputs in model.run(TICKS):
+        assert (model.get("k"), model.get("b")) == (12 if inputs["x"] > 0 else 11, inputs["x"] > 0)
+
+
+def test_declared_limits_are_described_and_do_not_saturate(twins):
+    model = twins("""model M
+  parameter Real gain(min = 0, max = 1) = 0.5;
+  input Real x(min = -1, max = 1);
+  output Real y(min = -2, max = 2);
+equation
+  when sample(0, 0.01) then
+    y = gain*x;
+  end when;
+end M;""")
+    model.set(gain=10.0, x=7.0)
+    model.initialize()
+    model.step(0.0)
+    assert model.get("y") == 70.0
+    described = model.c.variables["y"]
+    assert (described.minimum, described.maximum) == (-2.0, 2.0)
+
+
+def test_functions_of_the_same_short_name_are_refused_because_the_front_end_confuses_them(write):
+    path = write("""package A
+  function f
+    input Real x;
+    output Real y;
+  algorithm
+    y := x + 1;
+  end f;
+  block B
+    input Real u;
+    output Real y;
+  equation
+    y = f(u);
+  end B;
+end A;
+package C
+  function f
+    input Real x;
+    output Real y;
+  algorithm
+    y := x + 2;
+  end f;
+  block B
+    input Real u;
+    output Real y;
+  equation
+    y = f(u);
+  end B;
+end C;
+model M
+  input Real u;
+  output Real y;
+  A.B a;
+  C.B c;
+equation
+  a.u = u;
+  c.u = u;
+  y = a.y + c.y;
+end M;""")
+    with pytest.raises(InputError, match='several functions named "f"; give them different names'):
+        load(path)

@@ -1,0 +1,173 @@
+"""Which variables the Block shows, what it says of them, and who owns a parameter."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cosim.export.modelica import load
+
+OWNERS = """package P
+  block Gain
+    parameter Real k(unit = "1", min = 0) = 1 "gain";
+    parameter Real k2 = 2*k "follows";
+    final parameter Real limit = k + 1;
+    input Real u;
+    output Real y;
+  protected
+    parameter Real hidden = 5;
+    constant Real table[2] = {10, 20};
+  equation
+    y = k*u + k2 + limit + hidden + table[2];
+  end Gain;
+end P;
+model M "a model of owners"
+  parameter Real base(unit = "m/s") = 3 "owner of a.k";
+  parameter Integer n(min = 1, max = 3) = 2;
+  parameter Real A[2, 2] = {{1, 2}, {3, 10/4}};
+  final parameter Real twice = 2*base;
+  input Real u;
+  output Real y;
+  P.Gain a(k = base);
+  P.Gain b(k = 7);
+  P.Gain c;
+  P.Gain d(final k = 4);
+  P.Gain many[2](k = {base, 6});
+equation
+  a.u = u;
+  b.u = u;
+  c.u = u;
+  d.u = u;
+  many[1].u = u;
+  many[2].u = u;
+  y = a.y + b.y + c.y + d.y + twice + n + A[1, 2] + many[1].y + many[2].y;
+  when sample(0, 0.01) then
+  end when;
+end M;"""
+
+
+def test_only_owned_parameters_can_be_set(write):
+    shown = {v.name: v.causality for v in load(write(OWNERS)).variables}
+    parameters = {name for name, causality in shown.items() if causality == "parameter"}
+    assert parameters == {"base", "n", "A", "b.k", "c.k", "many[2].k"}
+    calculated = {name for name, causality in shown.items() if causality == "calculatedParameter"}
+    prefixes = ("a", "b", "c", "d", "many[1]", "many[2]")
+    assert calculated == {"twice", *(f"{p}.{n}" for p in prefixes for n in ("k2", "limit"))}
+    assert not [name for name in shown if "hidden" in name or "table" in name]
+
+
+def test_dependent_parameters_follow_their_owner(twins):
+    model = twins(OWNERS)
+    model.set(base=10.0, b__k=0.5)
+    model.compare(0)
+    assert [model.get(n) for n in ("twice", "a.k2", "a.limit", "b.k2", "many[1].k2", "c.k2")] == [
+        20.0,
+        20.0,
+        11.0,
+        1.0,
+        20.0,
+        2.0,
+    ]
+    model.set(u=2.0, A=np.array([[0.0, 100.0], [0.0, 0.0]]))
+    model.initialize()
+    gains = [10.0, 0.5, 1.0, 4.0, 10.0, 6.0]
+    assert model.get("y") == sum(k * 2 + 2 * k + k + 1 + 25 for k in gains) + 20 + 2 + 100
+
+
+def test_parameters_take_effect_between_steps(twins):
+    model = twins(OWNERS)
+    model.initialize()
+    model.step(0.0)
+    before = model.get("y")
+    model.set(base=4.0)
+    model.step(0.01)
+    assert model.get("y") == before + 2 * (3 * 1.0) + 2.0
+
+
+def test_descriptions_units_limits_and_starts(write):
+    block = load(write(OWNERS))
+    variables = {v.name: v for v in block.variables}
+    assert (block.identifier, block.description, block.step_size) == ("M", "a model of owners", 0.01)
+    base, gain, matrix, n = variables["base"], variables["c.k"], variables["A"], variables["n"]
+    assert (base.type, base.unit, base.description, base.start) == ("Float64", "m/s", "owner of a.k", 3.0)
+    assert (gain.minimum, gain.maximum, gain.member) == (0.0, None, "c_k")
+    assert (matrix.shape, matrix.start) == ((2, 2), (1.0, 2.0, 3.0, 2.5))
+    assert (n.type, n.minimum, n.maximum, n.start, n.variability) == ("Int32", 1.0, 3.0, 2, "tunable")
+    assert (variables["u"].variability, variables["y"].variability) == ("continuous", "discrete")
+
+
+def test_start_values_of_states_may_depend_on_parameters(twins):
+    model = twins("""model M
+  parameter Real x0 = 2;
+  input Real u;
+  output Real x(start = 3*x0, fixed = true);
+  output Real q[2](start = {x0, 1}, each fixed = true);
+equation
+  when sample(0, 0.01) then
+    x = pre(x) + u;
+    q = pre(q) + {1, 1};
+  end when;
+end M;""")
+    model.set(x0=5.0)
+    model.initialize()
+    assert (model.get("x"), list(model.get("q"))) == (15.0, [5.0, 1.0])
+    model.set(u=1.0)
+    model.step(0.0)
+    assert (model.get("x"), list(model.get("q"))) == (16.0, [6.0, 2.0])
+
+
+def test_large_parameter_lists(twins):
+    model = twins("""model M
+  constant Integer capacity = 32;
+  parameter Integer count(min = 1) = 3;
+  parameter Real wx[capacity] = cat(1, {1, 2, 10/3}, fill(0, capacity - 3));
+  parameter Boolean on[6] = fill(true, 6);
+  input Integer k(min = 1, max = 32, start = 1);
+  output Real y;
+equation
+  when sample(0, 0.01) then
+    y = if on[min(k, 6)] then wx[k] + count else -1;
+  end when;
+end M;""")
+    assert model.c.variables["wx"].start == (1.0, 2.0, 10 / 3, *[0.0] * 29)
+    model.initialize()
+    model.compare(0)
+    wx = np.linspace(-1, 1, 32)
+    model.set(wx=wx, count=5, on=[True, False, True, True, False, True])
+    for k, (place, expected) in enumerate([(1, wx[0] + 5), (2, -1), (32, wx[31] + 5)]):
+        model.set(k=place)
+        model.step(0.01 * k)
+        assert model.get("y") == expected
+
+
+def test_members_are_unique_and_no_words_of_c(twins):
+    model = twins("""model M
+  block B
+    input Real int;
+    output Real c;
+  equation
+    c = 2*int;
+  end B;
+  parameter Real double = 2;
+  input Real b_c;
+  input Boolean failure;
+  output Real m;
+  output Real clock;
+  B b;
+equation
+  b.int = b_c;
+  m = double*b.c;
+  clock = if failure then 1 else time;
+  when sample(0, 0.01) then
+  end when;
+end M;""")
+    members = [v.member for v in model.c.block.variables]
+    assert len(set(members)) == len(members)
+    model.set(b_c=1.5, failure=True)
+    model.initialize()
+    assert (model.get("m"), model.get("clock")) == (6.0, 1.0)
+
+
+def test_the_same_source_gives_the_same_c(write):
+    path = write(OWNERS)
+    assert load(path).files == load(path).files
+    assert str(path.parent) not in "".join(load(path).files.values())

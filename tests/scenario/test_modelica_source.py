@@ -1,0 +1,41 @@
+"""A controller named by its Modelica source is built when it is needed, and kept until the source changes."""
+
+import cosim
+
+GAIN = """
+block Doubler
+  parameter Real k = 2;
+  input Real u(start = 0);
+  output Real y(start = 0);
+equation
+  when sample(0, 1) then
+    y = k*u;
+  end when;
+end Doubler;
+"""
+
+
+def test_a_modelica_source_flies_and_is_built_once(folder, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "models").mkdir()
+    source = tmp_path / "models" / "Doubler.mo"
+    source.write_text(GAIN)
+    component = {"modelica": "models/Doubler.mo:Doubler", "parameters": {"u": 3.0}}
+    file = folder.scenario({"a": component})
+    assert cosim.run(file)["a.y"].tolist() == [0, 6, 6, 6]
+    (built,) = (tmp_path / "cache").rglob("*.fmu")
+    stamp = built.stat().st_mtime_ns
+    assert cosim.run(file, {"a.k": 5.0})["a.y"].tolist() == [0, 15, 15, 15]
+    assert built.stat().st_mtime_ns == stamp
+    source.write_text(GAIN.replace("k*u", "k*u + 1"))
+    assert cosim.run(file)["a.y"].tolist() == [0, 7, 7, 7]
+
+
+def test_a_model_that_cannot_be_built_says_where(folder, tmp_path):
+    import pytest
+
+    (tmp_path / "models").mkdir()
+    (tmp_path / "models" / "Doubler.mo").write_text(GAIN.replace("k*u", "k*w"))
+    file = folder.scenario({"a": {"modelica": "models/Doubler.mo:Doubler"}})
+    with pytest.raises(cosim.InputError, match=r"Doubler\.mo:8.*w"):
+        cosim.run(file)
