@@ -19,6 +19,9 @@ Action = Callable[[], object]
 #: the highest FMI status that lets a simulation go on
 WARNING = 1
 
+#: up to so many values are faster assigned one by one than by numpy
+FEW = 4
+
 
 class Termination(NamedTuple):
     """A component asked to end the simulation."""
@@ -156,9 +159,17 @@ def _copy(gather: Gather) -> Action:
     """The gather, its delay left aside, as one call that allocates as little as numpy allows."""
     first, count = int(gather.target_indices[0]), len(gather.target_indices)
     together = np.array_equal(gather.target_indices, np.arange(first, first + count))
-    if together and gather.factor is None and gather.source.dtype == gather.target.dtype:
-        return partial(gather.source.take, gather.source_indices, None, gather.target[first : first + count], "clip")
-    return partial(_scatter, gather, gather.source, gather.source_indices)
+    if gather.factor is not None or gather.source.dtype != gather.target.dtype or not together:
+        return partial(_scatter, gather, gather.source, gather.source_indices)
+    if count <= FEW and not gather.source.dtype.hasobject:
+        places = list(zip(gather.target_indices.tolist(), gather.source_indices.tolist(), strict=True))
+        return partial(_assign, gather.target.data, gather.source.data, places)
+    return partial(gather.source.take, gather.source_indices, None, gather.target[first : first + count], "clip")
+
+
+def _assign(target: memoryview, source: memoryview, places: Sequence[tuple[int, int]]) -> None:
+    for i, j in places:
+        target[i] = source[j]
 
 
 def _scatter(gather: Gather, source: np.ndarray, indices: np.ndarray) -> None:
