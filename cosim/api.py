@@ -5,12 +5,14 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from . import __version__
+from .errors import CosimError
 from .kpi import CheckOutcome, evaluate_checks, evaluate_kpis
 from .results import Result
 from .scenario import Assembly, assemble
@@ -62,7 +64,11 @@ def execute(assembly: Assembly, observers: Sequence[Observer] = ()) -> Result:
     if outcome.failure is not None:
         outcome.failure.result = result  # type: ignore[attr-defined]
         raise outcome.failure
-    return Result(outcome.recording, evaluate_kpis(result, assembly.kpis()), timing, metadata)
+    try:
+        return replace(result, kpis=evaluate_kpis(result, assembly.kpis()))
+    except CosimError as error:
+        error.result = result  # type: ignore[attr-defined]
+        raise
 
 
 def checks(assembly: Assembly, result: Result) -> list[CheckOutcome]:

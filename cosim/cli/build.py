@@ -36,5 +36,10 @@ def command(sources: tuple[Path, ...], check: bool) -> int:
 
 
 def _report(built: Built) -> None:
-    names = ", ".join(str(path.relative_to(path.parents[1] if path.parent.name == "fmus" else path.parents[2])) for path in built.fmus.values())
-    click.echo(f"{built.source.name} -> {names}")
+    names = ", ".join(path.as_posix()[path.as_posix().rindex("fmus/") :] for path in built.fmus.values())
+    click.echo(f"{_shown(built.source)} -> {names}")
+
+
+def _shown(source: Path) -> Path:
+    """A path as the user would write it, where that is shorter."""
+    return source.relative_to(Path.cwd()) if source.is_relative_to(Path.cwd()) else source

@@ -26,7 +26,12 @@ if TYPE_CHECKING:
 @click.option("--set", "settings", multiple=True, metavar="NAME=value", help="Set a variable, or /json/pointer=value anything.")
 @click.option("--no-report", is_flag=True, help="Write no figures.")
 def command(
-    scenario: str, output_dir: Path | None, stop_time: str | None, step_size: str | None, settings: tuple[str, ...], no_report: bool
+    scenario: str,
+    output_dir: Path | None,
+    stop_time: str | None,
+    step_size: str | None,
+    settings: tuple[str, ...],
+    no_report: bool,
 ) -> int:
     """Run SCENARIO, a JSON file or the name of a shipped scenario.
 
@@ -34,8 +39,9 @@ def command(
     failed, the results until then are kept; 2: the scenario was refused; 3: a check was not met.
     """
     from ..api import checks, execute, load
-    from ..errors import ComponentError
+    from ..errors import CosimError
     from ..kpi import kpi_units
+    from ..report.figures import draw_figures
     from ..report.tables import print_kpis
     from ..results.result import write_run
     from ..scenario.tree import parse_settings
@@ -48,12 +54,11 @@ def command(
     try:
         with _progress(assembly) as observers:
             result = execute(assembly, observers)
-    except (ComponentError, KeyboardInterrupt) as error:
+    except (CosimError, KeyboardInterrupt) as error:
         _keep(error, directory)
         raise
-    result.timing["total_seconds"] = time.perf_counter() - began  # type: ignore[index]
     write_run(result, directory)
-    figures = [] if no_report else _draw(assembly, result, directory)
+    figures = [] if no_report else draw_figures(result, assembly.figures(), directory)
     outcomes = checks(assembly, result)
     print_kpis(result.kpis, outcomes, kpi_units(assembly.kpis(), result.kpis))
     _summary(result, directory, figures, began)
@@ -64,21 +69,10 @@ def _keep(error: BaseException, directory: Path) -> None:
     """Write what was recorded before a failure."""
     from ..results.result import write_run
 
-    if partial := getattr(error, "result", None):
+    partial = getattr(error, "result", None)
+    if partial is not None and len(partial.time):
         write_run(partial, directory)
-        rows = len(partial.time)
-        click.echo(f"{rows} rows until t = {partial.time[-1]:g} s kept in {directory}" if rows else "no rows", err=True)
-
-
-def _draw(assembly: Assembly, result: Result, directory: Path) -> list[Path]:
-    from ..report.figures import draw, save
-
-    paths = []
-    for name, function, arguments in assembly.figures():
-        path = directory / f"{name}.png"
-        save(draw(result, name, function, arguments), path)
-        paths.append(path)
-    return paths
+        click.echo(f"{len(partial.time)} rows until t = {partial.time[-1]:g} s kept in {directory}", err=True)
 
 
 def _summary(result: Result, directory: Path, figures: list[Path], began: float) -> None:

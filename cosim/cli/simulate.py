@@ -57,15 +57,14 @@ def _prepare(
 ) -> tuple[System, Settings]:
     """The FMU, and the profile if there is one, as a system of their own."""
     from ..fmi import FmuFile, instantiate
-    from ..scenario.assembly import seconds
     from ..simulate import Settings
     from ..system import Connection, Endpoint, System
 
     file = FmuFile(fmu)
     experiment = file.description.default_experiment
     start = experiment.start_time or Fraction(0)
-    stop = seconds(stop_time) if stop_time else experiment.stop_time or start + 1
-    step = seconds(step_size) if step_size else experiment.step_size or (stop - start) / 100
+    stop = _seconds(stop_time) if stop_time else experiment.stop_time or start + 1
+    step = _seconds(step_size) if step_size else experiment.step_size or (stop - start) / 100
     components: dict[str, Component] = {NAME: instantiate(file, file.description.model_name)}
     connections, stages = [], [(NAME,)]
     if input_file:
@@ -91,7 +90,9 @@ def _profile(path: Path, component: Component) -> Component:
     inputs = [slot for v in component.variables if v.causality == "input" for slot in v.slots]
     unknown = [column for column in columns if column not in inputs]
     if unknown:
-        raise InputError(Problem(f'the FMU has no input "{column}"{did_you_mean(column, inputs)}', str(path)) for column in unknown)
+        raise InputError(
+            Problem(f'the FMU has no input "{column}"{did_you_mean(column, inputs)}', str(path)) for column in unknown
+        )
     return read_table(path, columns, "linear")
 
 
@@ -109,3 +110,13 @@ def _assigned(component: Component, start_values: dict[str, Any]) -> dict[str, A
     if problems:
         raise InputError(problems)
     return values
+
+
+def _seconds(text: str) -> Fraction:
+    from ..errors import InputError
+    from ..timing import exact
+
+    try:
+        return exact(text)
+    except (ValueError, ZeroDivisionError):
+        raise InputError(f'expected seconds, found "{text}"') from None

@@ -6,7 +6,7 @@ as a KPI is. Figures are made without pyplot: nothing global is left behind and 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -82,13 +82,16 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def draw_figures(
-    result: Result, figures: Iterable[tuple[str, Callable[..., Figure], Mapping[str, Any]]], directory: str | Path
+    result: Result,
+    figures: Iterable[tuple[str, Callable[..., Figure], Mapping[str, Any]]],
+    directory: str | Path,
+    suffixes: Sequence[str] = (".png",),
 ) -> list[Path]:
-    """Draw all figures, given as (name, function, arguments), into `directory`/NAME.png and NAME.svg; the files written."""
+    """Draw all figures, given as (name, function, arguments), into `directory`/NAME.png (or .svg); returns the files."""
     files = []
     for name, function, arguments in figures:
         figure = draw(result, name, function, arguments)
-        for suffix in (".png", ".svg"):
+        for suffix in suffixes:
             path = Path(directory) / f"{name}{suffix}"
             save(figure, path)
             files.append(path)

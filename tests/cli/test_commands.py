@@ -87,6 +87,15 @@ def test_a_failing_component_ends_with_one_and_keeps_the_rows(tmp_path):
     assert "tilt beyond limit" in json.loads((tmp_path / "runs/small/run.json").read_text())["failure"]
 
 
+def test_a_failing_kpi_loses_nothing(tmp_path):
+    (tmp_path / "kpis.py").write_text(KPIS)
+    kpi = {"name": "end", "python": "kpis.py:last", "arguments": {"signal": "a.z"}}
+    done = cosim("run", scenario(tmp_path, kpis=[kpi]), cwd=tmp_path)
+    assert done.returncode == 2
+    assert 'KPI "end": no signal "a.z" was recorded; did you mean "a.y"?' in done.stderr
+    assert len((tmp_path / "runs/small/result.csv").read_text().splitlines()) == 5
+
+
 def test_a_refused_scenario_ends_with_two_one_line_per_problem(tmp_path):
     done = cosim("run", scenario(tmp_path, colour="red", stop_time=2.5), cwd=tmp_path)
     assert done.returncode == 2

@@ -17,6 +17,7 @@ from cosim.report.figures import STYLE, draw, draw_figures, save
 from cosim.results import Result
 
 TIME = np.arange(200) / 100
+BOTH = (".png", ".svg")
 RESULT = Result(Recording(TIME, {"x": np.sin(TIME)}, {"x": "m"}))
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -30,7 +31,7 @@ def curve(result, signal):
 
 
 def test_each_figure_is_a_png_and_an_svg(tmp_path):
-    files = draw_figures(RESULT, [("curve", curve, {"signal": "x"})], tmp_path / "run")
+    files = draw_figures(RESULT, [("curve", curve, {"signal": "x"})], tmp_path / "run", BOTH)
     assert [file.name for file in files] == ["curve.png", "curve.svg"]
     assert sorted((tmp_path / "run").iterdir()) == files
     assert files[0].read_bytes().startswith(PNG)
@@ -44,14 +45,14 @@ import matplotlib
 matplotlib.rcParams.update({{"lines.linewidth": 7, "axes.facecolor": "red", "savefig.dpi": 30}})
 from test_figure_files import RESULT, curve
 from cosim.report.figures import draw_figures
-files = draw_figures(RESULT, [("curve", curve, {{"signal": "x"}})], {folder!r})
+files = draw_figures(RESULT, [("curve", curve, {{"signal": "x"}})], {folder!r}, (".png", ".svg"))
 print(json.dumps([hashlib.sha256(file.read_bytes()).hexdigest() for file in files]))
 print("matplotlib.pyplot" in sys.modules)
 """
 
 
 def test_another_process_with_other_settings_writes_the_same_bytes_without_pyplot(tmp_path):
-    here = draw_figures(RESULT, [("curve", curve, {"signal": "x"})], tmp_path / "here")
+    here = draw_figures(RESULT, [("curve", curve, {"signal": "x"})], tmp_path / "here", BOTH)
     script = FRESH.format(tests=str(Path(__file__).parent), folder=str(tmp_path / "there"))
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)  # noqa: S603
     hashes, pyplot = run.stdout.split("\n")[:2]
@@ -60,7 +61,7 @@ def test_another_process_with_other_settings_writes_the_same_bytes_without_pyplo
 
 
 def test_files_carry_neither_date_nor_version(tmp_path):
-    png, svg = draw_figures(RESULT, [("curve", curve, {"signal": "x"})], tmp_path)
+    png, svg = draw_figures(RESULT, [("curve", curve, {"signal": "x"})], tmp_path, BOTH)
     assert b"Software" not in png.read_bytes()
     assert "<dc:date>" not in svg.read_text()
     assert matplotlib.__version__ not in svg.read_text()

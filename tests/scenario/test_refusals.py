@@ -144,6 +144,13 @@ def test_periods_must_fit(folder):
     ]
 
 
+def test_a_period_inside_a_nested_system_is_found_in_its_file(folder):
+    folder.write({"components": {"g": folder.block("Gain", period=1.5)}}, "n.json")
+    (line,) = refused(folder, {"a": {"system": "n.json"}})
+    assert line.startswith("n.json:1:")
+    assert "$.components.g.period: period 1.5 s is no multiple of the step size 1.0 s" in line
+
+
 def test_incompatible_units_and_types_are_refused(folder, probes):
     xml = {"a": {"fmu": str(probes[2])}, "b": {"fmu": str(probes[3])}}
     found = refused(folder, xml, [wire("a.s_out", "b.u"), wire("a.b_out", "b.int8_in")])

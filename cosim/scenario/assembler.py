@@ -1,0 +1,208 @@
+"""From a scenario to a system that can be simulated; everything that is wrong is collected and reported together."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+from ..component import Component
+from ..errors import InputError, Problem, did_you_mean
+from ..simulate import Event, Settings, problems
+from ..system import Connection, Endpoint, Group, Stage, System
+from ..table import read_table
+from .functions import missing_function
+from .names import Target, Unknown, assign, resolve, under
+from .schema import kept
+from .selection import Selection
+from .sources import Workshop
+from .tree import Node, Scenario
+from .wiring import Wiring
+
+#: full name of the components made from input profiles: PROFILES.0, PROFILES.1, ...
+PROFILES = "inputs"
+
+
+class Assembler:
+    """The steps of assembling, each adding to `problems`."""
+
+    def __init__(self, scenario: Scenario):
+        self.root, self.spec, self.outside = scenario.root, scenario.spec, scenario.assignments
+        self.problems: list[Problem] = list(scenario.problems)
+        self.workshop = Workshop()
+        self.components: dict[str, Component] = {}
+        self.start_values: dict[str, dict[str, Any]] = defaultdict(dict)
+
+    def run(self) -> None:
+        self._make_components()
+        self._set_start_values()
+        aliases = self._aliases()
+        connections = list(self._connections())
+        self.system = System(
+            self.components,
+            connections,
+            (*self._stages(self.root), *([tuple(self.profiles)] if self.profiles else [])),
+            dict(self._periods(self.root)),
+            self.start_values,
+            aliases,
+        )
+        self.settings = Settings(
+            self.spec.start_time,
+            self.spec.stop_time,
+            self.spec.step_size,
+            self._columns(aliases),
+            self.spec.record.interval,
+            list(self._events()),
+        )
+        self.problems += [self._located(problem) for problem in problems(self.system, self.settings)]
+        self._check_functions()
+
+    # -- components and their start values -----------------------------------------------------------------------------
+
+    def _make_components(self) -> None:
+        for node in self.root.walk():
+            for name, component in node.spec.components.items():
+                if component.system is not None or name in node.broken:
+                    continue
+                try:
+                    self.components[node.full_name(name)] = self.workshop.make(node, name)
+                except InputError as error:
+                    node.broken.add(name)
+                    self._report(error, node, "components", name)
+        self.profiles = [f"{PROFILES}.{i}" for i, _ in kept(self.spec.inputs)]
+        for i, spec in kept(self.spec.inputs):
+            try:
+                table = read_table(self.root.folder / spec.file, list(spec.to), spec.interpolation)
+                self.components[f"{PROFILES}.{i}"] = table
+            except InputError as error:
+                self.profiles.remove(f"{PROFILES}.{i}")
+                self._report(error, self.root, "inputs", i)
+
+    def _set_start_values(self) -> None:
+        """Nested systems first, so that outer values win; those from outside come last."""
+        for node in self.root.walk():
+            for name, spec in node.spec.components.items():
+                for variable, value in spec.parameters.items():
+                    where = node.where("components", name, "parameters", variable)
+                    self._assign(self.start_values, node, f"{name}.{variable}", value, where)
+        for name, value in self.outside.items():
+            self._assign(self.start_values, self.root, name, value, f"--set {name}")
+
+    def _assign(self, values: dict[str, dict[str, Any]], node: Node, name: str, value: Any, where: str) -> None:
+        try:
+            for target in resolve(node, name, ("parameters", "inputs"), hidden=True):
+                if target.component in self.components:
+                    component = self.components[target.component]
+                    values[target.component] |= assign(target.component, component, target.prefix, value)
+        except (Unknown, ValueError) as error:
+            if str(error):
+                self.problems.append(Problem(str(error), where))
+
+    # -- wiring --------------------------------------------------------------------------------------------------------
+
+    def _connections(self) -> Iterator[Connection]:
+        given = {
+            Endpoint(name, slot)
+            for name, values in self.start_values.items()
+            for variable in self.components[name].variables
+            if variable.name in values
+            for slot in variable.slots
+        }
+        wiring = Wiring(self.components, given)
+        for node in self.root.walk():
+            wiring.connect(node)
+        for i, spec in kept(self.spec.inputs):
+            if f"{PROFILES}.{i}" in self.components:
+                for column, names in spec.to.items():
+                    for name in names:
+                        where = self.root.where("inputs", i, "to", column)
+                        wiring.feed(self.root, Endpoint(f"{PROFILES}.{i}", column), name, where)
+        yield from wiring.connections()
+        self.problems += wiring.problems
+
+    def _stages(self, node: Node) -> tuple[Stage, ...]:
+        """Names that mean nothing, stand twice or are missing are left to the system's own checks."""
+        listed = node.spec.algorithm.stages if node.spec.algorithm else [[name] for name in node.spec.components]
+        return tuple(tuple(self._member(node, name) for name in stage if name not in node.broken) for stage in listed if stage)
+
+    def _member(self, node: Node, name: str) -> str | Group:
+        if name in node.children:
+            return Group(node.full_name(name), self._stages(node.children[name]))
+        return node.full_name(name)
+
+    def _periods(self, node: Node, inherited: Fraction | None = None) -> Iterator[tuple[str, Fraction]]:
+        for name, spec in node.spec.components.items():
+            period = spec.period or inherited
+            if name in node.children:
+                yield from self._periods(node.children[name], period)
+            elif period and node.full_name(name) in self.components:
+                yield node.full_name(name), period
+
+    def _aliases(self) -> dict[str, Endpoint]:
+        """Outputs of nested systems under the names of their ports."""
+        aliases: dict[str, Endpoint] = {}
+        for node in self.root.walk():
+            for name, child in node.children.items():
+                for port, inner in child.spec.ports.outputs.items():  # type: ignore[attr-defined]
+                    try:
+                        (target,) = resolve(child, inner, ("outputs",))
+                    except Unknown as error:
+                        if str(error):
+                            self.problems.append(Problem(str(error), child.where("ports", "outputs", port)))
+                        continue
+                    aliases |= self._slots(target, f"{node.full_name(name)}.{port}")
+        return aliases
+
+    def _slots(self, target: Target, alias: str) -> dict[str, Endpoint]:
+        if target.component not in self.components:
+            return {}
+        slots = under(self.components[target.component], target.prefix, "output")
+        return {alias + rest: Endpoint(target.component, slot) for rest, slot in slots.items()}
+
+    # -- what is recorded, set and computed ----------------------------------------------------------------------------
+
+    def _columns(self, aliases: Mapping[str, Endpoint]) -> dict[str, Endpoint]:
+        broken = [node.full_name(name) for node in self.root.walk() for name in node.broken]
+        selection = Selection(self.components, aliases, broken)
+        patterns = [(text, self.root.where("record", "signals", i)) for i, text in enumerate(self.spec.record.signals)]
+        chosen = selection.choose(patterns)
+        self.problems += selection.problems
+        return chosen
+
+    def _events(self) -> Iterator[Event]:
+        for i, spec in kept(self.spec.events):
+            values: dict[str, dict[str, Any]] = defaultdict(dict)
+            for name, value in spec.values.items():
+                self._assign(values, self.root, name, value, self.root.where("events", i, "set", name))
+            yield Event(spec.time, values, self.root.where("events", i))
+
+    def _check_functions(self) -> None:
+        for kind in ("kpis", "figures"):
+            for i, spec in kept(getattr(self.spec, kind)):
+                if text := missing_function(spec, self.root.folder):
+                    self.problems.append(Problem(text, self.root.where(kind, i, "python")))
+        names = [spec.name for _, spec in kept(self.spec.kpis)]
+        for i, check in kept(self.spec.checks):
+            if check.kpi.partition(".")[0] not in names:
+                text = f'no KPI "{check.kpi}"{did_you_mean(check.kpi.partition(".")[0], names)}'
+                self.problems.append(Problem(text, self.root.where("checks", i, "kpi")))
+
+    # -- reporting -----------------------------------------------------------------------------------------------------
+
+    def _report(self, error: InputError, node: Node, *path: str | int) -> None:
+        self.problems += [
+            replace(problem, where=node.where(*path, *problem.subject), subject=()) if not problem.where else problem
+            for problem in error.problems
+        ]
+
+    def _located(self, problem: Problem) -> Problem:
+        """A problem of the system, with the place in the file of the setting it is about."""
+        if problem.where or not problem.subject:
+            return problem
+        for node in self.root.walk():
+            for name in node.spec.components:
+                if problem.subject[:2] == ("components", node.full_name(name)):
+                    return replace(problem, where=node.where("components", name, *problem.subject[2:]), subject=())
+        return replace(problem, where=self.root.where(*problem.subject), subject=())
