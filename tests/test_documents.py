@@ -27,20 +27,20 @@ def commands():
                 yield pytest.param(line.strip(), id=line.strip())
 
 
-@pytest.mark.parametrize("command", commands())
+@pytest.mark.parametrize("command", list(commands()))
 def test_commands_run(command, tmp_path):
     words = [str(ROOT / word) if (ROOT / word).exists() else word for word in shlex.split(command)[1:]]
     done = subprocess.run([sys.executable, "-m", "cosim", *words], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("code", blocks("python"))
+@pytest.mark.parametrize("code", list(blocks("python")))
 def test_python_examples_run(code, tmp_path):
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("text", blocks("json"))
+@pytest.mark.parametrize("text", list(blocks("json")))
 def test_json_examples_are_parts_of_scenarios(text):
     components = json.loads("{" + text + "}")
     shipped = json.loads((ROOT / "scenarios/demo1_box.json").read_text())["components"]

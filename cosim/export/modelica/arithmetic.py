@@ -109,7 +109,9 @@ def _larger(*arguments: Any) -> Any:
 
 
 def _elements(arguments: tuple[Any, ...]) -> list[Any]:
-    return [plain(x) for argument in arguments for x in np.asarray(argument).flat]
+    """All elements, as Real where one of them is."""
+    elements = [plain(x) for argument in arguments for x in np.asarray(argument).flat]
+    return [float(x) for x in elements] if any(isinstance(x, float) for x in elements) else elements
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -11,8 +11,9 @@ import numpy as np
 
 from ...component import Causality, Variability
 from ..block import Block, BlockVariable
+from .constants import inline_constants
 from .emit import emit
-from .flat import Expression, Model, Variable, refuse
+from .flat import Model, Variable, refuse
 from .folded import check_folding
 from .front import Sources, flatten
 from .header import members
@@ -53,7 +54,7 @@ def interpreter(path: Path, model: str | None = None) -> Interpreter:
 def _open(path: Path, model: str | None) -> tuple[Interpreter, Sources]:
     json, sources = flatten(Path(path), model)
     check_folding(json, sources)
-    flat = Reader(json, sources).model(model or Path(path).stem)
+    flat = inline_constants(Reader(json, sources).model(model or Path(path).stem))
     _check_types(flat)
     return Interpreter(flat), sources
 
@@ -62,6 +63,8 @@ def _check_types(model: Model) -> None:
     for variable in model.variables.values():
         if variable.type not in _FMI_TYPES:
             refuse(f"{variable.name}: variables of type {variable.type} are not supported", variable.where)
+        if 0 in variable.shape:
+            refuse(f"{variable.name}: arrays without elements are not supported", variable.where)
 
 
 def _root(files: Sequence[Path]) -> Path:
@@ -101,8 +104,8 @@ def _described(variable: Variable, member: str, role: Role, defaults: Interprete
         unit=variable.unit,
         shape=variable.shape,
         description=variable.description,
-        minimum=_limit(variable.minimum, defaults),
-        maximum=_limit(variable.maximum, defaults),
+        minimum=None if variable.minimum is None else float(np.min(defaults.evaluate(variable.minimum))),
+        maximum=None if variable.maximum is None else float(np.max(defaults.evaluate(variable.maximum))),
         enumeration=tuple((literal, "") for literal in _literals(variable, defaults.model)),
     )
 
@@ -118,7 +121,3 @@ def _literals(variable: Variable, model: Model) -> tuple[str, ...]:
 
 def _plain(value: Any) -> Any:
     return tuple(value.flat if isinstance(value, np.ndarray) else value) if np.ndim(value) else value
-
-
-def _limit(limit: Expression | None, defaults: Interpreter) -> float | None:
-    return None if limit is None else float(np.max(defaults.evaluate(limit)))

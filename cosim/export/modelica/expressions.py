@@ -24,6 +24,8 @@ class Expressions(Subscripts):
     def _literal(self, node: flat.Literal) -> Value:
         if node.type == "String":
             refuse("texts can only stand in assert()", None)
+        if node.type == "Integer" and not -(2**31) <= node.value < 2**31:  # type: ignore[operator]
+            refuse(f"the Integer {node.value} does not fit into 32 bits; write a Real", None)
         return scalar(node.type, number(node.value, node.type), simple=True)  # type: ignore[arg-type]
 
     def _name(self, node: flat.Name) -> Value:

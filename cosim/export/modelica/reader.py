@@ -29,7 +29,7 @@ class Reader(StatementReader):
             functions={key: self.function(node) for key, node in self.json["functions"].items() if not node["is_constructor"]},
             enumerations=self._enumerations(),
             structural=tuple(
-                flat.Structural(node["kind"], tuple(name for names in node["references"] for name in names), self.place(node))
+                flat.Structural(node["kind"], tuple(map(self._first_known, node["references"])), self.place(node))
                 for node in self.json.get("parameter_branch_selections", ())
             ),
         )
@@ -42,6 +42,10 @@ class Reader(StatementReader):
                 refuse(f"{kind.replace('_', ' ')} are not supported", None)
         if not all(node["interiors_materialized"] for node in self.json["structured_equations"]):
             refuse("a for-equation was not unrolled by the front end", None)
+
+    def _first_known(self, candidates: list[str]) -> str:
+        """Of the names by which a parameter may be meant, from the inside out, the one that exists."""
+        return next((name for name in candidates if name in self.json["variables"]), candidates[0])
 
     # variables
 

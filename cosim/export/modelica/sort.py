@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from .flat import (
     Assert,
     Assign,
+    Binary,
     Body,
     Builtin,
     Expression,
@@ -31,6 +32,7 @@ from .matching import Key, keys, match, match_initial
 from .triggers import Clock, Triggers, due
 from .visit import has_builtin, reads, remembered, rewrite, targets, walk
 
+_TRUE = Literal(True, "Boolean")
 _ZERO = {"Real": Literal(0.0, "Real"), "Integer": Literal(0, "Integer"), "Boolean": Literal(False, "Boolean")}
 
 
@@ -89,12 +91,12 @@ def plan(model: Model) -> Plan:
     event += [_node(model, (watch,)) for watch in triggers.watches]
     start = [*_initial_nodes(model, triggers), *(_node(model, (a,)) for a in (*continuous, *match_initial(model, assigned)))]
     start += [_node(model, (watch,)) for watch in triggers.watches]
-    single = len(triggers.clocks) == 1
+    ticks = _statements(_sorted(event))
     return Plan(
         triggers.clocks,
         len(triggers.watches),
         _with_initial(_statements(_sorted(start)), True),
-        _with_initial(_unconditional(_statements(_sorted(event)), single), False),
+        _with_initial(_unconditional(ticks) if len(triggers.clocks) == 1 else ticks, False),
     )
 
 
@@ -123,9 +125,9 @@ def _flag(index: Expression) -> Key:
 
 def _event_nodes(model: Model, triggers: Triggers) -> Iterator[_Node]:
     for when in model.whens:
-        yield from _split(model, (triggers.at_event(when),))
+        yield from _split(model, triggers.at_event(when))
     for body in model.algorithms:
-        yield _algorithm(model, tuple(triggers.at_event(s) if isinstance(s, When) else s for s in body))
+        yield from _algorithm(model, body, triggers.at_event)
     yield from (_node(model, (statement,)) for statement in model.asserts)
 
 
@@ -133,14 +135,15 @@ def _initial_nodes(model: Model, triggers: Triggers) -> Iterator[_Node]:
     for when in model.whens:
         yield from _split(model, triggers.at_initialization(when))
     for body in (*model.algorithms, *model.initial_algorithms):
-        active = tuple(t for s in body for t in (triggers.at_initialization(s) if isinstance(s, When) else (s,)))
-        if active:
-            yield _algorithm(model, active)
+        yield from _algorithm(model, body, triggers.at_initialization)
     yield from (_node(model, (statement,)) for statement in model.asserts)
 
 
-def _algorithm(model: Model, statements: Body) -> _Node:
-    return _node(model, statements, {base_name(target) for target in targets(statements)})
+def _algorithm(model: Model, body: Body, active: Callable[[When], Body]) -> Iterator[_Node]:
+    """One node, with what is active of its when-clauses; none if nothing is."""
+    statements = tuple(item for s in body for item in (active(s) if isinstance(s, When) else (s,)))
+    if statements:
+        yield _node(model, statements, {base_name(target) for target in targets(statements)})
 
 
 def _split(model: Model, statements: Body) -> Iterator[_Node]:
@@ -231,10 +234,17 @@ def _statements(nodes: list[_Node]) -> Body:
     return tuple(merged)
 
 
-def _unconditional(body: Body, single: bool) -> Body:
+def _unconditional(body: Body) -> Body:
     """Where there is a single clock it ticks in every event."""
-    inner = (s.branches[0][1] if single and isinstance(s, IfStatement) and s.branches[0][0] == due(0) else (s,) for s in body)
+    known = rewrite(body, lambda node: _TRUE if node == due(0) else node)
+    inner = (s.branches[0][1] if isinstance(s, IfStatement) and _is_certain(s.branches[0][0]) else (s,) for s in known)
     return tuple(statement for statements in inner for statement in statements)
+
+
+def _is_certain(condition: Expression) -> bool:
+    if isinstance(condition, Binary) and condition.operator == "or":
+        return _is_certain(condition.left) or _is_certain(condition.right)
+    return condition == _TRUE
 
 
 def _with_initial(body: Body, value: bool) -> Body:

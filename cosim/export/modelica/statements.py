@@ -27,10 +27,7 @@ class Statements(Expressions):
         getattr(self, f"_{type(node).__name__.lower()}")(node)
 
     def _assign(self, node: flat.Assign) -> None:
-        self.store(self._target(node.target), node.value, node.target)
-
-    def _target(self, target: flat.Name | flat.Index) -> Value:
-        return self.lower(target)
+        self.store(self.lower(node.target), node.value, node.target)
 
     def store(self, target: Value, value: Expression, reference: Expression) -> None:
         """Writes an expression to a target; `reference` names it, to see whether the expression reads what it overwrites."""
@@ -45,11 +42,10 @@ class Statements(Expressions):
 
     def _store_value(self, target: Value, value: Expression, reference: Expression) -> None:
         lowered = self.lower(value)
+        if lowered.shape not in ((), target.shape):
+            refuse(f"sizes differ: {list(target.shape)} := {list(lowered.shape)}", getattr(reference, "where", None))
         if lowered.shape != target.shape:
-            if lowered.shape:
-                refuse(f"sizes differ: {list(target.shape)} := {list(lowered.shape)}", getattr(reference, "where", None))
-            lowered = self.held(lowered)
-            lowered = replace(lowered, shape=target.shape)
+            lowered = replace(self.held(lowered), shape=target.shape)
         if target.shape and _read(value) & names(reference):
             lowered = self.held(replace(lowered, simple=False))
         self.copy(target, lowered)
@@ -82,7 +78,7 @@ class Statements(Expressions):
     def _close(self, yes: list[str], no: list[str]) -> None:
         """The branches of an `if` that is open; `else { if ... }` becomes `else if` where that is all there is."""
         self.out += yes
-        if no and no[0].startswith("    if (") and _is_one_block(no):
+        if no and _is_one_if(no):
             self.out += ["} else " + no[0].strip(), *(line[4:] for line in no[1:])]
         elif no:
             self.out += ["} else {", *no, "}"]
@@ -131,7 +127,7 @@ class Statements(Expressions):
 
     def _multiassign(self, node: flat.MultiAssign) -> None:
         for target, result in zip(node.targets, self.invoke(node.call), strict=False):
-            self.copy(self._target(target), result)
+            self.copy(self.lower(target), result)
 
     def _watch(self, node: flat.Watch) -> None:
         """Sets the flag of a condition that has become true since the last event."""
@@ -151,7 +147,6 @@ def _read(node: Expression) -> set[str]:
     return {flat.base_name(reference) for reference in reads(node)}
 
 
-def _is_one_block(lines: list[str]) -> bool:
-    """Whether the lines are a single `if` with its branches: only the last line closes at the outermost level."""
-    closing = [k for k, line in enumerate(lines) if line.startswith("    }") and line.strip() == "}"]
-    return closing == [len(lines) - 1]
+def _is_one_if(lines: list[str]) -> bool:
+    """Whether the lines are a single `if` with its branches: it opens in the first and closes for good in the last line."""
+    return lines[0].startswith("    if (") and lines[0].endswith("{") and lines.index("    }") == len(lines) - 1

@@ -31,8 +31,9 @@ class Subscripts(Lowering):
         shape = tuple(len(place) for place in places if isinstance(place, list))
         factors = [prod(base.shape[d + 1 :]) for d in range(len(base.shape))]
         selected = [offset(list(zip(factors, index, strict=True))) for index in product(*choices)]
-        whole = selected == list(range(base.size))
-        return base if whole else Value(base.type, shape, lambda k: base.at(selected[int(k)]), loops=False, simple=base.simple)
+        if shape == base.shape and selected == list(range(base.size)):
+            return base
+        return Value(base.type, shape, lambda k: base.at(selected[int(k)]), loops=False, simple=base.simple)
 
     def _places(self, subscript: Expression | flat.Colon, size: int, label: str, where: Place | None) -> list[int] | int | str:
         """Places counted from 0: several for a slice, a number or C text for one element."""

@@ -36,10 +36,11 @@ class Triggers:
         self.clocks: list[Clock] = []
         self.watches: list[Watch] = []
 
-    def at_event(self, when: When) -> IfStatement:
+    def at_event(self, when: When) -> Body:
         """The when-clause as seen in an event; branches that only initial() activates are left out."""
         flagged = [(self._flags(condition, when.where), body) for condition, body in when.branches]
-        return IfStatement(tuple((_any(flags), body) for flags, body in flagged if flags), (), when.where)
+        branches = tuple((_any(flags), body) for flags, body in flagged if flags)
+        return (IfStatement(branches, (), when.where),) if branches else ()
 
     def at_initialization(self, when: When) -> Body:
         """What of the when-clause is active in the initialization: the first branch with initial() in its condition."""

@@ -25,7 +25,9 @@ _OURS = re.compile(r"tmp_\d+|holds_\d+|pre_\w+")
 
 def identifier(name: str) -> str:
     """A C identifier for a Modelica name: "pid[1].kp" becomes pid_1_kp."""
-    plain = re.sub(r"\W+", "_", name).strip("_")
+    plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_")
+    if not plain or plain[0].isdigit():
+        plain = "_" + plain
     return plain + "_" if plain in _TAKEN or _OURS.fullmatch(plain) else plain
 
 

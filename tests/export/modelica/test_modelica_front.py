@@ -111,6 +111,14 @@ def test_another_version_of_the_front_end_is_refused(folder, monkeypatch):
 
 
 def test_a_place_that_the_front_end_knows_is_kept(write):
-    path = write("model M\n  parameter Integer n;\n  Real v[n];\n  output Real y;\nequation\n  y = 1;\nend M;")
-    with pytest.raises(InputError, match=r"M.mo:3: typecheck failed: .*unevaluable array dimensions for 'v'"):
+    path = write("""package P
+  constant Integer n = 3;
+end P;
+model M
+  Real v[P.n];
+  output Real y;
+equation
+  y = 1;
+end M;""")
+    with pytest.raises(InputError, match=r"M.mo:5: typecheck failed: .*unevaluable array dimensions for 'v'"):
         load(path)

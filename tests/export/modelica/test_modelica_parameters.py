@@ -139,6 +139,28 @@ end M;""")
         assert model.get("y") == expected
 
 
+def test_constants_may_size_arrays_slices_and_loops(twins):
+    model = twins("""model M
+  constant Integer half = 2;
+  constant Integer full = 2*half;
+  constant Real table[full] = {1, 2, 3, 4};
+  input Real u;
+  output Real y[full];
+  output Real s;
+equation
+  for i in 1:full loop
+    y[i] = u*table[i];
+  end for;
+  s = sum(y[1:half]) + sum(fill(u, full));
+  when sample(0, 0.01) then
+  end when;
+end M;""")
+    assert [v.name for v in model.c.block.variables] == ["u", "y", "s"]
+    model.initialize()
+    for _, inputs in model.run(20):
+        assert model.get("s") == inputs["u"] + 2 * inputs["u"] + (inputs["u"] + inputs["u"] + inputs["u"] + inputs["u"])
+
+
 def test_members_are_unique_and_no_words_of_c(twins):
     model = twins("""model M
   block B

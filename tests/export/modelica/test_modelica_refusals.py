@@ -19,7 +19,11 @@ CASES = {
         "a = sin(a) + u;\n  y = a;",
         r"M.mo:8: algebraic loop: a \(M.mo:8\) -> a .*; break it with pre\(\)",
     ),
-    "implicit": ("Real a;", "a + u = 2*a;\n  y = a;", "M.mo:8: this equation defines no variable: write it with a variable"),
+    "implicit": (
+        "Real a;",
+        "a + u = 2*a;\n  y = a;",
+        "M.mo:8: this equation defines no variable: write it with a variable",
+    ),
     "structural if": (
         "parameter Integer n = 2;",
         "if n == 1 then\n    y = u;\n  elseif n == 2 then\n    y = 2*u;\n  else\n    y = 3;\n  end if;",
@@ -48,6 +52,7 @@ CASES = {
         'y = u;\n  assert(u > 0, "u is " + String(u));',
         "M.mo:9: the expression StringConversion is not supported",
     ),
+    "no elements": ("Real v[0];", "y = u;", "M.mo:6: v: arrays without elements are not supported"),
     "delay": ("", "y = delay(u, 0.1);", r"M.mo:8: delay\(\) is not supported"),
     "unknown name": ("", "y = u + speeed;", "M.mo:8: unresolved component reference: 'speeed'"),
     "too few equations": ("Real a;", "y = u;", "unbalanced model"),

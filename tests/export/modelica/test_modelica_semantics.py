@@ -489,6 +489,140 @@ end M;""")
         assert (model.get("y"), model.get("z")) == (y, z)
 
 
+def test_a_when_clause_may_name_a_clock_and_a_condition(twins):
+    text = """model M
+  input Real u;
+  output Integer n(start = 0, fixed = true);
+  output Integer k(start = 0, fixed = true);
+equation
+  when {{sample(0, 0.02), u > 1}} then
+    n = pre(n) + 1;
+  end when;
+  when sample(0, {0}) then
+    k = pre(k) + 1;
+  end when;
+end M;"""
+    single = twins(text.format("0.02"))
+    single.initialize()
+    single.step(0.0, 0.1)
+    assert (single.get("n"), single.get("k")) == (5, 5)
+    double = twins(text.format("0.01").replace("M;", "N;").replace("model M", "model N"))
+    double.set(u=0.0)
+    double.initialize()
+    n, was = 0, 0.0
+    for tick, inputs in double.run(TICKS):
+        n += tick % 2 == 0 or (inputs["u"] > 1 and was <= 1)
+        was = inputs["u"]
+        assert (double.get("n"), double.get("k")) == (n, tick + 1)
+
+
+def test_an_algorithm_with_a_clause_for_the_initialization_only(twins):
+    model = twins("""model M
+  parameter Real x0 = 3;
+  output Real x(start = 0, fixed = true);
+  output Real y(start = 0, fixed = true);
+algorithm
+  when initial() then
+    x := x0;
+  end when;
+  when sample(0, 0.01) then
+    y := pre(y) + x;
+  end when;
+end M;""")
+    model.set(x0=4.0)
+    model.initialize()
+    assert (model.get("x"), model.get("y")) == (4.0, 0.0)
+    model.step(0.0, 0.02)
+    assert (model.get("x"), model.get("y")) == (4.0, 8.0)
+
+
+def test_array_valued_choices_and_functions_inside_expressions(twins):
+    model = twins("""package P
+  function turned
+    input Real v[2];
+    output Real w[2];
+  algorithm
+    w := {-v[2], v[1]};
+  end turned;
+end P;
+model M
+  input Real u[2];
+  input Boolean b;
+  output Real y[2];
+  output Real z;
+  output Boolean c;
+equation
+  when sample(0, 0.01) then
+    y = 2*(if b then P.turned(u) else u) + {1, 1};
+    z = 1 + (if b then sum(P.turned(u)) else u[1]);
+    c = b and sum(P.turned(u)) > 0 or not b and sum(P.turned(2*u)) > 1;
+  end when;
+end M;""")
+    for _, i in run(model):
+        u, b = i["u"], i["b"]
+        turned = np.array([-u[1], u[0]])
+        assert list(model.get("y")) == list(2 * (turned if b else u) + 1)
+        assert model.get("z") == 1 + (turned[0] + turned[1] if b else u[0])
+        assert model.get("c") == ((turned.sum() > 0) if b else (-(2 * u[1]) + 2 * u[0] > 1))
+
+
+def test_arrays_of_one_element_and_columns_of_one(twins):
+    model = twins("""model M
+  input Real a[1];
+  input Real B[2, 1];
+  output Real y;
+  output Real c[2];
+equation
+  when sample(0, 0.01) then
+    y = a[1] + B[2, 1];
+    c = B[:, 1] + {1, 2};
+  end when;
+end M;""")
+    for _, i in run(model, 20):
+        assert model.get("y") == i["a"][0] + i["B"][1, 0]
+        assert list(model.get("c")) == list(i["B"][:, 0] + [1, 2])
+
+
+def test_nested_branches_keep_their_statements_together(twins):
+    model = twins("""model M
+  input Real u;
+  input Integer k;
+  output Real y(start = 0, fixed = true);
+  output Real z(start = 0, fixed = true);
+algorithm
+  when sample(0, 0.01) then
+    if u > 1 then
+      y := 1;
+    else
+      assert(u < 10, "too large");
+      if k > 0 then
+        y := 2;
+      elseif k < -2 then
+        y := 3;
+      end if;
+    end if;
+    if u > 0 then
+      z := 5;
+    else
+      if k > 0 then
+        z := 6;
+      end if;
+      y := y + 1;
+    end if;
+  end when;
+end M;""")
+    y = z = 0.0
+    for _, i in run(model):
+        u, k = i["u"], i["k"]
+        y = 1.0 if u > 1 else 2.0 if k > 0 else 3.0 if k < -2 else y
+        if u > 0:
+            z = 5.0
+        else:
+            z = 6.0 if k > 0 else z
+            y += 1
+        assert (model.get("y"), model.get("z")) == (y, z)
+
+
 def test_records_flatten_to_dotted_names(twins):
     model = twins("""record Vector
   Real x(unit = "m");
@@ -586,7 +720,7 @@ end M;""")
     model.initialize()
     model.step(0.0)
     model.set(u=2.5)
-    assert model.c.step(0.01, 0.01) == 'u is "too" large (M.mo:5)'
+    assert model.c.step(0.01, 0.01) == 'u is "too" large (M.mo:7)'
     with pytest.raises(ComponentError, match='u is "too" large'):
         model.python.step(0.01, 0.01)
 
