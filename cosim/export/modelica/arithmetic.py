@@ -58,6 +58,8 @@ def _sum(values: Any) -> Any:
 
 def divide(a: float, b: float) -> float:
     """a / b as IEEE 754 has it."""
+    if b != 0:
+        return a / b
     with np.errstate(all="ignore"):
         return float(np.float64(a) / np.float64(b))
 

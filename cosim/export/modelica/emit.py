@@ -124,7 +124,7 @@ class _Emitter:
         lines += [""] * bool(finite(self.model, self.plan))
         for name in finite(self.model, self.plan):
             lines += self._finite_check(self.model.variables[name])
-        if self.plan.watches:
+        if mentions("risen", lines):
             lines.insert(0, f"bool risen[{self.plan.watches}];")
         return lines or ["(void)m;"]
 

@@ -43,7 +43,8 @@ class Interpreter:
     def set(self, name: str, value: Any) -> None:
         """Set a parameter or an input, arrays whole; parameters that depend on it follow."""
         self._give(name, value)
-        self._dependent()
+        if self.model.variables[name].variability == "parameter":
+            self._dependent()
 
     def get(self, name: str) -> Any:
         return deepcopy(self.values[name])

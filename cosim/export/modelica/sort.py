@@ -92,11 +92,13 @@ def plan(model: Model) -> Plan:
     start = [*_initial_nodes(model, triggers), *(_node(model, (a,)) for a in (*continuous, *match_initial(model, assigned)))]
     start += [_node(model, (watch,)) for watch in triggers.watches]
     ticks = _statements(_sorted(event))
+    if len(triggers.clocks) == 1:
+        ticks = _unconditional(ticks)
     return Plan(
         triggers.clocks,
         len(triggers.watches),
         _with_initial(_statements(_sorted(start)), True),
-        _with_initial(_unconditional(ticks) if len(triggers.clocks) == 1 else ticks, False),
+        _with_initial(_without_idle_watches(ticks), False),
     )
 
 
@@ -239,6 +241,12 @@ def _unconditional(body: Body) -> Body:
     known = rewrite(body, lambda node: _TRUE if node == due(0) else node)
     inner = (s.branches[0][1] if isinstance(s, IfStatement) and _is_certain(s.branches[0][0]) else (s,) for s in known)
     return tuple(statement for statements in inner for statement in statements)
+
+
+def _without_idle_watches(body: Body) -> Body:
+    """Nobody asks for a condition that stands beside a clock that always ticks."""
+    asked = {item.arguments[0] for item in walk(body) if isinstance(item, Builtin) and item.name == "risen"}
+    return tuple(s for s in body if not (isinstance(s, Watch) and Literal(s.index, "Integer") not in asked))
 
 
 def _is_certain(condition: Expression) -> bool:

@@ -516,24 +516,25 @@ end M;"""
         assert (double.get("n"), double.get("k")) == (n, tick + 1)
 
 
-def test_an_algorithm_with_a_clause_for_the_initialization_only(twins):
+def test_a_clause_for_the_initialization_only(twins):
     model = twins("""model M
-  parameter Real x0 = 3;
-  output Real x(start = 0, fixed = true);
-  output Real y(start = 0, fixed = true);
+  parameter Integer n0 = 3;
+  output Integer n(start = 0, fixed = true);
+  output Integer k(start = 0, fixed = true);
 algorithm
   when initial() then
-    x := x0;
+    n := n0;
   end when;
+equation
   when sample(0, 0.01) then
-    y := pre(y) + x;
+    k = pre(k) + n;
   end when;
 end M;""")
-    model.set(x0=4.0)
+    model.set(n0=4)
     model.initialize()
-    assert (model.get("x"), model.get("y")) == (4.0, 0.0)
+    assert (model.get("n"), model.get("k")) == (4, 0)
     model.step(0.0, 0.02)
-    assert (model.get("x"), model.get("y")) == (4.0, 8.0)
+    assert (model.get("n"), model.get("k")) == (4, 8)
 
 
 def test_array_valued_choices_and_functions_inside_expressions(twins):
