@@ -62,15 +62,12 @@ class Assembler:
     # -- components and their start values -----------------------------------------------------------------------------
 
     def _make_components(self) -> None:
-        for node in self.root.walk():
-            for name, component in node.spec.components.items():
-                if component.system is not None or name in node.broken:
-                    continue
-                try:
-                    self.components[node.full_name(name)] = self.workshop.make(node, name)
-                except InputError as error:
-                    node.broken.add(name)
-                    self._report(error, node, "components", name)
+        for node, name in self.root.leaves():
+            try:
+                self.components[node.full_name(name)] = self.workshop.make(node, name)
+            except InputError as error:
+                node.broken.add(name)
+                self._report(error, node, "components", name)
         self.profiles = [f"{PROFILES}.{i}" for i, _ in kept(self.spec.inputs)]
         for i, spec in kept(self.spec.inputs):
             try:

@@ -57,10 +57,10 @@ class Assembly:
 
     def origin(self, name: str) -> str:
         """Where a component comes from, in words."""
-        for node in self.root.walk():
-            for own, spec in node.spec.components.items():
-                if node.full_name(own) == name:
-                    return spec.fmu or spec.python or spec.modelica or ""
+        for node, own in self.root.leaves():
+            if node.full_name(own) == name:
+                spec = node.spec.components[own]
+                return spec.fmu or spec.python or spec.modelica or ""
         return self.spec.inputs[int(name.rpartition(".")[2])].file
 
     def free(self) -> None:

@@ -46,6 +46,15 @@ class Node:
         yield self
 
 
+    def leaves(self) -> Iterator[tuple[Node, str]]:
+        """(system, name) of every component that is no nested system, in the order of the files; refused ones left out."""
+        for name, component in self.spec.components.items():
+            if name in self.children:
+                yield from self.children[name].leaves()
+            elif name not in self.broken and component.system is None:
+                yield self, name
+
+
 @dataclass
 class Scenario:
     """A scenario with everything that is wrong with it so far, and the variables set from outside."""
