@@ -23,7 +23,7 @@ class CosimError(Exception):
 class Problem:
     """One refused thing: what is wrong, and where it stands (file, line, JSON path) as far as that is known.
 
-    `subject` names the setting that is wrong ("components", "usv", "period") for those who know where settings stand.
+    `subject` names the setting that is wrong ("components", "usv", "period"); who knows where settings stand replaces `where`.
     """
 
     message: str

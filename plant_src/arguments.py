@@ -63,7 +63,7 @@ class _Reader:
 
     def complain(self, path: Keys, text: str) -> None:
         where = ".".join(path)
-        self.problems.append(Problem(f"{where}: {text}", subject=("arguments", *path)))
+        self.problems.append(Problem(text, where, ("arguments", *path)))
 
     def vehicle(self, name: str, spec: Any) -> Spawn | None:
         path = ("vehicles", name)

@@ -190,7 +190,9 @@ class Assembler:
 
     def _report(self, error: InputError, node: Node, *path: str | int) -> None:
         self.problems += [
-            replace(problem, where=node.where(*path, *problem.subject), subject=()) if not problem.where else problem
+            replace(problem, where=node.where(*path, *problem.subject), subject=())
+            if problem.subject or not problem.where
+            else problem
             for problem in error.problems
         ]
 

@@ -159,7 +159,11 @@ def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
         if not separator or not name:
             raise InputError(f'expected NAME=value, found "{text}"')
         try:
-            parsed[name] = json.loads(value)
+            parsed[name] = json.loads(value, parse_constant=_refuse_constant)
         except ValueError:
             parsed[name] = value
     return parsed
+
+
+def _refuse_constant(word: str) -> None:
+    raise InputError(f"{word} is not allowed, expected a finite number")

@@ -4,6 +4,7 @@ import pytest
 from helpers import wire
 
 import cosim
+from cosim import resources
 
 
 def lines(file, **more):
@@ -149,6 +150,25 @@ def test_a_period_inside_a_nested_system_is_found_in_its_file(folder):
     (line,) = refused(folder, {"a": {"system": "n.json"}})
     assert line.startswith("n.json:1:")
     assert "$.components.g.period: period 1.5 s is no multiple of the step size 1.0 s" in line
+
+
+def test_units_of_different_quantities_are_refused(folder):
+    fmus = resources.root() / "fmus"
+    components = {name: {"fmu": str(fmus / f"{name}.fmu")} for name in ("vtol", "attitude_controller")}
+    (line,) = refused(folder, components, [wire("vtol.altitude_reference", "attitude_controller.roll_command")])
+    assert line.endswith(
+        'vtol.altitude_reference cannot feed attitude_controller.roll_command: units "m" and "rad" measure different quantities'
+    )
+
+
+def test_problems_of_a_python_component_stand_at_its_arguments(folder):
+    world = str(resources.root() / "plant_src/world.py:World")
+    vehicles = {"uav": {"model": "ar_dron", "position": [0, 0, 1]}, "usv": {"model": "strider", "position": [0]}}
+    found = refused(folder, {"plant": {"python": world, "arguments": {"vehicles": vehicles}}})
+    assert [line.split(": ", 1)[1] for line in found] == [
+        '$.components.plant.arguments.vehicles.uav.model: unknown vehicle model "ar_dron"; did you mean "ar_drone"?',
+        "$.components.plant.arguments.vehicles.usv.position: found [0], expected a list of 2 numbers [x, y]",
+    ]
 
 
 def test_incompatible_units_and_types_are_refused(folder, probes):
