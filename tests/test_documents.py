@@ -50,7 +50,11 @@ def test_json_examples_are_parts_of_scenarios(text):
 
 def test_the_readme_shows_what_a_run_prints(tmp_path):
     done = subprocess.run(
-        [sys.executable, "-m", "cosim", "run", "demo1_box", "--no-report"], cwd=tmp_path, capture_output=True, text=True, check=True
+        [sys.executable, "-m", "cosim", "run", "demo1_box", "--no-report"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     (shown,) = re.findall(r"```text\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
     printed = {" ".join(line.split()) for line in done.stdout.splitlines()}

@@ -45,7 +45,6 @@ class Node:
             yield from child.walk()
         yield self
 
-
     def leaves(self) -> Iterator[tuple[Node, str]]:
         """(system, name) of every component that is no nested system, in the order of the files; refused ones left out."""
         for name, component in self.spec.components.items():

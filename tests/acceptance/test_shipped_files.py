@@ -92,4 +92,3 @@ def test_scenarios_satisfy_the_published_schema(path):
     from cosim.scenario import json_schema
 
     jsonschema.validate(json.loads(path.read_text()), json_schema())
-

@@ -104,7 +104,10 @@ def test_a_refused_scenario_ends_with_two_one_line_per_problem(tmp_path):
     assert not (tmp_path / "runs").exists()
 
 
-@pytest.mark.parametrize("arguments", [["run"], ["fly"], ["run", "x.json", "--sett", "a=1"], ["run", "x.json", "--set", "a"], ["run", "x.json", "--set", "a=NaN"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [["run"], ["fly"], ["run", "x.json", "--sett", "a=1"], ["run", "x.json", "--set", "a"], ["run", "x.json", "--set", "a=NaN"]],
+)
 def test_wrong_usage_ends_with_two(arguments, tmp_path):
     done = cosim(*arguments, cwd=tmp_path)
     assert done.returncode == 2

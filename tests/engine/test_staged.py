@@ -140,7 +140,7 @@ def test_a_ring_that_starts_in_balance_stays_there():
 
 def test_an_algebraic_loop_in_initialization_is_named():
     built = system({"a": gain(2.0, start=1.0), "b": gain(2.0, start=1.0), "c": gain()}, "a.y > b.u, b.y > a.u")
-    with pytest.raises(ComponentError, match="a -> b: initialization failed at t = 0 s: .* algebraic loop"):
+    with pytest.raises(ComponentError, match=r"a -> b: initialization failed at t = 0 s: .* algebraic loop"):
         run(built, 1, 1)
 
 

@@ -6,8 +6,8 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
-from foreign import build_foreign
 from fakes import counter
+from foreign import build_foreign
 from helpers import end, run, system
 
 from cosim.errors import ComponentError, InputError
@@ -161,7 +161,7 @@ def test_what_is_no_fmu_is_refused(tmp_path):
         _ = FmuFile(tmp_path / "missing.fmu").description
     with ZipFile(tmp_path / "empty.fmu", "w"):
         pass
-    with pytest.raises(InputError, match="no item named 'modelDescription.xml'"):
+    with pytest.raises(InputError, match=r"no item named 'modelDescription\.xml'"):
         _ = FmuFile(tmp_path / "empty.fmu").description
 
 

@@ -81,7 +81,7 @@ print(digest.hexdigest(), trial["uav.contact.vessel"])
 def test_two_processes_compute_the_same_bytes() -> None:
     script = SCRIPT.format(root=str(ROOT), here=str(Path(__file__).parent))
     outcomes = [
-        subprocess.run(  # noqa: S603
+        subprocess.run(
             [sys.executable, "-c", script], capture_output=True, text=True, check=True, env={"PYTHONHASHSEED": seed}
         ).stdout
         for seed in ("1", "2")

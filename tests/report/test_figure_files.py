@@ -54,7 +54,7 @@ print("matplotlib.pyplot" in sys.modules)
 def test_another_process_with_other_settings_writes_the_same_bytes_without_pyplot(tmp_path):
     here = draw_figures(RESULT, [("curve", curve, {"signal": "x"})], tmp_path / "here", BOTH)
     script = FRESH.format(tests=str(Path(__file__).parent), folder=str(tmp_path / "there"))
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)  # noqa: S603
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     hashes, pyplot = run.stdout.split("\n")[:2]
     assert json.loads(hashes) == [hashlib.sha256(file.read_bytes()).hexdigest() for file in here]
     assert pyplot == "False"
@@ -106,5 +106,5 @@ def test_a_failed_write_leaves_the_former_file(tmp_path):
 
 def test_matplotlib_is_imported_late():
     code = "import sys, cosim.report.figures, cosim.report.tables; print({'matplotlib', 'rich'} & set(sys.modules))"
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)  # noqa: S603
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout == "set()\n"

@@ -41,7 +41,7 @@ def test_everything_that_is_wrong_is_said_at_once(folder):
         "1:67: $.colour: unknown key",
         '5:3: $.components.c: FMU "missing.fmu" does not exist',
         '3:24: $.components.a.parameters.kk: component "a" has no variable "kk"; did you mean "k"?',
-        '3:33: $.components.a.parameters.k: "k" is a Float64, found \'x\'',
+        "3:33: $.components.a.parameters.k: \"k\" is a Float64, found 'x'",
         "7:33: $.connections[1]: input b.u is connected twice: it is already fed by a.y",
         "8:4: $.connections[2].from: a.u is an input, expected an output",
         '8:34: $.connections[3].from: unknown component "d"; valid: a, b, c',
@@ -134,7 +134,7 @@ def test_ranges_of_an_fmu_are_respected(folder, probes):
 
 def test_a_list_that_is_too_long_says_how_long_it_may_be(folder):
     found = refused(folder, {"a": folder.block("Controller", parameters={"gain": [1, 2, 3]})})
-    assert found == [f'{found[0].split(": $")[0]}: $.components.a.parameters.gain: 3 values for gain[1..2]']
+    assert found == [f"{found[0].split(': $')[0]}: $.components.a.parameters.gain: 3 values for gain[1..2]"]
 
 
 def test_periods_must_fit(folder):
@@ -238,4 +238,6 @@ def test_unknown_scenarios_name_the_nearest_shipped_one():
 def test_settings_from_outside_are_checked_too(folder):
     file = folder.scenario({"a": folder.block("Gain")})
     assert lines(file, parameters={"a.kk": 1}) == ['--set a.kk: component "a" has no variable "kk"; did you mean "k"?']
-    assert lines(file, parameters={"/components/b/period": 1}) == ['--set /components/b/period: the scenario has no "/components/b"']
+    assert lines(file, parameters={"/components/b/period": 1}) == [
+        '--set /components/b/period: the scenario has no "/components/b"'
+    ]

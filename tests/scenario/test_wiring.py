@@ -1,7 +1,8 @@
 """Names, prefixes, ports: what a scenario's connections and parameters mean."""
 
-import cosim
 from helpers import wire
+
+import cosim
 
 WHOLE_PLANT = """
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
@@ -79,7 +80,8 @@ def test_a_port_may_mean_variables_that_only_some_of_its_readers_have(folder):
     components = {"head": folder.block("Controller"), "tail": folder.block("Controller")}
     folder.write({"components": components, "ports": {"inputs": {"vehicle": ["head.vehicle", "tail.gains"]}}}, "n.json")
     file = folder.scenario(
-        {"plant": folder.block("Plant"), "pilot": {"system": "n.json"}}, [wire("plant.ship.position.x", "pilot.vehicle.position.x")]
+        {"plant": folder.block("Plant"), "pilot": {"system": "n.json"}},
+        [wire("plant.ship.position.x", "pilot.vehicle.position.x")],
     )
     assembly = cosim.load(file)
     assembly.free()

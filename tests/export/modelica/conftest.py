@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -30,7 +31,7 @@ class CompiledBlock:
         offsets = ", ".join(["sizeof(Model)", *(f"offsetof(Model, {v.member})" for v in block.variables)])
         (folder / "layout.c").write_text(f'#include <stddef.h>\n#include "model.h"\nsize_t layout[] = {{{offsets}}};\n')
         library = folder / "block.so"
-        subprocess.run([*GCC, "-o", str(library), str(folder / "model.c"), str(folder / "layout.c"), "-lm"], check=True)  # noqa: S603
+        subprocess.run([*GCC, "-o", str(library), str(folder / "model.c"), str(folder / "layout.c"), "-lm"], check=True)
         self._library = ctypes.CDLL(str(library))
         size, *places = (ctypes.c_size_t * (1 + len(block.variables))).in_dll(self._library, "layout")
         self._offsets = dict(zip(self.variables, places, strict=True))
@@ -145,6 +146,9 @@ def write(tmp_path: Path) -> Callable[[str], Path]:
 @pytest.fixture
 def twins(tmp_path: Path, write: Callable[[str], Path]) -> Callable[..., Twins]:
     """Both forms of a model from its text, or from a file."""
+
+    if shutil.which("gcc") is None:
+        pytest.skip("needs gcc")
 
     def open_model(source: str | Path, model: str | None = None) -> Twins:
         path = write(source) if isinstance(source, str) else source

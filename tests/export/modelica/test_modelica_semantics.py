@@ -733,6 +733,7 @@ end M;""")
         ({"d": 0}, "division by zero in div(), mod() or rem()"),
         ({"x": -1.0}, "y is not a finite number"),
         ({"x": 1e12}, "Integer overflow"),
+        pytest.param({"k": 2**31 - 1, "x": -1.0}, "Integer overflow", id="the first failure counts"),
     ],
 )
 def test_arithmetic_that_has_no_result_is_a_failure(twins, inputs, reason):
