@@ -120,4 +120,4 @@ def _literals(variable: Variable, model: Model) -> tuple[str, ...]:
 
 
 def _plain(value: Any) -> Any:
-    return tuple(value.flat if isinstance(value, np.ndarray) else value) if np.ndim(value) else value
+    return tuple(value.ravel().tolist()) if isinstance(value, np.ndarray) else value

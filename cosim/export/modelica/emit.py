@@ -110,11 +110,10 @@ class _Emitter:
         lowering = self._lowering(initial)
         for name in memory(self.model, body):
             lowering.out += _remember(self.model.variables[name], self.members[name])
-        owner = ""
-        lowering.out += [""] * bool(lowering.out)
+        owner = None
         for statement in body:
             if (new := _owner(statement)) != owner:
-                lowering.out += ["", f"/* {new or 'the model itself'} */"]
+                lowering.out += [*[""] * bool(lowering.out), f"/* {new or 'the model itself'} */"]
                 owner = new
             lowering.statement(statement)
         return lowering.out

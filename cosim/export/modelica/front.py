@@ -32,7 +32,9 @@ class Sources:
 
     @classmethod
     def of(cls, files: Sequence[Path]) -> Sources:
-        return cls(files, {_fnv1a(name): file for file in files for name in (str(file), _alias(file))})
+        """The model's own file comes first."""
+        own = {_fnv1a(_alias(file)): file for file in files[:1]}
+        return cls(files, own | {_fnv1a(str(file)): file for file in files})
 
     def named(self, name: str) -> Path | None:
         """The file of this name, as the front end writes it."""
