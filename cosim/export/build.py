@@ -39,7 +39,7 @@ def build(sources: Sequence[Path] | None, root: Path, report: Callable[[Built], 
     for source in selected:
         fmus = fmu_files(source, root)
         files = export(source, fmus)
-        manifest[source.name] = _entry(source, files, fmus, root)
+        manifest[source.key] = _entry(source, files, fmus, root)
         _write_manifest(manifest, root)
         finished.append(Built(source.path, fmus))
         report(finished[-1])
@@ -47,7 +47,7 @@ def build(sources: Sequence[Path] | None, root: Path, report: Callable[[Built], 
 
 
 def _remove_orphans(manifest: dict[str, Any], sources: Sequence[Source], root: Path) -> None:
-    for name in manifest.keys() - {source.name for source in sources}:
+    for name in manifest.keys() - {source.key for source in sources}:
         for fmu in manifest.pop(name)["fmus"]:
             (root / fmu).unlink(missing_ok=True)
 
@@ -74,7 +74,7 @@ def cached_fmu(source: Path, model: str | None) -> Path:
 
 def fmu_files(source: Source, root: Path) -> dict[int, Path]:
     """FMI version -> the FMU of a source below `root`."""
-    return {version: root / FOLDERS[version] / f"{source.name}.fmu" for version in source.fmi_versions}
+    return {version: root / FOLDERS[version] / source.kind.folder / f"{source.name}.fmu" for version in source.fmi_versions}
 
 
 def _selected(sources: Sequence[Path] | None, root: Path) -> list[Source]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..errors import CosimError, Problem
 from .behaviour import compare
-from .build import FOLDERS, file_hash, fmu_files, read_manifest
+from .build import file_hash, fmu_files, read_manifest
 from .sources import Source, export, find_sources
 
 
@@ -28,20 +28,20 @@ def check(root: Path) -> list[Problem]:
 
 def _orphans(root: Path, manifest: Mapping[str, Any], sources: Sequence[Source]) -> list[Problem]:
     expected = {path for source in sources for path in fmu_files(source, root).values()}
-    present = {path for folder in FOLDERS.values() for path in (root / folder).glob("*.fmu")}
+    present = set((root / "fmus").rglob("*.fmu"))
     listed = {root / fmu for entry in manifest.values() for fmu in entry["fmus"]}
     return [Problem("belongs to no source", path.relative_to(root).as_posix()) for path in sorted((present | listed) - expected)]
 
 
 def _stale(root: Path, manifest: Mapping[str, Any], source: Source) -> list[Problem]:
     """What the manifest says about a source and is no longer true."""
-    entry = manifest.get(source.name)
+    entry = manifest.get(source.key)
     if entry is None:
         return [Problem("has no FMU; run `cosim build`", source.path.relative_to(root).as_posix())]
     problems = []
     for name, recorded in entry["sources"].items():
         if not (root / name).is_file() or file_hash(root / name) != recorded:
-            problems.append(Problem(f'changed since "{source.name}" was built; run `cosim build`', name))
+            problems.append(Problem(f'changed since "{source.key}" was built; run `cosim build`', name))
     for path in fmu_files(source, root).values():
         name = path.relative_to(root).as_posix()
         if not path.is_file():

@@ -19,12 +19,16 @@ from .python_class import write_python_fmu
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of source: where its files lie, which package reads it, and how (None: PythonFMU exports it, as FMI 2.0 only)."""
+    """A kind of source: where its files lie, which package reads it, and how (None: PythonFMU exports it, as FMI 2.0 only).
+
+    Its FMUs lie in `folder` below `fmus/`.
+    """
 
     name: str
     pattern: str
     tool: str
     load: Callable[[Path, str | None], Block] | None
+    folder: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +38,11 @@ class Source:
     path: Path
     kind: Kind
     name: str
+
+    @property
+    def key(self) -> str:
+        """The name with the folder of its kind: what the manifest calls it."""
+        return f"{self.kind.folder}/{self.name}".lstrip("/")
 
     @property
     def fmi_versions(self) -> Sequence[int]:
@@ -60,7 +69,7 @@ def _load_equations(path: Path, model: str | None) -> Block:
 
 KINDS = (
     Kind("Modelica model", "controllers/modelica/*.mo", "rumoca", _load_modelica),
-    Kind("PythonFMU class", "controllers/python/*.py", "pythonfmu", None),
+    Kind("PythonFMU class", "controllers/python/*.py", "pythonfmu", None, "python"),
     Kind("equations", "plant_src/vehicles/*/equations.py", "casadi", _load_equations),
 )
 
@@ -68,10 +77,10 @@ KINDS = (
 def find_sources(root: Path) -> list[Source]:
     """All sources below `root` that `cosim build` exports, ordered by the names of their FMUs, which must differ."""
     paths = [path for kind in KINDS for path in root.glob(kind.pattern) if not path.name.startswith("_")]
-    sources = sorted(map(source_of, paths), key=lambda source: source.name)
-    clashes = [(a, b) for a, b in pairwise(sources) if a.name == b.name]
+    sources = sorted(map(source_of, paths), key=lambda source: source.key)
+    clashes = [(a, b) for a, b in pairwise(sources) if a.key == b.key]
     if clashes:
-        raise InputError([Problem(f'becomes "{a.name}.fmu" as {b.path} does; rename one', str(a.path)) for a, b in clashes])
+        raise InputError([Problem(f'becomes "{a.key}.fmu" as {b.path} does; rename one', str(a.path)) for a, b in clashes])
     return sources
 
 

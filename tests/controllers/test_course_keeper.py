@@ -12,7 +12,7 @@ from cosim import resources
 ROOT = resources.root()
 SOURCES = {
     "in process": {"python": str(ROOT / "controllers/python/course_keeper.py:CourseKeeper")},
-    "exported": {"fmu": str(ROOT / "fmus/course_keeper.fmu")},
+    "exported": {"fmu": str(ROOT / "fmus/python/course_keeper.fmu")},
 }
 
 

@@ -113,7 +113,7 @@ def messages(root):
 
 def test_every_source_becomes_its_fmus(built_once):
     fmus = {path.relative_to(built_once).as_posix() for path in built_once.rglob("*.fmu")}
-    assert fmus == {"fmus/doubler.fmu", "fmus/raft.fmu", "fmus/fmi3/raft.fmu"}
+    assert fmus == {"fmus/python/doubler.fmu", "fmus/raft.fmu", "fmus/fmi3/raft.fmu"}
     assert [problem for fmu in fmus for problem in validate_fmu(str(built_once / fmu))] == []
 
 
@@ -139,16 +139,16 @@ def test_one_source_is_built_alone(root):
     reported = []
     (built,) = build([root / "controllers/python/doubler.py"], root, reported.append)
     assert reported == [built]
-    assert built.fmus == {2: root / "fmus/doubler.fmu"}
+    assert built.fmus == {2: root / "fmus/python/doubler.fmu"}
     assert not (root / "fmus/raft.fmu").exists()
     assert read_manifest(root)["raft"] == manifest["raft"]
-    assert read_manifest(root)["doubler"] != manifest["doubler"]
+    assert read_manifest(root)["python/doubler"] != manifest["python/doubler"]
 
 
 def test_building_all_removes_what_has_no_source(root):
     (root / "controllers/python/doubler.py").unlink()
     build(None, root)
-    assert not (root / "fmus/doubler.fmu").exists()
+    assert not (root / "fmus/python/doubler.fmu").exists()
     assert list(read_manifest(root)) == ["raft"]
 
 
@@ -158,8 +158,8 @@ def test_what_is_no_source_is_refused_with_the_nearest(root):
 
 
 def test_two_sources_of_one_fmu_are_refused(root):
-    write(root, {"controllers/modelica/Doubler.mo": "model Doubler end Doubler;"})
-    with pytest.raises(InputError, match=r'becomes "doubler\.fmu" as .* does; rename one'):
+    write(root, {"controllers/modelica/Raft.mo": "model Raft end Raft;"})
+    with pytest.raises(InputError, match=r'becomes "raft\.fmu" as .* does; rename one'):
         find_sources(root)
 
 
@@ -170,16 +170,16 @@ def test_a_fresh_build_passes_the_check(built_once):
 def test_the_check_finds_a_changed_source(root):
     write(root, {f"{VEHICLE}/parameters.py": "GAIN = 1.0  # a remark\n", "controllers/python/doubler.py": CLASS + "\n"})
     assert messages(root) == [
-        'controllers/python/doubler.py: changed since "doubler" was built; run `cosim build`',
+        'controllers/python/doubler.py: changed since "python/doubler" was built; run `cosim build`',
         f'{VEHICLE}/parameters.py: changed since "raft" was built; run `cosim build`',
     ]
 
 
 def test_the_check_finds_a_missing_and_a_foreign_fmu(root):
     (root / "fmus/fmi3/raft.fmu").unlink()
-    shutil.copy(root / "fmus/raft.fmu", root / "fmus/doubler.fmu")
+    shutil.copy(root / "fmus/raft.fmu", root / "fmus/python/doubler.fmu")
     assert messages(root) == [
-        "fmus/doubler.fmu: is not the file that `cosim build` wrote",
+        "fmus/python/doubler.fmu: is not the file that `cosim build` wrote",
         "fmus/fmi3/raft.fmu: is missing; run `cosim build`",
     ]
 
@@ -189,8 +189,8 @@ def test_the_check_finds_an_fmu_without_source_and_a_source_without_fmu(root):
     (root / "controllers/python/doubler.py").rename(root / "controllers/python/twice.py")
     assert sorted(messages(root)) == [
         "controllers/python/twice.py: has no FMU; run `cosim build`",
-        "fmus/doubler.fmu: belongs to no source",
         "fmus/fmi3/raft.fmu: belongs to no source",
+        "fmus/python/doubler.fmu: belongs to no source",
         "fmus/raft.fmu: belongs to no source",
     ]
 
