@@ -138,3 +138,8 @@ def motors(result: Result, rotor_speed: str, threshold: float = 1.0) -> dict[str
         "final_speed": float(fastest[-1]),
         "max_speed": float(fastest.max()),
     }
+
+
+def final(result: Result, signal: str) -> dict[str, float]:
+    """`value`: the last value of one signal, in its own unit."""
+    return {"value": result[signal][-1].item()}

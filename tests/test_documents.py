@@ -68,6 +68,12 @@ def test_links_lead_somewhere():
             assert target.startswith("https://") or (document.parent / target).exists(), f"{document.name}: {target}"
 
 
+def test_the_readme_lists_every_scenario():
+    text = (ROOT / "README.md").read_text()
+    missing = [path.stem for path in sorted((ROOT / "scenarios").glob("*.json")) if f"`{path.stem}`" not in text]
+    assert missing == []
+
+
 def test_the_readme_lists_every_command():
     from cosim.cli import COMMANDS
 

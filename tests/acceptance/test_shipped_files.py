@@ -9,6 +9,7 @@ from helpers import run, system
 
 import cosim
 from cosim import resources
+from cosim.api import checks, execute
 from cosim.fmi import FmuFile, instantiate
 from cosim.simulate import Settings, simulate
 from cosim.system import Endpoint
@@ -83,6 +84,14 @@ def test_scenarios_run_for_two_seconds(path):
     for name in result:
         if result[name].dtype.kind == "f":
             assert np.isfinite(result[name]).all(), name
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=label)
+def test_scenarios_meet_their_checks(path):
+    assembly = cosim.load(path)
+    outcomes = checks(assembly, execute(assembly))
+    assert outcomes
+    assert [(outcome.check, outcome.value) for outcome in outcomes if not outcome.passed] == []
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=label)

@@ -9,7 +9,7 @@ from mission_recording import SINK, STOP, TAKE_OFF, TOUCHDOWN, mission, replaced
 from cosim.errors import InputError
 from cosim.kpi import evaluate_kpis
 from cosim.results import Result
-from plant_src.kpis import landing, motors, tracking, waypoints
+from plant_src.kpis import final, landing, motors, tracking, waypoints
 
 DECK = {"vehicle": "plant.uav", "deck": "plant.usv.deck"}
 TIME = mission().time
@@ -166,3 +166,7 @@ def test_names_that_are_not_there_are_refused():
         evaluate_kpis(mission(), [("landing", landing, {**DECK, "vehicle": "plant.uva"})])
     with pytest.raises(InputError, match=r'KPI "motors": no signal "uav.rotors\[1\]"'):
         evaluate_kpis(mission(), [("motors", motors, {"rotor_speed": "uav.rotors"})])
+
+
+def test_the_final_value_of_a_signal():
+    assert final(mission(), "plant.uav.position.z") == {"value": mission()["plant.uav.position.z"][-1]}
