@@ -22,7 +22,10 @@ Observer = Callable[[int, int], None]
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """At `time` (s, exact), before the step that starts there, variables of components are set to values."""
+    """At `time` (s, exact), before the step that starts there, variables of components are set to values.
+
+    An event after the stop time does not happen.
+    """
 
     time: Fraction
     values: Mapping[str, Mapping[str, Any]]
@@ -89,7 +92,7 @@ def _loop(executor: Executor, events: Mapping[int, Sequence[Event]], observers: 
     """From event to event and from look to look of the observers."""
     components, count = executor.plan.system.components, executor.plan.grid.count
     looks = set(range(0, count, max(1, count // 100))) if observers else set()
-    for stop in sorted({*events, *looks, count}):
+    for stop in sorted({*(n for n in events if n < count), *looks, count}):
         executor.run(stop)
         for observe in observers:
             observe(executor.finished, count)

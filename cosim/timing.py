@@ -44,10 +44,10 @@ class Grid:
         return (self._origin + n * self._stride) / self._denominator
 
     def index(self, time: Fraction) -> int:
-        """The n whose time is exactly `time`. Raises ValueError when it lies off the grid or outside."""
+        """The n whose time is exactly `time`, beyond `count` after the end. Raises ValueError off the grid and before its start."""
         n = (time - self.start) / self.step
         if n.denominator != 1:
             raise ValueError(f"{float(time)!r} s lies between two communication points ({float(self.step)!r} s apart)")
-        if not 0 <= n <= self.count:
-            raise ValueError(f"{float(time)!r} s lies outside {self.seconds(0)!r} s ... {self.seconds(self.count)!r} s")
+        if n < 0:
+            raise ValueError(f"{float(time)!r} s lies before the start time {self.seconds(0)!r} s")
         return int(n)

@@ -51,5 +51,5 @@ def test_a_time_between_points_has_no_index():
     assert points.index(exact(0.29)) == 29
     with pytest.raises(ValueError, match="lies between two communication points"):
         points.index(exact(0.295))
-    with pytest.raises(ValueError, match="lies outside"):
-        points.index(exact(2))
+    with pytest.raises(ValueError, match=r"lies before the start time 0\.0 s"):
+        points.index(exact(-1))

@@ -49,6 +49,11 @@ def test_an_event_acts_before_the_step_that_starts_there():
     assert recording.columns["a.y"].tolist() == [0, 0, 0, 1, 2]
 
 
+def test_an_event_after_the_end_does_not_happen():
+    recording = run(system({"a": integrator()}), 2, 1, ["a.y"], [Event(exact(3), {"a": {"u": 1.0}})])
+    assert recording.columns["a.y"].tolist() == [0, 0, 0]
+
+
 def test_events_must_lie_on_the_grid_and_set_what_can_be_set():
     fixed = Variable("k", causality="parameter", variability="fixed", start=1.0)
     a = Fake([*inputs("u", "free"), *outputs("y"), fixed], lambda values, t, h: None)
