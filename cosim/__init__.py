@@ -21,6 +21,10 @@ _HOMES = {"load": "api", "run": "api", "Result": "results"} | {
 }
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 def __getattr__(name: str) -> Any:
     """Import public names when they are first used, so that `import cosim` costs nothing."""
     if name not in _HOMES:

@@ -64,11 +64,23 @@ def execute(assembly: Assembly, observers: Sequence[Observer] = ()) -> Result:
     if outcome.failure is not None:
         outcome.failure.result = result  # type: ignore[attr-defined]
         raise outcome.failure
-    try:
-        return replace(result, kpis=evaluate_kpis(result, assembly.kpis()))
-    except CosimError as error:
-        error.result = result  # type: ignore[attr-defined]
-        raise
+    return _with_kpis(result, assembly)
+
+
+def _with_kpis(result: Result, assembly: Assembly) -> Result:
+    """The result with all KPIs; when some fail, the first error carries the result with the others."""
+    kpis: dict[str, Any] = {}
+    failures: list[BaseException] = []
+    for kpi in assembly.kpis():
+        try:
+            kpis |= evaluate_kpis(result, [kpi])
+        except (CosimError, KeyboardInterrupt) as error:
+            failures.append(error)
+    result = replace(result, kpis=kpis)
+    if failures:
+        failures[0].result = result  # type: ignore[attr-defined]
+        raise failures[0]
+    return result
 
 
 def checks(assembly: Assembly, result: Result) -> list[CheckOutcome]:
@@ -81,13 +93,18 @@ def _metadata(assembly: Assembly, outcome: Run) -> dict[str, Any]:
     return {
         "name": assembly.spec.name,
         "scenario": assembly.document.value,
+        "scenario_file": str(assembly.document.file.resolve()),
         "macro_steps": outcome.macro_steps,
         "terminated_by": {"component": termination.component, "time": termination.time} if termination else None,
-        "failure": str(outcome.failure) or type(outcome.failure).__name__ if outcome.failure else None,
+        "failure": "interrupted" if isinstance(outcome.failure, KeyboardInterrupt) else _text(outcome.failure),
         "versions": {"cosim": __version__, "python": platform.python_version(), **_versions()},
         "machine": {"system": platform.system(), "machine": platform.machine()},
-        "sha256": {file.name: sha256(file.read_bytes()).hexdigest() for file in assembly.files()},
+        "sha256": {name: sha256(file.read_bytes()).hexdigest() for name, file in assembly.files().items()},
     }
+
+
+def _text(failure: BaseException | None) -> str | None:
+    return None if failure is None else str(failure) or type(failure).__name__
 
 
 def _versions() -> dict[str, str]:

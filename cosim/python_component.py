@@ -38,7 +38,8 @@ class PythonSlave(Component):
         self._registered: dict[str, ScalarVariable] = {v.name: v for v in slave.vars.values()}
         self.variables = [_variable(v) for v in slave.vars.values()]
         self._setters: list[tuple[Callable[[Any], None], np.ndarray, int]] = []
-        self._getters: list[tuple[Callable[[], Any], np.ndarray, int]] = []
+        self._getters: list[tuple[str, Callable[[], Any], np.ndarray, int]] = []
+        self._types = {variable.name: variable.type for variable in self.variables}
 
     def set(self, name: str, value: Any) -> None:
         registered = self._registered[name]
@@ -58,7 +59,7 @@ class PythonSlave(Component):
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         self._setters = [(self._registered[v.name].setter, *place) for v, place in _places(inputs)]
-        self._getters = [(self._registered[v.name].getter, *place) for v, place in _places(outputs)]
+        self._getters = [(v.name, self._registered[v.name].getter, *place) for v, place in _places(outputs)]
 
     def set_inputs(self) -> None:
         self._guard("set_inputs", self._set_all)
@@ -69,15 +70,20 @@ class PythonSlave(Component):
 
     def do_step(self, time: float, step_size: float) -> None:
         self._time = time
-        if not self._guard("do_step", self._slave.do_step, time, step_size):
-            raise ComponentError(self._name, "do_step", "do_step returned False", time)
+        returned = self._guard("do_step", self._slave.do_step, time, step_size)
+        if not returned:
+            raise ComponentError(self._name, "do_step", f"returned {returned}, expected True", time)
 
     def get_outputs(self) -> None:
         self._guard("get_outputs", self._get_all)
 
     def _get_all(self) -> None:
-        for getter, array, index in self._getters:
-            array[index] = getter()
+        for name, getter, array, index in self._getters:
+            value = getter()
+            try:
+                array[index] = value
+            except (TypeError, ValueError):
+                raise TypeError(f'output "{name}" is {value!r}, expected a value of type {self._types[name]}') from None
 
     def get_state(self) -> Any:
         return self._slave._get_fmu_state()
@@ -96,7 +102,7 @@ class PythonSlave(Component):
         """Call user code; what it raises becomes a ComponentError, what it logged reaches the log."""
         try:
             return call(*arguments)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             place = inspect.trace()[-1]
             reason = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
             raise ComponentError(self._name, function, reason, self._time) from error
@@ -175,11 +181,23 @@ def load_object(reference: str, folder: Path) -> Any:
     return getattr(module, name)
 
 
-def _import(path: Path) -> ModuleType:
-    """Import a file, as a member of its package if it is in one, under a name made unique by the root's path."""
+def package_root(path: Path) -> Path:
+    """The folder that holds a file's outermost package; the file's own folder when it is in no package."""
     root = path.parent
     while (root / "__init__.py").is_file():
         root = root.parent
+    return root
+
+
+def package_files(path: Path) -> list[Path]:
+    """A Python file and everything it may import relatively: all modules of its outermost package."""
+    inside = path.resolve().relative_to(package_root(path.resolve())).parts
+    return [path] if len(inside) == 1 else sorted((package_root(path.resolve()) / inside[0]).rglob("*.py"))
+
+
+def _import(path: Path) -> ModuleType:
+    """Import a file, as a member of its package if it is in one, under a name made unique by the root's path."""
+    root = package_root(path)
     unique = f"_cosim_{sha256(str(root).encode()).hexdigest()[:12]}"
     if unique not in sys.modules:
         namespace = ModuleType(unique)

@@ -110,11 +110,14 @@ def _act(event: Event, components: Mapping[str, Component]) -> None:
 
 def problems(system: System, settings: Settings) -> list[Problem]:
     """Everything that keeps a system from being simulated with these settings; empty when it can run."""
-    found = system.problems()
+    found = [*system.problems(), *_event_problems(system, settings.events)]
     try:
         grid = Grid.of(settings.start_time, settings.stop_time, settings.step_size)
     except ValueError as error:
-        return [*found, Problem(str(error), subject=("stop_time",)), *_event_problems(system, settings.events)]
+        found.append(Problem(str(error), subject=("stop_time",)))
+        if settings.step_size <= 0:
+            return found
+        grid = Grid.of(settings.start_time, settings.start_time, settings.step_size)
     found += _period_problems(system, grid)
     interval = settings.record_interval or grid.step
     if interval < grid.step or (interval / grid.step).denominator != 1:
@@ -125,7 +128,7 @@ def problems(system: System, settings: Settings) -> list[Problem]:
             grid.index(event.time)
         except ValueError as error:
             found.append(Problem(f"event time {error}", event.where))
-    return found + _event_problems(system, settings.events)
+    return found
 
 
 def _period_problems(system: System, grid: Grid) -> Iterator[Problem]:

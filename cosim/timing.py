@@ -44,7 +44,7 @@ class Grid:
         return (self._origin + n * self._stride) / self._denominator
 
     def index(self, time: Fraction) -> int:
-        """The n whose time is exactly `time`, beyond `count` after the end. Raises ValueError off the grid and before its start."""
+        """The n whose time is exactly `time`; beyond `count` after the end. Raises ValueError off the grid and before it."""
         n = (time - self.start) / self.step
         if n.denominator != 1:
             raise ValueError(f"{float(time)!r} s lies between two communication points ({float(self.step)!r} s apart)")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING
 
 import click
@@ -52,24 +53,40 @@ def command(
     assembly = load(scenario, parse_settings(settings), stop_time=stop_time, step_size=step_size)
     directory = output_dir or Path("runs") / assembly.spec.name
     try:
+        _prepare(directory, [spec.name for spec in assembly.spec.figures])
         with _progress(assembly) as observers:
             result = execute(assembly, observers)
+        write_run(result, directory)
     except (CosimError, KeyboardInterrupt) as error:
-        _keep(error, directory)
+        assembly.free()
+        _keep(getattr(error, "result", None), directory)
         raise
-    write_run(result, directory)
-    figures = [] if no_report else draw_figures(result, assembly.figures(), directory)
     outcomes = checks(assembly, result)
     print_kpis(result.kpis, outcomes, kpi_units(assembly.kpis(), result.kpis))
+    figures = [] if no_report else draw_figures(result, assembly.figures(), directory)
     _summary(result, directory, figures, began)
     return 0 if all(outcome.passed for outcome in outcomes) else 3
 
 
-def _keep(error: BaseException, directory: Path) -> None:
+def _prepare(directory: Path, figures: Sequence[str]) -> None:
+    """Make sure that results can be written before anything runs, and remove the figures of an earlier run."""
+    from ..errors import InputError
+
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=directory):
+            pass
+        for name in figures:
+            for suffix in (".png", ".svg", ".csv"):
+                (directory / f"{name}{suffix}").unlink(missing_ok=True)
+    except OSError as error:
+        raise InputError(f'cannot write to "{directory}": {error.strerror or error}') from None
+
+
+def _keep(partial: Result | None, directory: Path) -> None:
     """Write what was recorded before a failure."""
     from ..results.result import write_run
 
-    partial = getattr(error, "result", None)
     if partial is not None and len(partial.time):
         write_run(partial, directory)
         click.echo(f"{len(partial.time)} rows until t = {partial.time[-1]:g} s kept in {directory}", err=True)

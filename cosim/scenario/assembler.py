@@ -13,7 +13,7 @@ from ..errors import InputError, Problem, did_you_mean
 from ..simulate import Event, Settings, problems
 from ..system import Connection, Endpoint, Group, Stage, System
 from ..table import read_table
-from .functions import missing_function
+from .functions import function_problem
 from .names import Target, Unknown, assign, resolve, under
 from .schema import kept
 from .selection import Selection
@@ -56,7 +56,9 @@ class Assembler:
             self.spec.record.interval,
             list(self._events()),
         )
-        self.problems += [self._located(problem) for problem in problems(self.system, self.settings)]
+        self.problems += [
+            self._located(problem) for problem in problems(self.system, self.settings) if not self._follows(problem)
+        ]
         self._check_functions()
 
     # -- components and their start values -----------------------------------------------------------------------------
@@ -85,7 +87,7 @@ class Assembler:
                     where = node.where("components", name, "parameters", variable)
                     self._assign(self.start_values, node, f"{name}.{variable}", value, where)
         for name, value in self.outside.items():
-            self._assign(self.start_values, self.root, name, value, f"--set {name}")
+            self._assign(self.start_values, self.root, name, value, f'setting "{name}"')
 
     def _assign(self, values: dict[str, dict[str, Any]], node: Node, name: str, value: Any, where: str) -> None:
         try:
@@ -121,6 +123,8 @@ class Assembler:
 
     def _stages(self, node: Node) -> tuple[Stage, ...]:
         """Names that mean nothing, stand twice or are missing are left to the system's own checks."""
+        if "components" in node.refused:
+            return ()
         listed = node.spec.algorithm.stages if node.spec.algorithm else [[name] for name in node.spec.components]
         return tuple(tuple(self._member(node, name) for name in stage if name not in node.broken) for stage in listed if stage)
 
@@ -162,6 +166,7 @@ class Assembler:
 
     def _columns(self, aliases: Mapping[str, Endpoint]) -> dict[str, Endpoint]:
         broken = [node.full_name(name) for node in self.root.walk() for name in node.broken]
+        broken += [node.prefix for node in self.root.walk() if "components" in node.refused]
         selection = Selection(self.components, aliases, broken)
         patterns = [(text, self.root.where("record", "signals", i)) for i, text in enumerate(self.spec.record.signals)]
         chosen = selection.choose(patterns)
@@ -178,8 +183,12 @@ class Assembler:
     def _check_functions(self) -> None:
         for kind in ("kpis", "figures"):
             for i, spec in kept(getattr(self.spec, kind)):
-                if text := missing_function(spec, self.root.folder):
-                    self.problems.append(Problem(text, self.root.where(kind, i, "python")))
+                if text := function_problem(spec, self.root.folder):
+                    self.problems.append(Problem(text, self.root.where(kind, i)))
+            names = [spec.name for _, spec in kept(getattr(self.spec, kind))]
+            for i, spec in kept(getattr(self.spec, kind)):
+                if spec.name in names[:i]:
+                    self.problems.append(Problem(f'the name "{spec.name}" stands twice', self.root.where(kind, i, "name")))
         names = [spec.name for _, spec in kept(self.spec.kpis)]
         for i, check in kept(self.spec.checks):
             if check.kpi.partition(".")[0] not in names:
@@ -195,6 +204,12 @@ class Assembler:
             else problem
             for problem in error.problems
         ]
+
+    def _follows(self, problem: Problem) -> bool:
+        """Whether a problem only follows from a time or a component list that was refused."""
+        times = {"stop_time", "step_size", "start_time"} & self.root.refused
+        timing = problem.subject[:1] in (("stop_time",), ("record",)) or problem.subject[-1:] == ("period",)
+        return bool(times and (timing or problem.message.startswith("event time")))
 
     def _located(self, problem: Problem) -> Problem:
         """A problem of the system, with the place in the file of the setting it is about."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from os.path import relpath
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..python_component import load_object
+from ..python_component import load_object, package_files
 from ..simulate import Settings
 from ..system import System
 from .assembler import Assembler
@@ -51,9 +52,14 @@ class Assembly:
     def _functions(self, specs: Sequence[FunctionSpec]) -> list[Function]:
         return [(spec.name, load_object(spec.python, self.root.folder), spec.arguments) for spec in specs]
 
-    def files(self) -> list[Path]:
-        """The scenario, its nested systems and its FMUs."""
-        return [*(node.document.file for node in self.root.walk()), *self.workshop.fmus]
+    def files(self) -> dict[str, Path]:
+        """All files that the run depends on, by their path from the scenario: scenario, FMUs, Python, Modelica, profiles."""
+        own = [node.document.file for node in self.root.walk()]
+        own += [self.root.folder / spec.file for spec in self.spec.inputs]
+        functions = [self.root.folder / spec.python.rpartition(":")[0] for spec in (*self.spec.kpis, *self.spec.figures)]
+        python = [member for file in (*functions, *self.workshop.python) for member in package_files(file)]
+        files = {file.resolve() for file in (*own, *python, *self.workshop.fmus, *self.workshop.modelica)}
+        return {Path(relpath(file, self.root.folder.resolve())).as_posix(): file for file in sorted(files)}
 
     def origin(self, name: str) -> str:
         """Where a component comes from, in words."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -32,7 +34,7 @@ def resolve(node: Node, text: str, ports: Sequence[str], hidden: bool = False) -
     Raises Unknown.
     """
     component, _, rest = text.partition(".")
-    if component in node.broken:
+    if component in node.broken or "components" in node.refused:
         raise Unknown
     if component not in node.spec.components:
         raise Unknown(f'unknown component "{component}"{did_you_mean(component, node.spec.components)}')
@@ -75,13 +77,16 @@ def assign(name: str, component: Component, text: str, value: Any) -> dict[str, 
     Raises Unknown when there is no such variable, ValueError when it does not take the value.
     """
     variables = {variable.name: variable for variable in component.variables}
+    value = value.tolist() if hasattr(value, "tolist") else value
     if text in variables:
         return {text: _checked(variables[text], value)}
-    if isinstance(value, list) and f"{text}[1]" in variables:
+    if f"{text}[1]" in variables:
+        if not isinstance(value, list) or not value:
+            raise ValueError(f'"{text}" is a list of values, found {json.dumps(value)}')
         names = [f"{text}[{i}]" for i in range(1, len(value) + 1)]
         if names[-1] not in variables:
             size = sum(other.startswith(f"{text}[") for other in variables)
-            raise ValueError(f"{len(value)} values for {text}[1..{size}]")
+            raise ValueError(f'"{text}" takes at most {size} values, found {len(value)}')
         return {each: _checked(variables[each], element) for each, element in zip(names, value, strict=True)}
     settable = [v.name for v in component.variables if v.causality in ("parameter", "input")]
     raise Unknown(f'component "{name}" has no variable "{text}"{did_you_mean(text, settable)}')
@@ -93,8 +98,10 @@ def _checked(variable: Variable, value: Any) -> Any:
     if not variable.shape:
         return _scalar(variable, value)
     size = len(variable.slots)
-    if not isinstance(value, list) or len(value) > size:
-        raise ValueError(f'"{variable.name}" takes a list of at most {size} values, found {value!r}')
+    if not isinstance(value, list):
+        raise ValueError(f'"{variable.name}" is an array of {size} values, expected a list, found {json.dumps(value)}')
+    if len(value) > size:
+        raise ValueError(f'"{variable.name}" takes at most {size} values, found {len(value)}')
     start = variable.start if isinstance(variable.start, tuple) else (variable.start or 0,) * size
     return [*(_scalar(variable, element) for element in value), *start[len(value) :]]
 
@@ -102,11 +109,11 @@ def _checked(variable: Variable, value: Any) -> Any:
 def _scalar(variable: Variable, value: Any) -> Any:
     """The value as the variable's type. Raises ValueError when it is not of that type or out of range."""
     if not _accepts(variable.type, value):
-        raise ValueError(f'"{variable.name}" is a {variable.type}, found {value!r}')
+        raise ValueError(f'"{variable.name}" is of type {variable.type}, found {json.dumps(value)}')
     low, high = variable.minimum, variable.maximum
     if (low is not None and value < low) or (high is not None and value > high):
         span = f"{'-inf' if low is None else low} ... {'inf' if high is None else high}"
-        raise ValueError(f'"{variable.name}" must lie in {span}, found {value!r}')
+        raise ValueError(f'"{variable.name}" must lie in {span}, found {json.dumps(value)}')
     return float(value) if variable.type in _REALS else value
 
 
@@ -115,4 +122,4 @@ def _accepts(kind: str, value: Any) -> bool:
         return kind == "Boolean" and isinstance(value, bool)
     if kind in ("String", "Binary"):
         return isinstance(value, str)
-    return isinstance(value, int | float if kind in _REALS else int)
+    return isinstance(value, int | float) and math.isfinite(value) if kind in _REALS else isinstance(value, int)

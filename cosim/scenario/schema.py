@@ -168,6 +168,8 @@ class CheckSpec(Spec):
 
     @model_validator(mode="after")
     def _bounded(self) -> CheckSpec:
+        if self is not CUT and None not in (self.min, self.max) and self.min > self.max:  # type: ignore[operator]
+            raise ValueError('expected "min" to be at most "max"')
         if self is not CUT and self.min is None and self.max is None and self.equals is None:
             raise ValueError('expected at least one of "min", "max", "equals"')
         return self
@@ -202,7 +204,7 @@ class SystemSpec(Spec):
     schema_: str | None = Field(None, alias="$schema")
     name: str = ""
     description: str = ""
-    components: Annotated[dict[Name, ComponentSpec], Field(min_length=1)]
+    components: dict[Name, ComponentSpec]
     connections: list[ConnectionSpec] = []
     algorithm: AlgorithmSpec | None = Field(None, description="default: one component per stage in the listed order")
 
@@ -216,7 +218,9 @@ class NestedSpec(SystemSpec):
 class ScenarioSpec(SystemSpec):
     """A whole scenario: a system, its times, and what to keep, compute, check and draw."""
 
-    name: Annotated[str, StringConstraints(min_length=1)]
+    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$")] = Field(
+        description="also the name of the folder for results"
+    )
     start_time: Seconds = Fraction(0)
     stop_time: Seconds
     step_size: Period

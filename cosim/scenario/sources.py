@@ -18,6 +18,9 @@ class Workshop:
     def __init__(self) -> None:
         self.fmus: dict[Path, FmuFile] = {}
         self._users: dict[Path, str] = {}
+        #: source files of components
+        self.python: list[Path] = []
+        self.modelica: list[Path] = []
 
     def make(self, node: Node, name: str) -> Component:
         """The component `name` of a system. Raises InputError."""
@@ -39,12 +42,14 @@ class Workshop:
             raise InputError(f'expected "file.mo:Model", found "{spec.modelica}"')
         if not (folder / file).is_file():
             raise InputError(f'file "{file}" does not exist')
+        self.modelica.append(folder / file)
         return self._instance(cached_fmu(folder / file, model), name)
 
     def from_python(self, folder: Path, spec: ComponentSpec, name: str) -> Component:
         from ..python_component import load_component
 
         assert spec.python is not None
+        self.python.append(folder / spec.python.rpartition(":")[0])
         return load_component(spec.python, folder, name, spec.arguments)
 
     def _instance(self, path: Path, name: str) -> Component:

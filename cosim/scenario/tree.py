@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,6 +28,8 @@ class Node:
     prefix: str = ""
     children: dict[str, Node] = field(default_factory=dict)
     broken: set[str] = field(default_factory=set)
+    #: keys of the file that were refused or are missing: nothing that follows from them is said
+    refused: set[str] = field(default_factory=set)
 
     @property
     def folder(self) -> Path:
@@ -94,14 +97,17 @@ def load(scenario: str | Path, settings: Mapping[str, Any] | None = None) -> Sce
             problems += _set_pointer(document, name, value)
         else:
             variables[name] = value
-    spec, found = validate(document, ScenarioSpec)
-    root = Node(document, spec)
+    spec, found, refused = validate(document, ScenarioSpec)
+    root = Node(document, spec, refused=refused)
     problems += found + _load_children(root, (document.file.resolve(),))
     return Scenario(root, problems, variables)
 
 
 def _load_children(node: Node, ancestors: tuple[Path, ...]) -> list[Problem]:
     problems: list[Problem] = []
+    if not node.spec.components and "components" not in node.refused:
+        problems.append(Problem("expected at least one component, found none", node.where("components")))
+        node.refused.add("components")
     raw = node.document.value.get("components") if isinstance(node.document.value, dict) else None
     node.broken |= set(raw if isinstance(raw, dict) else {}) - set(node.spec.components)
     for name, component in node.spec.components.items():
@@ -116,8 +122,8 @@ def _load_children(node: Node, ancestors: tuple[Path, ...]) -> list[Problem]:
             node.broken.add(name)
             problems += [Problem(p.message, p.where or node.where("components", name, "system")) for p in error.problems]
             continue
-        spec, found = validate(document, NestedSpec)
-        node.children[name] = Node(document, spec, node.full_name(name))
+        spec, found, refused = validate(document, NestedSpec)
+        node.children[name] = Node(document, spec, node.full_name(name), refused=refused)
         problems += found + _load_children(node.children[name], (*ancestors, file.resolve()))
     return problems
 
@@ -125,7 +131,7 @@ def _load_children(node: Node, ancestors: tuple[Path, ...]) -> list[Problem]:
 def _set_pointer(document: Document, pointer: str, value: Any) -> list[Problem]:
     """Change the JSON value before it is read; the last step may be new."""
     keys = [key.replace("~1", "/").replace("~0", "~") for key in pointer[1:].split("/")]
-    target, where = document.value, f"--set {pointer}"
+    target, where = document.value, f'setting "{pointer}"'
     for depth, key in enumerate(keys[:-1]):
         target = _child(target, key)
         if target is None:
@@ -150,19 +156,28 @@ def _child(value: Any, key: str) -> Any:
 def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
     """The values of `NAME=value` texts: JSON where it is JSON, else text.
 
-    Raises InputError for texts without "=".
+    Raises InputError for texts without "=" and for numbers that are not finite.
     """
     parsed: dict[str, Any] = {}
+    problems = []
     for text in settings:
         name, separator, value = text.partition("=")
         if not separator or not name:
-            raise InputError(f'expected NAME=value, found "{text}"')
+            problems.append(Problem(f'expected NAME=value, found "{text}"'))
+            continue
         try:
-            parsed[name] = json.loads(value, parse_constant=_refuse_constant)
+            parsed[name] = json.loads(value)
         except ValueError:
             parsed[name] = value
+        if not _is_finite(parsed[name]):
+            problems.append(Problem(f"expected finite numbers, found {value}", name))
+    if problems:
+        raise InputError(problems)
     return parsed
 
 
-def _refuse_constant(word: str) -> None:
-    raise InputError(f"{word} is not allowed, expected a finite number")
+def _is_finite(value: Any) -> bool:
+    """Whether all numbers in a JSON value are finite."""
+    if isinstance(value, dict | list):
+        return all(map(_is_finite, value.values() if isinstance(value, dict) else value))
+    return not isinstance(value, float) or math.isfinite(value)

@@ -7,7 +7,7 @@ import json
 import types
 import typing
 from collections.abc import Sequence
-from typing import Any, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -18,31 +18,38 @@ from .schema import CUT, SystemSpec
 S = TypeVar("S", bound=SystemSpec)
 
 #: what stands in for missing or wrong keys of the root, so that the rest can be read
-_STAND_INS: dict[str, Any] = {
-    "name": "unnamed",
-    "stop_time": 1,
-    "step_size": 1,
-    "components": {"unknown": {"python": "unknown.py:Unknown"}},
-}
+_STAND_INS: dict[str, Any] = {"name": "unnamed", "stop_time": 1, "step_size": 1, "components": {}}
 
 
-def validate(document: Document, kind: type[S]) -> tuple[S, list[Problem]]:
-    """The spec in a document, without its wrong parts, and everything that is wrong with it."""
+class Validated(NamedTuple, Generic[S]):
+    """The spec in a document without its wrong parts, what is wrong, and the root keys that were refused or are missing."""
+
+    spec: S
+    problems: list[Problem]
+    refused: set[str]
+
+
+def validate(document: Document, kind: type[S]) -> Validated[S]:
+    """Read a document as a spec, whatever is wrong with it."""
     value = copy.deepcopy(document.value)
-    problems = list(document.problems)
+    problems, refused = list(document.problems), set()
     if not isinstance(value, dict):
         problems.append(Problem(f"expected an object, found {_shown(value)}", document.where(())))
         value = {}
     first = True
     while True:
         try:
-            return kind.model_validate(value), problems
+            return Validated(kind.model_validate(value), problems, refused)
         except ValidationError as error:
             for detail in error.errors(include_url=False):
                 path = tuple(key for key in detail["loc"] if key != "[key]")
                 if first:  # later ones are consequences of cutting
                     problems.append(Problem(_message(kind, path, detail), document.where(path)))
-                _cut(kind, value, path[:-1] if detail["type"] == "missing" and len(path) > 1 else path)
+                refused |= {str(key) for key in path[:1] if len(path) == 1}
+                if detail["type"] == "extra_forbidden":
+                    _remove(value, path)
+                else:
+                    _cut(kind, value, path[:-1] if detail["type"] == "missing" and len(path) > 1 else path)
             first = False
 
 
@@ -63,6 +70,16 @@ def _message(kind: type[BaseModel], path: Sequence[str | int], detail: Any) -> s
 def _shown(value: Any) -> str:
     text = json.dumps(value, ensure_ascii=False, default=str)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _remove(value: Any, path: Sequence[str | int]) -> None:
+    """Remove a key that should not be there, unless what it was in has been removed already."""
+    for key in path[:-1]:
+        if value is CUT or not (key in value if isinstance(value, dict) else key in range(len(value))):
+            return
+        value = value[key]
+    if isinstance(value, dict):
+        value.pop(path[-1], None)
 
 
 def _cut(kind: Any, value: Any, path: Sequence[str | int]) -> None:

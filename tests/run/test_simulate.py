@@ -61,9 +61,9 @@ def test_events_must_lie_on_the_grid_and_set_what_can_be_set():
     with pytest.raises(InputError) as refusal:
         simulate(system({"a": a, "b": gain()}, "b.y > a.u"), settings(events=events))
     assert [problem.message for problem in refusal.value.problems] == [
-        "event time 0.5 s lies between two communication points (1.0 s apart)",
         "a.u is fed by a connection, an event cannot set it",
         "a.k is neither a tunable parameter nor an input, an event cannot set it",
+        "event time 0.5 s lies between two communication points (1.0 s apart)",
     ]
 
 

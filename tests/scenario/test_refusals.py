@@ -1,5 +1,6 @@
 """Bad scenarios: every problem at once, each with file, line and JSON path, before the first step."""
 
+import numpy as np
 import pytest
 from helpers import wire
 
@@ -41,7 +42,7 @@ def test_everything_that_is_wrong_is_said_at_once(folder):
         "1:67: $.colour: unknown key",
         '5:3: $.components.c: FMU "missing.fmu" does not exist',
         '3:24: $.components.a.parameters.kk: component "a" has no variable "kk"; did you mean "k"?',
-        "3:33: $.components.a.parameters.k: \"k\" is a Float64, found 'x'",
+        '3:33: $.components.a.parameters.k: "k" is of type Float64, found "x"',
         "7:33: $.connections[1]: input b.u is connected twice: it is already fed by a.y",
         "8:4: $.connections[2].from: a.u is an input, expected an output",
         '8:34: $.connections[3].from: unknown component "d"; valid: a, b, c',
@@ -50,7 +51,8 @@ def test_everything_that_is_wrong_is_said_at_once(folder):
         '10:16: $.algorithm.stages: unknown component "e"; valid: a, b',
         '10:16: $.algorithm.stages: component "b" is in no stage, so it would never step',
         "1:33: $.stop_time: 3.5 s is no multiple of the step size 1.0 s",
-        '11:25: $.kpis[0].python: file "none.py" does not exist',
+        "12:13: $.events[0]: event time 0.5 s lies between two communication points (1.0 s apart)",
+        '11:11: $.kpis[0]: file "none.py" does not exist',
         '11:62: $.checks[0].kpi: no KPI "kk.x"; did you mean "k"?',
     ]
 
@@ -77,7 +79,7 @@ def test_everything_that_is_wrong_is_said_at_once(folder):
         ({"connections": [wire("a.yy", "a.u")]}, 'component "a" has no output "yy"; did you mean "y"?'),
         ({"connections": [wire("aa.y", "a.u")]}, 'unknown component "aa"; did you mean "a"?'),
         ({"connections": [wire("a.y", "a.u")] * 2}, "input a.u is connected twice: it is already fed by a.y"),
-        ({"kpis": [{"name": "k", "python": "none.py:f"}]}, '$.kpis[0].python: file "none.py" does not exist'),
+        ({"kpis": [{"name": "k", "python": "none.py:f"}]}, '$.kpis[0]: file "none.py" does not exist'),
         ({"checks": [{"kpi": "k.x", "max": 1}]}, '$.checks[0].kpi: no KPI "k.x"'),
         ({"checks": [{"kpi": "k.x"}]}, 'expected at least one of "min", "max", "equals"'),
         ({"inputs": [{"file": "no.csv", "to": {"x": "a.u"}}]}, "cannot read profile"),
@@ -112,9 +114,9 @@ def test_a_component_without_a_sound_source_is_one_line_and_nothing_else_is_said
 @pytest.mark.parametrize(
     ("parameters", "line"),
     [
-        ({"number": 1.5}, '"number" is a Int32, found 1.5'),
-        ({"flag": 1}, '"flag" is a Boolean, found 1'),
-        ({"text": 3}, '"text" is a String, found 3'),
+        ({"number": 1.5}, '"number" is of type Int32, found 1.5'),
+        ({"flag": 1}, '"flag" is of type Boolean, found 1'),
+        ({"text": 3}, '"text" is of type String, found 3'),
         ({"out": True}, '"out" is of causality output and cannot be set'),
         ({"numbr": 1}, 'component "a" has no variable "numbr"; did you mean "number"?'),
         ({"number": {"x": 1}}, "expected a number, true, false, a text, or a list of these"),
@@ -134,7 +136,9 @@ def test_ranges_of_an_fmu_are_respected(folder, probes):
 
 def test_a_list_that_is_too_long_says_how_long_it_may_be(folder):
     found = refused(folder, {"a": folder.block("Controller", parameters={"gain": [1, 2, 3]})})
-    assert found == [f"{found[0].split(': $')[0]}: $.components.a.parameters.gain: 3 values for gain[1..2]"]
+    assert [line.split(": ", 1)[1] for line in found] == [
+        '$.components.a.parameters.gain: "gain" takes at most 2 values, found 3'
+    ]
 
 
 def test_periods_must_fit(folder):
@@ -225,6 +229,70 @@ def test_what_is_no_json_says_where(folder, text, line):
     assert line in found
 
 
+def test_a_nested_system_with_times_is_refused_and_not_read_for_ever(folder):
+    folder.write({"components": {"g": folder.block("Gain")}, "stop_time": 3, "step_size": 1}, "n.json")
+    found = refused(folder, {"a": {"system": "n.json"}})
+    assert [line.split(";")[0].split(": ", 1)[1] for line in found] == ["$.stop_time: unknown key", "$.step_size: unknown key"]
+
+
+@pytest.mark.parametrize("components", [None, [], 3, {}])
+def test_without_components_nothing_else_is_said_about_them(folder, components):
+    content = {"name": "x", "stop_time": 1, "step_size": 1, "connections": [wire("a.y", "b.u")]}
+    if components is not None:
+        content["components"] = components
+    (line,) = lines(folder.write({**content, "algorithm": {"stages": [["a"]]}, "record": {"signals": ["a.y"]}}))
+    assert "$.components" in line
+
+
+def test_a_wrong_step_size_has_no_consequences(folder):
+    gain = folder.block("Gain", period=0.3)
+    (line,) = refused(folder, {"a": gain}, step_size="fast", events=[{"time": 0.7, "set": {"a.u": 1}}])
+    assert "$.step_size: expected seconds" in line
+
+
+def test_a_wrong_stop_time_hides_no_wrong_event(folder):
+    found = refused(folder, {"a": folder.block("Gain")}, stop_time=2.5, events=[{"time": 0.7, "set": {"a.u": 1}}])
+    assert [line.split(": ")[1] for line in found] == ["$.stop_time", "$.events[0]"]
+
+
+def test_a_name_is_the_name_of_a_folder(folder):
+    (line,) = refused(folder, {"a": folder.block("Gain")}, name="../evil")
+    assert "$.name: expected a name" in line
+
+
+FUNCTIONS = """
+def good(result, signal, limit=1.0): ...
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ({"sgnal": "a.y"}, '"good" takes no argument "sgnal"; did you mean "signal"?'),
+        ({}, '"good" needs the argument signal'),
+    ],
+)
+def test_arguments_of_kpis_are_checked_before_the_run(folder, arguments, line):
+    (folder.path / "f.py").write_text(FUNCTIONS)
+    kpi = {"name": "k", "python": "f.py:good", "arguments": arguments}
+    (found,) = refused(folder, {"a": folder.block("Gain")}, kpis=[kpi])
+    assert found.endswith(f"$.kpis[0]: {line}")
+
+
+def test_two_kpis_do_not_share_a_name(folder):
+    (folder.path / "f.py").write_text(FUNCTIONS)
+    kpi = {"name": "k", "python": "f.py:good", "arguments": {"signal": "a.y"}}
+    (found,) = refused(folder, {"a": folder.block("Gain")}, kpis=[kpi, kpi])
+    assert found.endswith('$.kpis[1].name: the name "k" stands twice')
+
+
+def test_settings_from_outside_may_be_arrays_and_must_be_finite(folder):
+    file = folder.scenario({"a": folder.block("Controller")})
+    cosim.run(file, {"a.gain": np.array([1.0, 2.0])})
+    assert lines(file, parameters={"a.gain": []}) == ['setting "a.gain": "gain" is a list of values, found []']
+    assert lines(file, parameters={"a.offset": np.inf}) == ['setting "a.offset": "offset" is of type Float64, found Infinity']
+
+
 def test_numbers_beyond_a_double_are_refused(folder):
     found = lines(folder.write('{"name": "x", "stop_time": 1e400, "step_size": 1, "components": {"a": {"fmu": "x.fmu"}}}'))
     assert "$.stop_time: 1e400 is not allowed, expected a finite number" in found[0]
@@ -237,7 +305,7 @@ def test_unknown_scenarios_name_the_nearest_shipped_one():
 
 def test_settings_from_outside_are_checked_too(folder):
     file = folder.scenario({"a": folder.block("Gain")})
-    assert lines(file, parameters={"a.kk": 1}) == ['--set a.kk: component "a" has no variable "kk"; did you mean "k"?']
+    assert lines(file, parameters={"a.kk": 1}) == ['setting "a.kk": component "a" has no variable "kk"; did you mean "k"?']
     assert lines(file, parameters={"/components/b/period": 1}) == [
-        '--set /components/b/period: the scenario has no "/components/b"'
+        'setting "/components/b/period": the scenario has no "/components/b"'
     ]
