@@ -8,11 +8,12 @@ import click
 
 
 @click.command()
-def command() -> None:
+@click.option("--nested", is_flag=True, help="The schema of nested systems instead.")
+def command(nested: bool) -> None:
     """Print the JSON Schema of scenario files.
 
     Editors complete and check a scenario that names it: "$schema": "scenario.schema.json".
     """
     from ..scenario import json_schema
 
-    click.echo(json.dumps(json_schema(), indent=2))
+    click.echo(json.dumps(json_schema(nested), indent=2))

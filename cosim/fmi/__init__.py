@@ -1,7 +1,18 @@
 """FMUs as components; the only room that knows FMPy."""
 
+from ..component import Component
 from .description import DefaultExperiment, Description
 from .file import FmuFile
-from .instance import instantiate
+from .fmi2 import Fmi2Instance
+from .fmi3 import Fmi3Instance
 
 __all__ = ["DefaultExperiment", "Description", "FmuFile", "instantiate"]
+
+
+def instantiate(file: FmuFile, instance_name: str, logging_on: bool = False) -> Component:
+    """A component for the FMU; no code of the FMU runs before `bind`.
+
+    Raises InputError when the FMU cannot run on this machine.
+    """
+    kind = Fmi2Instance if file.description.major == 2 else Fmi3Instance
+    return kind(file, instance_name, logging_on)

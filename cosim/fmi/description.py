@@ -11,6 +11,7 @@ from typing import Any
 from zipfile import BadZipFile, ZipFile
 
 import numpy as np
+from lxml import etree
 
 from ..component import Variable
 from ..errors import InputError
@@ -62,20 +63,33 @@ def read_description(path: Path) -> Description:
 
     if not path.is_file():
         raise InputError(f'FMU "{path}" does not exist')
+    fmi_version = _fmi_version(path)
+    if fmi_version.partition(".")[0] not in ("2", "3"):
+        raise InputError(f'"{path}" is an FMI {fmi_version} FMU; FMI 2.0 and 3.0 are supported')
     try:
-        with ZipFile(path) as archive:
-            archive.getinfo("modelDescription.xml")
         model = read_model_description(path, validate=False)
         platforms = supported_platforms(path)
-    except (BadZipFile, KeyError) as error:
-        raise InputError(f'"{path}" is no FMU: {error.args[0]}') from None
     except Exception as error:
         raise InputError(f'the model description of "{path}" cannot be read: {error}') from error
-    if model.fmiMajorVersion not in (2, 3):
-        raise InputError(f'"{path}" is an FMI {model.fmiVersion} FMU; FMI 2.0 and 3.0 are supported')
     if model.coSimulation is None:
         raise InputError(f'"{path}" offers no Co-Simulation interface')
+    if not model.instantiationToken:
+        attribute = "guid" if model.fmiMajorVersion == 2 else "instantiationToken"
+        raise InputError(f'the model description of "{path}" lacks the attribute {attribute}')
     return _description(path, model, platforms)
+
+
+def _fmi_version(path: Path) -> str:
+    """What the root element says. Raises InputError when the file is no FMU at all."""
+    try:
+        with ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+            parser = etree.XMLParser(resolve_entities=False, no_network=True)
+            root = etree.parse(file, parser).getroot()
+    except (BadZipFile, KeyError) as error:
+        raise InputError(f'"{path}" is no FMU: {error.args[0]}') from None
+    except etree.XMLSyntaxError as error:
+        raise InputError(f'the model description of "{path}" is no XML: {error.msg}') from None
+    return root.get("fmiVersion") or "of unknown version"
 
 
 def _description(path: Path, model: Any, platforms: Sequence[str]) -> Description:

@@ -23,18 +23,6 @@ STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 
 
-def instantiate(file: FmuFile, instance_name: str, logging_on: bool = False) -> Component:
-    """A component for the FMU; no code of the FMU runs before `bind`.
-
-    Raises InputError when the FMU cannot run on this machine.
-    """
-    from .fmi2 import Fmi2Instance
-    from .fmi3 import Fmi3Instance
-
-    kind = Fmi2Instance if file.description.major == 2 else Fmi3Instance
-    return kind(file, instance_name, logging_on)
-
-
 class FmuInstance(Component):
     """What FMI 2.0 and 3.0 have in common. Subclasses name the C functions and lay out their arguments."""
 

@@ -233,7 +233,7 @@ class ScenarioSpec(SystemSpec):
     reference: ReferenceSpec | None = None
 
 
-def json_schema() -> dict[str, Any]:
-    """JSON Schema (2020-12) of a scenario file."""
-    schema = ScenarioSpec.model_json_schema(by_alias=True)
+def json_schema(nested: bool = False) -> dict[str, Any]:
+    """JSON Schema (2020-12) of a scenario file, or of a nested system's."""
+    schema = (NestedSpec if nested else ScenarioSpec).model_json_schema(by_alias=True)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

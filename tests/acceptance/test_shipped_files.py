@@ -17,6 +17,7 @@ from cosim.timing import exact
 
 FMUS = sorted(resources.root().glob("fmus/**/*.fmu"))
 SCENARIOS = sorted(resources.root().glob("scenarios/*.json"))
+SYSTEMS = sorted(resources.root().glob("scenarios/systems/*.json"))
 
 
 def label(path):
@@ -94,10 +95,10 @@ def test_scenarios_meet_their_checks(path):
     assert [(outcome.check, outcome.value) for outcome in outcomes if not outcome.passed] == []
 
 
-@pytest.mark.parametrize("path", SCENARIOS, ids=label)
+@pytest.mark.parametrize("path", [*SCENARIOS, *SYSTEMS], ids=label)
 def test_scenarios_satisfy_the_published_schema(path):
     import jsonschema
 
     from cosim.scenario import json_schema
 
-    jsonschema.validate(json.loads(path.read_text()), json_schema())
+    jsonschema.validate(json.loads(path.read_text()), json_schema(nested=path.parent.name == "systems"))

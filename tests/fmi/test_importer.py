@@ -165,6 +165,23 @@ def test_what_is_no_fmu_is_refused(tmp_path):
         _ = FmuFile(tmp_path / "empty.fmu").description
 
 
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ((b'fmiVersion="2.0"', b'fmiVersion="1.0"'), r"is an FMI 1\.0 FMU; FMI 2\.0 and 3\.0 are supported"),
+        ((b'guid="probe"', b""), "lacks the attribute guid"),
+        ((b"<CoSimulation", b"<CoSimulation><"), "is no XML: "),
+        ((b'start="1" min', b'start="one" min'), 'start value "one" of variable "y_start" is no Float64'),
+    ],
+)
+def test_a_wrong_description_is_refused_in_words(probes, tmp_path, change, words):
+    changed = tmp_path / "changed.fmu"
+    with ZipFile(probes[2]) as source, ZipFile(changed, "w") as target:
+        target.writestr("modelDescription.xml", source.read("modelDescription.xml").replace(*change))
+    with pytest.raises(InputError, match=words):
+        _ = FmuFile(changed).description
+
+
 def test_an_fmu_for_another_machine_says_what_it_has(probes, tmp_path):
     foreign = tmp_path / "windows.fmu"
     with ZipFile(probes[2]) as source, ZipFile(foreign, "w") as target:
