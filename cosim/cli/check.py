@@ -27,6 +27,7 @@ def command(scenario: str, settings: tuple[str, ...], connections: bool) -> None
         _stages(assembly)
         if connections:
             _connections(assembly)
+            _unfed(assembly)
         times = assembly.settings
         click.echo(
             f"\n{assembly.spec.name}: {float(times.start_time):g} s ... {float(times.stop_time):g} s in steps of "
@@ -73,3 +74,12 @@ def _connections(assembly: Assembly) -> None:
         if source.type != target.type:
             notes.append(f"{source.type} to {target.type}")
         click.echo(f"  {connection.source} -> {connection.target}" + (f"  ({', '.join(notes)})" if notes else ""))
+
+
+def _unfed(assembly: Assembly) -> None:
+    """Inputs that keep their start values unless an event sets them."""
+    fed = {connection.target for connection in assembly.system.connections}
+    for name, component in assembly.system.components.items():
+        inputs = [slot for variable in component.variables if variable.causality == "input" for slot in variable.slots]
+        if free := [slot for slot in inputs if (name, slot) not in fed]:
+            click.echo(f"\ninputs of {name} that nothing feeds\n  {', '.join(free)}")

@@ -32,7 +32,8 @@ class Validated(NamedTuple, Generic[S]):
 def validate(document: Document, kind: type[S]) -> Validated[S]:
     """Read a document as a spec, whatever is wrong with it."""
     value = copy.deepcopy(document.value)
-    problems, refused = list(document.problems), set()
+    problems = list(document.problems)
+    refused: set[str] = set()
     if not isinstance(value, dict):
         problems.append(Problem(f"expected an object, found {_shown(value)}", document.where(())))
         value = {}

@@ -1,0 +1,152 @@
+"""`cosim new controller`: what it makes runs at once, in every language."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim import resources
+from cosim.results import Result
+
+MADE = {
+    "python": ["my_keeper.json", "my_keeper.py"],
+    "modelica": ["MyKeeper.mo", "my_keeper.json"],
+    "c": ["modelDescription.xml", "my_keeper.c", "my_keeper.json"],
+}
+
+
+def cosim(*arguments, cwd):
+    command = [sys.executable, "-m", "cosim", *map(str, arguments)]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+
+
+def new(folder, name, language, *more):
+    return cosim("new", "controller", name, "--language", language, *more, cwd=folder)
+
+
+def next_commands(done):
+    return [shlex.split(line)[1:] for line in done.stdout.splitlines() if line.startswith("  cosim ")]
+
+
+@pytest.fixture(scope="module")
+def sailed(tmp_path_factory):
+    """language -> folder in which a controller was made and everything was run that the command proposes."""
+
+    def sail(language):
+        folder = tmp_path_factory.mktemp(language)
+        made = new(folder, "my_keeper", language)
+        assert made.returncode == 0, made.stderr
+        assert sorted(path.name for path in (folder / "my_keeper").iterdir()) == MADE[language]
+        for command in next_commands(made):
+            done = cosim(*command, cwd=folder)
+            assert done.returncode == 0, done.stdout + done.stderr
+        return folder
+
+    return {language: sail(language) for language in MADE}
+
+
+@pytest.mark.parametrize("language", MADE)
+def test_it_keeps_speed_and_course_at_once(sailed, language):
+    result = Result.from_csv(sailed[language] / "runs/my_keeper/result.csv")
+    assert result["vessel.velocity_body.u"][-1] == pytest.approx(1.0, abs=1e-3)
+    assert result["vessel.attitude.yaw"][-1] == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("language", ["modelica", "c"])
+def test_all_languages_sail_the_same_course(sailed, language):
+    ours, theirs = (Result.from_csv(sailed[one] / "runs/my_keeper/result.csv") for one in (language, "python"))
+    for name in ("vessel.position.x", "vessel.position.y", "vessel.attitude.yaw", "vessel.velocity_body.u"):
+        assert np.abs(ours[name] - theirs[name]).max() < 1e-12, name
+
+
+@pytest.mark.parametrize("language", MADE)
+def test_the_exported_fmu_sails_the_same_course(sailed, language, tmp_path):
+    """`cosim new` proposes how to export it; here the FMU takes the source's place."""
+    scenario = json.loads((sailed[language] / "my_keeper/my_keeper.json").read_text())
+    scenario["components"]["usv"] = {
+        "fmu": str(sailed[language] / "my_keeper/my_keeper.fmu"),
+        "parameters": scenario["components"]["usv"]["parameters"],
+    }
+    (tmp_path / "exported.json").write_text(json.dumps(scenario))
+    assert cosim("run", "exported.json", "--no-report", "--output-dir", "out", cwd=tmp_path).returncode == 0
+    first, second = (Result.from_csv(file / "result.csv") for file in (sailed[language] / "runs/my_keeper", tmp_path / "out"))
+    assert np.array_equal(first["vessel.position.x"], second["vessel.position.x"])
+
+
+@pytest.mark.parametrize(("name", "expected"), [("PIDKeeper", "pid_keeper/PidKeeper.mo"), ("k2_slow", "k2_slow/K2Slow.mo")])
+def test_names_take_the_form_of_the_language(tmp_path, name, expected):
+    assert new(tmp_path, name, "modelica", "--directory", "mine").returncode == 0
+    text = (tmp_path / "mine" / expected).read_text()
+    model = Path(expected).stem
+    assert text.startswith(f"block {model} ") and text.endswith(f"end {model};\n")
+
+
+def test_nothing_of_the_templates_name_remains(sailed):
+    for folder in sailed.values():
+        texts = [path.read_text() for path in (folder / "my_keeper").iterdir() if path.suffix != ".fmu"]
+        assert not [text for text in texts if "speed_keeper" in text or "SpeedKeeper" in text]
+
+
+def test_two_controllers_in_c_do_not_take_each_others_binary(tmp_path):
+    """The GUID holds the name, so that a description and another controller's binary do not fit."""
+    for name in ("one", "two"):
+        assert new(tmp_path, name, "c").returncode == 0
+    shutil.copy(tmp_path / "one/one.c", tmp_path / "two/two.c")
+    assert cosim("build", "two", "--output", "two/two.fmu", cwd=tmp_path).returncode == 0
+    done = cosim("run", "two/two.json", cwd=tmp_path)
+    assert done.returncode == 2 or done.returncode == 1
+    assert "another GUID" in done.stderr
+
+
+def test_inside_a_clone_the_scenario_can_move_with_it(tmp_path):
+    """A clone is imitated by a folder with links to what is needed."""
+    clone = tmp_path / "clone"
+    (clone / "work").mkdir(parents=True)
+    for name in ("cosim", "controllers", "fmus", "plant_src"):
+        shutil.copytree(resources.root() / name, clone / name, ignore=shutil.ignore_patterns("__pycache__"))
+    command = [sys.executable, "-c", "import sys; sys.path.insert(0, '..'); from cosim.cli import main; main()"]
+    arguments = ["new", "controller", "keeper", "--language", "python"]
+    subprocess.run([*command, *arguments], cwd=clone / "work", check=True, capture_output=True)
+    moved = clone.rename(tmp_path / "moved")
+    assert json.loads((moved / "work/keeper/keeper.json").read_text())["components"]["vessel"]["fmu"] == "../../fmus/strider.fmu"
+    assert cosim("run", "work/keeper/keeper.json", "--no-report", cwd=moved).returncode == 0
+
+
+def test_files_are_overwritten_only_by_force(tmp_path):
+    assert new(tmp_path, "keeper", "python").returncode == 0
+    source = tmp_path / "keeper/keeper.py"
+    template = source.read_text()
+    source.write_text("mine")
+    refused = new(tmp_path, "keeper", "python")
+    assert refused.returncode == 2
+    assert refused.stderr.splitlines() == [f"keeper/{file}: exists; --force overwrites it" for file in ("keeper.py", "keeper.json")]
+    assert source.read_text() == "mine"
+    assert new(tmp_path, "keeper", "python", "--force").returncode == 0
+    assert source.read_text() == template
+
+
+@pytest.mark.parametrize(
+    ("name", "language", "message"),
+    [
+        ("keeper", "pyton", 'there is no language "pyton"; did you mean "python"?'),
+        ("keeper", "ada", 'there is no language "ada"; valid: python, modelica, c'),
+        ("my-keeper", "c", '"my-keeper" is no name of a controller: expected a letter, then letters, digits and underscores'),
+        ("../keeper", "c", '"../keeper" is no name of a controller'),
+        ("2fast", "python", '"2fast" is no name of a controller'),
+        ("math", "python", '"math" means something else already; choose another name'),
+        ("vehicle", "modelica", '"vehicle" means something else already; choose another name'),
+        ("Boolean", "modelica", '"Boolean" means something else already; choose another name'),
+    ],
+)
+def test_unsuitable_names_and_languages_are_refused(tmp_path, name, language, message):
+    done = new(tmp_path, name, language)
+    assert done.returncode == 2
+    assert done.stderr.startswith(message)
+    assert list(tmp_path.iterdir()) == []
