@@ -11,7 +11,7 @@ from typing import Any
 
 from ..errors import InputError, Problem, did_you_mean
 from ..resources import cache_directory
-from .sources import KINDS, Source, export, find_sources, source_of, tools
+from .sources import KINDS, Source, export, find_sources, source_file, source_of, tools
 
 #: FMI version -> folder of the FMUs
 FOLDERS = {2: Path("fmus"), 3: Path("fmus/fmi3")}
@@ -83,13 +83,14 @@ def _selected(sources: Sequence[Path] | None, root: Path) -> list[Source]:
         return list(known.values())
     places = {str(path.relative_to(root.resolve())) for path in known}
     problems = []
-    for path in sources:
+    files = [source_file(path) for path in sources]
+    for path in files:
         if path.resolve() not in known:
             where = ", ".join(kind.pattern for kind in KINDS)
             problems.append(Problem(f"is no source of an FMU ({where}){did_you_mean(str(path), places)}", str(path)))
     if problems:
         raise InputError(problems)
-    return [known[path.resolve()] for path in sources]
+    return [known[path.resolve()] for path in files]
 
 
 # -- the manifest --------------------------------------------------------------------------------------------------------------

@@ -120,13 +120,13 @@ def _root(block: Block, fmi_version: str, **token: str) -> Element:
 
 def _common_parts(root: Element, block: Block, fmi_version: int) -> None:
     names = {variable.unit for variable in block.variables if variable.type == "Float64" and variable.unit}
-    _add_units(root, names | {"s"} if fmi_version == 3 else names)
+    add_units(root, names | {"s"} if fmi_version == 3 else names)
     _add_enumerations(root, block, fmi_version)
     _add(_add(root, "LogCategories"), "Category", **ERRORS)
     _add(root, "DefaultExperiment", stepSize=block.step_size)
 
 
-def _add_units(root: Element, names: Iterable[str]) -> None:
+def add_units(root: Element, names: Iterable[str]) -> None:
     if not names:
         return
     definitions = _add(root, "UnitDefinitions")

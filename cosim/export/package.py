@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -33,7 +33,8 @@ def write_fmu(block: Block, fmi_version: int, target: Path) -> Path:
     check_block(block)
     files = _with_token(block, fmi_version)
     files |= {f"resources/{name}": path.read_bytes() for name, path in block.resources.items()}
-    files |= _binary(block, fmi_version, files)
+    sources = {name.removeprefix("sources/"): text for name, text in files.items() if name.startswith("sources/")}
+    files |= compile_binary(block.identifier, fmi_version, sources, _c_files(sources))
     return write_archive(files, target)
 
 
@@ -51,33 +52,34 @@ def _with_token(block: Block, fmi_version: int) -> dict[str, bytes]:
 
 def _sources(block: Block, fmi_version: int) -> dict[str, bytes]:
     """All that is needed to compile the FMU anywhere, FMI's own headers included."""
-    headers = _fmi_header_folder()
     sources = {name: text.encode() for name, text in block.files.items()}
     sources |= {name: (SHELL / name).read_bytes() for name in _SHELL_FILES[fmi_version]}
-    sources |= {name: (headers / name).read_bytes() for name in _FMI_HEADERS[fmi_version]}
+    sources |= fmi_headers(fmi_version)
     sources["variables.h"] = c_table(block, fmi_version).encode()
     return sources
 
 
-def _fmi_header_folder() -> Path:
+def fmi_headers(fmi_version: int) -> dict[str, bytes]:
+    """FMI's own C headers, by name."""
     fmpy = find_spec("fmpy")
     if fmpy is None or fmpy.origin is None:
         raise InputError('exporting takes the FMI headers from FMPy, which is missing: pip install "fmi-cosim[build]"')
-    return Path(fmpy.origin).parent / "c-code"
+    folder = Path(fmpy.origin).parent / "c-code"
+    return {name: (folder / name).read_bytes() for name in _FMI_HEADERS[fmi_version]}
 
 
 def _c_files(sources: Mapping[str, bytes]) -> list[str]:
     return sorted(name for name in sources if name.endswith(".c"))
 
 
-def _binary(block: Block, fmi_version: int, files: Mapping[str, bytes]) -> dict[str, bytes]:
+def compile_binary(identifier: str, fmi_version: int, sources: Mapping[str, bytes], c_files: Sequence[str]) -> dict[str, bytes]:
+    """The shared library of `c_files` for this machine, under its name in the FMU; `sources` holds them and their headers."""
     from fmpy import platform, platform_tuple, sharedLibraryExtension
 
-    sources = {name.removeprefix("sources/"): text for name, text in files.items() if name.startswith("sources/")}
-    name = f"{block.identifier}{sharedLibraryExtension}"
+    name = f"{identifier}{sharedLibraryExtension}"
     with TemporaryDirectory(prefix="cosim-build-") as temporary:
         folder = Path(temporary)
         for source, text in sources.items():
             (folder / source).write_bytes(text)
-        compile_library(folder, _c_files(sources), folder / name)
+        compile_library(folder, c_files, folder / name)
         return {f"binaries/{platform if fmi_version == 2 else platform_tuple}/{name}": (folder / name).read_bytes()}

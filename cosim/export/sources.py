@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import ast
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from itertools import pairwise
@@ -12,16 +11,20 @@ from pathlib import Path
 
 from ..errors import CosimError, InputError, Problem
 from .block import Block
+from .c_sources import write_c_fmu
 from .compiler import compiler_version, find_compiler
+from .imports import with_relative_imports
 from .package import write_fmu
 from .python_class import write_python_fmu
+from .validation import DESCRIPTION
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of source: where its files lie, which package reads it, and how (None: PythonFMU exports it, as FMI 2.0 only).
+    """A kind of source: where its files lie, which package reads it, and how.
 
-    Its FMUs lie in `folder` below `fmus/`.
+    Either `load` reads it as a block, which becomes an FMU of each version, or `write` makes its FMI 2.0 FMU and returns the
+    files that went in. Its FMUs lie in `folder` below `fmus/`.
     """
 
     name: str
@@ -29,6 +32,8 @@ class Kind:
     tool: str
     load: Callable[[Path, str | None], Block] | None
     folder: str = ""
+    write: Callable[[Path, Path], list[Path]] | None = None
+    compiled: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,10 +72,16 @@ def _load_equations(path: Path, model: str | None) -> Block:
         raise InputError(Problem(f"block() failed: {type(error).__name__}: {error}", str(path))) from error
 
 
+def _write_python(path: Path, target: Path) -> list[Path]:
+    write_python_fmu(path, target)
+    return with_relative_imports(path)
+
+
 KINDS = (
     Kind("Modelica model", "controllers/modelica/*.mo", "rumoca", _load_modelica),
-    Kind("PythonFMU class", "controllers/python/*.py", "pythonfmu", None, "python"),
+    Kind("PythonFMU class", "controllers/python/*.py", "pythonfmu", None, "python", _write_python, compiled=False),
     Kind("equations", "plant_src/vehicles/*/equations.py", "casadi", _load_equations),
+    Kind("C controller", f"controllers/c/*/{DESCRIPTION}", "fmpy", None, "c", write_c_fmu),
 )
 
 
@@ -86,13 +97,21 @@ def find_sources(root: Path) -> list[Source]:
 
 def source_of(path: Path, model: str | None = None) -> Source:
     """What kind of source a file is, and the name of its FMU. Raises InputError for files that cannot be exported."""
+    path = source_file(path)
     if path.suffix == ".mo":
         return Source(path, KINDS[0], snake_case((model or path.stem).rpartition(".")[2]))
     if path.name == "equations.py":
         return Source(path, KINDS[2], path.resolve().parent.name)
     if path.suffix == ".py":
         return Source(path, KINDS[1], snake_case(path.stem))
-    raise InputError(Problem("cannot be exported; expected a .mo or .py file", str(path)))
+    if path.name == DESCRIPTION:
+        return Source(path, KINDS[3], path.resolve().parent.name)
+    raise InputError(Problem(f"cannot be exported; expected a .mo or .py file, or a C controller's {DESCRIPTION}", str(path)))
+
+
+def source_file(path: Path) -> Path:
+    """The file that stands for a source: a controller in C may be named by its folder."""
+    return path / DESCRIPTION if (path / DESCRIPTION).is_file() else path
 
 
 def snake_case(name: str) -> str:
@@ -107,30 +126,12 @@ def export(source: Source, targets: Mapping[int, Path], model: str | None = None
     """Export to one file per FMI version; the result lists all files that went in."""
     tool_version(source.kind.tool)
     if source.kind.load is None:
-        write_python_fmu(source.path, targets[2])
-        return [source.path]
+        assert source.kind.write is not None
+        return source.kind.write(source.path, targets[2])
     block = replace(source.kind.load(source.path, model), identifier=source.name)
     for fmi_version, target in targets.items():
         write_fmu(block, fmi_version, target)
-    return [*_with_relative_imports(source.path), *block.resources.values()]
-
-
-def _with_relative_imports(path: Path) -> list[Path]:
-    """A Python file and the files of its package that it imports, directly or not; other files stand alone."""
-    files, new = [path], [path] if path.suffix == ".py" else []
-    while new:
-        imported = {file.resolve() for known in new for file in _relative_imports(known)}
-        new = sorted(imported - {file.resolve() for file in files})
-        files += new
-    return files
-
-
-def _relative_imports(path: Path) -> Iterator[Path]:
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom) and node.level:
-            base = path.resolve().parents[node.level - 1].joinpath(*(node.module or "").split("."))
-            named = (base / alias.name for alias in node.names)
-            yield from (file for module in (base, *named) if (file := module.with_suffix(".py")).is_file())
+    return [*with_relative_imports(source.path), *block.resources.values()]
 
 
 def tool_version(package: str) -> str:
@@ -144,6 +145,6 @@ def tool_version(package: str) -> str:
 def tools(source: Source) -> dict[str, str]:
     """Names and versions of everything that turns this source into an FMU."""
     versions = {source.kind.tool: tool_version(source.kind.tool)}
-    if source.kind.load is not None:
+    if source.kind.compiled:
         versions["compiler"] = compiler_version(tuple(find_compiler()))
     return versions

@@ -1,6 +1,7 @@
 """The command line as a user meets it: real processes, exit codes, what is printed."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -161,6 +162,15 @@ def test_info_tells_what_an_fmu_is(probe):
     assert "Co-Simulation" in done.stdout
     assert "y_start" in done.stdout
     assert cosim("info", "missing.fmu").returncode == 2
+
+
+def test_openmodelica_is_asked_for_with_a_source_and_a_target(tmp_path):
+    (tmp_path / "M.mo").write_text("model M\nend M;\n")
+    without_target = cosim("build", tmp_path / "M.mo", "--modelica-compiler", "omc")
+    assert (without_target.returncode, "needs --output" in without_target.stderr) == (2, True)
+    environment = {**os.environ, "PATH": str(tmp_path)}
+    missing = cosim("build", tmp_path / "M.mo", "--output", tmp_path / "m.fmu", "--modelica-compiler", "omc", env=environment)
+    assert (missing.returncode, "OpenModelica is not installed" in missing.stderr) == (2, True)
 
 
 def test_schema_describes_scenarios():

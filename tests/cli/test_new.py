@@ -7,12 +7,16 @@ import shlex
 import shutil
 import subprocess
 import sys
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from functools import cache
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cosim import resources
+from cosim.cli import main
 from cosim.results import Result
 
 MADE = {
@@ -28,7 +32,11 @@ def cosim(*arguments, cwd):
 
 
 def new(folder, name, language, *more):
-    return cosim("new", "controller", name, "--language", language, *more, cwd=folder)
+    """The same in this process, which is quicker."""
+    out, err = StringIO(), StringIO()
+    with chdir(folder), redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as end:
+        main(["new", "controller", name, "--language", language, *more])
+    return subprocess.CompletedProcess("cosim new", end.value.code, out.getvalue(), err.getvalue())
 
 
 def next_commands(done):
@@ -37,8 +45,9 @@ def next_commands(done):
 
 @pytest.fixture(scope="module")
 def sailed(tmp_path_factory):
-    """language -> folder in which a controller was made and everything was run that the command proposes."""
+    """`sailed(language)` is a folder in which a controller was made and everything was run that the command proposes."""
 
+    @cache
     def sail(language):
         folder = tmp_path_factory.mktemp(language)
         made = new(folder, "my_keeper", language)
@@ -49,19 +58,19 @@ def sailed(tmp_path_factory):
             assert done.returncode == 0, done.stdout + done.stderr
         return folder
 
-    return {language: sail(language) for language in MADE}
+    return sail
 
 
 @pytest.mark.parametrize("language", MADE)
 def test_it_keeps_speed_and_course_at_once(sailed, language):
-    result = Result.from_csv(sailed[language] / "runs/my_keeper/result.csv")
+    result = Result.from_csv(sailed(language) / "runs/my_keeper/result.csv")
     assert result["vessel.velocity_body.u"][-1] == pytest.approx(1.0, abs=1e-3)
     assert result["vessel.attitude.yaw"][-1] == pytest.approx(1.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("language", ["modelica", "c"])
 def test_all_languages_sail_the_same_course(sailed, language):
-    ours, theirs = (Result.from_csv(sailed[one] / "runs/my_keeper/result.csv") for one in (language, "python"))
+    ours, theirs = (Result.from_csv(sailed(one) / "runs/my_keeper/result.csv") for one in (language, "python"))
     for name in ("vessel.position.x", "vessel.position.y", "vessel.attitude.yaw", "vessel.velocity_body.u"):
         assert np.abs(ours[name] - theirs[name]).max() < 1e-12, name
 
@@ -69,14 +78,14 @@ def test_all_languages_sail_the_same_course(sailed, language):
 @pytest.mark.parametrize("language", MADE)
 def test_the_exported_fmu_sails_the_same_course(sailed, language, tmp_path):
     """`cosim new` proposes how to export it; here the FMU takes the source's place."""
-    scenario = json.loads((sailed[language] / "my_keeper/my_keeper.json").read_text())
+    scenario = json.loads((sailed(language) / "my_keeper/my_keeper.json").read_text())
     scenario["components"]["usv"] = {
-        "fmu": str(sailed[language] / "my_keeper/my_keeper.fmu"),
+        "fmu": str(sailed(language) / "my_keeper/my_keeper.fmu"),
         "parameters": scenario["components"]["usv"]["parameters"],
     }
     (tmp_path / "exported.json").write_text(json.dumps(scenario))
     assert cosim("run", "exported.json", "--no-report", "--output-dir", "out", cwd=tmp_path).returncode == 0
-    first, second = (Result.from_csv(file / "result.csv") for file in (sailed[language] / "runs/my_keeper", tmp_path / "out"))
+    first, second = (Result.from_csv(file / "result.csv") for file in (sailed(language) / "runs/my_keeper", tmp_path / "out"))
     assert np.array_equal(first["vessel.position.x"], second["vessel.position.x"])
 
 
@@ -88,10 +97,10 @@ def test_names_take_the_form_of_the_language(tmp_path, name, expected):
     assert text.startswith(f"block {model} ") and text.endswith(f"end {model};\n")
 
 
-def test_nothing_of_the_templates_name_remains(sailed):
-    for folder in sailed.values():
-        texts = [path.read_text() for path in (folder / "my_keeper").iterdir() if path.suffix != ".fmu"]
-        assert not [text for text in texts if "speed_keeper" in text or "SpeedKeeper" in text]
+@pytest.mark.parametrize("language", MADE)
+def test_nothing_of_the_templates_name_remains(sailed, language):
+    texts = [(sailed(language) / "my_keeper" / name).read_text() for name in MADE[language]]
+    assert not [text for text in texts if "speed_keeper" in text or "SpeedKeeper" in text]
 
 
 def test_two_controllers_in_c_do_not_take_each_others_binary(tmp_path):
@@ -101,12 +110,11 @@ def test_two_controllers_in_c_do_not_take_each_others_binary(tmp_path):
     shutil.copy(tmp_path / "one/one.c", tmp_path / "two/two.c")
     assert cosim("build", "two", "--output", "two/two.fmu", cwd=tmp_path).returncode == 0
     done = cosim("run", "two/two.json", cwd=tmp_path)
-    assert done.returncode == 2 or done.returncode == 1
+    assert done.returncode == 1
     assert "another GUID" in done.stderr
 
 
 def test_inside_a_clone_the_scenario_can_move_with_it(tmp_path):
-    """A clone is imitated by a folder with links to what is needed."""
     clone = tmp_path / "clone"
     (clone / "work").mkdir(parents=True)
     for name in ("cosim", "controllers", "fmus", "plant_src"):
@@ -126,7 +134,9 @@ def test_files_are_overwritten_only_by_force(tmp_path):
     source.write_text("mine")
     refused = new(tmp_path, "keeper", "python")
     assert refused.returncode == 2
-    assert refused.stderr.splitlines() == [f"keeper/{file}: exists; --force overwrites it" for file in ("keeper.py", "keeper.json")]
+    assert refused.stderr.splitlines() == [
+        f"keeper/{file}: exists; --force overwrites it" for file in ("keeper.py", "keeper.json")
+    ]
     assert source.read_text() == "mine"
     assert new(tmp_path, "keeper", "python", "--force").returncode == 0
     assert source.read_text() == template

@@ -20,6 +20,7 @@ from .header import members
 from .interpret import Interpreter
 from .matching import is_input
 from .reader import Reader
+from .states import with_states
 
 _FMI_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 _DEFAULT_STEP = 0.01
@@ -54,7 +55,7 @@ def interpreter(path: Path, model: str | None = None) -> Interpreter:
 def _open(path: Path, model: str | None) -> tuple[Interpreter, Sources]:
     json, sources = flatten(Path(path), model)
     check_folding(json, sources)
-    flat = inline_constants(Reader(json, sources).model(model or Path(path).stem))
+    flat = with_states(inline_constants(Reader(json, sources).model(model or Path(path).stem)))
     _check_types(flat)
     return Interpreter(flat), sources
 
@@ -85,7 +86,7 @@ def _role(variable: Variable, defaults: Interpreter) -> Role | None:
         return "parameter", "fixed" if variable.name in roles.timing else "tunable"
     if variable.variability == "parameter":
         return None if variable.protected or variable.bound_by_modifier else ("calculatedParameter", "tunable")
-    continuous = variable.type == "Real" and not defaults.plan.clocks
+    continuous = variable.type == "Real" and bool(defaults.model.states or not defaults.plan.clocks)
     if is_input(variable):
         return "input", "continuous" if variable.type == "Real" else "discrete"
     if variable.causality == "output" and variable.top_level:

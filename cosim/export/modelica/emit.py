@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from typing import Any
 
 import numpy as np
 
-from .flat import Body, Name, Place, Statement, Variable, base_name
+from .flat import Body, Name, Place, Statement, Variable, base_name, derivative, owner
 from .functions import Functions
 from .header import Header, member, members
 from .interpret import Interpreter
@@ -18,6 +18,7 @@ from .layout import definition, mentions
 from .matching import is_input
 from .sort import finite, memory, start_value
 from .statements import Statements
+from .steps import continuous_step, sampled_step
 from .values import C_TYPES, Text, Value, number, scalar
 from .visit import targets
 
@@ -30,9 +31,10 @@ def emit(defaults: Interpreter, sources: Sequence[str]) -> dict[str, str]:
 
     Raises InputError for what cannot be translated.
     """
-    runtime = resources.files(__package__ or "").joinpath("runtime.h").read_text(encoding="utf-8")
     header = Header(defaults.model, defaults.plan, defaults.roles, sources).text()
-    return {"model.c": _Emitter(defaults).source(), "model.h": header, "runtime.h": runtime}
+    fixed = ("runtime.h", "runge_kutta.h") if defaults.model.states else ("runtime.h",)
+    texts = {name: resources.files(__package__ or "").joinpath(name).read_text(encoding="utf-8") for name in fixed}
+    return {"model.c": _Emitter(defaults).source(), "model.h": header, **texts}
 
 
 @dataclass
@@ -51,15 +53,17 @@ class _Emitter:
             k: v for k, v in (("time", "double time"), ("due", "const bool *due")) if mentions(k, event)
         }
         call = f"event({', '.join(wanted).replace('time', 'now')});"
+        step = continuous_step if self.model.states else sampled_step
         definitions = [
             definition("static void start_variables(Model *m)", self._start_variables()),
             definition("void model_parameters(Model *m)", self._parameters()),
             definition("void model_start(Model *m)", self._start()),
             definition(f"static void event({', '.join(wanted.values())})", event),
             definition("const char *model_initialize(Model *m, double time)", self._initialize()),
-            definition("const char *model_step(Model *m, double time, double step_size)", self._step(call)),
+            *self._continuous(),
+            definition("const char *model_step(Model *m, double time, double step_size)", step(len(self.plan.clocks), call)),
         ]
-        includes = '#include "model.h"\n#include "runtime.h"'
+        includes = f'#include "model.h"\n#include "{"runge_kutta.h" if self.model.states else "runtime.h"}"'
         return "\n\n".join([includes, self._reasons(), *self.functions.texts, *definitions]) + "\n"
 
     def _reasons(self) -> str:
@@ -143,32 +147,32 @@ class _Emitter:
         unused = [] if mentions("time", lines) else ["(void)time;"]
         return [*unused, "m->failure = 0;", "start_variables(m);", *lines, "return REASONS[m->failure];"]
 
-    def _step(self, event: str) -> list[str]:
-        """The loop over the ticks of a communication step; `event` calls the function of that name at the time `now`."""
-        count = len(self.plan.clocks)
-        if count == 0:
-            unused = [] if "now" in event else ["(void)time;", "(void)step_size;"]
-            now = ["const double now = time + step_size;"] if "now" in event else []
-            return [*unused, *now, "m->failure = 0;", event, "return REASONS[m->failure];"]
-        if count == 1:
-            once = [
-                "double now;",
-                "while (m->failure == 0 && (now = next_tick(m->clock)) < time + step_size - TOLERANCE * m->clock->period) {",
-            ]
-            return ["m->failure = 0;", *once, f"    {event}", "    m->clock->ticks++;", "}", "return REASONS[m->failure];"]
-        loop = [
-            f"bool due[{count}];",
-            f"const double now = next_event(m->clock, {count}, due);",
-            f"if (m->failure != 0 || now >= time + step_size - TOLERANCE * shortest_period(m->clock, {count})) break;",
-            event,
-            f"for (int k = 0; k < {count}; k++) m->clock[k].ticks += due[k];",
+    # continuous states
+
+    def _continuous(self) -> list[str]:
+        """The derivatives as a function of the states and the time, and the integration of both."""
+        if not self.model.states:
+            return []
+        lines = self._body(self.plan.derivatives, initial=False)
+        unused = [] if mentions("time", lines) else ["(void)time;"]
+        states, rates = self._places(self.model.states), self._places(map(derivative, self.model.states))
+        system = ["const System system = {", f"    {{{states}}},", f"    {{{rates}}},", "    derivatives,", "};"]
+        return [
+            definition("static void derivatives(Model *m, double time)", [*unused, *lines]),
+            definition(
+                "static double advance(Model *m, double from, double to)", [*system, "return integrate(m, &system, from, to);"]
+            ),
         ]
-        return ["m->failure = 0;", "for (;;) {", *("    " + line for line in loop), "}", "return REASONS[m->failure];"]
+
+    def _places(self, names: Iterable[str]) -> str:
+        """Pointers to all elements of variables."""
+        values = (member(self.model.variables[name], f"m->{self.members[name]}") for name in names)
+        return ", ".join(f"&{value.at(k).code}" for value in values for k in range(value.size))
 
 
 def _owner(statement: Statement) -> str:
     """The component whose variable a statement assigns first."""
-    return next((base_name(target).rpartition(".")[0] for target in targets(statement)), "")
+    return next((owner(base_name(target)) for target in targets(statement)), "")
 
 
 def _remember(variable: Variable, name: str) -> list[str]:

@@ -238,7 +238,10 @@ class Structural(NamedTuple):
 
 @dataclass(frozen=True)
 class Model:
-    """Everything of a flat model; `whens` are those of equation sections, `enumerations` maps a type to its literals."""
+    """Everything of a flat model; `whens` are those of equation sections, `enumerations` maps a type to its literals.
+
+    `states` are the continuous ones, which der() makes (see states.py).
+    """
 
     name: str
     description: str
@@ -252,6 +255,7 @@ class Model:
     functions: Mapping[str, Function]
     enumerations: Mapping[str, tuple[str, ...]]
     structural: tuple[Structural, ...]
+    states: tuple[str, ...] = ()
 
 
 def base_name(target: Expression) -> str:
@@ -261,3 +265,13 @@ def base_name(target: Expression) -> str:
     if not isinstance(target, Name):
         raise TypeError(f"not a reference: {target}")
     return target.name
+
+
+def derivative(state: str) -> str:
+    """The name of the variable that holds the derivative of a state."""
+    return f"der({state})"
+
+
+def owner(name: str) -> str:
+    """The component that a variable belongs to; "" for the model's own."""
+    return name.removeprefix("der(").rpartition(".")[0]

@@ -20,6 +20,9 @@ RUMOCA_VERSION = "0.10.2"
 _WITHIN = re.compile(r"^\s*within\s+([\w.]+)\s*;", re.MULTILINE)
 _QUOTED = re.compile(r"'([\w.]+)'")
 _ENDING = re.compile(r"\[(?P<file>[^\[\]]+):(?P<line>\d+):\d+\]$")
+_PANIC = re.compile(
+    r'detail: "(?P<what>[^"]+)", span: Span \{ source: SourceId\((?P<source>\d+)\), start: BytePos\((?P<start>\d+)\)'
+)
 _SYNTAX = re.compile(r"×\s*(?P<what>.+?)\n.*?\[[^\]]*:(?P<line>\d+):\d+\]", re.DOTALL)
 
 
@@ -58,14 +61,13 @@ def flatten(path: Path, model: str | None) -> tuple[dict[str, Any], Sources]:
     if not path.is_file():
         raise InputError(Problem("no such Modelica file", str(path)))
     text = path.read_text(encoding="utf-8")
-    packages = _packages(path, text)
+    packages = find_packages(path, text)
     sources = Sources.of([path, *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path)])
     _check_syntax(rumoca, sources.files)
-    within = _WITHIN.search(text)
-    name = model or (f"{within[1]}.{path.stem}" if within else path.stem)
+    name = model_name(path, text, model)
     session = rumoca.Session(roots=[str(package) for package in packages])
     try:
-        compiled = session.load(str(path), model=name) if within else _load_alone(session, path, text, name)
+        compiled = session.load(str(path), model=name) if _WITHIN.search(text) else _load_alone(session, path, text, name)
         return json.loads(compiled.to_json("flat")), sources
     except (KeyboardInterrupt, SystemExit):
         raise
@@ -94,7 +96,13 @@ def _rumoca() -> Any:
     return rumoca
 
 
-def _packages(path: Path, text: str) -> list[Path]:
+def model_name(path: Path, text: str, model: str | None) -> str:
+    """The full name of a model of a file, by default of the one that is named as the file."""
+    within = _WITHIN.search(text)
+    return model or (f"{within[1]}.{path.stem}" if within else path.stem)
+
+
+def find_packages(path: Path, text: str) -> list[Path]:
     """The package folders whose names the file may use."""
     folder = path.parent
     if _WITHIN.search(text):
@@ -118,6 +126,8 @@ def _check_syntax(rumoca: Any, files: Sequence[Path]) -> None:
 
 def _explain(error: BaseException, name: str, path: Path, sources: Sources) -> list[Problem]:
     """One problem per line of the front end's message that says something."""
+    if panic := _PANIC.search(str(error)):
+        return [Problem(panic["what"], str(sources.place({key: int(panic[key]) for key in ("source", "start")}) or path))]
     lines = [line.rpartition("[Resolve]:")[2].strip(" -") for line in str(error).splitlines()]
     reasons = [line for line in dict.fromkeys(lines) if line and not line.startswith("Related failures")]
     specific = [line for line in reasons if " could not be compiled: " not in line] or reasons

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from .flat import Model, Variable
+from .flat import Model, Variable, derivative
 from .matching import is_input
 from .roles import Roles
 from .sort import Plan
@@ -55,6 +55,7 @@ class Header:
             "    int64_t ticks;",
             "} Clock;",
             "",
+            *self._states(),
             "typedef struct {",
             *(f"    {line}" for line in self._struct()),
             "} Model;",
@@ -68,6 +69,10 @@ class Header:
         ]
         return "\n".join(lines) + "\n"
 
+    def _states(self) -> list[str]:
+        count = sum(member(self.model.variables[name], name).size for name in self.model.states)
+        return [f"enum {{ STATES = {count} }};", ""] if count else []
+
     def _struct(self) -> Iterator[str]:
         sections: dict[str, Callable[[Variable], bool]] = {
             "parameters": lambda v: v.name in self.roles.settable,
@@ -75,9 +80,12 @@ class Header:
             "constants": lambda v: v.name in self.roles.fixed,
             "inputs": is_input,
             "outputs": lambda v: v.causality == "output" and v.top_level,
+            "continuous states": lambda v: v.name in self.model.states,
+            "derivatives of the states": lambda v: v.name in rates,
             "inner variables": lambda v: True,
         }
         names, left = members(self.model), list(self.model.variables.values())
+        rates = set(map(derivative, self.model.states))
         for title, belongs in sections.items():
             chosen = [variable for variable in left if belongs(variable)]
             left = [variable for variable in left if variable not in chosen]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from copy import deepcopy
 from typing import Any
 
@@ -11,12 +13,13 @@ import numpy as np
 from ...errors import ComponentError
 from .arithmetic import Failure, divide
 from .evaluate import Evaluator, typed
-from .flat import Model
+from .flat import Model, derivative
 from .matching import is_input
 from .roles import roles
 from .sort import finite, memory, plan, start_value
 
 _TOLERANCE = 1e-6
+_LONGEST_STEP = 0.005
 
 
 class Interpreter:
@@ -62,20 +65,60 @@ class Interpreter:
         self.evaluate.flags.clear()
 
     def step(self, time: float, step_size: float) -> None:
-        """All ticks t with time <= t < time + step_size; without any clock, the equations at time + step_size."""
-        end = time + step_size
-        if not self.clocks:
+        """All ticks t with time <= t < time + step_size; with states or without any clock, the equations at time + step_size."""
+        end, reached = time + step_size, self._ticks(time, time + step_size)
+        if self.model.states or not self.clocks:
+            self._integrate(reached, end)
+            self.evaluate.flags.update({("due", k): False for k in range(len(self.clocks))})
             self._compute("step", end)
+
+    def _ticks(self, time: float, end: float) -> float:
+        """All ticks in time <= t < end; returns the time that the states have reached."""
+        reached = time
         while self.clocks:
             ticks = [start + count * period for start, period, count in self.clocks]
             now = min(ticks)
             if not now < end - _TOLERANCE * min(period for _, period, _ in self.clocks):
-                return
+                break
+            reached = self._integrate(reached, now)
             for k, (clock, tick) in enumerate(zip(self.clocks, ticks, strict=True)):
                 self.evaluate.flags["due", k] = tick <= now + _TOLERANCE * clock[1]
             self._compute("step", now)
             for k, clock in enumerate(self.clocks):
                 clock[2] += self.evaluate.flags["due", k]
+        return reached
+
+    def _integrate(self, start: float, end: float) -> float:
+        """The states from one time to another in equal steps of at most 5 ms; returns the time reached."""
+        count = math.ceil((end - start) / _LONGEST_STEP - 1e-9) if self.model.states else 0
+        if count <= 0:
+            return start
+        h = (end - start) / count
+        for k in range(count):
+            self._runge_kutta(start + k * h, h)
+        return end
+
+    def _runge_kutta(self, time: float, h: float) -> None:
+        """One step of the classical method of order 4."""
+        start = self._states()
+        k1 = self._slopes(time)
+        k2 = self._slopes(time + h / 2, [x + h / 2 * k for x, k in zip(start, k1, strict=True)])
+        k3 = self._slopes(time + h / 2, [x + h / 2 * k for x, k in zip(start, k2, strict=True)])
+        k4 = self._slopes(time + h, [x + h * k for x, k in zip(start, k3, strict=True)])
+        for name, x, a, b, c, d in zip(self.model.states, start, k1, k2, k3, k4, strict=True):
+            self._give(name, x + h / 6 * (a + 2 * b + 2 * c + d))
+
+    def _states(self) -> list[Any]:
+        return [self.get(name) for name in self.model.states]
+
+    def _slopes(self, time: float, states: Sequence[Any] | None = None) -> list[Any]:
+        """The derivatives at a time, for the given states or the present ones."""
+        for name, value in zip(self.model.states, states or (), strict=False):
+            self._give(name, value)
+        self.values["time"] = time
+        with self._reported("step", time), np.errstate(all="ignore"):
+            self.evaluate.run(self.plan.derivatives)
+        return [self.get(derivative(name)) for name in self.model.states]
 
     def _declared(self, name: str) -> Any:
         binding = self.model.variables[name].binding
@@ -99,10 +142,15 @@ class Interpreter:
         body = self.plan.event if function == "step" else self.plan.initialization
         self.values["time"] = time
         self.evaluate.memory = {name: deepcopy(self.values[name]) for name in self._remembered[function]}
-        try:
+        with self._reported(function, time):
             self.evaluate.run(body)
             if function == "step":
                 self._check_finite()
+
+    @contextmanager
+    def _reported(self, function: str, time: float) -> Iterator[None]:
+        try:
+            yield
         except Failure as failure:
             raise ComponentError(self.model.name, function, str(failure), time) from None
 

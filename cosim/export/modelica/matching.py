@@ -83,7 +83,8 @@ def _refuse_stuck(equations: list[Equation], model: Model, defined: Collection[K
         names = ", ".join(sorted({side.name for e in equations for side in (e.left, e.right) if isinstance(side, Name)}))
         refuse(f"these variables are only connected to each other, nothing gives them a value: {names}", equation.where)
     refuse(
-        "this equation defines no variable: write it with a variable alone on one side that no other equation defines",
+        "this equation defines no variable: write it with a variable, or der() of one, alone on one side "
+        "that no other equation defines",
         equation.where,
     )
 
@@ -95,7 +96,10 @@ def _check_complete(model: Model, defined: Collection[Key]) -> None:
 
 
 def match_initial(model: Model, assigned: Collection[str]) -> list[Assign]:
-    """Initial equations as assignments to variables that a when-clause or algorithm assigns later; `pre(x) = ...` is x."""
+    """Initial equations as assignments to continuous states and to what a when-clause or algorithm assigns later.
+
+    `pre(x) = ...` is x.
+    """
     return [_initial(model, equation, assigned) for equation in model.initial_equations]
 
 
@@ -104,4 +108,7 @@ def _initial(model: Model, equation: Equation, assigned: Collection[str]) -> Ass
         target: Expression = side.arguments[0] if isinstance(side, Builtin) and side.name == "pre" else side
         if isinstance(target, Name | Index) and {name for name, _ in keys(model.variables, target)} & set(assigned):
             return Assign(target, other, equation.where)
-    refuse("an initial equation must have a variable alone on one side that a when-clause assigns", equation.where)
+    refuse(
+        "an initial equation must have a continuous state, or a variable that a when-clause assigns, alone on one side",
+        equation.where,
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -18,12 +19,11 @@ _OPERATORS = {
     "Lt": "<", "Le": "<=", "Gt": ">", "Ge": ">=", "Eq": "==", "Neq": "<>", "And": "and", "Or": "or",
 }  # fmt: skip
 _REFUSED_BUILTINS = {
-    "der": "der(): continuous states are not supported; write the integration as a difference equation in `when sample`",
     "delay": "delay() is not supported; keep old values in an array",
-    "reinit": "reinit(): continuous states are not supported",
     "terminal": "terminal() is not supported: the end of a simulation is not known to an FMU",
     "terminate": "terminate() is not supported; use assert()",
 }
+_INTEGER_OPERATORS = {"+": operator.add, "-": operator.sub, "*": operator.mul}
 _SPELLING = {"noevent": "noEvent", "outerproduct": "outerProduct"}
 
 
@@ -31,6 +31,16 @@ def only(node: Json) -> tuple[str, Any]:
     """The kind and the payload of a node `{kind: payload}`."""
     ((kind, payload),) = node.items()
     return kind, payload
+
+
+def _computed(node: Expression) -> Expression:
+    """An Integer in place of sums and products of Integers, such as the subscripts of an unrolled loop have."""
+    if not (isinstance(node, flat.Binary) and node.operator in _INTEGER_OPERATORS):
+        return node
+    left, right = _computed(node.left), _computed(node.right)
+    if isinstance(left, flat.Literal) and isinstance(right, flat.Literal) and left.type == right.type == "Integer":
+        return flat.Literal(_INTEGER_OPERATORS[node.operator](left.value, right.value), "Integer")
+    return node
 
 
 @dataclass(frozen=True)
@@ -85,7 +95,7 @@ class ExpressionReader:
     def _subscript(self, kind: str, node: Json) -> Expression | flat.Colon:
         if kind == "Colon":
             return flat.Colon()
-        return flat.Literal(node["value"], "Integer") if kind == "Index" else self.expression(node["expr"])
+        return flat.Literal(node["value"], "Integer") if kind == "Index" else _computed(self.expression(node["expr"]))
 
     def _unary(self, node: Json) -> Expression:
         operand = self.expression(node["rhs"])

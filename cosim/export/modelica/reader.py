@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from . import flat
 from .flat import Body, Expression, Place, Statement, refuse
 from .read_expressions import Json, only
 from .read_statements import StatementReader
+from .unroll import rolled_up
 
 
 class Reader(StatementReader):
@@ -20,7 +22,7 @@ class Reader(StatementReader):
             name=name,
             description=self.json["model_description"] or "",
             variables={key: self.variable(key) for key in names},
-            equations=(*self.equations("equations"), *self._declaration_equations()),
+            equations=(*self._unrolled_equations(), *self._declaration_equations()),
             whens=tuple(self.when_chain(chain) for chain in self.json["when_chains"]),
             algorithms=tuple(self.body(algorithm["statements"]) for algorithm in self.json["algorithms"]),
             asserts=tuple(self._assert(node) for node in self.json["assert_equations"]),
@@ -40,8 +42,9 @@ class Reader(StatementReader):
         for kind in ("initial_assert_equations", "definite_roots", "branches", "optional_edges", "potential_roots"):
             if self.json.get(kind):
                 refuse(f"{kind.replace('_', ' ')} are not supported", None)
-        if not all(node["interiors_materialized"] for node in self.json["structured_equations"]):
-            refuse("a for-equation was not unrolled by the front end", None)
+
+        if next(rolled_up(self.json, "initial_structured_equations"), None):
+            refuse("a for-equation among the initial equations was not unrolled by the front end", None)
 
     def _first_known(self, candidates: list[str]) -> str:
         """Of the names by which a parameter may be meant, from the inside out, the one that exists."""
@@ -110,6 +113,15 @@ class Reader(StatementReader):
     def equations(self, section: str) -> tuple[flat.Equation, ...]:
         return tuple(pair for node in self.json[section] for pair in self._equation(node))
 
+    def _unrolled_equations(self) -> Iterator[flat.Equation]:
+        """The equations with the for-equations that the front end has left rolled up."""
+        true = dict(rolled_up(self.json, "structured_equations"))
+        for place, node in enumerate(self.json["equations"]):
+            written = self._equation({**node, "residual": true.get(place, node["residual"])})
+            if [e.left for e in written] != [e.left for e in self._equation(node)]:
+                refuse("this for-equation was not unrolled by the front end; write its equations one by one", self.place(node))
+            yield from written
+
     def _equation(self, node: Json) -> list[flat.Equation]:
         kind, residual = only(node["residual"])
         if kind != "Binary" or residual["op"] != "Sub":
@@ -148,6 +160,9 @@ class Reader(StatementReader):
         if kind == "Assign":
             where = self.place(node)
             return flat.Assign(self._target_text(node["target"], where), self.expression(node["value"]), where)
+        if kind == "Reinit":
+            where = self.place(node)
+            return flat.Assign(self._target_text(node["state"], where), self.expression(node["value"]), where)
         if kind == "Conditional":
             branches = tuple((self.expression(condition), self._when_body(body)) for condition, body in node["branches"])
             return flat.IfStatement(branches, self._when_body(node["else_branch"] or []), self.place(node))

@@ -35,6 +35,7 @@ def roles(model: Model, plan: Plan) -> Roles:
     """Raises InputError where a settable parameter has shaped the model, and for parameters that depend on themselves."""
     parameters = [v for v in model.variables.values() if v.variability in ("parameter", "constant")]
     needs = {v.name: _needs(v) for v in parameters}
+    _check_needs(model, needs)
     settable = [v.name for v in parameters if v.variability == "parameter" and not (needs[v.name] or v.final or v.protected)]
     _check_structure(model, needs, settable)
     try:
@@ -53,6 +54,12 @@ def roles(model: Model, plan: Plan) -> Roles:
 def _needs(parameter: Variable) -> list[str]:
     value = parameter.binding if parameter.binding is not None else parameter.start
     return sorted(names(value))
+
+
+def _check_needs(model: Model, needs: dict[str, list[str]]) -> None:
+    for name, others in needs.items():
+        if unknown := [other for other in others if other not in needs]:
+            refuse(f"the parameter {name} depends on {unknown[0]}, which is no parameter", model.variables[name].where)
 
 
 def _closure(name: str, needs: dict[str, list[str]]) -> Iterator[str]:

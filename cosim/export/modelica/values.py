@@ -17,6 +17,7 @@ _WORDS = """
     return short signed sizeof static struct switch typedef union unsigned void volatile while bool true false NULL NAN INFINITY I
     m time each due risen event fail element add subtract multiply divide modulo remainder_of absolute integer_of smaller larger
     smaller_integer larger_integer square sign real_modulo real_remainder real_quotient
+    integrate advance derivatives runge_kutta System
     acos asin atan atan2 ceil cos cosh exp fabs floor isfinite log log10 memcpy memset pow sin sinh sqrt tan tanh trunc
 """
 _TAKEN = frozenset(_WORDS.split())

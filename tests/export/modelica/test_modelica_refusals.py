@@ -8,7 +8,32 @@ from cosim.errors import InputError
 from cosim.export.modelica import load
 
 CASES = {
-    "der": ("Real x;", "der(x) = u;\n  y = x;", r"M.mo:\d+: der\(\): continuous states are not supported"),
+    "implicit der": ("Real x;", "2*der(x) = u;\n  y = x;", r"M.mo:8: this equation defines no variable: .* or der\(\) of one"),
+    "two der": (
+        "Real x;\n  Real z;",
+        "der(x) + der(z) = u;\n  der(z) = x;\n  y = x;",
+        "M.mo:9: this equation defines no variable",
+    ),
+    "der in a loop": (
+        "Real x;\n  Real a;",
+        "der(x) = a;\n  a = u - der(x);\n  y = x;",
+        r"M.mo:9: algebraic loop: der\(x\) \(M.mo:9\) -> a \(M.mo:10\) -> der\(x\)",
+    ),
+    "der of an expression": ("Real x;", "der(2*x) = u;\n  y = x;", r"M.mo: .*der\(...\) must have exactly one resolved variable"),
+    "der of an input": ("", "y = der(u);", r"M.mo:8: der\(...\) must name a coordinate classified as a continuous state"),
+    "der of an Integer": ("Integer n;", "n = 1;\n  y = der(n);", "M.mo:9: .*n"),
+    "index reduction": ("Real x;", "x = sin(time);\n  y = der(x);", "M.mo:8: this equation defines no variable"),
+    "parameter of a variable": ("parameter Real p = u;", "y = p;", "M.mo:6: the parameter p depends on u, which is no parameter"),
+    "a state in an algorithm": (
+        "Real x;",
+        "der(x) = 1;\nalgorithm\n  x := u;\n  y := x;\nequation",
+        "assignment target `x` is not a whole writable coordinate",
+    ),
+    "steady start": (
+        "Real x;",
+        "der(x) = u - x;\n  y = x;\ninitial equation\n  der(x) = 0;\nequation",
+        "M.mo:11: an initial equation must have a continuous state, or a variable",
+    ),
     "loop": (
         "Real a;\n  Real b;",
         "a = b + u;\n  b = 2*a;\n  y = a;",
@@ -121,6 +146,24 @@ equation
 end M;""")
     with pytest.raises(InputError, match="recursive function"):
         load(path)
+
+
+def test_a_for_equation_that_does_not_fit_its_placeholders_is_refused(write):
+    from cosim.export.modelica.front import flatten
+    from cosim.export.modelica.reader import Reader
+
+    path = write("""model M
+  output Real x[4];
+equation
+  for i in 1:3 loop
+    der(x[i]) = i;
+  end for;
+  der(x[4]) = 0;
+end M;""")
+    json, sources = flatten(path, None)
+    json["structured_equations"][0]["first_equation_index"] = 1
+    with pytest.raises(InputError, match=r"M.mo:\d: this for-equation was not unrolled by the front end"):
+        Reader(json, sources).model("M")
 
 
 def test_unknown_json_is_refused_not_dropped():

@@ -1,0 +1,124 @@
+"""`cosim new`: a controller of one's own that runs at once, to be changed from there."""
+
+from __future__ import annotations
+
+import json
+import keyword
+import os
+import re
+import shlex
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from .. import resources
+from ..errors import InputError, Problem, did_you_mean
+
+TEMPLATES = Path(__file__).parents[1] / "templates"
+#: what the templates are called: they are valid programs, in which a new controller's name replaces this one
+_SNAKE, _CAMEL = "speed_keeper", "SpeedKeeper"
+_TYPES = ("Real", "Integer", "Boolean", "String")
+
+
+@dataclass(frozen=True, slots=True)
+class Language:
+    """Where a language's template lies, and what in it a scenario (`key`: `component`) and `cosim build` have to name."""
+
+    folder: Path
+    key: str
+    component: str
+    source: str
+
+
+LANGUAGES = {
+    "python": Language(TEMPLATES / "python", "python", f"{_SNAKE}.py:{_CAMEL}", f"{_SNAKE}.py"),
+    "modelica": Language(TEMPLATES / "modelica", "modelica", f"{_CAMEL}.mo:{_CAMEL}", f"{_CAMEL}.mo"),
+    "c": Language(resources.root() / "controllers/c" / _SNAKE, "fmu", f"{_SNAKE}.fmu", "."),
+}
+
+
+@click.group()
+def command() -> None:
+    """Begin something of your own."""
+
+
+@command.command()
+@click.argument("name")
+@click.option("--language", required=True, help=f"{', '.join(LANGUAGES)}.")
+@click.option("--directory", type=click.Path(path_type=Path), default=Path(), help="Where the folder NAME goes; default: here.")
+@click.option("--force", is_flag=True, help="Overwrite files.")
+def controller(name: str, language: str, directory: Path, force: bool) -> None:
+    """Make the folder NAME with a vessel autopilot and a scenario in which it keeps a speed and a course.
+
+    The scenario checks that it does. Change the controller from there, and run the scenario again.
+    """
+    if language not in LANGUAGES:
+        raise InputError(f'there is no language "{language}"{did_you_mean(language, LANGUAGES)}')
+    chosen = LANGUAGES[language]
+    template = _template(chosen)
+    names = _names(name, template.values())
+    folder = directory / names[_SNAKE]
+    files = {folder / _replaced(file, names): _replaced(text, names) for file, text in template.items()}
+    files[folder / f"{names[_SNAKE]}.json"] = _scenario(chosen, folder, names)
+    _write(files, force)
+    _say_what_is_next(chosen, folder, names)
+
+
+def _template(language: Language) -> dict[str, str]:
+    """The files of a template: name -> text."""
+    return {path.name: path.read_text() for path in sorted(language.folder.iterdir()) if path.is_file()}
+
+
+def _names(name: str, texts: Iterable[str]) -> dict[str, str]:
+    """The template's names -> the controller's, as a file and as a class. Refuses names that some language cannot take."""
+    from ..export.sources import snake_case
+
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        raise InputError(f'"{name}" is no name of a controller: expected a letter, then letters, digits and underscores')
+    snake = snake_case(name)
+    camel = "".join(word[:1].upper() + word[1:] for word in snake.split("_"))
+    taken = {*_TYPES, *(word for text in texts for word in re.findall(r"\w+", text))} - {_CAMEL}
+    modules = {*sys.stdlib_module_names, "pythonfmu"}
+    if camel in taken or snake in modules or keyword.iskeyword(snake) or keyword.iskeyword(camel):
+        raise InputError(f'"{name}" means something else already; choose another name')
+    return {_SNAKE: snake, _CAMEL: camel}
+
+
+def _replaced(text: str, names: Mapping[str, str]) -> str:
+    return re.sub("|".join(names), lambda match: names[match[0]], text)
+
+
+def _scenario(language: Language, folder: Path, names: Mapping[str, str]) -> str:
+    marks = {"SOURCE": language.key, "FILE": _replaced(language.component, names), "ROOT": _shipped_from(folder)}
+    quoted = {mark: json.dumps(text)[1:-1] for mark, text in marks.items()}
+    return _replaced((TEMPLATES / "scenario.json").read_text(), {**names, **quoted})
+
+
+def _shipped_from(folder: Path) -> str:
+    """The way from a new scenario to what cosim ships: relative inside a clone, which may be moved, else absolute."""
+    root = resources.root()
+    inside = folder.resolve().is_relative_to(root)
+    return Path(os.path.relpath(root, folder.resolve()) if inside else root).as_posix()
+
+
+def _write(files: Mapping[Path, str], force: bool) -> None:
+    present = [path for path in files if path.exists()]
+    if present and not force:
+        raise InputError([Problem("exists; --force overwrites it", str(path)) for path in present])
+    for path, text in files.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        click.echo(path)
+
+
+def _say_what_is_next(language: Language, folder: Path, names: Mapping[str, str]) -> None:
+    name = names[_SNAKE]
+    run = shlex.join(["cosim", "run", str(folder / f"{name}.json")])
+    source, fmu = folder / _replaced(language.source, names), folder / f"{name}.fmu"
+    build = shlex.join(["cosim", "build", str(source), "--output", str(fmu)])
+    click.echo(
+        f"\nBuild and run it:\n  {build}\n  {run}" if language.key == "fmu" else f"\nRun it:\n  {run}\nAs an FMU:\n  {build}"
+    )

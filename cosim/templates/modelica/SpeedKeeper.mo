@@ -1,0 +1,48 @@
+block SpeedKeeper "A vessel autopilot that keeps a speed and a course; SI units, yaw counter-clockwise from east"
+  record Attitude
+    Real yaw(unit = "rad") "Counter-clockwise from east";
+  end Attitude;
+
+  record BodyVelocity
+    Real u(unit = "m/s") "Forward";
+  end BodyVelocity;
+
+  record Rates
+    Real r(unit = "rad/s") "Yaw rate";
+  end Rates;
+
+  record Vehicle "Measurements of the vessel"
+    Attitude attitude;
+    BodyVelocity velocity_body;
+    Rates rates;
+  end Vehicle;
+
+  constant Real sample_period(unit = "s") = 0.01;
+  parameter Real speed_command(unit = "m/s") = 1;
+  parameter Real speed_P(unit = "N.s/m") = 82.65 "Thrust per speed error";
+  parameter Real speed_I(unit = "N/m") = 10 "Thrust per integral of the speed error";
+  parameter Real thrust_limit(unit = "N") = 3;
+  parameter Real course_command(unit = "rad") = 0 "Counter-clockwise from east";
+  parameter Real course_P(unit = "1") = 1.5 "Rudder angle per course error";
+  parameter Real course_D(unit = "s") = 0.8 "Rudder angle per yaw rate";
+  parameter Real rudder_limit(unit = "rad") = 0.610865238198015 "35 degrees";
+  input Vehicle vehicle;
+  output Real thrust(start = 0, fixed = true, unit = "N");
+  output Real rudder_angle(start = 0, fixed = true, unit = "rad") "Positive: bow to starboard";
+protected
+  discrete Real speed_error(start = 0, fixed = true, unit = "m/s");
+  discrete Real speed_integral(start = 0, fixed = true, unit = "N") "Rests while the thrust is at its limit";
+  discrete Real demand(start = 0, fixed = true, unit = "N") "Thrust without limit";
+  discrete Real course_error(start = 0, fixed = true, unit = "rad");
+equation
+  when sample(0, sample_period) then
+    speed_error = speed_command - vehicle.velocity_body.u;
+    demand = speed_P * speed_error + pre(speed_integral);
+    thrust = max(-thrust_limit, min(thrust_limit, demand));
+    speed_integral = pre(speed_integral) + (if abs(demand) < thrust_limit then speed_I * sample_period * speed_error else 0);
+
+    // A positive rudder angle reduces the yaw angle, hence measurement minus command.
+    course_error = atan2(sin(vehicle.attitude.yaw - course_command), cos(vehicle.attitude.yaw - course_command));
+    rudder_angle = max(-rudder_limit, min(rudder_limit, course_P * course_error + course_D * vehicle.rates.r));
+  end when;
+end SpeedKeeper;

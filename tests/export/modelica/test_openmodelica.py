@@ -1,0 +1,82 @@
+"""What is asked of OpenModelica, and what is said when it is missing or fails. OpenModelica itself is not tested here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cosim.errors import InputError
+from cosim.export.modelica.omc import export_with_omc
+
+MODEL = "model M\n  output Real x;\nequation\n  der(x) = 1;\nend M;\n"
+
+
+@pytest.fixture
+def omc(tmp_path, monkeypatch):
+    """Puts a shell script called omc on PATH, alone with the commands of the system; it is told what to do."""
+
+    def install(commands: str) -> Path:
+        script = tmp_path / "bin" / "omc"
+        script.parent.mkdir()
+        script.write_text(f"#!/bin/sh\n{commands}\n")
+        script.chmod(0o755)
+        monkeypatch.setenv("PATH", str(script.parent), prepend=":")
+        return tmp_path / "asked.mos"
+
+    return install
+
+
+def test_the_command_loads_packages_and_file_and_builds_a_co_simulation_fmu(omc, write, tmp_path):
+    path = write(MODEL)
+    (tmp_path / "Library").mkdir()
+    (tmp_path / "Library" / "package.mo").write_text("package Library\nend Library;\n")
+    asked = omc(f'cp "$1" "{tmp_path}/asked.mos"; echo archive > M.fmu')
+    export_with_omc(path, tmp_path / "fmus" / "m.fmu")
+    assert asked.read_text().splitlines() == [
+        f'loadFile("{tmp_path}/Library/package.mo");',
+        f'loadFile("{path}");',
+        'buildModelFMU(M, version="2.0", fmuType="cs", platforms={"static"});',
+        "print(getErrorString());",
+    ]
+    assert (tmp_path / "fmus" / "m.fmu").read_text() == "archive\n"
+
+
+def test_a_member_of_a_package_is_loaded_with_its_package(omc, tmp_path):
+    (tmp_path / "Library").mkdir()
+    (tmp_path / "Library" / "package.mo").write_text("package Library\nend Library;\n")
+    member = tmp_path / "Library" / "M.mo"
+    member.write_text(f"within Library;\n{MODEL}")
+    asked = omc(f'cp "$1" "{tmp_path}/asked.mos"; echo archive > Library.M.fmu')
+    export_with_omc(member, tmp_path / "m.fmu")
+    lines = asked.read_text().splitlines()
+    assert lines[0] == f'loadFile("{tmp_path}/Library/package.mo");'
+    assert lines[1].startswith("buildModelFMU(Library.M, ")
+
+
+def test_errors_are_told_with_file_and_line(omc, write, tmp_path):
+    path = write(MODEL)
+    omc(f'echo "true"; echo "[{path}:4:3-4:13:writable] Error: Variable y not found in scope M."; echo "Error: no code"; exit 1')
+    with pytest.raises(InputError) as refused:
+        export_with_omc(path, tmp_path / "m.fmu")
+    assert str(refused.value).splitlines() == [f"{path}:4: Variable y not found in scope M.", f"{path}: no code"]
+    assert not (tmp_path / "m.fmu").exists()
+
+
+def test_silence_is_an_error_too(omc, write, tmp_path):
+    path = write(MODEL)
+    omc("exit 0")
+    with pytest.raises(InputError, match="OpenModelica has made no FMU: it printed nothing"):
+        export_with_omc(path, tmp_path / "m.fmu")
+
+
+def test_without_omc_the_error_says_what_is_missing(write, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(InputError, match='there is no "omc" on PATH'):
+        export_with_omc(write(MODEL), tmp_path / "m.fmu")
+
+
+def test_a_missing_file_is_refused(omc, tmp_path):
+    omc("exit 0")
+    with pytest.raises(InputError, match="no such Modelica file"):
+        export_with_omc(tmp_path / "None.mo", tmp_path / "m.fmu")

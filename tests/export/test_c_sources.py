@@ -1,0 +1,163 @@
+"""A folder with C files and a hand-written description becomes an FMU."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+from fmpy import extract, simulate_fmu
+from fmpy.build import build_platform_binary
+from fmpy.validation import validate_fmu
+
+from cosim.errors import InputError
+from cosim.export.build import build, build_one, read_manifest
+from cosim.export.check import check
+from cosim.export.sources import find_sources
+from cosim.resources import root
+
+KEEPER = root() / "controllers/c/speed_keeper"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A copy of the shipped controller, free to be spoilt."""
+    return Path(shutil.copytree(KEEPER, tmp_path / "controllers/c/keeper"))
+
+
+@pytest.fixture
+def description(folder):
+    return folder / "modelDescription.xml"
+
+
+def replace(path, old, new):
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def test_it_validates_and_carries_its_sources(folder, tmp_path):
+    replace(folder / "speed_keeper.c", '#include "fmi2Functions.h"', '#include "own.h"')
+    (folder / "own.h").write_text('#include "fmi2Functions.h"\n')
+    (folder / "notes.txt").write_text("not for others")
+    fmu = build_one(folder, None, tmp_path / "keeper.fmu")
+    assert validate_fmu(str(fmu)) == []
+    headers = {"fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"}
+    with ZipFile(fmu) as archive:
+        sources = {name.removeprefix("sources/") for name in archive.namelist() if name.startswith("sources/")}
+        assert archive.read("modelDescription.xml") == (folder / "modelDescription.xml").read_bytes()
+    assert sources == {"speed_keeper.c", "own.h", *headers}
+
+
+def test_the_same_sources_make_the_same_bytes(folder, tmp_path):
+    first, second = (build_one(source, None, tmp_path / f"{source.name}.fmu") for source in (folder, KEEPER))
+    assert first.read_bytes() == second.read_bytes()
+
+
+@pytest.mark.skipif(shutil.which("cmake") is None, reason="needs cmake")
+def test_its_sources_alone_build_it_elsewhere(folder, tmp_path):
+    fmu = build_one(folder, None, tmp_path / "keeper.fmu")
+    unpacked = Path(extract(str(fmu), str(tmp_path / "unpacked")))
+    shutil.rmtree(unpacked / "binaries")
+    build_platform_binary(unpacked, generator="Unix Makefiles")
+    assert simulate_fmu(str(unpacked), stop_time=0.1, output=["thrust"])["thrust"][-1] == 3.0
+
+
+def test_several_files_are_compiled_together(folder, description, tmp_path):
+    replace(
+        folder / "speed_keeper.c", "static double limited(double value, double limit) {", "double limited(double, double); /*"
+    )
+    replace(folder / "speed_keeper.c", "fmax(-limit, fmin(limit, value)); }", "*/")
+    (folder / "limited.c").write_text(
+        "double limited(double value, double limit) { return value < limit ? value : limit / 2; }\n"
+    )
+    replace(description, '<File name="speed_keeper.c"/>', '<File name="speed_keeper.c"/><File name="limited.c"/>')
+    fmu = build_one(folder, None, tmp_path / "keeper.fmu")
+    assert simulate_fmu(str(fmu), stop_time=0.1, output=["thrust"])["thrust"][-1] == 1.5
+
+
+def test_building_writes_manifest_and_check_agrees(folder, description, tmp_path):
+    (built,) = build([folder], tmp_path)
+    assert built.fmus == {2: tmp_path / "fmus/c/keeper.fmu"}
+    entry = read_manifest(tmp_path)["c/keeper"]
+    assert list(entry["sources"]) == ["controllers/c/keeper/modelDescription.xml", "controllers/c/keeper/speed_keeper.c"]
+    assert set(entry["tools"]) == {"fmpy", "compiler"}
+    assert check(tmp_path) == []
+    replace(description, "Keeps a speed", "Keeps one speed")
+    assert [str(problem) for problem in check(tmp_path)] == [
+        'controllers/c/keeper/modelDescription.xml: changed since "c/keeper" was built; run `cosim build`'
+    ]
+
+
+def test_every_folder_is_found_and_named_after_itself(folder, tmp_path):
+    shutil.copytree(folder, folder.with_name("other"))
+    assert [source.key for source in find_sources(tmp_path)] == ["c/keeper", "c/other"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('name="speed_keeper.c"', 'name="speed_kepper.c"', r'"speed_kepper\.c"> does not exist; did you mean "speed_keeper\.c"'),
+        (
+            '<SourceFiles>\n      <File name="speed_keeper.c"/>\n    </SourceFiles>',
+            "",
+            "names no file in <CoSimulation><SourceFiles>",
+        ),
+        ('fmiVersion="2.0"', 'fmiVersion="3.0"', r'found fmiVersion "3\.0", expected "2\.0"'),
+        ("<ModelStructure>", "<ModelStructure", "cannot be read: not well-formed"),
+        ('index="13"', 'index="11"', "ModelStructure/Outputs"),
+    ],
+)
+def test_a_faulty_description_is_refused(folder, description, tmp_path, old, new, message):
+    replace(description, old, new)
+    with pytest.raises(InputError, match=rf"(?s)modelDescription\.xml: .*{message}"):
+        build_one(folder, None, tmp_path / "keeper.fmu")
+    assert not (tmp_path / "keeper.fmu").exists()
+
+
+def test_model_exchange_alone_is_refused(folder, description, tmp_path):
+    text = description.read_text()
+    before, after = text[: text.index("<CoSimulation")], text[text.index("</CoSimulation>") + len("</CoSimulation>") :]
+    description.write_text(f'{before}<ModelExchange modelIdentifier="keeper"/>{after}')
+    with pytest.raises(InputError, match=r"modelDescription\.xml: has no <CoSimulation>"):
+        build_one(folder, None, tmp_path / "keeper.fmu")
+
+
+def test_compiler_errors_are_shown_with_their_line(folder, tmp_path):
+    replace(folder / "speed_keeper.c", "#include <math.h>", "#include <math.h>\nint wrong = thrust;")
+    with pytest.raises(InputError, match=r"speed_keeper: speed_keeper\.c:8:\d+: error: .thrust. undeclared"):
+        build_one(folder, None, tmp_path / "keeper.fmu")
+
+
+def test_a_missing_function_is_named(folder, tmp_path):
+    replace(folder / "speed_keeper.c", "static double limited(", "extern double limited(double, double);\nstatic double unused(")
+    with pytest.raises(InputError, match="undefined reference to `limited'"):
+        build_one(folder, None, tmp_path / "keeper.fmu")
+
+
+def cosim(*arguments, cwd):
+    command = [sys.executable, "-m", "cosim", *map(str, arguments)]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+
+
+def test_the_command_builds_a_source_that_lies_anywhere(folder, tmp_path):
+    done = cosim("build", folder, "--output", "there/keeper.fmu", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, f"{folder} -> there/keeper.fmu\n")
+    assert validate_fmu(str(tmp_path / "there/keeper.fmu")) == []
+
+
+@pytest.mark.parametrize(
+    ("sources", "message"),
+    [
+        ((), "--output needs one source, found 0"),
+        (("nothing.mo",), "nothing.mo: does not exist"),
+        ((".",), ".: cannot be exported"),
+    ],
+)
+def test_the_command_refuses_what_is_no_source(tmp_path, sources, message):
+    done = cosim("build", *sources, "--output", "x.fmu", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith(message)
