@@ -1,0 +1,1 @@
+"""The published simulator rebuilt, with its conventions: signal interface, force models, controllers."""

@@ -1,0 +1,146 @@
+"""The two vehicles as bodies that Bullet integrates by itself, held by forces in the world frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..arguments import Numbers
+from ..bullet import pybullet
+from ..shadow import compound, set_dynamics
+from ..vehicles.ar_drone import geometry as ar_drone
+from ..vehicles.ar_drone.parameters import CENTRE_OF_MASS, ROTOR_SENSES, ROTORS, principal_axes
+from ..vehicles.shapes import quaternion
+from ..vehicles.strider import geometry as strider
+from ..vehicles.strider.parameters import RUDDER_ARM
+
+#: mass of each of the two links of the published joint rig (kg): 4.31 kg move in x, 4.21 kg in y
+LINK_MASS = 0.1
+
+#: forward-right-down <-> forward-left-up
+_FLIP = np.diag([1.0, -1.0, -1.0])
+
+_UP = np.array([0.0, 0.0, 1.0])
+
+#: (3, 8): four thrusts and four propeller torques -> torque about the centre of mass, forward-left-up
+_TORQUES = np.hstack((np.cross(ROTORS, _UP).T, np.outer(_UP, ROTOR_SENSES)))
+
+#: (3, 3): angular velocity -> velocity of the centre of mass as seen from the origin of the model frame
+_LEVER = np.cross(np.eye(3), CENTRE_OF_MASS).T
+
+
+class Quadcopter:
+    """A rigid body on which thrusts and propeller torques act; Bullet's frame of it has the principal axes of inertia."""
+
+    def __init__(self, client: int, initial: Numbers):
+        """`initial`: position (3) of the model's origin, yaw, velocity (3) and rates (3) in forward-left-up body axes."""
+        self._client, self._axes = client, principal_axes()[1]
+        turn = _about_z(initial[3])
+        centre = np.array(initial[0:3]) + turn @ CENTRE_OF_MASS
+        yaw = pybullet.getQuaternionFromEuler([0.0, 0.0, initial[3]])
+        _, orientation = pybullet.multiplyTransforms([0, 0, 0], yaw, [0, 0, 0], quaternion(self._axes))
+        self.body = pybullet.createMultiBody(
+            ar_drone.BODY.mass, compound(ar_drone.BODY.boxes, client), -1, centre.tolist(), orientation, physicsClientId=client
+        )
+        set_dynamics(client, self.body, -1, ar_drone.BODY)
+        linear, angular = turn @ (initial[4:7] + _LEVER @ initial[7:10]), turn @ initial[7:10]
+        pybullet.resetBaseVelocity(self.body, linear.tolist(), angular.tolist(), physicsClientId=client)
+
+    def apply(self, loads: np.ndarray) -> None:
+        """Four thrusts (N) and four propeller torques (N m), for the coming step of Bullet, fixed in the world frame."""
+        centre, to_world = self._pose()
+        force, torque = to_world[:, 2] * loads[0:4].sum(), to_world @ (_TORQUES @ loads)
+        options = {"flags": pybullet.WORLD_FRAME, "physicsClientId": self._client}
+        pybullet.applyExternalForce(self.body, -1, force.tolist(), centre.tolist(), **options)
+        pybullet.applyExternalTorque(self.body, -1, torque.tolist(), **options)
+
+    def measure(self) -> tuple[np.ndarray, np.ndarray]:
+        """Position, attitude (phi, theta, psi) and velocity as published, shape (9,); and R v + position, shape (3,).
+
+        The difference quotient of the latter was published as acceleration.
+        """
+        centre, to_world = self._pose()
+        linear, angular = pybullet.getBaseVelocity(self.body, self._client)
+        position, from_original = centre - to_world @ CENTRE_OF_MASS, to_world @ _FLIP
+        velocity = linear - to_world @ (_LEVER @ (to_world.T @ angular))
+        return np.concatenate((position, attitude(from_original), velocity)), from_original @ velocity + position
+
+    def _pose(self) -> tuple[np.ndarray, np.ndarray]:
+        """Centre of mass, and the rotation from the forward-left-up body frame to the world."""
+        centre, orientation = pybullet.getBasePositionAndOrientation(self.body, self._client)
+        principal = np.array(pybullet.getMatrixFromQuaternion(orientation)).reshape(3, 3)
+        return np.array(centre), principal @ self._axes.T
+
+
+class Vessel:
+    """The hull at the end of a chain of sliders in x and y and a yaw joint."""
+
+    _JOINTS = (0, 1, 2)
+
+    def __init__(self, client: int, initial: Numbers):
+        """`initial`: x, y, yaw, surge and sway velocity, yaw rate."""
+        self._client, self.body = client, _chain(client)
+        velocity = (_about_z(initial[2])[:2, :2] @ np.array(initial[3:5])).tolist()
+        for joint, rate in zip(self._JOINTS, (*velocity, initial[5]), strict=True):
+            pybullet.setJointMotorControl2(self.body, joint, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client)
+            pybullet.resetJointState(self.body, joint, initial[joint], rate, physicsClientId=client)
+            pybullet.changeDynamics(self.body, joint, jointDamping=0, physicsClientId=client)
+        for link in (-1, 0, 1):
+            set_dynamics(client, self.body, link)
+        set_dynamics(client, self.body, 2, strider.BODY)
+
+    def apply(self, loads: np.ndarray) -> None:
+        """Propeller thrust, rudder X and Y, water X and Y (N) and water N (N m), for the coming step of Bullet."""
+        thrust, rudder_x, rudder_y, water_x, water_y, moment = loads
+        yaw = self._joints()[0][2]
+        force = _about_z(yaw)[:2, :2] @ [thrust + rudder_x + water_x, rudder_y + water_y]
+        efforts = [*force.tolist(), float(moment - RUDDER_ARM * rudder_y)]
+        pybullet.setJointMotorControlArray(
+            self.body, self._JOINTS, pybullet.TORQUE_CONTROL, forces=efforts, physicsClientId=self._client
+        )
+
+    def measure(self) -> np.ndarray:
+        """Position, velocity, angular velocity and yaw as published, shape (10,)."""
+        (x, y, yaw), (vx, vy, rate) = self._joints()
+        wrapped = math.pi - (math.pi - yaw) % (2 * math.pi)
+        return np.array([x, y, strider.BODY.height, vx, vy, 0.0, 0.0, 0.0, rate, wrapped])
+
+    def _joints(self) -> tuple[Sequence[float], Sequence[float]]:
+        states = pybullet.getJointStates(self.body, self._JOINTS, self._client)
+        return [state[0] for state in states], [state[1] for state in states]
+
+
+def attitude(to_world: np.ndarray) -> np.ndarray:
+    """phi, theta, psi (rad) of a rotation matrix (3, 3) from the forward-right-down body frame to the world."""
+    r = to_world
+    theta = math.asin(max(-1.0, min(1.0, r[2, 0])))
+    return np.array([math.atan2(-r[2, 1], -r[2, 2]), theta, math.atan2(-r[1, 0], r[0, 0])])
+
+
+def _about_z(angle: float) -> np.ndarray:
+    cos, sin = math.cos(angle), math.sin(angle)
+    return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _chain(client: int) -> int:
+    origin, upright = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]
+    return pybullet.createMultiBody(
+        0,
+        -1,
+        -1,
+        [0.0, 0.0, strider.BODY.height],
+        upright,
+        linkMasses=[LINK_MASS, LINK_MASS, strider.BODY.mass],
+        linkCollisionShapeIndices=[-1, -1, compound(strider.BODY.boxes, client)],
+        linkVisualShapeIndices=[-1] * 3,
+        linkPositions=[origin] * 3,
+        linkOrientations=[upright] * 3,
+        linkInertialFramePositions=[origin] * 3,
+        linkInertialFrameOrientations=[upright] * 3,
+        linkParentIndices=[0, 1, 2],
+        linkJointTypes=[pybullet.JOINT_PRISMATIC, pybullet.JOINT_PRISMATIC, pybullet.JOINT_REVOLUTE],
+        linkJointAxis=[[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+        physicsClientId=client,
+    )

@@ -1,0 +1,54 @@
+"""What the replica's units in Python share: variables by name, and PID loops whose gains and states are variables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import partial
+from typing import Any
+
+from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
+
+from .pid import Pid
+
+_PARAMETER: dict[str, Any] = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.tunable}
+_STATE: dict[str, Any] = {"causality": Fmi2Causality.local}
+
+
+class Unit(Fmi2Slave):
+    """A PythonFMU class that keeps its variables in `value`, by name."""
+
+    def __init__(self, **arguments: Any):
+        super().__init__(**arguments)
+        self.value: dict[str, float] = {}
+
+    def inputs(self, *names: str) -> None:
+        """Declare inputs, which start at zero."""
+        self._register(names, causality=Fmi2Causality.input)
+
+    def outputs(self, *names: str) -> None:
+        """Declare outputs, which start at zero."""
+        self._register(names, causality=Fmi2Causality.output)
+
+    def parameters(self, **values: float) -> None:
+        """Declare parameters with their values."""
+        self._register(values, **_PARAMETER)
+        self.value |= values
+
+    def states(self, **values: float) -> None:
+        """Declare memory with its start values."""
+        self._register(values, **_STATE)
+        self.value |= values
+
+    def pid(self, name: str, loop: Pid) -> Pid:
+        """Declare gains and states of a loop."""
+        for field in ("P", "I", "D", "N", "integral", "filtered"):
+            kind = _PARAMETER if field.isupper() else _STATE
+            access = {"getter": partial(getattr, loop, field), "setter": partial(setattr, loop, field)}
+            self.register_variable(Real(f"{name}.{field}", **access, **kind))
+        return loop
+
+    def _register(self, names: Iterable[str], **kind: Any) -> None:
+        for name in names:
+            self.value[name] = 0.0
+            access = {"getter": partial(self.value.__getitem__, name), "setter": partial(self.value.__setitem__, name)}
+            self.register_variable(Real(name, **access, **kind))

@@ -1,0 +1,63 @@
+"""The published guidance and control of the vessel."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from .forces import body_velocity
+from .pid import Pid
+from .unit import Unit
+
+LARGEST_COUNT = 32
+
+
+class Waypoints(Unit):
+    """Course (rad, in [0, 2 pi)) straight to the current waypoint; the next one when `acceptance_radius` (m) is entered.
+
+    The test of the radius is one sample old, as published. The last waypoint stays current (published: undefined).
+    """
+
+    description = "Line of sight to waypoints"
+
+    def __init__(self, **arguments: Any):
+        super().__init__(**arguments)
+        self.inputs("vehicle.position.x", "vehicle.position.y")
+        self.parameters(acceptance_radius=0.5, waypoint_count=1.0)
+        self.parameters(**{f"waypoint_{axis}[{i}]": 0.0 for axis in "xy" for i in range(1, LARGEST_COUNT + 1)})
+        self.states(was_inside=1.0, old_distance=0.0)
+        self.outputs("course_command", "waypoint")
+        self.value["waypoint"] = 1.0
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        value = self.value
+        inside = float(value["old_distance"] <= value["acceptance_radius"])
+        if inside > value["was_inside"] and value["waypoint"] < value["waypoint_count"]:
+            value["waypoint"] += 1
+        i = int(value["waypoint"])
+        x, y = (value[f"waypoint_{axis}[{i}]"] - value[f"vehicle.position.{axis}"] for axis in "xy")
+        value["was_inside"], value["old_distance"] = inside, math.hypot(x, y)
+        value["course_command"] = math.atan2(y, x) % (2 * math.pi)
+        return True
+
+
+class Autopilot(Unit):
+    """Thrust (N) proportional to the speed error, rudder angle (rad) by PD on the heading error taken the shorter way."""
+
+    description = "Speed and heading control"
+
+    def __init__(self, **arguments: Any):
+        super().__init__(**arguments)
+        self.inputs("vehicle.velocity.x", "vehicle.velocity.y", "vehicle.attitude.yaw", "course_command")
+        self.parameters(speed_command=0.0)
+        self.outputs("thrust", "rudder_angle")
+        largest = math.radians(35)
+        self._speed = self.pid("speed", Pid(82.65, lower=-3.0, upper=3.0))
+        self._heading = self.pid("heading", Pid(0.5, 0.0, 0.6, 21.4165136740303, lower=-largest, upper=largest))
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        value = self.value
+        error = (value["vehicle.attitude.yaw"] - value["course_command"] + math.pi) % (2 * math.pi) - math.pi
+        value["rudder_angle"] = self._heading.step(error, step_size)
+        value["thrust"] = self._speed.step(value["speed_command"] - body_velocity(value)[0], step_size)
+        return True
