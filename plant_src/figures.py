@@ -1,6 +1,6 @@
-"""Figures of a mission: the paths in the horizontal plane, and the landing over time.
+"""Figures of a mission: the paths in the horizontal plane, the tracking error and the landing over time.
 
-They show what figures 14 and 16 of the paper show. Every function takes a result and names of things in it, as the KPIs do.
+They show what figures 14 to 16 of the paper show. Every function takes a result and names of things in it, as the KPIs do.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from matplotlib.text import Text
 
 from cosim.results import Result
 
-from .kpis import horizontal_distance, touchdown_row
+from .kpis import horizontal_distance, touchdown_row, waypoints
 
 FLYING, SAILING, REFERENCE, TOUCHDOWN = "#0072B2", "#D55E00", "#444444", "#111111"
 TINTS = ("#F4F4F4", "#FFF8E1", "#EAF2FA", "#EDF6E8", "#FDEFE7", "#F2EDF8")
@@ -171,6 +171,43 @@ def _mark_touchdown(figure: Figure, time: float, altitude: float) -> None:
     for axes, top in zip(figure.axes, (0.88, 1.0), strict=True):
         axes.axvline(time, ymax=top, color=TOUCHDOWN, linewidth=0.8, linestyle=":")
     figure.axes[0].plot(time, altitude, **STAR, label="touchdown", zorder=5)
+
+
+def tracking_error(
+    result: Result,
+    vehicle: str,
+    target: str,
+    x: Sequence[float] = (),
+    y: Sequence[float] = (),
+    radius: float = 0.0,
+    limit: float | None = None,
+    start: float = 0.0,
+) -> Figure:
+    """Horizontal distance of `vehicle` from `target` ("plant.usv.deck"), logarithmic, over time from `start` (s) on.
+
+    Numbered lines mark the turns of the target's vessel: when it comes within `radius` (m) of its waypoints `x`, `y` (m, world).
+    `limit` (m) marks a distance.
+    """
+    figure = Figure(figsize=(COLUMN, 2.2), layout="constrained")
+    axes = figure.add_subplot()
+    shown = slice(int(np.searchsorted(result.time, start)), None)
+    _draw_error(axes, result.time[shown], horizontal_distance(result, vehicle, target)[shown], limit)
+    axes.set(xlabel="t / s", xlim=(start, result.time[-1]))
+    if len(x):
+        _mark_turns(axes, waypoints(result, target.removesuffix(".deck"), x, y, radius), len(x))
+    return figure
+
+
+def _mark_turns(axes: Axes, reached: Mapping[str, Any], count: int) -> None:
+    """A numbered line for every waypoint reached but the last, behind which there is no turn."""
+    first, last = axes.get_xlim()
+    for number in range(1, count):
+        time = reached[f"time[{number}]"]
+        if first <= time <= last:
+            axes.axvline(time, color=SAILING, linewidth=0.8, linestyle=":", zorder=1)
+            axes.text(
+                time, 1.02, f"turn {number}", transform=axes.get_xaxis_transform(), ha="center", fontsize=6.5, color=SAILING
+            )
 
 
 def _write(axes: Axes, text: str, place: tuple[float, float], offset: tuple[float, float], color: str) -> Text:

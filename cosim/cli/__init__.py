@@ -16,8 +16,10 @@ COMMANDS = {
     "run": ("run", "Run a scenario; write results and figures."),
     "check": ("check", "Load, wire and validate a scenario; print the expanded system."),
     "simulate": ("simulate", "Simulate one FMU alone."),
+    "plot": ("plot", "Draw the figures of finished runs again."),
     "info": ("info", "Print what an FMU says about itself."),
     "build": ("build", "Export controllers and plants to fmus/."),
+    "new": ("new", "Begin a controller of your own that runs at once."),
     "schema": ("schema", "Print the JSON Schema of scenarios."),
 }
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from ..kpi import Evaluation
 from ..results import Result
 from ..results.files import replacing
+from .numbers import write_numbers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -86,13 +87,20 @@ def draw_figures(
     figures: Iterable[tuple[str, Callable[..., Figure], Mapping[str, Any]]],
     directory: str | Path,
     suffixes: Sequence[str] = (".png",),
+    numbers: bool = False,
 ) -> list[Path]:
-    """Draw all figures, given as (name, function, arguments), into `directory`/NAME.png (or .svg); returns the files."""
+    """Draw all figures, given as (name, function, arguments), into `directory`/NAME.png (or .svg); returns the files.
+
+    With `numbers`, the numbers behind each are written to NAME.csv beside it.
+    """
     files = []
     for name, function, arguments in figures:
         figure = draw(result, name, function, arguments)
         for suffix in suffixes:
             path = Path(directory) / f"{name}{suffix}"
             save(figure, path)
+            files.append(path)
+        path = Path(directory) / f"{name}.csv"
+        if numbers and write_numbers(figure, path):
             files.append(path)
     return files

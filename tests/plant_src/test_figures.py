@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 from mission_recording import TOUCHDOWN, mission
 
-from plant_src.figures import AFTER_TOUCHDOWN, landing, paths
+from plant_src.figures import AFTER_TOUCHDOWN, landing, paths, tracking_error
 
 DECK = {"vehicle": "plant.uav", "deck": "plant.usv.deck"}
 LANDING = {
@@ -135,3 +135,29 @@ def test_axes_carry_units_and_the_figure_fits_a_column(figure):
     assert picture.get_size_inches()[0] == 3.5
     assert all(axes.get_ylabel().endswith("/ m") for axes in picture.axes)
     assert picture.axes[-1].get_xlabel() in ("x / m", "t / s")
+
+
+TURNS = {"x": [4.0, 9.0, 30.0], "y": [0.0, 0.0, 0.0], "radius": 0.5}
+
+
+def turns(figure):
+    return [line.get_xdata()[0] for line in figure.axes[0].lines if line.get_linestyle() == ":"]
+
+
+def test_the_tracking_error_is_the_horizontal_distance():
+    figure = tracking_error(mission(offset=(0.06, 0.08)), "plant.uav", "plant.usv.deck")
+    time, error = figure.axes[0].lines[0].get_data()
+    assert error[0] == pytest.approx(np.hypot(5.0, 1.0))
+    assert error[time >= 9.0] == pytest.approx(0.1)
+
+
+def test_turns_are_marked_when_the_vessel_enters_their_circles():
+    figure = tracking_error(mission(), "plant.uav", "plant.usv.deck", **TURNS)
+    assert turns(figure) == pytest.approx([3.5, 8.5])
+    assert [text.get_text() for text in figure.axes[0].texts] == ["turn 1", "turn 2"]
+
+
+def test_turns_before_the_window_are_not_marked():
+    figure = tracking_error(mission(), "plant.uav", "plant.usv.deck", **TURNS, start=5.0)
+    assert turns(figure) == pytest.approx([8.5])
+    assert figure.axes[0].lines[0].get_xdata()[0] == 5.0

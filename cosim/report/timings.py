@@ -1,0 +1,52 @@
+"""Real-time factors of runs side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+from ..results import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: real-time factors of the published simulator (Simulink and V-REP over TCP): figure 18 and section 6.3 of the paper
+PUBLISHED = (0.5, 0.7)
+
+
+def timings(result: Result, others: Sequence[Result] = ()) -> Figure:
+    """Bars of simulated over elapsed time (of the stepping loop) of `result` and `others`, above the band of the paper.
+
+    The axis is logarithmic. Raises InputError for a result that holds no wall time.
+    """
+    from matplotlib.figure import Figure
+
+    runs = [result, *others]
+    names, factors = [_name(run) for run in runs], [real_time_factor(run) for run in runs]
+    figure = Figure(layout="constrained")
+    axes = figure.add_subplot(yscale="log", ylabel="simulated time / elapsed time")
+    axes.axhspan(*PUBLISHED, color="#D55E00", alpha=0.35, linewidth=0, label="published simulator")
+    bars = axes.bar(range(len(runs)), factors, width=0.6, color="#0072B2", label="cosim")
+    axes.bar_label(bars, [f"{factor:.3g}" for factor in factors], padding=1, fontsize=7)
+    axes.axhline(1.0, color="#444444", linestyle="--", linewidth=0.9, label="real time")
+    axes.set_xticks(range(len(runs)), names)
+    axes.set_xlim(-0.6, len(runs) - 0.4)
+    axes.set_ylim(min(0.3, *factors) / 1.2, max(*factors, 1.0) * 2.0)
+    axes.grid(visible=False, axis="x")
+    axes.yaxis.set_major_formatter("{x:g}")
+    figure.legend(loc="outside upper center", ncols=3)
+    return figure
+
+
+def real_time_factor(result: Result) -> float:
+    """Simulated time over the wall time of the stepping loop."""
+    loop = result.timing.get("loop_seconds", 0.0)
+    if not loop or len(result.time) < 2:
+        raise InputError(f"{_name(result)}: no wall time of the stepping loop is known (timing.loop_seconds in run.json)")
+    return float(result.time[-1] - result.time[0]) / loop
+
+
+def _name(result: Result) -> str:
+    """The scenario's name, broken where it may be."""
+    return str(result.metadata.get("name", "run")).replace("_", "\n")

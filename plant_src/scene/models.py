@@ -1,0 +1,156 @@
+"""What things look like: vehicles, take-off decks, shore and trees, made from boxes, cylinders and spheres.
+
+Appearance only; the dynamics know none of it. The vehicles' dimensions are those of their geometry where that names them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from ..vehicles.ar_drone.geometry import EDGE, FEET_HEIGHT
+from ..vehicles.ar_drone.parameters import ROTORS
+from ..vehicles.shapes import Quaternion, Vector
+from ..vehicles.strider import geometry as strider_geometry
+from ..vehicles.strider.parameters import DECK_TOP, DECK_X, DECK_Y
+
+UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
+ALONG_X: Quaternion = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))  # turns a cylinder's axis from z to x
+BETWEEN_ARMS: Quaternion = (0.0, 0.0, -math.sin(math.pi / 8), math.cos(math.pi / 8))  # x turned by -45 degrees about z
+WHITE, BLACK, GREY, SILVER = (0.95, 0.95, 0.95), (0.09, 0.09, 0.10), (0.35, 0.36, 0.38), (0.70, 0.72, 0.75)
+ORANGE, RED, YELLOW, BLUE = (0.96, 0.48, 0.08), (0.84, 0.18, 0.12), (0.98, 0.80, 0.18), (0.10, 0.32, 0.58)
+PLANKS = ((0.64, 0.47, 0.30), (0.58, 0.42, 0.26), (0.68, 0.51, 0.33))
+BARK, SAND, GRASS = (0.36, 0.26, 0.17), (0.80, 0.73, 0.55), (0.42, 0.55, 0.27)
+LEAVES = ((0.22, 0.42, 0.17), (0.28, 0.48, 0.19), (0.18, 0.36, 0.18), (0.36, 0.50, 0.20))
+
+
+class Part(NamedTuple):
+    """A coloured solid in the frame of what it belongs to (m): a box by its edges, a cylinder by radius and length along z,
+    a sphere by its radius."""
+
+    shape: Literal["box", "cylinder", "sphere"]
+    size: tuple[float, ...]
+    position: Vector
+    colour: Vector
+    orientation: Quaternion = UPRIGHT
+
+
+def ar_drone() -> list[Part]:
+    """The quadcopter about its centre of mass: rotor arms along the body axes, the hull between front and right arm."""
+    body = [
+        Part("box", (0.26, 0.075, 0.045), (0.0, 0.0, 0.0), ORANGE, BETWEEN_ARMS),
+        Part("box", (0.12, 0.10, 0.055), (0.0, 0.0, 0.012), BLACK, BETWEEN_ARMS),
+        Part("sphere", (0.025,), (0.092, -0.092, 0.0), BLACK),
+        Part("box", (2 * ROTORS[0, 0], 0.014, 0.014), (0.0, 0.0, 0.0), BLACK),
+        Part("box", (0.014, 2 * ROTORS[1, 1], 0.014), (0.0, 0.0, 0.0), BLACK),
+    ]
+    for (x, y, z), colour in zip(ROTORS.tolist(), (RED, SILVER, SILVER, RED), strict=True):
+        body += _rotor(x, y, z, colour)
+    return body
+
+
+def _rotor(x: float, y: float, z: float, colour: Vector) -> list[Part]:
+    leg, share = -FEET_HEIGHT, EDGE / math.sqrt(2) / ROTORS[0, 0]  # the feet stand a little inside the motors
+    return [
+        Part("cylinder", (0.012, leg), (share * x, share * y, -leg / 2), GREY),
+        Part("cylinder", (0.103, 0.004), (x, y, z + 0.012), BLACK),
+        Part("cylinder", (0.095, 0.006), (x, y, z + 0.012), colour),
+        Part("cylinder", (0.014, 0.02), (x, y, z + 0.01), BLACK),
+    ]
+
+
+def strider() -> list[Part]:
+    """The catamaran about its centre of mass: two hulls, four struts, and the landing deck with its mark."""
+    x, y, _ = strider_geometry.DECK_CENTRE
+    length, width = DECK_X[1] - DECK_X[0], DECK_Y[1] - DECK_Y[0]
+    plate = strider_geometry.PLATE_THICKNESS
+    top = DECK_TOP - plate / 2
+    parts = [
+        Part("box", (length, width, plate), (x, y, top), GREY),
+        Part("box", strider_geometry.HOUSING, (x, y, top - plate / 2 - strider_geometry.HOUSING[2] / 2), BLUE),
+        Part("box", (0.004, 0.06, 0.09), (-0.46, 0.0, -0.11), BLACK),
+        Part("cylinder", (0.008, 0.2), (-0.46, 0.0, 0.0), BLACK),
+        Part("box", (0.16, 0.012, 0.012), (-0.40, 0.0, 0.09), BLACK),
+        *_mark(x, y, DECK_TOP),
+    ]
+    for side in (-1.0, 1.0):
+        parts += _hull(side * strider_geometry.HULL_DISTANCE)
+        parts += [_strut(end * 0.24, side, width / 2) for end in (-1.0, 1.0)]
+    return parts
+
+
+def _mark(x: float, y: float, z: float) -> list[Part]:
+    """The landing mark: white ring, white H."""
+    disc = [Part("cylinder", (radius, 0.002), (x, y, z + rise), colour) for radius, rise, colour in _RINGS]
+    bars = [Part("box", (0.20, 0.03, 0.002), (x, y + side * 0.06, z + 0.004), WHITE) for side in (-1.0, 1.0)]
+    return [*disc, *bars, Part("box", (0.03, 0.12, 0.002), (x, y, z + 0.004), WHITE)]
+
+
+_RINGS = ((0.24, 0.001, WHITE), (0.21, 0.002, GREY))
+
+
+def _hull(y: float) -> list[Part]:
+    radius, half = 0.055, strider_geometry.HULL_LENGTH / 2
+    z = strider_geometry.HULL_BOTTOM + radius - 0.03
+    straight = 2 * (half - radius)
+    ends = [Part("sphere", (radius,), (end * (half - radius), y, z), YELLOW) for end in (-1.0, 1.0)]
+    stripe = Part("box", (straight, 0.03, 0.02), (0.0, y, z + radius), GREY)
+    return [Part("cylinder", (radius, straight), (0.0, y, z), YELLOW, ALONG_X), *ends, stripe]
+
+
+def _strut(x: float, side: float, deck_edge: float) -> Part:
+    """A bar from a hull up to the edge of the deck."""
+    outer, low, inner, high = strider_geometry.HULL_DISTANCE, -0.07, deck_edge - 0.02, DECK_TOP - 0.03
+    run, rise = inner - outer, high - low
+    angle = side * math.atan2(-run, rise)  # about x, from z towards the middle
+    turn = (math.sin(angle / 2), 0.0, 0.0, math.cos(angle / 2))
+    return Part("cylinder", (0.013, math.hypot(run, rise)), (x, side * (outer + inner) / 2, (low + high) / 2), SILVER, turn)
+
+
+def platform(size: Sequence[float], position: Sequence[float], plank: float = 0.25) -> Iterator[Part]:
+    """A take-off deck of planks on posts, `size` and centre `position` in m as the plant has it."""
+    (length, width, thickness), (x, y, z) = size, position
+    count = max(1, round(width / plank))
+    pitch = width / count
+    for i in range(count):
+        place = (x, y - width / 2 + (i + 0.5) * pitch, z)
+        yield Part("box", (length, pitch - 0.012, thickness), place, PLANKS[i * 7 % len(PLANKS)])
+    post = z - thickness / 2
+    for east in (-0.46, 0.0, 0.46):
+        for north in (-0.46, 0.46):
+            yield Part("cylinder", (0.09, post), (x + east * length, y + north * width, post / 2), BARK)
+
+
+def shore(seed: int = 4) -> Iterator[Part]:
+    """Two banks, north and west of the lake, with trees."""
+    random = np.random.default_rng(seed)
+    for x, y, length, width in ((0.0, 334.0, 1400.0, 600.0), (-370.0, 0.0, 700.0, 1400.0)):
+        yield Part("box", (length + 2.4, width + 2.4, 0.12), (x, y, 0.06), SAND)
+        yield Part("box", (length, width, 0.4), (x, y, 0.2), GRASS)
+    for x in np.arange(-44.0, 90.0, 3.4):
+        yield from tree(x + random.uniform(-1.2, 1.2), 37.5 + random.uniform(0.0, 9.0), random)
+    for y in np.arange(-34.0, 34.0, 3.6):
+        yield from tree(-23.0 - random.uniform(0.0, 9.0), y + random.uniform(-1.2, 1.2), random)
+
+
+def tree(x: float, y: float, random: np.random.Generator) -> Iterator[Part]:
+    """A trunk and a crown of a few balls, 4 to 7 m high."""
+    height = random.uniform(4.0, 7.0)
+    leaves = LEAVES[random.integers(len(LEAVES))]
+    yield Part("cylinder", (0.035 * height, 0.6 * height), (x, y, 0.3 * height), BARK)
+    for level in (0.5, 0.66, 0.82):
+        radius = height * (0.34 - 0.24 * (level - 0.5)) * random.uniform(0.85, 1.1)
+        east, north = random.uniform(-0.08, 0.08, 2) * height
+        yield Part("sphere", (radius,), (x + float(east), y + float(north), level * height), leaves)
+
+
+def lake(platforms: Mapping[str, Mapping[str, Sequence[float]]]) -> list[Part]:
+    """Everything that keeps still; water and sky are no solids (see `light`)."""
+    decks = [part for one in platforms.values() for part in platform(one["size"], one["position"])]
+    return [*shore(), *decks]
+
+
+VEHICLES = {"ar_drone": ar_drone, "strider": strider}

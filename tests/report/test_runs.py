@@ -1,0 +1,79 @@
+"""A run's folder is read back: its result, and the figures its scenario asks for."""
+
+import json
+
+import numpy as np
+import pytest
+
+from cosim.errors import InputError
+from cosim.recording import Recording
+from cosim.report.runs import figures_of, read_run
+from cosim.results import Result, write_run
+
+FIGURE = """
+from matplotlib.figure import Figure
+
+def curve(result, signal):
+    figure = Figure()
+    figure.add_subplot(xlabel="t / s", ylabel="x / m").plot(result.time, result[signal], label="x")
+    return figure
+"""
+
+
+def write(folder, **metadata):
+    """A run of a scenario in `folder`/scenario with one figure; returns the run's folder."""
+    (folder / "scenario").mkdir()
+    (folder / "scenario/own_figures.py").write_text(FIGURE)
+    spec = {"name": "curve", "python": "own_figures.py:curve", "arguments": {"signal": "a.x"}}
+    about = {"name": "small", "scenario": {"figures": [spec]}, "scenario_file": str(folder / "scenario/small.json"), **metadata}
+    time = np.arange(3) / 2
+    result = Result(Recording(time, {"a.x": time**2}, {"a.x": "m"}), {"end.x": 1.0}, {"loop_seconds": 0.25}, about)
+    write_run(result, folder / "run")
+    return folder / "run"
+
+
+def test_what_was_written_is_read_back(tmp_path):
+    result = read_run(write(tmp_path))
+    assert result["a.x"].tolist() == [0.0, 0.25, 1.0]
+    assert result.kpis == {"end.x": 1.0}
+    assert result.timing == {"loop_seconds": 0.25}
+    assert result.metadata["name"] == "small"
+
+
+def test_figures_are_found_beside_the_scenario(tmp_path):
+    result = read_run(write(tmp_path))
+    ((name, function, arguments),) = figures_of(result)
+    assert name == "curve"
+    assert function(result, **arguments).axes[0].lines[0].get_ydata().tolist() == [0.0, 0.25, 1.0]
+
+
+def test_a_run_without_figures_has_none(tmp_path):
+    assert figures_of(read_run(write(tmp_path, scenario={}))) == []
+
+
+def test_a_folder_that_is_no_run_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"run\.json: No such file.*expected a folder that `cosim run` wrote"):
+        read_run(tmp_path)
+
+
+def test_a_spoiled_run_is_refused(tmp_path):
+    run = write(tmp_path)
+    (run / "run.json").write_text("{")
+    with pytest.raises(InputError, match=r"run\.json is no JSON"):
+        read_run(run)
+
+
+def test_a_run_of_an_unknown_place_is_refused(tmp_path):
+    run = write(tmp_path)
+    about = json.loads((run / "run.json").read_text())
+    del about["scenario_file"]
+    (run / "run.json").write_text(json.dumps(about))
+    with pytest.raises(InputError, match="run the scenario again"):
+        figures_of(read_run(run))
+
+
+def test_a_scenario_that_is_gone_is_refused(tmp_path):
+    result = read_run(write(tmp_path))
+    (tmp_path / "scenario/own_figures.py").unlink()
+    with pytest.raises(InputError, match=r'"own_figures\.py" does not exist'):
+        figures_of(result)

@@ -1,0 +1,35 @@
+"""Real-time factors: simulated time over the wall time of the stepping loop."""
+
+import numpy as np
+import pytest
+
+from cosim.errors import InputError
+from cosim.recording import Recording
+from cosim.report.timings import timings
+from cosim.results import Result
+
+
+def run(name, duration, loop_seconds):
+    return Result(
+        Recording(np.array([5.0, 5.0 + duration]), {}, {}), timing={"loop_seconds": loop_seconds}, metadata={"name": name}
+    )
+
+
+def test_every_run_has_a_bar():
+    axes = timings(run("short_run", 15.0, 0.5), [run("long_run", 35.0, 70.0)]).axes[0]
+    (bars,) = axes.containers
+    assert [bar.get_height() for bar in bars] == [30.0, 0.5]
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["short\nrun", "long\nrun"]
+
+
+def test_the_published_band_is_drawn_and_within_the_axis():
+    axes = timings(run("fast", 10.0, 0.01)).axes[0]
+    (band,) = [patch for patch in axes.patches if patch.get_label() == "published simulator"]
+    assert (band.get_y(), band.get_y() + band.get_height()) == pytest.approx((0.5, 0.7))
+    assert axes.get_ylim()[0] < 0.5
+    assert axes.get_ylim()[1] > 1000.0
+
+
+def test_a_result_without_wall_time_is_refused():
+    with pytest.raises(InputError, match=r"^foreign: no wall time"):
+        timings(run("foreign", 10.0, 0.0))
