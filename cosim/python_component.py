@@ -19,6 +19,7 @@ from pythonfmu.variables import Boolean, Integer, Real, ScalarVariable, String
 from . import log
 from .component import Component, Ports, Variable
 from .errors import ComponentError, InputError, Problem, did_you_mean
+from .units import parse
 
 _TYPES = {Real: "Float64", Integer: "Int32", Boolean: "Boolean", String: "String"}
 _CASTS: Mapping[str, Callable[[Any], Any]] = {"Float64": float, "Int32": int, "Boolean": bool, "String": str}
@@ -122,6 +123,7 @@ def _type(registered: ScalarVariable) -> str:
 
 
 def _variable(registered: ScalarVariable) -> Variable:
+    unit = getattr(registered, "unit", None)
     causality: Any = registered.causality.name if registered.causality else "local"
     return Variable(
         registered.name,
@@ -129,6 +131,7 @@ def _variable(registered: ScalarVariable) -> Variable:
         causality,
         registered.variability.name if registered.variability else "continuous",
         registered.getter() if causality in ("parameter", "input") else None,
+        parse(unit) if unit else None,
         description=registered.description or "",
     )
 

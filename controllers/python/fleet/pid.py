@@ -1,0 +1,45 @@
+"""Sampled PID controller: parallel form, filtered derivative, output limits, anti-windup, reset."""
+
+from __future__ import annotations
+
+from . import SAMPLE_PERIOD, limit
+
+
+class Pid:
+    """u = P e + I integral(e) + D N/(1 + N/s) e, limited; the integral stands still while it would drive u further into a limit.
+
+    The derivative filter takes one third-order Runge-Kutta step per period, as in the published simulator.
+    """
+
+    def __init__(self) -> None:
+        self.running, self.integral, self.filtered = False, 0.0, 0.0
+
+    def __call__(
+        self,
+        error: float,
+        feed_forward: float = 0.0,
+        reset: bool = False,
+        *,
+        P: float = 0.0,
+        I: float = 0.0,  # noqa: E741 - the letters of the equation
+        D: float = 0.0,
+        N: float = 100.0,
+        limits: tuple[float, float] = (-1e9, 1e9),
+        start: float = 0.0,
+    ) -> float:
+        """The limited output of one tick; `reset` holds the start state: integral `start`, the error ignored."""
+        e = 0.0 if reset else error
+        if reset or not self.running:
+            self.integral, self.filtered = start, D * e
+        self.running = not reset
+        unlimited = feed_forward + P * e + self.integral + N * (D * e - self.filtered)
+        u = limit(unlimited, *limits)
+        if I * e * (unlimited - u) <= 0:
+            self.integral = self.integral + SAMPLE_PERIOD * I * e
+        self.filtered = D * e + _decay(N) * (self.filtered - D * e)
+        return u
+
+
+def _decay(N: float) -> float:
+    h = N * SAMPLE_PERIOD
+    return 1 - h + h * h / 2 - h**3 / 6

@@ -1,0 +1,105 @@
+"""The base of the sampled controllers: declares variables with their units and runs the ticks of a step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from types import SimpleNamespace
+from typing import Any
+from xml.etree.ElementTree import Element
+
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
+
+from . import SAMPLE_PERIOD
+
+TOLERANCE = 1e-6  # part of a period by which a tick may seem to lie off the communication points
+
+
+class Quantity(Real):
+    """A Real variable with a unit."""
+
+    def __init__(self, name: str, unit: str, **attributes: Any):
+        super().__init__(name, **attributes)
+        self.unit = unit
+
+    def to_xml(self) -> Element:
+        element = super().to_xml()
+        if self.unit:
+            element[0].set("unit", self.unit)
+        return element
+
+
+class Sampled(Fmi2Slave):
+    """A controller whose `tick` runs at every multiple of SAMPLE_PERIOD within a step, on the inputs of that step.
+
+    Constructors declare variables by dotted names: `self.input("vehicle.position.z", 0.0, "m")` makes the variable and
+    the attribute `self.vehicle.position.z`. The start value decides the type; a list declares name[1], name[2], ...
+    What is declared is the state, so that it can be saved.
+    """
+
+    def __init__(self, **arguments: Any):
+        super().__init__(**arguments)
+        self.local("ticks", 0, description="Ticks since time 0")
+
+    def tick(self, time: float) -> None:
+        """Compute the outputs at `time` (s) from the inputs."""
+        raise NotImplementedError
+
+    def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
+        self.ticks = max(0, math.ceil(start_time / SAMPLE_PERIOD - TOLERANCE))
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        end = current_time + step_size - TOLERANCE * SAMPLE_PERIOD
+        while (time := self.ticks * SAMPLE_PERIOD) < end:
+            self.tick(time)
+            self.ticks += 1
+        return True
+
+    def parameter(self, name: str, start: Any, unit: str = "", description: str = "") -> None:
+        self._declare(name, start, unit, description, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable)
+
+    def calculated_parameter(self, name: str, getter: Callable[[], float], unit: str = "", description: str = "") -> None:
+        """A value that follows from parameters; there is no attribute of that name."""
+        kind = {"causality": Fmi2Causality.calculatedParameter, "variability": Fmi2Variability.tunable}
+        self.register_variable(Quantity(name, unit, getter=getter, description=description, **kind))
+
+    def input(self, name: str, start: Any, unit: str = "", description: str = "") -> None:
+        self._declare(name, start, unit, description, causality=Fmi2Causality.input)
+
+    def output(self, name: str, start: Any, unit: str = "", description: str = "") -> None:
+        self._declare(name, start, unit, description, causality=Fmi2Causality.output, variability=Fmi2Variability.discrete)
+
+    def local(self, name: str, start: Any, unit: str = "", description: str = "") -> None:
+        self._declare(name, start, unit, description, causality=Fmi2Causality.local, variability=Fmi2Variability.discrete)
+
+    def block(self, name: str, block: Any) -> Any:
+        """Declare the attributes of a shared block, which are its states, as local variables below `name`; returns the block."""
+        setattr(self, name, block)
+        for state, start in list(vars(block).items()):
+            self.local(f"{name}.{state}", start)
+        return block
+
+    def _declare(self, name: str, start: Any, unit: str, description: str, **attributes: Any) -> None:
+        setattr(self._owner(name), name.rpartition(".")[2], start)
+        attributes["description"] = description or None
+        if not isinstance(start, list):
+            self.register_variable(_variable(name, start, unit, **attributes))
+            return
+        for i, element in enumerate(start):
+            access = {"getter": partial(start.__getitem__, i), "setter": partial(start.__setitem__, i)}
+            self.register_variable(_variable(f"{name}[{i + 1}]", element, unit, **access, **attributes), nested=False)
+
+    def _owner(self, name: str) -> Any:
+        owner: Any = self
+        for part in name.split(".")[:-1]:
+            if not hasattr(owner, part):
+                setattr(owner, part, SimpleNamespace())
+            owner = getattr(owner, part)
+        return owner
+
+
+def _variable(name: str, start: Any, unit: str, **attributes: Any) -> Boolean | Integer | Quantity:
+    if isinstance(start, bool):
+        return Boolean(name, **attributes)
+    return Integer(name, **attributes) if isinstance(start, int) else Quantity(name, unit, **attributes)
