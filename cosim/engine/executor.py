@@ -119,6 +119,7 @@ class Executor:
     def run(self, end: int) -> None:
         """Macro steps until communication point `end` is reached, or a component asks to terminate."""
         seconds, phases, record, clock = self.plan.grid.seconds, self._phases, self.recorder.record, self._clock
+        warning = WARNING
         for n in range(self.finished, end):
             clock.value = seconds(n)
             for moves, turns in phases:
@@ -129,7 +130,7 @@ class Executor:
                         continue
                     for function, arguments, name in calls:
                         status = function(*arguments)
-                        if status > WARNING:
+                        if status > warning:
                             self._ended_early(step, step.component.failed(name, status))
                             break
             self.finished = n + 1
@@ -159,11 +160,11 @@ def _copy(gather: Gather) -> Action:
     """The gather, its delay left aside, as one call that allocates as little as numpy allows."""
     first, count = int(gather.target_indices[0]), len(gather.target_indices)
     together = np.array_equal(gather.target_indices, np.arange(first, first + count))
-    if gather.factor is not None or gather.source.dtype != gather.target.dtype or not together:
-        return partial(_scatter, gather, gather.source, gather.source_indices)
-    if count <= FEW and not gather.source.dtype.hasobject:
+    if count <= FEW and gather.factor is None and not gather.source.dtype.hasobject:
         places = list(zip(gather.target_indices.tolist(), gather.source_indices.tolist(), strict=True))
         return partial(_assign, gather.target.data, gather.source.data, places)
+    if gather.factor is not None or gather.source.dtype != gather.target.dtype or not together:
+        return partial(_scatter, gather, gather.source, gather.source_indices)
     return partial(gather.source.take, gather.source_indices, None, gather.target[first : first + count], "clip")
 
 
