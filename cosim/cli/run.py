@@ -54,11 +54,14 @@ def command(
     directory = output_dir or Path("runs") / assembly.spec.name
     try:
         _prepare(directory, [spec.name for spec in assembly.spec.figures])
+    except CosimError:
+        assembly.free()  # from here on `simulate` frees the components
+        raise
+    try:
         with _progress(assembly) as observers:
             result = execute(assembly, observers)
         write_run(result, directory)
     except (CosimError, KeyboardInterrupt) as error:
-        assembly.free()
         _keep(getattr(error, "result", None), directory)
         raise
     outcomes = checks(assembly, result)

@@ -97,6 +97,48 @@ def test_a_failing_kpi_loses_nothing(tmp_path):
     assert len((tmp_path / "runs/small/result.csv").read_text().splitlines()) == 5
 
 
+FREED = """
+from pathlib import Path
+
+from cosim.component import Component
+from cosim.errors import ComponentError
+
+
+class Once(Component):
+    binds_everything = has_state = False
+    variables = ()
+
+    def __init__(self, instance_name): ...
+    def enter_initialization_mode(self, start_time, stop_time): ...
+    def exit_initialization_mode(self): ...
+    def bind(self, inputs, outputs): ...
+    def set_inputs(self): ...
+    def get_outputs(self): ...
+    def set(self, name, value): ...
+    def get(self, name): ...
+    def get_state(self): ...
+    def set_state(self, state): ...
+    def free_state(self, state): ...
+    def terminate(self): ...
+
+    def do_step(self, time, step_size):
+        raise ComponentError("a", "do_step", "no more", time)
+
+    def free(self):
+        with Path("freed").open("a") as file:
+            file.write("x")
+"""
+
+
+@pytest.mark.parametrize("output", ["out", "once.py/out"], ids=["failing", "unwritable"])
+def test_components_are_freed_exactly_once(tmp_path, output):
+    (tmp_path / "once.py").write_text(FREED)
+    file = scenario(tmp_path, components={"a": {"python": "once.py:Once"}}, record={"signals": []})
+    done = cosim("run", file, "--output-dir", output, cwd=tmp_path)
+    assert done.returncode == (1 if output == "out" else 2), done.stderr
+    assert (tmp_path / "freed").read_text() == "x"
+
+
 def test_a_refused_scenario_ends_with_two_one_line_per_problem(tmp_path):
     done = cosim("run", scenario(tmp_path, colour="red", stop_time=2.5), cwd=tmp_path)
     assert done.returncode == 2

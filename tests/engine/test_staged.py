@@ -92,6 +92,11 @@ def test_a_delay_counts_macro_steps_for_slow_readers_too():
     assert run(built, 6, 1, ["b.y"]).columns["b.y"].tolist() == [0, 0, 0, 2, 2, 4, 4]
 
 
+def test_a_delay_inside_a_group_counts_each_macro_step_once():
+    built = system({"a": counter(), "b": gain()}, "a.y >2 b.u", [(Group("g", (("a",), ("b",))),)])
+    assert run(built, 5, 1, ["b.y"]).columns["b.y"].tolist() == [0, 0, 0, 1, 2, 3]
+
+
 def test_units_are_converted_on_the_way():
     source = Fake(outputs("y", unit=parse("deg")), lambda values, t, h: None, start={"y": 180.0})
     sink = Fake([*inputs("u", unit=parse("rad")), *outputs("y")], lambda v, t, h: v.update(y=v["u"]), start={})

@@ -99,11 +99,13 @@ def test_rows_until_a_failure_are_kept(probe):
     assert outcome.recording.time.tolist() == [0, 0.01, 0.02, 0.03]
 
 
-def test_after_fatal_not_even_free_is_called(probes):
-    built = system(copies(probes[2], "a"), start_values={"a": {"fail_time": 0.0, "fail_status": 4}})
-    with pytest.raises(ComponentError, match=r"status 4 \(fatal\)"):
+@pytest.mark.parametrize(("status", "freed"), [(3, True), (4, False)], ids=["error", "fatal"])
+def test_after_fatal_not_even_free_is_called(probes, caplog, status, freed):
+    start = {"fail_time": 0.0, "fail_status": status, "i_in": 9}
+    built = system(copies(probes[2], "a"), start_values={"a": start})
+    with caplog.at_level(logging.INFO, "cosim"), pytest.raises(ComponentError, match=f"status {status}"):
         run(built, 1, 0.01)
-    assert built.components["a"]._dead
+    assert ("a: freed" in caplog.messages) is freed
 
 
 def test_an_fmu_may_end_the_simulation(probe):
