@@ -1,9 +1,13 @@
-"""Puts scenarios, FMUs, plant and controller sources into the wheel, as cosim/_bundle/ in the layout of the checkout."""
+"""What pyproject.toml cannot say: the optional native executor, and the bundle.
+
+The wheel carries scenarios, FMUs, plant and controller sources as cosim/_bundle/ in the layout of the checkout.
+"""
 
 import shutil
+import sys
 from pathlib import Path
 
-from setuptools import setup
+from setuptools import Extension, setup
 from setuptools.command.build_py import build_py
 
 BUNDLED = ("controllers", "fmus", "plant_src", "scenarios")
@@ -21,4 +25,16 @@ class BuildWithBundle(build_py):
             shutil.copytree(name, target, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
 
 
-setup(cmdclass={"build_py": BuildWithBundle})
+def native_executor() -> Extension:
+    """Optional: without a C compiler cosim installs all the same and runs the pure Python executor."""
+    flags = [] if sys.platform == "win32" else ["-std=c11", "-O2", "-ffp-contract=off"]
+    return Extension(
+        "cosim.engine._native", ["cosim/engine/_native.c"], extra_compile_args=flags, py_limited_api=True, optional=True
+    )
+
+
+setup(
+    cmdclass={"build_py": BuildWithBundle},
+    ext_modules=[native_executor()],
+    options={"bdist_wheel": {"py_limited_api": "cp311"}},
+)

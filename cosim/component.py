@@ -89,12 +89,46 @@ class StepResult(NamedTuple):
     terminate_requested: bool = False
 
 
+class Access(NamedTuple):
+    """A get or set of FMI in C: addresses of function, instance, value references and values, and how many there are."""
+
+    version: int
+    function: int
+    instance: int
+    references: int
+    count: int
+    values: int
+    size: int
+
+
+class DoStep(NamedTuple):
+    """A doStep of FMI in C; `flags` is where FMI 3.0 says event needed, terminate and early return, `reached` where how far."""
+
+    version: int
+    function: int
+    instance: int
+    step_size: float
+    flags: int = 0
+    reached: int = 0
+
+
+class Flags(NamedTuple):
+    """A look at the flags of a doStep: discard (2) when one of them is set."""
+
+    flags: int
+
+
 class Call(NamedTuple):
-    """A call made ready beforehand: a function that returns an FMI status (0 OK, 1 warning), and its arguments."""
+    """A call made ready beforehand: a function that returns an FMI status (0 OK, 1 warning), and its arguments.
+
+    `native` is the same call for an executor in C, `kept` what has to live as long as the call.
+    """
 
     function: Callable[..., int]
     arguments: tuple[Any, ...]
     name: str
+    native: Access | DoStep | Flags | None = None
+    kept: tuple[Any, ...] = ()
 
 
 class Ports(NamedTuple):

@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import Any
 
 from .component import Component
-from .engine import Executor, Recorder, Termination, compile_plan
+from .engine import Executor, Kind, Recorder, Termination, compile_plan, executor_kind
 from .errors import InputError, Problem
 from .recording import Recording
 from .system import Endpoint, System
@@ -34,7 +34,10 @@ class Event:
 
 @dataclass(frozen=True)
 class Settings:
-    """When and how a system is simulated; times in seconds, exact. `columns` maps recorded names to outputs."""
+    """When and how a system is simulated; times in seconds, exact. `columns` maps recorded names to outputs.
+
+    `finite`: a connected output that is not finite ends the run.
+    """
 
     start_time: Fraction
     stop_time: Fraction
@@ -42,6 +45,8 @@ class Settings:
     columns: Mapping[str, Endpoint] = field(default_factory=dict)
     record_interval: Fraction | None = None
     events: Sequence[Event] = ()
+    executor: Kind = "auto"
+    finite: bool = True
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,7 @@ def simulate(system: System, settings: Settings, observers: Sequence[Observer] =
         grid = Grid.of(settings.start_time, settings.stop_time, settings.step_size)
         plan = compile_plan(system, grid, settings.columns.values())
         recorder = Recorder(plan, settings.columns, int((settings.record_interval or grid.step) / grid.step))
-        executor = Executor(plan, recorder)
+        executor = executor_kind(settings.executor)(plan, recorder, finite=settings.finite)
         events = {grid.index(event.time): [] for event in settings.events}  # type: dict[int, list[Event]]
         for event in settings.events:
             events[grid.index(event.time)].append(event)

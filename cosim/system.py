@@ -153,6 +153,8 @@ def _converts(source: Variable, target: Variable) -> bool:
     integral = INTEGERS | {"Enumeration"}
     if target.type in FLOATS:
         return source.type in FLOATS | integral
-    if target.type == "Enumeration" or source.type == "Enumeration":
-        return {source.type, target.type} <= integral
+    if source.type == "Enumeration":  # its values are small, whatever their type
+        return target.type in ("Int32", "Int64")
+    if target.type == "Enumeration":
+        return source.type in INTEGERS - {"UInt64"}
     return {source.type, target.type} <= INTEGERS and bool(np.can_cast(source.dtype, target.dtype, "safe"))

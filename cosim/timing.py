@@ -6,6 +6,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import lcm
 
+import numpy as np
+
+#: integers up to this one are exact as floats
+_EXACT = 2**53
+
 
 def exact(value: float | int | str | Fraction) -> Fraction:
     """The number a person wrote: 0.01 is 1/100, "1/60" is a sixtieth.
@@ -42,6 +47,21 @@ class Grid:
     def seconds(self, n: int) -> float:
         """Time of communication point n: correctly rounded, whatever n is."""
         return (self._origin + n * self._stride) / self._denominator
+
+    def times(self, points: range) -> np.ndarray:
+        """Times of many communication points, shape (points,): the same numbers that `seconds` gives."""
+        if not self.formula(points.stop):
+            return np.array([self.seconds(n) for n in points], np.float64)
+        n = np.arange(points.start, points.stop, points.step, dtype=np.int64)
+        return (self._origin + n * self._stride) / self._denominator
+
+    def formula(self, last: int) -> tuple[float, float, float] | None:
+        """(origin, stride, denominator): n is at (origin + n * stride) / denominator, exact in floats but for the division.
+
+        None when that does not hold for all points until `last`.
+        """
+        largest = max(abs(self._origin), abs(self._origin + last * self._stride), last * self._stride, self._denominator)
+        return (self._origin, self._stride, self._denominator) if largest <= _EXACT else None
 
     def index(self, time: Fraction) -> int:
         """The n whose time is exactly `time`; beyond `count` after the end. Raises ValueError off the grid and before it."""

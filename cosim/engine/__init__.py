@@ -1,7 +1,22 @@
-"""The flat plan of a system and its executor."""
+"""The flat plan of a system and its executors."""
 
-from .executor import Executor, Termination
+from typing import Literal
+
+from .executor import Executor, PythonExecutor, Termination
+from .native import NativeExecutor, available
 from .plan import Plan, compile_plan
 from .recorder import Recorder
 
-__all__ = ["Executor", "Plan", "Recorder", "Termination", "compile_plan"]
+Kind = Literal["auto", "native", "python"]
+
+EXECUTORS: dict[str, type[Executor]] = {"native": NativeExecutor, "python": PythonExecutor}
+
+
+def executor_kind(kind: Kind) -> type[Executor]:
+    """The executor of that kind; "auto" is the native one where it was built. Raises ValueError where it was not."""
+    if kind == "native" and not available():
+        raise ValueError("the native executor was not built: install cosim where a C compiler is found")
+    return EXECUTORS["python" if kind == "auto" and not available() else "native" if kind == "auto" else kind]
+
+
+__all__ = ["EXECUTORS", "Executor", "Kind", "Plan", "Recorder", "Termination", "available", "compile_plan", "executor_kind"]

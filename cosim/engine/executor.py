@@ -1,26 +1,33 @@
-"""The pure Python executor of a plan."""
+"""Runs a plan: from fresh components through initialization, macro step by macro step.
+
+There are two executors with bit-identical results: this module's `PythonExecutor`, always available, and the native one.
+"""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
-from functools import partial
-from typing import Any, NamedTuple
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
 from ..component import Call, Component, Ports, StepResult
 from ..errors import ComponentError
+from .moves import DelayLine, Move, copy
 from .plan import Gather, Plan, Step
 from .recorder import Recorder
-
-Action = Callable[[], object]
 
 #: the highest FMI status that lets a simulation go on
 WARNING = 1
 
-#: up to so many values are faster assigned one by one than by numpy
-FEW = 4
+#: places in the marker: number of the present call, macro steps finished, rows recorded
+CALL, STEPS, ROWS, MARKER_SIZE = 0, 1, 2, 3
+
+#: status of a Python component's turn in a macro step after which the simulation ends
+_TERMINATION = 100
+
+_FLOATS = (np.dtype(np.float64), np.dtype(np.float32))
 
 
 class Termination(NamedTuple):
@@ -30,25 +37,36 @@ class Termination(NamedTuple):
     time: float
 
 
-class _Turn(NamedTuple):
-    """One component's turn as calls that return an FMI status."""
+class Turn(NamedTuple):
+    """One component's turn as calls that return an FMI status; `first` is the number of the first call."""
 
-    divisor: int
-    calls: Sequence[Call]
     step: Step
+    calls: Sequence[Call]
+    first: int
 
 
-class Executor:
-    """Initializes the components of a plan and runs macro steps."""
+class Executor(ABC):
+    """Initializes the components of a plan and runs macro steps.
 
-    def __init__(self, plan: Plan, recorder: Recorder):
+    `marker` (int64) says at any moment, also to another process that shares its memory, which call is being made: see CALL,
+    STEPS and ROWS. With `finite`, a value that is connected somewhere and not finite ends the run.
+    """
+
+    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None, finite: bool = True):
         self.plan, self.recorder = plan, recorder
         self.termination: Termination | None = None
-        #: macro steps finished so far
-        self.finished = 0
+        self.marker = np.zeros(MARKER_SIZE, np.int64) if marker is None else marker
+        self._finite = finite
         self._clock = ctypes.c_double()
-        self._delays = {g: _DelayLine(g) for phase in plan.phases for g in phase.gathers if g.delay}
-        self._phases: list[tuple[list[Action], list[_Turn]]] = []
+        self._delays = {g: DelayLine(g) for phase in plan.phases for g in phase.gathers if g.delay}
+        self._turns: list[Turn] = []
+
+    @property
+    def finished(self) -> int:
+        """Macro steps finished so far."""
+        return int(self.marker[STEPS])
+
+    # -- initialization ------------------------------------------------------------------------------------------------
 
     def initialize(self) -> None:
         """From fresh components to the initial outputs at the start time, recorded as row 0.
@@ -57,6 +75,7 @@ class Executor:
         """
         plan, grid = self.plan, self.plan.grid
         start, stop = grid.seconds(0), grid.seconds(grid.count)
+        self._clock.value = start
         for name, component in plan.system.components.items():
             component.bind(plan.inputs.ports[name], plan.signals.ports[name])
             for variable, value in plan.system.start_values.get(name, {}).items():
@@ -71,14 +90,14 @@ class Executor:
             component.get_outputs()
         for line in self._delays.values():
             line.fill()
-        self._phases = [
-            ([self._move(gather) for gather in phase.gathers], [self._turn(step) for step in phase.steps])
-            for phase in plan.phases
-        ]
+        self._check_finite("exit_initialization_mode")
+        self._turns = list(self._number(step for phase in plan.phases for step in phase.steps))
+        self._prepare()
         self.recorder.record(0)
+        self.marker[ROWS] = self.recorder.rows
 
     def _propagate(self, time: float) -> None:
-        moves = [_copy(gather) for phase in self.plan.phases for gather in phase.gathers]
+        moves = [copy(gather) for phase in self.plan.phases for gather in phase.gathers]
         components = self.plan.system.components
         before = self._snapshot()
         for _ in range(len(components) + 1):
@@ -100,12 +119,15 @@ class Executor:
             for name, ports in self.plan.signals.ports.items()
         }
 
-    def _move(self, gather: Gather) -> Action:
-        return self._delays[gather].move if gather.delay else _copy(gather)
+    # -- turns ---------------------------------------------------------------------------------------------------------
 
-    def _turn(self, step: Step) -> _Turn:
-        calls = step.component.turn(self._clock, step.step_size)
-        return _Turn(step.divisor, calls or [Call(self._python_turn, (step,), "do_step")], step)
+    def _number(self, steps: Iterator[Step]) -> Iterator[Turn]:
+        first = 0
+        for step in steps:
+            calls = step.component.turn(self._clock, step.step_size)
+            calls = calls or [Call(self._python_turn, (step,), "do_step")]
+            yield Turn(step, calls, first)
+            first += len(calls)
 
     def _python_turn(self, step: Step) -> int:
         component = step.component
@@ -114,29 +136,22 @@ class Executor:
         if result is not None:
             self._ended_early(step, result)
         component.get_outputs()
-        return 0
+        return _TERMINATION if self.termination else 0
 
-    def run(self, end: int) -> None:
-        """Macro steps until communication point `end` is reached, or a component asks to terminate."""
-        seconds, phases, record, clock = self.plan.grid.seconds, self._phases, self.recorder.record, self._clock
-        warning = WARNING
-        for n in range(self.finished, end):
-            clock.value = seconds(n)
-            for moves, turns in phases:
-                for move in moves:
-                    move()
-                for divisor, calls, step in turns:
-                    if divisor != 1 and n % divisor:
-                        continue
-                    for function, arguments, name in calls:
-                        status = function(*arguments)
-                        if status > warning:
-                            self._ended_early(step, step.component.failed(name, status))
-                            break
-            self.finished = n + 1
-            record(n + 1)
-            if self.termination:
-                return
+    @property
+    def calls(self) -> list[tuple[str, str]]:
+        """(component, function) of every call, by the number that stands in the marker."""
+        return [(turn.step.name, call.name) for turn in self._turns for call in turn.calls]
+
+    def _turn_of(self, number: int) -> tuple[Turn, Call]:
+        turn = next(turn for turn in reversed(self._turns) if turn.first <= number)
+        return turn, turn.calls[number - turn.first]
+
+    # -- what may happen in a step -------------------------------------------------------------------------------------
+
+    def _bad_status(self, turn: Turn, call: Call, status: int) -> None:
+        if status != _TERMINATION:
+            self._ended_early(turn.step, turn.step.component.failed(call.name, status))
 
     def _ended_early(self, step: Step, result: StepResult) -> None:
         time = self._clock.value
@@ -146,6 +161,92 @@ class Executor:
             reached = f"reached only t = {result.time_reached!r} s of {time + step.step_size!r} s"
             raise ComponentError(step.name, "do_step", f"{reached}; staged stepping needs whole steps", time)
 
+    def _float_state_changed(self, turn: Turn, call: Call) -> NoReturn:
+        reason = "changed the floating-point mode (rounding, flush to zero or traps) and did not restore it"
+        raise ComponentError(turn.step.name, call.name, reason, self._clock.value)
+
+    def _check_finite(self, function: str = "do_step") -> None:
+        """Raises ComponentError when an output that feeds something is not finite."""
+        if not self._finite:
+            return
+        for connection in self.plan.system.connections:
+            slot = self.plan.signals.places[connection.source]
+            if slot.dtype in _FLOATS and not np.isfinite(value := self.plan.signals.arrays[slot.dtype][slot.offset]):
+                output = f'the output "{connection.source.slot}" is {value}, and {connection.target} reads it'
+                raise ComponentError(connection.source.component, function, output, self._clock.value)
+
+    @property
+    def watched(self) -> list[np.ndarray]:
+        """Arrays to look at after each macro step: when a value in them is not finite, `_check_finite` decides."""
+        arrays = self.plan.signals.arrays
+        return [arrays[dtype] for dtype in _FLOATS if dtype in arrays and self._finite]
+
+    # -- macro steps ---------------------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def _prepare(self) -> None:
+        """Make everything ready for `run`, after initialization."""
+
+    def run(self, end: int) -> None:
+        """Macro steps until communication point `end` is reached, or a component asks to terminate."""
+        try:
+            self._run(end)
+        except ComponentError:
+            self._check_finite()  # more likely the cause than what failed upon it
+            raise
+
+    @abstractmethod
+    def _run(self, end: int) -> None: ...
+
+
+class PythonExecutor(Executor):
+    """The executor that needs no compiler: C functions are called through ctypes."""
+
+    def _prepare(self) -> None:
+        turns = iter(self._turns)
+        self._phases = [
+            ([self._move(gather) for gather in phase.gathers], [self._numbered(next(turns)) for _ in phase.steps])
+            for phase in self.plan.phases
+        ]
+        self._watched = [(floats, np.zeros_like(floats)) for floats in self.watched]
+
+    def _move(self, gather: Gather) -> Move:
+        return self._delays[gather].move if gather.delay else copy(gather)
+
+    @staticmethod
+    def _numbered(turn: Turn) -> tuple[int, list[tuple[Any, Any, int]], Turn]:
+        return (turn.step.divisor, [(c.function, c.arguments, turn.first + i) for i, c in enumerate(turn.calls)], turn)
+
+    def _run(self, end: int) -> None:
+        seconds, phases, record, clock = self.plan.grid.seconds, self._phases, self.recorder.record, self._clock
+        marker, recorder, warning = self.marker.data, self.recorder, WARNING
+        watched = self._watched
+        # equal in the default rounding mode only, and the least denormal is no zero only if it is not flushed
+        one, little, least = 1.0, 2.0**-54, 5e-324
+        for n in range(self.finished, end):
+            clock.value = seconds(n)
+            for moves, turns in phases:
+                for move in moves:
+                    move()
+                for divisor, calls, turn in turns:
+                    if divisor != 1 and n % divisor:
+                        continue
+                    for function, arguments, number in calls:
+                        marker[CALL] = number
+                        status = function(*arguments)
+                        if status > warning:
+                            self._bad_status(turn, turn.calls[number - turn.first], status)
+                            break
+                    if one + little != one - little or not least + least:
+                        self._float_state_changed(turn, turn.calls[-1])
+            for floats, zeros in watched:
+                if floats.dot(zeros):  # NaN unless all are finite
+                    self._check_finite()
+            record(n + 1)
+            marker[ROWS], marker[STEPS] = recorder.rows, n + 1
+            if self.termination:
+                return
+
 
 def _take_start_values(component: Component, ports: Ports) -> None:
     """Fill the bound inputs with the component's own values, which those keep that no connection feeds."""
@@ -154,46 +255,3 @@ def _take_start_values(component: Component, ports: Ports) -> None:
         begin = filled[variable.dtype]
         filled[variable.dtype] += len(variable.slots)
         ports.arrays[variable.dtype][begin : filled[variable.dtype]] = component.get(variable.name)
-
-
-def _copy(gather: Gather) -> Action:
-    """The gather, its delay left aside, as one call that allocates as little as numpy allows."""
-    first, count = int(gather.target_indices[0]), len(gather.target_indices)
-    together = np.array_equal(gather.target_indices, np.arange(first, first + count))
-    if count <= FEW and gather.factor is None and not gather.source.dtype.hasobject:
-        places = list(zip(gather.target_indices.tolist(), gather.source_indices.tolist(), strict=True))
-        return partial(_assign, gather.target.data, gather.source.data, places)
-    if gather.factor is not None or gather.source.dtype != gather.target.dtype or not together:
-        return partial(_scatter, gather, gather.source, gather.source_indices)
-    return partial(gather.source.take, gather.source_indices, None, gather.target[first : first + count], "clip")
-
-
-def _assign(target: memoryview, source: memoryview, places: Sequence[tuple[int, int]]) -> None:
-    for i, j in places:
-        target[i] = source[j]
-
-
-def _scatter(gather: Gather, source: np.ndarray, indices: np.ndarray) -> None:
-    values: Any = source[indices]
-    if gather.factor is not None:
-        values = gather.factor * values + gather.offset
-    gather.target[gather.target_indices] = values
-
-
-class _DelayLine:
-    """A gather whose values arrive `delay` macro steps late; until then the initial outputs do."""
-
-    def __init__(self, gather: Gather):
-        self._gather = gather
-        self._ring = np.empty((gather.delay, len(gather.source_indices)), gather.source.dtype)
-        self._oldest = 0
-        self._all = np.arange(len(gather.source_indices))
-
-    def fill(self) -> None:
-        self._ring[:] = self._gather.source[self._gather.source_indices]
-
-    def move(self) -> None:
-        oldest = self._ring[self._oldest]
-        _scatter(self._gather, oldest, self._all)
-        oldest[:] = self._gather.source[self._gather.source_indices]
-        self._oldest = (self._oldest + 1) % len(self._ring)

@@ -1,9 +1,9 @@
-"""Where values lie: one array per dtype for all components, each component's values in one piece of it."""
+"""Where values lie: one block of memory for all components, in it one array per dtype, in that a piece per component."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -13,6 +13,9 @@ from ..component import Ports, Variable
 from ..system import Endpoint
 
 Dtype = np.dtype[Any]
+
+#: every array begins at a multiple of this many bytes
+ALIGNMENT = 64
 
 
 class Slot(NamedTuple):
@@ -24,11 +27,20 @@ class Slot(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """The arrays, each component's part of them, and the place of every slot."""
+    """The arrays, each component's part of them, and the place of every slot.
 
+    `block` is the memory (bytes) that all arrays of numbers share; texts and binaries are objects in an array of their own.
+    """
+
+    block: np.ndarray
     arrays: Mapping[Dtype, np.ndarray]
     ports: Mapping[str, Ports]
     places: Mapping[Endpoint, Slot]
+
+    def position(self, slot: Slot) -> int:
+        """Where the value of a number begins in the block, in bytes."""
+        begin = self.arrays[slot.dtype].ctypes.data - self.block.ctypes.data
+        return int(begin + slot.offset * slot.dtype.itemsize)
 
 
 def lay_out(variables: Mapping[str, Sequence[Variable]]) -> Layout:
@@ -43,13 +55,35 @@ def lay_out(variables: Mapping[str, Sequence[Variable]]) -> Layout:
                 places[Endpoint(name, slot)] = Slot(dtype, extents[dtype])
                 extents[dtype] += 1
             parts[name][dtype] = slice(first, extents[dtype])
-    arrays = {dtype: _blank(dtype, extent) for dtype, extent in extents.items()}
+    block, arrays = _allocate(extents)
     ports = {
         name: Ports(tuple(owned), {dtype: arrays[dtype][part] for dtype, part in parts[name].items()})
         for name, owned in variables.items()
     }
-    return Layout(arrays, ports, places)
+    return Layout(block, arrays, ports, places)
 
 
-def _blank(dtype: Dtype, size: int) -> np.ndarray:
-    return np.full(size, "", dtype) if dtype.hasobject else np.zeros(size, dtype)
+def _allocate(extents: Mapping[Dtype, int]) -> tuple[np.ndarray, dict[Dtype, np.ndarray]]:
+    """The block and its arrays, the widest dtype first; all numbers are zero, all objects empty texts."""
+    numbers = sorted((dtype for dtype in extents if not dtype.hasobject), key=lambda dtype: -dtype.itemsize)
+    sizes = {dtype: _rounded_up(extents[dtype] * dtype.itemsize) for dtype in numbers}
+    block = _aligned(sum(sizes.values()))
+    arrays, begin = {}, 0
+    for dtype in numbers:
+        arrays[dtype] = block[begin : begin + extents[dtype] * dtype.itemsize].view(dtype)
+        begin += sizes[dtype]
+    return block, arrays | _objects(extents.items())
+
+
+def _objects(extents: Iterable[tuple[Dtype, int]]) -> dict[Dtype, np.ndarray]:
+    return {dtype: np.full(extent, "", dtype) for dtype, extent in extents if dtype.hasobject}
+
+
+def _aligned(size: int) -> np.ndarray:
+    block = np.zeros(size + ALIGNMENT, np.uint8)
+    begin = -block.ctypes.data % ALIGNMENT
+    return block[begin : begin + size]
+
+
+def _rounded_up(size: int) -> int:
+    return -(-size // ALIGNMENT) * ALIGNMENT

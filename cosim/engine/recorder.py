@@ -1,78 +1,177 @@
-"""Recording into preallocated blocks: one per dtype, one row per recorded communication point."""
+"""Recording: a row of values at every recorded communication point."""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import groupby
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..recording import Recording
 from ..system import Endpoint
-from .layout import Dtype
+from .layout import Slot
+from .moves import FEW
 from .plan import Plan
+from .rows import FileRows, Rows
+
+
+class Piece(NamedTuple):
+    """Values of one dtype that go into each row: from these places of the signals, to this position in the row (bytes)."""
+
+    source: np.ndarray
+    indices: np.ndarray
+    position: int
 
 
 class Recorder:
-    """Keeps the values of `columns` (recorded name -> output) at every `every`-th communication point."""
+    """Keeps the values of `columns` (recorded name -> output) at every `every`-th communication point.
 
-    def __init__(self, plan: Plan, columns: Mapping[str, Endpoint], every: int = 1):
-        self._plan, self._columns, self._every = plan, columns, every
+    A row is the whole block of signals when at least half of it is wanted (one copy of memory), else only what is wanted,
+    packed. With `file` the rows lie in that file. Texts are kept apart, in memory.
+    """
+
+    def __init__(self, plan: Plan, columns: Mapping[str, Endpoint], every: int = 1, file: Path | None = None):
+        self._plan, self._columns, self.every = plan, columns, every
+        self._places = {name: plan.signals.places[endpoint] for name, endpoint in columns.items()}
+        slots = sorted({slot for slot in self._places.values() if not slot.dtype.hasobject}, key=_order)
+        #: the whole block of signals is a row
+        self.whole = 2 * sum(slot.dtype.itemsize for slot in slots) >= plan.signals.block.nbytes > 0
+        #: what a row consists of otherwise
+        self.pieces: Sequence[Piece] = () if self.whole else list(self._pack(slots))
+        dtype, expected = self._row_dtype(slots), plan.grid.count // every + 1
+        self.store = FileRows(dtype, expected, file) if file else Rows(dtype, expected)
+        #: rows recorded so far
         self.rows = 0
-        self._capacity = plan.grid.count // every + 1
-        wanted: dict[Dtype, dict[str, int]] = defaultdict(dict)
-        for name, endpoint in columns.items():
-            slot = plan.signals.places[endpoint]
-            wanted[slot.dtype][name] = slot.offset
-        self._blocks: dict[Dtype, np.ndarray] = {}
-        #: dtype -> name -> column in the block
-        self._places: dict[Dtype, Mapping[str, int]] = {}
-        self._keeps = [self._keep(dtype, offsets) for dtype, offsets in wanted.items()]
+        self._texts = {name: _Texts(plan.signals.arrays[slot.dtype], slot.offset) for name, slot in self._texts_of().items()}
+        self._keeps: Sequence[Callable[[int], object]] = ()
+        #: rows that still fit into the present chunk, and the chunk's memory
+        self.room, self.chunk = 0, np.zeros(0, np.uint8)
 
-    def _keep(self, dtype: Dtype, offsets: Mapping[str, int]) -> Callable[[int], object]:
-        """Lay out the block of a dtype; returns the function that keeps a row.
+    def _texts_of(self) -> dict[str, Slot]:
+        return {name: slot for name, slot in self._places.items() if slot.dtype.hasobject}
 
-        A row is all signals when at least half of them are wanted (one copy of memory), else only the wanted ones.
-        """
-        signals = self._plan.signals.arrays[dtype]
-        chosen = sorted(set(offsets.values()))
-        whole = not dtype.hasobject and 2 * len(chosen) >= len(signals)
-        width = len(signals) if whole else len(chosen)
-        self._places[dtype] = offsets if whole else {name: chosen.index(offset) for name, offset in offsets.items()}
-        block = self._blocks[dtype] = np.empty((self._capacity, width), dtype)
-        if whole:
-            return partial(_copy, block.data.cast("B"), signals.data.cast("B"))
-        return partial(_choose, block, signals, np.array(chosen, np.intp))
+    def _pack(self, slots: Sequence[Slot]) -> Iterator[Piece]:
+        position = 0
+        for dtype, alike in groupby(slots, lambda slot: slot.dtype):
+            offsets = np.array([slot.offset for slot in alike], np.intp)
+            yield Piece(self._plan.signals.arrays[dtype], offsets, position)
+            position += len(offsets) * dtype.itemsize
+
+    def _row_dtype(self, slots: Sequence[Slot]) -> np.dtype[Any]:
+        """The row as a structured dtype with the recorded names as fields; two names of one signal share their memory."""
+        signals = self._plan.signals
+        if self.whole:
+            positions = {slot: signals.position(slot) for slot in slots}
+        else:
+            ends = np.cumsum([0, *(slot.dtype.itemsize for slot in slots)]).tolist()
+            positions = dict(zip(slots, ends, strict=False))
+        size = signals.block.nbytes if self.whole else -(-sum(slot.dtype.itemsize for slot in slots) // 8) * 8
+        fields = {name: slot for name, slot in self._places.items() if not slot.dtype.hasobject}
+        return np.dtype(
+            {
+                "names": list(fields),
+                "formats": [slot.dtype for slot in fields.values()],
+                "offsets": [positions[slot] for slot in fields.values()],
+                "itemsize": size,
+            }
+        )
+
+    def extend(self) -> None:
+        """A new chunk, when the present one is full."""
+        chunk = self.store.extend()
+        self.room, self.chunk = len(chunk), chunk.view(np.uint8) if chunk.dtype.itemsize else np.zeros(0, np.uint8)
+        size, first = self.store.dtype.itemsize, self.rows
+        if self.whole:
+            self._keeps = [partial(_copy, self.chunk.data, self._plan.signals.block.data, size, first)]
+        else:
+            self._keeps = [_keep(self.chunk, size, piece, first) for piece in self.pieces]
 
     def record(self, n: int) -> None:
         """Keep the present values as those of communication point n, if it is one to be recorded."""
-        if n % self._every:
+        if n % self.every:
             return
+        if not self.room:
+            self.extend()
+        row = self.rows
         for keep in self._keeps:
-            keep(self.rows)
-        self.rows += 1
+            keep(row)
+        for text in self._texts.values():
+            text.keep(row)
+        self.rows, self.room = row + 1, self.room - 1
+
+    def advance(self, rows: int) -> None:
+        """Rows until this number were put into the chunk by someone else."""
+        self.room -= rows - self.rows
+        self.rows = rows
+
+    @property
+    def used(self) -> int:
+        """Bytes of the present chunk that are in use."""
+        return len(self.chunk) - self.room * self.store.dtype.itemsize
+
+    @property
+    def needs_python(self) -> bool:
+        """Rows are more than copies of memory: there are texts."""
+        return bool(self._texts)
 
     def recording(self) -> Recording:
         """Everything recorded so far; columns in the order they were asked for."""
-        columns = {
-            name: self._blocks[dtype][: self.rows, place]
-            for dtype, places in self._places.items()
-            for name, place in places.items()
-        }
+        rows = self.store.first(self.rows)
         variables = {name: self._plan.system.place(endpoint).variable for name, endpoint in self._columns.items()}
-        booleans = {name for name, variable in variables.items() if variable.type == "Boolean"}
-        return Recording(
-            np.array([self._plan.grid.seconds(row * self._every) for row in range(self.rows)]),
-            {name: columns[name].astype(bool) if name in booleans else columns[name] for name in self._columns},
-            {name: variable.unit.name if variable.unit else "" for name, variable in variables.items()},
-        )
+        columns: dict[str, np.ndarray] = {}
+        for name, variable in variables.items():
+            values = self._texts[name].column(self.rows) if name in self._texts else rows[name]
+            columns[name] = values.astype(bool) if variable.type == "Boolean" else values
+        time = self._plan.grid.times(range(0, self.rows * self.every, self.every))
+        return Recording(time, columns, {name: v.unit.name if v.unit else "" for name, v in variables.items()})
 
 
-def _copy(block: memoryview, signals: memoryview, row: int) -> None:
-    size = len(signals)
-    block[row * size : row * size + size] = signals
+def _order(slot: Slot) -> tuple[int, str, int]:
+    """The widest first, so that every value of a packed row is aligned."""
+    return -slot.dtype.itemsize, slot.dtype.str, slot.offset
 
 
-def _choose(block: np.ndarray, signals: np.ndarray, indices: np.ndarray, row: int) -> None:
-    signals.take(indices, None, block[row], "clip")
+def _copy(chunk: memoryview, block: memoryview, size: int, first: int, row: int) -> None:
+    begin = (row - first) * size
+    chunk[begin : begin + size] = block
+
+
+def _keep(chunk: np.ndarray, size: int, piece: Piece, first: int) -> Callable[[int], object]:
+    """The function that puts a piece into a row of the chunk whose first row is `first`."""
+    source, indices, position = piece
+    shape, strides = (len(chunk) // size, len(indices)), (size, source.itemsize)
+    cells = np.ndarray(shape, source.dtype, chunk.data, position, strides)
+    if len(indices) <= FEW:
+        return partial(_assign, cells.data, source.data, list(enumerate(indices.tolist())), first)
+    return partial(_choose, cells, source, indices, first)
+
+
+def _choose(cells: np.ndarray, source: np.ndarray, indices: np.ndarray, first: int, row: int) -> None:
+    source.take(indices, None, cells[row - first], "clip")
+
+
+def _assign(cells: memoryview, source: memoryview, places: Sequence[tuple[int, int]], first: int, row: int) -> None:
+    for i, j in places:
+        cells[row - first, i] = source[j]
+
+
+class _Texts:
+    """A column of texts or binaries, kept as its changes."""
+
+    def __init__(self, values: np.ndarray, place: int):
+        self._values, self._place = values, place
+        self._changes: list[tuple[int, Any]] = []
+
+    def keep(self, row: int) -> None:
+        value = self._values[self._place]
+        if not self._changes or self._changes[-1][1] != value:
+            self._changes.append((row, value))
+
+    def column(self, rows: int) -> np.ndarray:
+        values = np.empty(rows, object)
+        for row, value in self._changes:
+            values[row:] = value
+        return values

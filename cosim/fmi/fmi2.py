@@ -5,11 +5,9 @@ from __future__ import annotations
 import ctypes
 from typing import Any
 
-import numpy as np
-
-from ..component import Call, StepResult
+from ..component import Call, DoStep, StepResult
 from ..errors import ComponentError
-from .instance import DISCARD, FmuInstance, pointer
+from .instance import DISCARD, POINTER, FmuInstance, address
 
 _LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3
 
@@ -17,7 +15,7 @@ _LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3
 class Fmi2Instance(FmuInstance):
     """An instance of an FMI 2.0 FMU."""
 
-    prefix = "fmi2"
+    prefix, major = "fmi2", 2
     accessors = {"Float64": "Real", "Int32": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
 
     def _slave(self, **arguments: Any) -> Any:
@@ -38,16 +36,15 @@ class Fmi2Instance(FmuInstance):
         except Exception:
             raise ComponentError(self.name, "fmi2Instantiate", self._message or "the FMU gave no reason") from None
 
-    def _access_arguments(self, references: Any, count: int, values: np.ndarray) -> tuple[Any, ...]:
-        return references, ctypes.c_size_t(count), pointer(values)
-
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
         self._clock.value = start_time
         self.call("setupExperiment", None, start_time, stop_time)
         self.call("enterInitializationMode")
 
     def _step_calls(self, step_size: ctypes.c_double) -> list[Call]:
-        return [Call(self._do_step, (self._handle, self._clock, step_size, ctypes.c_int(1)), "fmi2DoStep")]
+        arguments = (POINTER(self._handle), self._clock, step_size, ctypes.c_int.from_param(1))
+        native = DoStep(2, address(self._do_step), self._handle, step_size.value)
+        return [Call(self._do_step, arguments, "fmi2DoStep", native)]
 
     def failed(self, name: str, status: int) -> StepResult:
         """Discard with `terminated` ends the simulation; every other bad status is a failure (FMI 2.0 section 4.2.1)."""

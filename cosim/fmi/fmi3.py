@@ -5,11 +5,9 @@ from __future__ import annotations
 import ctypes
 from typing import Any
 
-import numpy as np
-
-from ..component import DTYPES, Call, StepResult
+from ..component import DTYPES, Call, DoStep, Flags, StepResult
 from ..errors import ComponentError
-from .instance import DISCARD, OK, FmuInstance, pointer
+from .instance import DISCARD, OK, POINTER, FmuInstance, address
 
 _ENDED = "how fmi3DoStep ended"
 
@@ -17,7 +15,7 @@ _ENDED = "how fmi3DoStep ended"
 class Fmi3Instance(FmuInstance):
     """An instance of an FMI 3.0 FMU."""
 
-    prefix = "fmi3"
+    prefix, major = "fmi3", 3
     accessors = {name: name for name in DTYPES} | {"Enumeration": "Int64"}
 
     def _slave(self, **arguments: Any) -> Any:
@@ -32,27 +30,26 @@ class Fmi3Instance(FmuInstance):
             reason = self._message or "the FMU gave no reason"
             raise ComponentError(self.name, "fmi3InstantiateCoSimulation", reason) from None
 
-    def _access_arguments(self, references: Any, count: int, values: np.ndarray) -> tuple[Any, ...]:
-        return references, ctypes.c_size_t(count), pointer(values), ctypes.c_size_t(len(values))
-
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
         self._clock.value = start_time
         self.call("enterInitializationMode", None, start_time, stop_time)
 
     def _step_calls(self, step_size: ctypes.c_double) -> list[Call]:
-        self._event, self._terminate, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
-        self._reached = ctypes.c_double()
-        results = (self._event, self._terminate, self._early, self._reached)
-        arguments = (self._handle, self._clock, step_size, ctypes.c_bool(True), *map(_reference, results))
-        return [Call(self._do_step, arguments, "fmi3DoStep"), Call(self._ended, (), _ENDED)]
+        self._flags, self._reached = (ctypes.c_bool * 3)(), ctypes.c_double()
+        flags, reached = ctypes.addressof(self._flags), ctypes.addressof(self._reached)
+        results = [POINTER(flags + i * ctypes.sizeof(ctypes.c_bool)) for i in range(3)]
+        arguments = (POINTER(self._handle), self._clock, step_size, ctypes.c_bool.from_param(True), *results, POINTER(reached))
+        native = DoStep(3, address(self._do_step), self._handle, step_size.value, flags, reached)
+        kept = (self._flags, self._reached)
+        return [Call(self._do_step, arguments, "fmi3DoStep", native, kept), Call(self._ended, (), _ENDED, Flags(flags), kept)]
 
     def _ended(self) -> int:
-        """Discard stands for a step that is to be looked at: it ended early, met an event or asks to terminate."""
-        return DISCARD if self._terminate or self._early or self._event else OK
+        """Discard stands for a step that is to be looked at: it met an event, asks to terminate or ended early."""
+        return DISCARD if any(self._flags) else OK
 
     def failed(self, name: str, status: int) -> StepResult:
         if name == _ENDED:
-            return StepResult(self._reached.value, self._event.value, self._terminate.value)
+            return StepResult(self._reached.value, self._flags[0], self._flags[1])
         self.fail(name, status)
 
     def get_state(self) -> Any:
@@ -63,7 +60,3 @@ class Fmi3Instance(FmuInstance):
 
     def free_state(self, state: Any) -> None:
         self.call("freeFMUState", state)
-
-
-def _reference(result: Any) -> Any:
-    return ctypes.byref(result)

@@ -15,12 +15,15 @@ from typing import Any, NoReturn
 import numpy as np
 
 from .. import log
-from ..component import Call, Component, Ports, StepResult, Variable
+from ..component import Access, Call, Component, Ports, StepResult, Variable
 from ..errors import ComponentError, InputError
 from .file import FmuFile
 
 STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
+
+#: arguments made beforehand that ctypes passes on as they are: half the price of a call goes into converting others
+POINTER, SIZE = ctypes.c_void_p.from_param, ctypes.c_size_t.from_param
 
 
 class FmuInstance(Component):
@@ -29,6 +32,7 @@ class FmuInstance(Component):
     binds_everything = False
     #: prefix of the C functions
     prefix: str
+    major: int
     #: cosim type -> the part of fmi*Get..., fmi*Set... after Get and Set
     accessors: Mapping[str, str]
 
@@ -53,9 +57,6 @@ class FmuInstance(Component):
     def _instantiate(self) -> None:
         raise NotImplementedError
 
-    def _access_arguments(self, references: Any, count: int, values: np.ndarray) -> tuple[Any, ...]:
-        raise NotImplementedError
-
     def _step_calls(self, step_size: ctypes.c_double) -> list[Call]:
         """doStep from the time in `self._clock`."""
         raise NotImplementedError
@@ -72,7 +73,7 @@ class FmuInstance(Component):
             self._dead = True
             self._file.release()
             raise
-        self._handle = ctypes.c_void_p(self._fmu.component)
+        self._handle: int = self._fmu.component
         self._library = ctypes.PyDLL(None, handle=self._fmu.dll._handle)
         # doStep may take long: it is called without holding the interpreter lock
         self._do_step = ctypes.CDLL(None, handle=self._fmu.dll._handle)[f"{self.prefix}DoStep"]
@@ -182,7 +183,12 @@ class FmuInstance(Component):
         references = (ctypes.c_uint32 * len(variables))(*(self.description.references[v.name] for v in variables))
         bound = self._library[function]
         bound.restype = ctypes.c_int
-        return Call(bound, (self._handle, *self._access_arguments(references, len(variables), values)), function)
+        pointers = (self._handle, ctypes.addressof(references), values.ctypes.data)
+        arguments = (*map(POINTER, pointers[:2]), SIZE(len(variables)), POINTER(pointers[2]))
+        if self.major > 2:
+            arguments += (SIZE(len(values)),)
+        native = Access(self.major, address(bound), *pointers[:2], len(variables), pointers[2], len(values))
+        return Call(bound, arguments, function, native, (references, values))
 
     def turn(self, clock: ctypes.c_double, step_size: float) -> Sequence[Call]:
         self._clock = clock
@@ -199,16 +205,16 @@ class FmuInstance(Component):
         self._make(self._gets)
 
     def _make(self, calls: Sequence[Call]) -> StepResult | None:
-        for function, arguments, name in calls:
-            status = function(*arguments)
+        for call in calls:
+            status = call.function(*call.arguments)
             if status > WARNING:
-                return self.failed(name, status)
+                return self.failed(call.name, status)
         return None
 
     def failed(self, name: str, status: int) -> StepResult:
         self.fail(name, status)
 
 
-def pointer(values: np.ndarray) -> ctypes.c_void_p:
-    """The address of an array's data as an argument that needs no conversion when it is used."""
-    return ctypes.c_void_p(values.ctypes.data)
+def address(function: Any) -> int:
+    """Where a C function lies."""
+    return ctypes.cast(function, ctypes.c_void_p).value or 0

@@ -13,6 +13,8 @@ from cosim.system import Group
 from cosim.timing import exact
 from cosim.units import parse
 
+pytestmark = pytest.mark.usefixtures("executor")
+
 
 def chain(n):
     """Accumulators that count and pass on what they read."""

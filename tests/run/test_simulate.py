@@ -11,6 +11,8 @@ from cosim.errors import ComponentError, InputError
 from cosim.simulate import Event, Settings, simulate
 from cosim.timing import exact
 
+pytestmark = pytest.mark.usefixtures("executor")
+
 
 def settings(stop=3, step=1, record=("a.y",), **more):
     return Settings(Fraction(0), exact(stop), exact(step), {name: end(name) for name in record}, **more)

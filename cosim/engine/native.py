@@ -1,0 +1,157 @@
+"""The native executor: the same plan, laid out for `_native.c`, which runs many macro steps per call."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+
+import numpy as np
+
+from ..component import Access, Call, DoStep, Flags
+from .executor import ROWS, Executor, Turn
+from .moves import copy
+from .plan import Gather
+
+try:
+    from . import _native
+except ImportError:  # installed without a compiler
+    _native = None  # type: ignore[assignment]
+
+#: macro steps per call at most; in the first call, which measures the steps of the components
+BATCH, TRIALS = 1 << 16, 3
+
+#: what is reported beside FMI statuses, as in _native.c
+_FLOAT_STATE_CHANGED, _NOT_FINITE = -1, -2
+
+
+def available() -> bool:
+    """Whether the native executor was built."""
+    return _native is not None
+
+
+class NativeExecutor(Executor):
+    """Runs everything but Python components in C."""
+
+    def _prepare(self) -> None:
+        self._program = _native.Program(ctypes.addressof(self._clock), self.marker.ctypes.data, self._on_status)
+        turns = iter(self._turns)
+        for phase in self.plan.phases:
+            for gather in phase.gathers:
+                self._add_move(gather)
+            for _ in phase.steps:
+                self._add_turn(next(turns))
+        watched = {array.dtype.itemsize: array for array in self.watched}
+        self._program.watch(*(part for size in (8, 4) for part in _extent(watched.get(size, np.zeros(0)))))
+        self._add_recording()
+
+    # -- laying out ----------------------------------------------------------------------------------------------------
+
+    def _add_move(self, gather: Gather) -> None:
+        if gather.source.dtype.hasobject:
+            self._add_object_move(self._delays[gather].move if gather.delay else copy(gather))
+            return
+        first, count = int(gather.target_indices[0]), len(gather.target_indices)
+        together = np.array_equal(gather.target_indices, np.arange(first, first + count))
+        self._program.move(
+            _address(gather.target[first:] if together else gather.target),
+            gather.target.dtype.char.translate(_KINDS),
+            0 if together else _address(gather.target_indices),
+            _address(gather.source),
+            gather.source.dtype.char.translate(_KINDS),
+            _address(gather.source_indices),
+            count,
+            _address(gather.factor),
+            _address(gather.offset),
+            _address(self._delays[gather].ring) if gather.delay else 0,
+            gather.delay,
+        )
+
+    def _add_object_move(self, move: Callable[[], object]) -> None:
+        self._program.begin_turn(1)
+        self._program.python(-1, _succeed, (move,))
+        self._program.end_turn()
+
+    def _add_turn(self, turn: Turn) -> None:
+        self._program.begin_turn(turn.step.divisor)
+        for number, call in enumerate(turn.calls, start=turn.first):
+            self._add_call(number, call)
+        self._program.end_turn()
+
+    def _add_call(self, number: int, call: Call) -> None:
+        program, native = self._program, call.native
+        if isinstance(native, Access):
+            program.access(number, *native)
+        elif isinstance(native, DoStep):
+            (program.step2 if native.version == 2 else program.step3)(number, *native[1:])
+        elif isinstance(native, Flags):
+            program.flags(number, 0, 0, 0.0, native.flags, 0)
+        else:
+            program.python(number, call.function, call.arguments)
+
+    def _add_recording(self) -> None:
+        recorder, block = self.recorder, self.plan.signals.block
+        record = self._record if recorder.needs_python else None
+        self._program.recording(
+            recorder.every, recorder.store.dtype.itemsize, *(_extent(block) if recorder.whole else (0, 0)), record
+        )
+        for source, indices, position in recorder.pieces:
+            self._program.piece(_address(source), _address(indices), len(indices), source.itemsize, position)
+
+    # -- running -------------------------------------------------------------------------------------------------------
+
+    def _run(self, end: int) -> None:
+        formula = self.plan.grid.formula(end)
+        while self.finished < end and not self.termination:
+            first = self.finished
+            count = min(end - first, self._batch(first), self._steps_with_room()) if formula else 1
+            try:
+                self._program.run(first, count, *(formula or (self.plan.grid.seconds(first), 0.0, 1.0)))
+            finally:
+                self.recorder.advance(int(self.marker[ROWS]))
+
+    @staticmethod
+    def _batch(first: int) -> int:
+        return BATCH if first >= TRIALS else TRIALS
+
+    def _steps_with_room(self) -> int:
+        """Macro steps until the present chunk of rows is full; a new chunk when it is full now."""
+        recorder = self.recorder
+        if not recorder.room:
+            recorder.extend()
+        self._program.row(recorder.chunk.ctypes.data + recorder.used)
+        return (recorder.room + 1) * recorder.every - self.finished % recorder.every - 1
+
+    def _record(self, n: int) -> None:
+        self.recorder.record(n)
+        self.marker[ROWS] = self.recorder.rows
+
+    def _on_status(self, number: int, status: int) -> bool:
+        """What a bad status means; returns whether the simulation shall end after this macro step."""
+        if status == _NOT_FINITE:
+            self._check_finite()
+            return False
+        turn, call = self._turn_of(number)
+        if status == _FLOAT_STATE_CHANGED:
+            self._float_state_changed(turn, call)
+        self._bad_status(turn, call, status)
+        return self.termination is not None
+
+
+#: numpy's characters for dtypes -> those of the struct module
+_KINDS = str.maketrans({"l": "q", "L": "Q"})
+
+
+def _address(array: np.ndarray | None) -> int:
+    return 0 if array is None else array.ctypes.data
+
+
+def _extent(array: np.ndarray) -> tuple[int, int]:
+    return array.ctypes.data, len(array)
+
+
+def _succeed(move: Callable[[], object]) -> int:
+    move()
+    return 0
+
+
+__all__ = ["NativeExecutor", "available"]

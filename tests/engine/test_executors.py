@@ -1,0 +1,141 @@
+"""The two executors run the same plan and agree in every bit of every row."""
+
+import random
+import struct
+
+import numpy as np
+import pytest
+from fakes import Fake
+from helpers import end
+
+from cosim.component import DTYPES, Variable
+from cosim.engine import EXECUTORS, available
+from cosim.errors import ComponentError
+from cosim.fmi import FmuFile, instantiate
+from cosim.simulate import Settings, simulate
+from cosim.system import Connection, Endpoint, Group, System, incompatibility
+from cosim.timing import exact
+from cosim.units import parse
+
+pytestmark = pytest.mark.skipif(not available(), reason="the native executor was not built")
+
+NUMBERS = [name for name in DTYPES if name not in ("String", "Binary", "Clock")]
+UNITS = {"rad": parse("rad"), "deg": parse("deg")}
+
+
+def machine(seed):
+    """A component with an input and an output of every type; outputs mix inputs, time and random numbers."""
+    draw = random.Random(seed)  # noqa: S311
+    variables = [
+        Variable(f"{side}_{name}", name, causality, unit=UNITS[draw.choice(["rad", "deg"])] if name == "Float64" else None)
+        for name in [*NUMBERS, "String"]
+        for side, causality in (("u", "input"), ("y", "output"))
+    ]
+
+    def step(values, t, h):
+        for name in NUMBERS:
+            values[f"y_{name}"] = _mixed(name, values[f"u_{name}"], draw)
+        values["y_String"] = values["u_String"][-6:] + draw.choice("abc")
+
+    return Fake(variables, step)
+
+
+def _mixed(name, value, draw):
+    if name.startswith("Float"):
+        return float(np.float32(draw.uniform(-1, 1) + 0.5 * value)) if name == "Float32" else draw.uniform(-1, 1) + 0.5 * value
+    if name == "Boolean":
+        return bool(value) != (draw.random() < 0.5)
+    if name == "Enumeration":
+        return draw.randrange(-100, 100)
+    bits = 8 * DTYPES[name].itemsize
+    return draw.randrange(2**bits) - (0 if name.startswith("U") else 2 ** (bits - 1))
+
+
+def random_system(seed, extra=()):
+    """Machines and FMUs with random connections of all types, delays, periods, stages and groups."""
+    draw = random.Random(seed)  # noqa: S311
+    components = {f"m{i}": machine(100 * seed + i) for i in range(5)} | dict(extra)
+    ends = {
+        causality: [
+            Endpoint(n, s) for n, c in components.items() for v in c.variables if v.causality == causality for s in v.slots
+        ]
+        for causality in ("input", "output")
+    }
+    places = System(components).place
+    connections = []
+    for target in ends["input"]:
+        sources = [e for e in ends["output"] if not incompatibility(places(e).variable, places(target).variable)]
+        if sources and draw.random() < 0.9:
+            connections.append(Connection(draw.choice(sources), target, draw.choice([0, 0, 0, 1, 3])))
+    names = draw.sample(list(components), len(components))
+    stages = ((names[0], Group("g", ((names[1],), (names[2], names[3])))), tuple(names[4:]))
+    periods = {names[1]: exact(0.02), names[4]: exact(0.05)}
+    return System(components, connections, stages, periods), [str(e) for e in ends["output"]]
+
+
+def bits(recording):
+    return {
+        name: [struct.pack("d", x) if isinstance(x, float) else x for x in column.tolist()]
+        for name, column in recording.columns.items()
+    }
+
+
+def recorded(kind, build, share=1.0, interval="1/100"):
+    system, outputs = build()
+    chosen = outputs[: max(1, int(share * len(outputs)))]
+    settings = Settings(exact(0), exact(1), exact(0.01), {n: end(n) for n in chosen}, exact(interval), executor=kind)
+    outcome = simulate(system, settings)
+    assert outcome.failure is None, outcome.failure
+    return bits(outcome.recording)
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize(("share", "interval"), [(1.0, "1/100"), (0.2, "3/100")], ids=["everything", "some"])
+def test_random_systems(seed, share, interval):
+    native, python = (recorded(kind, lambda: random_system(seed), share, interval) for kind in ("native", "python"))
+    assert native == python
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_systems_with_foreign_fmus_of_all_types(seed, probes):
+    def build():
+        files = [FmuFile(path) for path in probes.values()]
+        return random_system(seed, {f"f{i}": instantiate(file, f"f{i}") for i, file in enumerate([*files, *files])})
+
+    assert recorded("native", build) == recorded("python", build)
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_a_value_that_is_not_finite_is_blamed_on_its_source(kind):
+    def step(values, t, h):
+        values["y"] = float("nan") if t > 0.045 else 1.0
+
+    def consume(values, t, h):
+        if values["u"] != values["u"]:
+            raise ComponentError("b", "do_step", "cannot digest this", t)
+
+    def built(*stages):
+        a = Fake([Variable("y", causality="output")], step)
+        b = Fake([Variable("u", causality="input", start=0.0)], consume)
+        return System({"a": a, "b": b}, [Connection(end("a.y"), end("b.u"))], stages)
+
+    for stages in ([("a", "b")], [("a",), ("b",)]):
+        outcome = simulate(built(*stages), Settings(exact(0), exact(1), exact(0.01), {"a.y": end("a.y")}, executor=kind))
+        assert str(outcome.failure) == 'a: do_step failed at t = 0.05 s: the output "y" is nan, and b.u reads it'
+        assert len(outcome.recording.time) == 6
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_values_that_nobody_reads_may_be_anything(kind):
+    source = Fake([Variable("y", causality="output")], lambda v, t, h: v.update(y=float("inf")))
+    outcome = simulate(System({"a": source}, (), (("a",),)), Settings(exact(0), exact(1), exact(0.1), {"a.y": end("a.y")}))
+    assert outcome.failure is None
+    assert np.isinf(outcome.recording.columns["a.y"][1:]).all()
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_many_rows_do_not_fit_into_one_chunk(kind, monkeypatch):
+    monkeypatch.setattr("cosim.engine.rows.CHUNK", 1000)
+    count = Fake([Variable("y", causality="output")], lambda v, t, h: v.update(y=v["y"] + 1), start={"y": 0.0})
+    outcome = simulate(System({"a": count}, (), (("a",),)), Settings(exact(0), exact(10000), exact(1), {"a.y": end("a.y")}))
+    assert outcome.recording.columns["a.y"].tolist() == list(range(10001))
