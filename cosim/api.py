@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from . import __version__
-from .errors import CosimError
+from .errors import ComponentError, CosimError
 from .kpi import CheckOutcome, evaluate_checks, evaluate_kpis
+from .pacer import Late
 from .results import Result
 from .scenario import Assembly, assemble
-from .simulate import Observer, Run, simulate
+from .simulate import Observer, Run, simulation
+from .unfinished import write_metadata
 
 #: packages whose versions can change a result
 _PACKAGES = ("numpy", "scipy", "fmpy", "pybullet", "pybullet-arm64", "pythonfmu")
@@ -28,14 +31,19 @@ def load(
     *,
     stop_time: float | str | None = None,
     step_size: float | str | None = None,
+    real_time: float | None = None,
+    late: Late = "warn",
 ) -> Assembly:
     """A scenario, read, wired and checked, ready to run once.
 
     `scenario` is a path, or the name of a shipped scenario. `parameters` sets variables ("uav.vtol.landing_time") or, by
-    JSON pointer ("/components/plant/arguments/environment/seed"), anything in the file. Raises InputError with all problems.
+    JSON pointer ("/components/plant/arguments/environment/seed"), anything in the file. `real_time` is the number of simulated
+    seconds per second on the wall (None: as fast as possible); with `late="fail"` a run that falls more than one step behind ends
+    with a LateError. Raises InputError with all problems.
     """
     times = {"/stop_time": stop_time, "/step_size": step_size}
-    return assemble(scenario, {**{key: value for key, value in times.items() if value is not None}, **(parameters or {})})
+    assembly = assemble(scenario, {**{key: value for key, value in times.items() if value is not None}, **(parameters or {})})
+    return replace(assembly, settings=replace(assembly.settings, real_time=real_time, late=late))
 
 
 def run(
@@ -44,6 +52,8 @@ def run(
     *,
     stop_time: float | str | None = None,
     step_size: float | str | None = None,
+    real_time: float | None = None,
+    late: Late = "warn",
     observers: Sequence[Observer] = (),
 ) -> Result:
     """Run a scenario in this process (see `load`) and evaluate its KPIs.
@@ -51,24 +61,55 @@ def run(
     Raises InputError when it cannot start. When a component fails while running, the ComponentError carries everything
     recorded until then as its attribute `result`.
     """
-    return execute(load(scenario, parameters, stop_time=stop_time, step_size=step_size), observers)
+    assembly = load(scenario, parameters, stop_time=stop_time, step_size=step_size, real_time=real_time, late=late)
+    return execute(assembly, observers)
+
+
+@dataclass(frozen=True)
+class Execution:
+    """A run that has ended; with a `failure`, `result` holds what was recorded and computed until then."""
+
+    result: Result
+    failure: BaseException | None = None
+
+
+@contextmanager
+def executed(assembly: Assembly, observers: Sequence[Observer] = ()) -> Iterator[Execution]:
+    """Simulate an assembled scenario and evaluate its KPIs; when the block is left, the components are terminated and freed.
+
+    Raises ComponentError at the end when a component fails to terminate.
+    """
+    began = time.perf_counter()
+    metadata = _metadata(assembly)
+    write_metadata(metadata)
+    with simulation(assembly.system, assembly.settings, observers) as outcome:
+        timing = {**_added(assembly.timing, outcome.timing), "simulate_seconds": time.perf_counter() - began}
+        result = Result(outcome.recording, timing=timing, metadata={**metadata, **_ending(outcome)})
+        yield Execution(result, outcome.failure) if outcome.failure else _with_kpis(result, assembly)
 
 
 def execute(assembly: Assembly, observers: Sequence[Observer] = ()) -> Result:
     """Simulate an assembled scenario and evaluate its KPIs; see `run`."""
-    began = time.perf_counter()
-    outcome = simulate(assembly.system, assembly.settings, observers)
-    timing = {"loop_seconds": outcome.loop_seconds, "simulate_seconds": time.perf_counter() - began}
-    metadata = _metadata(assembly, outcome)
-    result = Result(outcome.recording, timing=timing, metadata=metadata)
-    if outcome.failure is not None:
-        outcome.failure.result = result  # type: ignore[attr-defined]
-        raise outcome.failure
-    return _with_kpis(result, assembly)
+    execution = None
+    try:
+        with executed(assembly, observers) as execution:
+            pass
+    except ComponentError as error:  # while terminating
+        if execution:
+            error.result = execution.result  # type: ignore[attr-defined]
+        raise
+    if execution.failure:
+        execution.failure.result = execution.result  # type: ignore[attr-defined]
+        raise execution.failure
+    return execution.result
 
 
-def _with_kpis(result: Result, assembly: Assembly) -> Result:
-    """The result with all KPIs; when some fail, the first error carries the result with the others."""
+def _added(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, float]:
+    return {part: first.get(part, 0.0) + second.get(part, 0.0) for part in {**first, **second}}
+
+
+def _with_kpis(result: Result, assembly: Assembly) -> Execution:
+    """The result with all KPIs; when some fail, the others are there all the same."""
     kpis: dict[str, Any] = {}
     failures: list[BaseException] = []
     for kpi in assembly.kpis():
@@ -76,11 +117,7 @@ def _with_kpis(result: Result, assembly: Assembly) -> Result:
             kpis |= evaluate_kpis(result, [kpi])
         except (CosimError, KeyboardInterrupt) as error:
             failures.append(error)
-    result = replace(result, kpis=kpis)
-    if failures:
-        failures[0].result = result  # type: ignore[attr-defined]
-        raise failures[0]
-    return result
+    return Execution(replace(result, kpis=kpis), failures[0] if failures else None)
 
 
 def checks(assembly: Assembly, result: Result) -> list[CheckOutcome]:
@@ -88,18 +125,26 @@ def checks(assembly: Assembly, result: Result) -> list[CheckOutcome]:
     return evaluate_checks(result.kpis, assembly.checks)
 
 
-def _metadata(assembly: Assembly, outcome: Run) -> dict[str, Any]:
-    termination = outcome.termination
+def _metadata(assembly: Assembly) -> dict[str, Any]:
+    """What describes a run before it has begun."""
     return {
         "name": assembly.spec.name,
         "scenario": assembly.document.value,
         "scenario_file": str(assembly.document.file.resolve()),
-        "macro_steps": outcome.macro_steps,
-        "terminated_by": {"component": termination.component, "time": termination.time} if termination else None,
-        "failure": "interrupted" if isinstance(outcome.failure, KeyboardInterrupt) else _text(outcome.failure),
         "versions": {"cosim": __version__, "python": platform.python_version(), **_versions()},
         "machine": {"system": platform.system(), "machine": platform.machine()},
         "sha256": {name: sha256(file.read_bytes()).hexdigest() for name, file in assembly.files().items()},
+    }
+
+
+def _ending(outcome: Run) -> dict[str, Any]:
+    """How a run has ended."""
+    termination = outcome.termination
+    return {
+        "macro_steps": outcome.macro_steps,
+        "real_time": outcome.real_time,
+        "terminated_by": {"component": termination.component, "time": termination.time} if termination else None,
+        "failure": "interrupted" if isinstance(outcome.failure, KeyboardInterrupt) else _text(outcome.failure),
     }
 
 

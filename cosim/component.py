@@ -96,9 +96,9 @@ class Access(NamedTuple):
     function: int
     instance: int
     references: int
-    count: int
+    reference_count: int
     values: int
-    size: int
+    value_count: int
 
 
 class DoStep(NamedTuple):
@@ -147,6 +147,8 @@ class Component(Protocol):
     variables: Sequence[Variable]
     #: bound with all inputs and outputs, not only with those that are connected or recorded
     binds_everything: bool
+    #: what components have in common that may not step at the same time: the same code, which may have state of its own
+    code: object = None
     #: get_state and set_state work (FMI: canGetAndSetFMUState)
     has_state: bool
 

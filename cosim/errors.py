@@ -3,6 +3,7 @@
 CosimError
 ├── InputError        the user's input is refused: usage, scenario, FMU (exit code 2); carries all problems at once
 ├── ComponentError    a component failed while it ran (exit code 1)
+├── LateError         a real-time run could not keep up (exit code 1)
 └── CheckError        a check, comparison or `build --check` was not met (exit code 3)
 """
 
@@ -58,6 +59,12 @@ class ComponentError(CosimError):
     def __str__(self) -> str:
         when = "" if self.time is None else f" at t = {self.time:.12g} s"
         return f"{self.component}: {self.function} failed{when}: {self.reason}"
+
+
+class LateError(CosimError):
+    """A run that was to keep up with real time did not."""
+
+    exit_code = 1
 
 
 class CheckError(CosimError):

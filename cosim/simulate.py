@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-import time as wall
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass, field
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from math import inf
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from . import log
 from .component import Component
-from .engine import Executor, Kind, Recorder, Termination, compile_plan, executor_kind
-from .errors import InputError, Problem
+from .engine import MARKER_SIZE, Executor, Kind, Recorder, Termination, compile_plan, executor_kind
+from .errors import ComponentError, InputError, Problem
+from .journal import Phase, calling, current, waiting
+from .pacer import Late, Pacer
+from .process_state import contained
 from .recording import Recording
+from .stopwatch import Stopwatch
 from .system import Endpoint, System
 from .timing import Grid
+from .unfinished import ROWS_FILE, write_header
 
 #: called with (finished macro steps, all macro steps); observers only look
 Observer = Callable[[int, int], None]
@@ -36,7 +46,9 @@ class Event:
 class Settings:
     """When and how a system is simulated; times in seconds, exact. `columns` maps recorded names to outputs.
 
-    `finite`: a connected output that is not finite ends the run.
+    `finite`: a connected output that is not finite ends the run. `real_time`: simulated seconds per second on the wall, None for
+    as fast as possible; `late` says what happens when a step is ready more than one step too late.
+    `rows_file`: where the rows are kept while the run goes on; by default in memory, or in a temporary file when they are many.
     """
 
     start_time: Fraction
@@ -47,17 +59,31 @@ class Settings:
     events: Sequence[Event] = ()
     executor: Kind = "auto"
     finite: bool = True
+    real_time: float | None = None
+    late: Late = "warn"
+    rows_file: Path | None = None
 
 
 @dataclass(frozen=True)
 class Run:
-    """What came of it. `failure` is the error that ended the run early; the rows until then are in the recording."""
+    """What came of it. `failure` is the error that ended the run early; the rows until then are in the recording.
+
+    `timing`: wall time (s) of checking the system and laying out the plan ("wiring_seconds"), extracting and instantiating
+    ("instantiate_seconds"), initialization mode ("initialize_seconds") and the stepping loop alone ("loop_seconds").
+    `real_time`: how well the run kept up, see `pacer.Pacer.statistics`; None when it was not asked to.
+    """
 
     recording: Recording
-    loop_seconds: float
+    timing: Mapping[str, float]
     macro_steps: int
     termination: Termination | None
     failure: BaseException | None
+    real_time: Mapping[str, Any] | None = None
+
+    @property
+    def loop_seconds(self) -> float:
+        """Wall time of the stepping loop alone; 0 when it was not reached."""
+        return self.timing.get("loop_seconds", 0.0)
 
 
 def simulate(system: System, settings: Settings, observers: Sequence[Observer] = ()) -> Run:
@@ -66,45 +92,115 @@ def simulate(system: System, settings: Settings, observers: Sequence[Observer] =
     Raises InputError when the system or the settings cannot be simulated. Failures while running are kept in the returned
     run, with everything recorded before.
     """
+    run = None
+    try:
+        with simulation(system, settings, observers) as run:
+            pass
+    except ComponentError as error:  # while terminating
+        if run is None:
+            raise
+        run = replace(run, failure=error)
+    return run
+
+
+@contextmanager
+def simulation(system: System, settings: Settings, observers: Sequence[Observer] = ()) -> Iterator[Run]:
+    """As `simulate`, but the components are terminated and freed when the block is left: whatever they do then, the run is safe.
+
+    Raises ComponentError at the end when a component fails to terminate.
+    """
     with ExitStack() as stack:
-        for component in system.components.values():
-            stack.callback(component.free)
-        if found := problems(system, settings):
-            raise InputError(found)
-        grid = Grid.of(settings.start_time, settings.stop_time, settings.step_size)
-        plan = compile_plan(system, grid, settings.columns.values())
-        recorder = Recorder(plan, settings.columns, int((settings.record_interval or grid.step) / grid.step))
-        executor = executor_kind(settings.executor)(plan, recorder, finite=settings.finite)
-        events = {grid.index(event.time): [] for event in settings.events}  # type: dict[int, list[Event]]
-        for event in settings.events:
-            events[grid.index(event.time)].append(event)
-        failure, loop_seconds = None, 0.0
-        try:
+        for name, component in system.components.items():
+            stack.callback(_free, name, component)
+        watch = Stopwatch()
+        with watch.measure("wiring_seconds"):
+            if found := problems(system, settings):
+                raise InputError(found)
+            executor = _executor(system, settings)
+        run = _run(executor, settings, observers, watch)
+        yield run
+        if run.failure is None:
+            for name, component in system.components.items():
+                with calling(name, "terminate", "end"):
+                    component.terminate()
+
+
+def _free(name: str, component: Component) -> None:
+    with calling(name, "free", "end"):
+        component.free()
+
+
+def _executor(system: System, settings: Settings) -> Executor:
+    grid = Grid.of(settings.start_time, settings.stop_time, settings.step_size)
+    plan = compile_plan(system, grid, settings.columns.values())
+    journal = current()
+    rows_file = settings.rows_file or (journal.folder / ROWS_FILE if journal and journal.folder else None)
+    recorder = Recorder(plan, settings.columns, int((settings.record_interval or grid.step) / grid.step), rows_file)
+    marker = None if journal is None else np.frombuffer(journal.memory, np.int64, MARKER_SIZE)
+    return executor_kind(settings.executor)(plan, recorder, marker, settings.finite)
+
+
+def _run(executor: Executor, settings: Settings, observers: Sequence[Observer], watch: Stopwatch) -> Run:
+    journal, grid, recorder = current(), executor.plan.grid, executor.recorder
+    events: dict[int, list[Event]] = defaultdict(list)
+    for event in settings.events:
+        events[grid.index(event.time)].append(event)
+    pacer = Pacer(grid, settings.real_time, settings.late) if settings.real_time else None
+    failure = None
+    try:
+        with watch.measure("instantiate_seconds"):
+            executor.instantiate()
+        with watch.measure("initialize_seconds"):
             executor.initialize()
-            began = wall.perf_counter()
-            try:
-                _loop(executor, events, observers)
-            finally:
-                loop_seconds = wall.perf_counter() - began
-            for component in system.components.values():
-                component.terminate()
-        except (Exception, KeyboardInterrupt) as error:
-            failure = error
-        return Run(recorder.recording(), loop_seconds, executor.finished, executor.termination, failure)
+        if journal and journal.folder:
+            write_header(journal.folder, executor)
+        if journal:
+            journal.enter(Phase.STEPPING, journal.deadlines.step)
+        with contained(_together(executor.plan.system.components)), watch.measure("loop_seconds"):
+            _loop(executor, events, observers, pacer)
+    except (Exception, KeyboardInterrupt) as error:
+        failure = error
+    finally:
+        executor.close()
+    if journal:
+        journal.enter(Phase.QUIET)
+    log.tell_what_was_cut()
+    kept_up = pacer.statistics() if pacer else None
+    return Run(recorder.recording(), watch.seconds, executor.finished, executor.termination, failure, kept_up)
 
 
-def _loop(executor: Executor, events: Mapping[int, Sequence[Event]], observers: Sequence[Observer]) -> None:
+def _together(names: Iterable[str]) -> str:
+    some = list(names)
+    return some[0] if len(some) == 1 else f"one of {', '.join(some[:8])}{' ...' if len(some) > 8 else ''}"
+
+
+def _loop(executor: Executor, events: Mapping[int, Sequence[Event]], observers: Sequence[Observer], pacer: Pacer | None) -> None:
     """From event to event and from look to look of the observers."""
+    if pacer:
+        pacer.start()
     components, count = executor.plan.system.components, executor.plan.grid.count
     looks = set(range(0, count, max(1, count // 100))) if observers else set()
     for stop in sorted({*(n for n in events if n < count), *looks, count}):
-        executor.run(stop)
+        _advance(executor, stop, pacer)
         for observe in observers:
             observe(executor.finished, count)
         if executor.termination:
             return
         for event in events.get(stop, ()):
             _act(event, components)
+
+
+def _advance(executor: Executor, stop: int, pacer: Pacer | None) -> None:
+    """To communication point `stop`, or until a component asks to terminate."""
+    if pacer is None:
+        executor.run(stop)
+        return
+    for n in range(executor.finished + 1, stop + 1):
+        executor.run(n)
+        if executor.termination:
+            return
+        with waiting():
+            pacer.wait(n)
 
 
 def _act(event: Event, components: Mapping[str, Component]) -> None:
@@ -116,6 +212,8 @@ def _act(event: Event, components: Mapping[str, Component]) -> None:
 def problems(system: System, settings: Settings) -> list[Problem]:
     """Everything that keeps a system from being simulated with these settings; empty when it can run."""
     found = [*system.problems(), *_event_problems(system, settings.events)]
+    if settings.real_time is not None and not 0 < settings.real_time < inf:
+        found.append(Problem(f"expected a positive factor for real time, found {settings.real_time!r}"))
     try:
         grid = Grid.of(settings.start_time, settings.stop_time, settings.step_size)
     except ValueError as error:

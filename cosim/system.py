@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -40,12 +40,17 @@ class Connection:
     where: str = ""
 
 
+#: whether the components of a stage step at the same time, on threads: where it pays, always, or never
+Parallel = Literal["auto", True, False]
+
+
 @dataclass(frozen=True, slots=True)
 class Group:
     """Components that step in stages of their own inside one place of an outer stage (a nested system)."""
 
     name: str
     stages: tuple[Stage, ...]
+    parallel: Parallel = "auto"
 
 
 Stage = tuple["str | Group", ...]
@@ -73,7 +78,8 @@ class System:
     """What is simulated. Stages step one after the other; the components of a stage step side by side.
 
     `start_values` holds parameters and start values by component and variable name; `periods` the components that step
-    less often than every macro step (s); `aliases` further names under which outputs are recorded.
+    less often than every macro step (s); `aliases` further names under which outputs are recorded. `parallel`: whether the
+    components of a stage step at the same time, with the same result.
     """
 
     components: Mapping[str, Component]
@@ -82,6 +88,7 @@ class System:
     periods: Mapping[str, Fraction] = field(default_factory=dict)
     start_values: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     aliases: Mapping[str, Endpoint] = field(default_factory=dict)
+    parallel: Parallel = "auto"
 
     @cached_property
     def slots(self) -> Mapping[str, Mapping[str, Place]]:

@@ -48,6 +48,11 @@ class Grid:
         """Time of communication point n: correctly rounded, whatever n is."""
         return (self._origin + n * self._stride) / self._denominator
 
+    @property
+    def integers(self) -> dict[str, int]:
+        """The grid in whole numbers: n is at (origin + n * stride) / denominator s."""
+        return {"origin": self._origin, "stride": self._stride, "denominator": self._denominator}
+
     def times(self, points: range) -> np.ndarray:
         """Times of many communication points, shape (points,): the same numbers that `seconds` gives."""
         if not self.formula(points.stop):

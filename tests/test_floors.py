@@ -11,12 +11,14 @@ PACKAGE = Path(__file__).parents[1] / "cosim"
 
 #: rooms from the ground up; a room imports only from its own floor or from below
 FLOORS = [
-    {"errors", "resources", "log"},
-    {"timing", "units"},
-    {"component"},
+    {"errors", "resources", "log", "stopwatch", "journal"},
+    {"timing", "units", "sandbox", "process_state"},
+    {"component", "pacer"},
     {"system", "recording"},
     {"engine"},
-    {"simulate"},
+    {"unfinished"},
+    {"live_csv"},
+    {"simulate", "supervise"},
     {"fmi", "python_component", "table"},
     {"export"},
     {"scenario"},

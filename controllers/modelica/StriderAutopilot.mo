@@ -1,4 +1,4 @@
-block StriderAutopilot "Waypoint guidance, surge speed and heading control of a vessel with thruster and rudder"
+block StriderAutopilot "Waypoint guidance, speed and heading control of a vessel with thruster and rudder in one block"
   record Attitude
     Real yaw(unit = "rad") "Counter-clockwise from east";
   end Attitude;
@@ -34,36 +34,32 @@ block StriderAutopilot "Waypoint guidance, surge speed and heading control of a 
   output Boolean finished(start = false) "The last waypoint is reached and the list does not repeat";
 protected
   Fleet.WaypointGuidance guidance(
+    final speed_command = speed_command,
     final acceptance_radius = acceptance_radius,
     final waypoint_count = waypoint_count,
     final waypoint_x = waypoint_x,
     final waypoint_y = waypoint_y,
     final end_policy = end_policy);
-  Fleet.Pid surge(
-    final P = speed_P,
-    final u_min = -thrust_limit,
-    final u_max = thrust_limit);
-  Fleet.Pid heading(
-    final P = heading_P,
-    final D = heading_D,
-    final N = heading_N,
-    final u_min = -rudder_limit,
-    final u_max = rudder_limit);
+  Fleet.SpeedController speed(
+    final speed_P = speed_P,
+    final thrust_limit = thrust_limit);
+  Fleet.HeadingController heading(
+    final heading_P = heading_P,
+    final heading_D = heading_D,
+    final heading_N = heading_N,
+    final rudder_limit = rudder_limit);
 equation
-  guidance.position.x = vehicle.position.x;
-  guidance.position.y = vehicle.position.y;
+  guidance.vehicle.position.x = vehicle.position.x;
+  guidance.vehicle.position.y = vehicle.position.y;
 
-  surge.error = (if finished and end_policy == Fleet.EndPolicy.stop then 0 else speed_command) - vehicle.velocity_body.u;
-  surge.feed_forward = 0;
-  surge.reset = false;
+  speed.vehicle.velocity_body.u = vehicle.velocity_body.u;
+  speed.speed_reference = guidance.speed_reference;
 
-  // A positive rudder angle reduces the yaw angle, hence measurement minus reference.
-  heading.error = Fleet.wrap_angle(vehicle.attitude.yaw - heading_reference);
-  heading.feed_forward = 0;
-  heading.reset = false;
+  heading.vehicle.attitude.yaw = vehicle.attitude.yaw;
+  heading.heading_reference = guidance.heading_reference;
 
-  thrust = surge.u;
-  rudder_angle = heading.u;
+  thrust = speed.thrust;
+  rudder_angle = heading.rudder_angle;
   heading_reference = guidance.heading_reference;
   distance = guidance.distance;
   active_waypoint = guidance.active_waypoint;

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+import traceback
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -18,9 +20,11 @@ COMMANDS = {
     "simulate": ("simulate", "Simulate one FMU alone."),
     "plot": ("plot", "Draw the figures of finished runs again."),
     "info": ("info", "Print what an FMU says about itself."),
+    "validate": ("validate", "Examine FMUs against the FMI standard without running them."),
     "build": ("build", "Export controllers and plants to fmus/."),
     "new": ("new", "Begin a controller of your own that runs at once."),
     "schema": ("schema", "Print the JSON Schema of scenarios."),
+    "doctor": ("doctor", "Print what is installed and active here."),
 }
 
 
@@ -54,31 +58,38 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _code(arguments: list[str]) -> int:
-    debug = "--debug" in arguments
+    return guarded(lambda: _outcome(cli.main(arguments, prog_name="cosim", standalone_mode=False)))
+
+
+def guarded(command: Callable[[], int]) -> int:
+    """The exit code of a command; what it raises is reported to the user."""
     try:
-        return _outcome(cli.main(arguments, prog_name="cosim", standalone_mode=False))
-    except click.exceptions.Abort:
-        click.echo("interrupted", err=True)
-        return 130
-    except KeyboardInterrupt:
-        click.echo("interrupted", err=True)
-        return 130
-    except click.ClickException as error:
-        error.show()
-        return error.exit_code
-    except CosimError as error:
-        if debug:
-            raise
-        click.echo(str(error), err=True)
-        return error.exit_code
+        return command()
     except BrokenPipeError:
         sys.stderr.close()
         return 0
-    except Exception as error:
-        if debug:
-            raise
-        click.echo(f"internal error: {type(error).__name__}: {error}  (cosim --debug shows where)", err=True)
-        return 70
+    except (Exception, KeyboardInterrupt) as error:
+        return report(error)
+
+
+def report(error: BaseException) -> int:
+    """Tell the user about an error; returns the exit code that belongs to it. With --debug the traceback is shown."""
+    if isinstance(error, KeyboardInterrupt | click.exceptions.Abort):
+        click.echo("interrupted", err=True)
+        return 130
+    if isinstance(error, click.ClickException):
+        error.show()
+        return error.exit_code
+    if "--debug" in sys.argv:
+        traceback.print_exception(error)
+    if isinstance(error, CosimError):
+        click.echo(str(error), err=True)
+        return error.exit_code
+    if isinstance(error, OSError):
+        click.echo(f"the operating system refuses: {error}", err=True)
+        return 1
+    click.echo(f"internal error: {type(error).__name__}: {error}  (cosim --debug shows where)", err=True)
+    return 70
 
 
 def _outcome(value: Any) -> int:

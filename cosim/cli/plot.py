@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from .progress import progress_bar
+
 FORMATS = ("png", "svg")
 
 
@@ -14,7 +16,7 @@ FORMATS = ("png", "svg")
 @click.option("--output-dir", type=click.Path(path_type=Path), help="Where pictures go; default: beside the result.")
 @click.option("--format", "formats", multiple=True, type=click.Choice(FORMATS), default=FORMATS, help="Default: both.")
 @click.option("--timings", is_flag=True, help="Also draw the real-time factors of all RESULTs side by side.")
-@click.option("--video", is_flag=True, help='Also render a video of each run, CAMERA.mp4 (extra "video"); takes minutes.')
+@click.option("--video", is_flag=True, help='Also render a video of each run, CAMERA.mp4 (extra "video").')
 @click.option("--camera", default="chase", help="Where the video is seen from: overview, chase (default), deck or landing.")
 def command(
     results: tuple[Path, ...], output_dir: Path | None, formats: tuple[str, ...], timings: bool, video: bool, camera: str
@@ -35,7 +37,9 @@ def command(
         target = directory if output_dir is None else output_dir / directory.name if len(runs) > 1 else output_dir
         _report(draw_figures(result, figures_of(result), target, suffixes, numbers=True))
         if video:
-            _report([write_video(result, target / f"{camera}.mp4", camera)])
+            with progress_bar(f"{camera}.mp4") as progress:
+                file = write_video(result, target / f"{camera}.mp4", camera, progress=progress)
+            _report([file])
     if timings:
         figure = ("timings", draw_timings, {"others": list(runs.values())[1:]})
         _report(draw_figures(next(iter(runs.values())), [figure], output_dir or results[0].parent, suffixes, numbers=True))

@@ -4,19 +4,30 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from shutil import rmtree
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..simulate import Observer
+from ..errors import CosimError
+from ..journal import STEPS
+from . import report, supervision
 
 if TYPE_CHECKING:
+    from ..api import Execution
     from ..results import Result
     from ..scenario import Assembly
+    from ..simulate import Observer
+    from ..supervise import Outcome
+
+_LATENESS = {"max": "max_lateness", "mean": "mean_lateness", "99 %": "lateness_99_percent"}
+
+#: folder of a run that is going on, inside its output directory
+UNFINISHED = ".unfinished"
 
 
 @click.command()
@@ -25,50 +36,95 @@ if TYPE_CHECKING:
 @click.option("--stop-time", help="Stop time in s instead of the scenario's.")
 @click.option("--step-size", help="Macro step in s instead of the scenario's.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=value", help="Set a variable, or /json/pointer=value anything.")
+@click.option(
+    "--real-time",
+    type=click.FloatRange(min=0, min_open=True),
+    is_flag=False,
+    flag_value=1.0,
+    metavar="[FACTOR]",
+    help="Keep pace with the clock, FACTOR simulated seconds per second (1 when left out).",
+)
+@click.option(
+    "--late",
+    type=click.Choice(["warn", "fail"]),
+    default="warn",
+    show_default=True,
+    help="What happens when a real-time run falls more than one step behind.",
+)
 @click.option("--no-report", is_flag=True, help="Write no figures.")
-def command(
+@supervision.option
+def command(isolation: str, **options: Any) -> int:
+    """Run SCENARIO, a JSON file or the name of a shipped scenario.
+
+    Writes result.csv, kpis.json, run.json and figures to the output directory. Exit code 0: all is well; 1: a component
+    failed, the results until then are kept; 2: the scenario was refused; 3: a check was not met.
+    """
+    return supervision.protected(lambda: _run(**options), isolation, _salvage)
+
+
+def _run(
     scenario: str,
     output_dir: Path | None,
     stop_time: str | None,
     step_size: str | None,
     settings: tuple[str, ...],
     no_report: bool,
+    **pace: Any,
 ) -> int:
-    """Run SCENARIO, a JSON file or the name of a shipped scenario.
-
-    Writes result.csv, kpis.json, run.json and figures to the output directory. Exit code 0: all is well; 1: a component
-    failed, the results until then are kept; 2: the scenario was refused; 3: a check was not met.
-    """
-    from ..api import checks, execute, load
-    from ..errors import CosimError
-    from ..kpi import kpi_units
-    from ..report.figures import draw_figures
-    from ..report.tables import print_kpis
-    from ..results.result import write_run
+    from ..api import executed, load
     from ..scenario.tree import parse_settings
+    from ..unfinished import unfinished
     from . import messages
 
     messages.show()
     began = time.perf_counter()
-    assembly = load(scenario, parse_settings(settings), stop_time=stop_time, step_size=step_size)
-    directory = output_dir or Path("runs") / assembly.spec.name
+    assembly = load(scenario, parse_settings(settings), stop_time=stop_time, step_size=step_size, **pace)
+    supervision.configure(assembly.spec.deadlines)
+    directory = (output_dir or Path("runs") / assembly.spec.name).absolute()
+    shown = output_dir or Path("runs") / assembly.spec.name
     try:
         _prepare(directory, [spec.name for spec in assembly.spec.figures])
     except CosimError:
-        assembly.free()  # from here on `simulate` frees the components
+        assembly.free()  # from here on `executed` frees the components
         raise
-    try:
-        with _progress(assembly) as observers:
-            result = execute(assembly, observers)
-        write_run(result, directory)
-    except (CosimError, KeyboardInterrupt) as error:
-        _keep(getattr(error, "result", None), directory)
-        raise
+    with (
+        unfinished(directory / UNFINISHED, directory / "result.csv"),
+        _progress(assembly) as observers,
+        executed(assembly, observers) as execution,
+    ):
+        return supervision.leaving(_finish(execution, assembly, directory, shown, no_report, began))
+
+
+def _finish(execution: Execution, assembly: Assembly, directory: Path, shown: Path, no_report: bool, began: float) -> int:
+    """Write, print and draw what came of the run; returns the exit code."""
+    from ..api import checks
+    from ..kpi import kpi_units
+    from ..report.figures import draw_figures
+    from ..report.tables import print_kpis
+    from ..results.result import write_run
+
+    result = execution.result
+    if execution.failure:
+        _keep(result, directory, shown)
+        return report(execution.failure)
+    write_run(result, directory)
     outcomes = checks(assembly, result)
     print_kpis(result.kpis, outcomes, kpi_units(assembly.kpis(), result.kpis))
     figures = [] if no_report else draw_figures(result, assembly.figures(), directory)
-    _summary(result, directory, figures, began)
+    _summary(result, shown, figures, began)
     return 0 if all(outcome.passed for outcome in outcomes) else 3
+
+
+def _salvage(outcome: Outcome) -> None:
+    """Write what a child has left that came to a bad end."""
+    from ..results import Result
+    from ..unfinished import read_metadata
+
+    folder = outcome.journal.folder
+    if folder is not None:
+        metadata = {**read_metadata(folder), "macro_steps": outcome.journal[STEPS], "failure": str(outcome.failure)}
+        _keep(Result(supervision.recovered(outcome), metadata=metadata), folder.parent, folder.parent)
+        rmtree(folder, ignore_errors=True)
 
 
 def _prepare(directory: Path, figures: Sequence[str]) -> None:
@@ -86,13 +142,13 @@ def _prepare(directory: Path, figures: Sequence[str]) -> None:
         raise InputError(f'cannot write to "{directory}": {error.strerror or error}') from None
 
 
-def _keep(partial: Result | None, directory: Path) -> None:
+def _keep(partial: Result, directory: Path, shown: Path) -> None:
     """Write what was recorded before a failure."""
     from ..results.result import write_run
 
-    if partial is not None and len(partial.time):
+    if len(partial.time):
         write_run(partial, directory)
-        click.echo(f"{len(partial.time)} rows until t = {partial.time[-1]:g} s kept in {directory}", err=True)
+        click.echo(f"{len(partial.time)} rows until t = {partial.time[-1]:g} s kept in {shown}", err=True)
 
 
 def _summary(result: Result, directory: Path, figures: list[Path], began: float) -> None:
@@ -100,8 +156,15 @@ def _summary(result: Result, directory: Path, figures: list[Path], began: float)
     files = ", ".join(["result.csv", "kpis.json", "run.json", *(path.name for path in figures)])
     click.echo(f"\n{simulated:g} s simulated in {loop:.2f} s: {simulated / loop:.0f} times real time")
     click.echo(f"{files} in {directory} ({time.perf_counter() - began:.1f} s in all)")
+    if pace := result.metadata["real_time"]:
+        click.echo(_pace(pace))
     if by := result.metadata["terminated_by"]:
         click.echo(f"{by['component']} asked to end the simulation at t = {by['time']:g} s")
+
+
+def _pace(pace: Mapping[str, Any]) -> str:
+    lateness = ", ".join(f"{label} {1e3 * pace[key]:.3g} ms" for label, key in _LATENESS.items())
+    return f"paced to {pace['factor']:g} times real time: {pace['late_steps']} of {pace['steps']} steps late; lateness {lateness}"
 
 
 @contextmanager

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from fractions import Fraction
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from . import report, supervision
+
 if TYPE_CHECKING:
     from ..component import Component
+    from ..recording import Recording
     from ..simulate import Settings
     from ..system import System
 
@@ -23,33 +27,57 @@ NAME, PROFILE = "fmu", "profile"
 @click.option("--step-size", help="Communication step in s; default: the FMU's, else a hundredth of the duration.")
 @click.option("--start-value", "start_values", multiple=True, metavar="name=value", help="Set a parameter or start value.")
 @click.option("--input-file", type=click.Path(path_type=Path), help='CSV file with "time" and columns named as inputs.')
-def command(
+@supervision.option
+def command(isolation: str, output_file: Path | None, **options: Any) -> int:
+    """Simulate FMU (FMI 2.0 or 3.0 Co-Simulation) from its default start time."""
+    output = output_file.absolute() if output_file else None
+    with TemporaryDirectory(prefix="cosim-run-") as folder:
+        return supervision.protected(
+            lambda: _simulate(Path(folder) / "run", output, output_file, **options),
+            isolation,
+            lambda outcome: _save(supervision.recovered(outcome), output, output_file),
+        )
+
+
+def _simulate(
+    folder: Path,
+    output: Path | None,
+    shown: Path | None,
     fmu: Path,
-    output_file: Path | None,
     stop_time: str | None,
     step_size: str | None,
     start_values: tuple[str, ...],
     input_file: Path | None,
-) -> None:
-    """Simulate FMU (FMI 2.0 or 3.0 Co-Simulation) from its default start time."""
-    from ..results import Result
+) -> int:
     from ..scenario.tree import parse_settings
-    from ..simulate import simulate
+    from ..simulate import simulation
+    from ..unfinished import unfinished
     from . import messages
 
     messages.show()
     system, settings = _prepare(fmu, stop_time, step_size, parse_settings(start_values), input_file)
-    run = simulate(system, settings)
-    result = Result(run.recording)
-    if output_file:
-        result.to_csv(output_file)
-        click.echo(f"{len(result.time)} rows in {output_file}")
-    if run.failure is not None:
-        raise run.failure
-    if not output_file:
-        click.echo(f"time = {result.time.tolist()[-1]!r} s")
-        for name in result:
-            click.echo(f"{name} = {result[name].tolist()[-1]!r} {result.units[name]}".rstrip())
+    with unfinished(folder, output), simulation(system, settings) as run:
+        if output:
+            _save(run.recording, output, shown)
+        if run.failure:
+            return supervision.leaving(report(run.failure))
+        if not output:
+            _print_last(run.recording)
+        return supervision.leaving(0)
+
+
+def _save(recording: Recording, output: Path | None, shown: Path | None) -> None:
+    from ..results.csv_files import write_csv
+
+    if output and len(recording.time):
+        write_csv(recording, output)
+        click.echo(f"{len(recording.time)} rows in {shown}")
+
+
+def _print_last(recording: Recording) -> None:
+    click.echo(f"time = {recording.time.tolist()[-1]!r} s")
+    for name, values in recording.columns.items():
+        click.echo(f"{name} = {values.tolist()[-1]!r} {recording.units[name]}".rstrip())
 
 
 def _prepare(
@@ -100,11 +128,12 @@ def _assigned(component: Component, start_values: dict[str, Any]) -> dict[str, A
     from ..errors import InputError, Problem
     from ..scenario.names import Unknown, assign
 
+    variables = {variable.name: variable for variable in component.variables}
     values: dict[str, Any] = {}
     problems = []
     for name, value in start_values.items():
         try:
-            values |= assign(NAME, component, name, value)
+            values |= assign(NAME, variables, name, value)
         except (Unknown, ValueError) as error:
             problems.append(Problem(str(error), f"--start-value {name}"))
     if problems:

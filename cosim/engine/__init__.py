@@ -2,10 +2,11 @@
 
 from typing import Literal
 
-from .executor import Executor, PythonExecutor, Termination
+from .executor import MARKER_SIZE, Executor, PythonExecutor, Termination
 from .native import NativeExecutor, available
 from .plan import Plan, compile_plan
 from .recorder import Recorder
+from .rows import read_rows
 
 Kind = Literal["auto", "native", "python"]
 
@@ -19,4 +20,16 @@ def executor_kind(kind: Kind) -> type[Executor]:
     return EXECUTORS["python" if kind == "auto" and not available() else "native" if kind == "auto" else kind]
 
 
-__all__ = ["EXECUTORS", "Executor", "Kind", "Plan", "Recorder", "Termination", "available", "compile_plan", "executor_kind"]
+__all__ = [
+    "EXECUTORS",
+    "MARKER_SIZE",
+    "Executor",
+    "Kind",
+    "Plan",
+    "Recorder",
+    "Termination",
+    "available",
+    "compile_plan",
+    "executor_kind",
+    "read_rows",
+]

@@ -450,6 +450,18 @@ static PyObject *run(Program *p, PyObject *arguments) {
     Py_RETURN_NONE;
 }
 
+/* (number of the call, ns of the shortest so far) of every doStep. */
+static PyObject *durations(Program *p, PyObject *unused) {
+    PyObject *list = PyList_New(0);
+    for (const Operation *op = p->operations; list && op < p->operations + p->count; op++) {
+        if (op->kind != STEP2 && op->kind != STEP3) continue;
+        PyObject *pair = Py_BuildValue("iL", op->number, (long long)op->step.memory->shortest);
+        if (!pair || PyList_Append(list, pair) < 0) Py_CLEAR(list);
+        Py_XDECREF(pair);
+    }
+    return list;
+}
+
 /* ---- building -------------------------------------------------------------------------------------------------------- */
 
 static void *pointer(unsigned long long address) { return (void *)(uintptr_t)address; }
@@ -655,6 +667,7 @@ static PyMethodDef methods[] = {
     {"recording", (PyCFunction)set_recording, METH_VARARGS, "What a row is."},
     {"piece", (PyCFunction)add_piece, METH_VARARGS, "One piece of a row."},
     {"row", (PyCFunction)set_row, METH_VARARGS, "Where the next row goes."},
+    {"durations", (PyCFunction)durations, METH_NOARGS, "The shortest of every doStep."},
     {"run", (PyCFunction)run, METH_VARARGS, "Macro steps from the times at an address."},
     {NULL, NULL, 0, NULL},
 };

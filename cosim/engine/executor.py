@@ -7,19 +7,24 @@ from __future__ import annotations
 
 import ctypes
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
+from math import inf
+from time import perf_counter
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from ..component import Call, Component, Ports, StepResult
+from ..component import Call, Component, DoStep, Ports, StepResult
 from ..errors import ComponentError
+from ..journal import calling
 from .moves import DelayLine, Move, copy
+from .parallel import TRIALS, Crew, SideBySide, may_overlap, processors
 from .plan import Gather, Plan, Step
 from .recorder import Recorder
+from .turns import WARNING, Ending, Turn, take
 
-#: the highest FMI status that lets a simulation go on
-WARNING = 1
+#: components named in messages about several
+SHOWN = 8
 
 #: places in the marker: number of the present call, macro steps finished, rows recorded
 CALL, STEPS, ROWS, MARKER_SIZE = 0, 1, 2, 3
@@ -37,14 +42,6 @@ class Termination(NamedTuple):
     time: float
 
 
-class Turn(NamedTuple):
-    """One component's turn as calls that return an FMI status; `first` is the number of the first call."""
-
-    step: Step
-    calls: Sequence[Call]
-    first: int
-
-
 class Executor(ABC):
     """Initializes the components of a plan and runs macro steps.
 
@@ -60,6 +57,11 @@ class Executor(ABC):
         self._clock = ctypes.c_double()
         self._delays = {g: DelayLine(g) for phase in plan.phases for g in phase.gathers if g.delay}
         self._turns: list[Turn] = []
+        #: the turns of each phase
+        self._stages: list[list[Turn]] = []
+        #: joint turns that may take the place of others in a phase, by the number of the phase
+        self._joint: dict[int, Turn] = {}
+        self._crew: Crew[Sequence[Turn], list[Ending]] | None = None
 
     @property
     def finished(self) -> int:
@@ -68,8 +70,14 @@ class Executor(ABC):
 
     # -- initialization ------------------------------------------------------------------------------------------------
 
+    def instantiate(self) -> None:
+        """Bind all components to their arrays: FMUs are extracted, loaded and instantiated here."""
+        for name, component in self.plan.system.components.items():
+            with calling(name, "bind", "load"):
+                component.bind(self.plan.inputs.ports[name], self.plan.signals.ports[name])
+
     def initialize(self) -> None:
-        """From fresh components to the initial outputs at the start time, recorded as row 0.
+        """From instantiated components to the initial outputs at the start time, recorded as row 0.
 
         In initialization mode outputs go to inputs again and again until nothing changes, at most once per component.
         """
@@ -77,21 +85,23 @@ class Executor(ABC):
         start, stop = grid.seconds(0), grid.seconds(grid.count)
         self._clock.value = start
         for name, component in plan.system.components.items():
-            component.bind(plan.inputs.ports[name], plan.signals.ports[name])
-            for variable, value in plan.system.start_values.get(name, {}).items():
-                component.set(variable, value)
+            with calling(name, "set", "initialization"):
+                for variable, value in plan.system.start_values.get(name, {}).items():
+                    component.set(variable, value)
         for name, component in plan.system.components.items():
-            component.enter_initialization_mode(start, stop)
-            component.get_outputs()
-            _take_start_values(component, plan.inputs.ports[name])
+            with calling(name, "enter_initialization_mode", "initialization", start):
+                component.enter_initialization_mode(start, stop)
+                component.get_outputs()
+                _take_start_values(component, plan.inputs.ports[name])
         self._propagate(start)
-        for component in plan.system.components.values():
-            component.exit_initialization_mode()
-            component.get_outputs()
+        for name, component in plan.system.components.items():
+            with calling(name, "exit_initialization_mode", "initialization", start):
+                component.exit_initialization_mode()
+                component.get_outputs()
         for line in self._delays.values():
             line.fill()
         self._check_finite("exit_initialization_mode")
-        self._turns = list(self._number(step for phase in plan.phases for step in phase.steps))
+        self._number()
         self._prepare()
         self.recorder.record(0)
         self.marker[ROWS] = self.recorder.rows
@@ -103,9 +113,10 @@ class Executor(ABC):
         for _ in range(len(components) + 1):
             for move in moves:
                 move()
-            for component in components.values():
-                component.set_inputs()
-                component.get_outputs()
+            for name, component in components.items():
+                with calling(name, "set_inputs and get_outputs", "initialization", time):
+                    component.set_inputs()
+                    component.get_outputs()
             after = self._snapshot()
             if after == before:
                 return
@@ -121,13 +132,28 @@ class Executor(ABC):
 
     # -- turns ---------------------------------------------------------------------------------------------------------
 
-    def _number(self, steps: Iterator[Step]) -> Iterator[Turn]:
-        first = 0
-        for step in steps:
-            calls = step.component.turn(self._clock, step.step_size)
-            calls = calls or [Call(self._python_turn, (step,), "do_step")]
-            yield Turn(step, calls, first)
-            first += len(calls)
+    def _number(self) -> None:
+        self._stages = [[self._turn(self._calls_of(step), step) for step in phase.steps] for phase in self.plan.phases]
+        for place, (phase, turns) in enumerate(zip(self.plan.phases, self._stages, strict=True)):
+            overlapping = [turn for turn in turns if may_overlap(turn)]
+            together = SideBySide(overlapping, phase.parallel)
+            if phase.parallel and len(together.groups()) > 1:
+                self._joint[place] = self._join(together)
+
+    def _calls_of(self, step: Step) -> Sequence[Call]:
+        return step.component.turn(self._clock, step.step_size) or [Call(self._python_turn, (step,), "do_step")]
+
+    def _turn(self, calls: Sequence[Call], step: Step) -> Turn:
+        first = self._turns[-1].first + len(self._turns[-1].calls) if self._turns else 0
+        self._turns.append(Turn(step, calls, first))
+        return self._turns[-1]
+
+    def _join(self, together: SideBySide) -> Turn:
+        """A turn that stands for several, which are taken at the same time."""
+        names = [turn.step.name for turn in together.turns]
+        some = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
+        step = Step(f"one of {some}", together.turns[0].step.component, 1, 0.0)
+        return self._turn([Call(self._side_by_side, (together,), "a step side by side")], step)
 
     def _python_turn(self, step: Step) -> int:
         component = step.component
@@ -142,6 +168,15 @@ class Executor(ABC):
     def calls(self) -> list[tuple[str, str]]:
         """(component, function) of every call, by the number that stands in the marker."""
         return [(turn.step.name, call.name) for turn in self._turns for call in turn.calls]
+
+    def _side_by_side(self, together: SideBySide) -> int:
+        assert self._crew is not None
+        endings = [ending for lane in self._crew.run(together.lanes) for ending in lane]
+        for turn, call, status in sorted(endings, key=lambda ending: ending.turn.first):
+            if status is None:
+                self._float_state_changed(turn, call)
+            self._bad_status(turn, call, status)
+        return _TERMINATION if self.termination else 0
 
     def _turn_of(self, number: int) -> tuple[Turn, Call]:
         turn = next(turn for turn in reversed(self._turns) if turn.first <= number)
@@ -190,7 +225,12 @@ class Executor(ABC):
     def run(self, end: int) -> None:
         """Macro steps until communication point `end` is reached, or a component asks to terminate."""
         try:
-            self._run(end)
+            if self._joint and self.finished < TRIALS:
+                self._run(min(end, TRIALS))
+                if self.finished == TRIALS:
+                    self._decide()
+            if not self.termination:
+                self._run(end)
         except ComponentError:
             self._check_finite()  # more likely the cause than what failed upon it
             raise
@@ -198,24 +238,63 @@ class Executor(ABC):
     @abstractmethod
     def _run(self, end: int) -> None: ...
 
+    @abstractmethod
+    def _measured(self) -> dict[int, float]:
+        """The shortest doStep of every turn so far (s), by the number of the turn's first call."""
+
+    def _decide(self) -> None:
+        """After the first steps: put joint turns in the place of those that are worth it."""
+        widest, seconds = 1, self._measured()
+        for place, joint in self._joint.items():
+            (together,) = joint.calls[0].arguments
+            together.decide(seconds, processors())
+            if together.lanes:
+                self._stages[place] = [joint, *(turn for turn in self._stages[place] if not may_overlap(turn))]
+            widest = max(widest, len(together.lanes))
+        if widest > 1:
+            self._crew = Crew(widest - 1, lambda turns: take(turns, self.finished))
+        self._prepare()
+
+    def close(self) -> None:
+        """Let threads end; nothing is run any more."""
+        if self._crew:
+            self._crew.close()
+
 
 class PythonExecutor(Executor):
     """The executor that needs no compiler: C functions are called through ctypes."""
 
+    def __init__(self, *arguments: Any, **named: Any):
+        super().__init__(*arguments, **named)
+        self._shortest: dict[int, float] = {}
+
     def _prepare(self) -> None:
-        turns = iter(self._turns)
         self._phases = [
-            ([self._move(gather) for gather in phase.gathers], [self._numbered(next(turns)) for _ in phase.steps])
-            for phase in self.plan.phases
+            ([self._move(gather) for gather in phase.gathers], [self._numbered(turn) for turn in turns])
+            for phase, turns in zip(self.plan.phases, self._stages, strict=True)
         ]
         self._watched = [(floats, np.zeros_like(floats)) for floats in self.watched]
 
     def _move(self, gather: Gather) -> Move:
         return self._delays[gather].move if gather.delay else copy(gather)
 
-    @staticmethod
-    def _numbered(turn: Turn) -> tuple[int, list[tuple[Any, Any, int]], Turn]:
-        return (turn.step.divisor, [(c.function, c.arguments, turn.first + i) for i, c in enumerate(turn.calls)], turn)
+    def _numbered(self, turn: Turn) -> tuple[int, list[tuple[Any, Any, int]], Turn]:
+        measure = self._joint and self.finished < TRIALS
+        functions = [self._timed(c, turn.first) if measure and isinstance(c.native, DoStep) else c.function for c in turn.calls]
+        calls = [(f, c.arguments, turn.first + i) for i, (f, c) in enumerate(zip(functions, turn.calls, strict=True))]
+        return turn.step.divisor, calls, turn
+
+    def _timed(self, call: Call, first: int) -> Callable[..., int]:
+        def timed(*arguments: Any) -> int:
+            began = perf_counter()
+            status = call.function(*arguments)
+            self._shortest[first] = min(self._shortest.get(first, inf), perf_counter() - began)
+            return status
+
+        return timed
+
+    def _measured(self) -> dict[int, float]:
+        return self._shortest
 
     def _run(self, end: int) -> None:
         seconds, phases, record, clock = self.plan.grid.seconds, self._phases, self.recorder.record, self._clock

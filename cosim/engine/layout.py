@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,8 +40,12 @@ class Layout:
 
     def position(self, slot: Slot) -> int:
         """Where the value of a number begins in the block, in bytes."""
-        begin = self.arrays[slot.dtype].ctypes.data - self.block.ctypes.data
-        return int(begin + slot.offset * slot.dtype.itemsize)
+        return self._begins[slot.dtype] + slot.offset * slot.dtype.itemsize
+
+    @cached_property
+    def _begins(self) -> dict[Dtype, int]:
+        numbers = (dtype for dtype in self.arrays if not dtype.hasobject)
+        return {dtype: self.arrays[dtype].ctypes.data - self.block.ctypes.data for dtype in numbers}
 
 
 def lay_out(variables: Mapping[str, Sequence[Variable]]) -> Layout:

@@ -54,6 +54,10 @@ class DelayLine:
         """Take the present values as those of all steps before."""
         self.ring[:] = self.gather.source[self.gather.source_indices]
 
+    def rewind(self, moves: int) -> None:
+        """Put the rows in the order of their age, after so many moves that someone else has made."""
+        self.ring[:] = np.roll(self.ring, -moves, 0)
+
     def move(self) -> None:
         oldest = self.ring[self._oldest]
         _scatter(self.gather, oldest, self._all)

@@ -8,17 +8,19 @@ from collections.abc import Callable
 import numpy as np
 
 from ..component import Access, Call, DoStep, Flags
-from .executor import ROWS, Executor, Turn
+from .executor import ROWS, Executor
 from .moves import copy
+from .parallel import TRIALS
 from .plan import Gather
+from .turns import Turn
 
 try:
     from . import _native
 except ImportError:  # installed without a compiler
     _native = None  # type: ignore[assignment]
 
-#: macro steps per call at most; in the first call, which measures the steps of the components
-BATCH, TRIALS = 1 << 16, 3
+#: macro steps per call at most, but for the first call, which measures the steps of the components
+BATCH = 1 << 16
 
 #: what is reported beside FMI statuses, as in _native.c
 _FLOAT_STATE_CHANGED, _NOT_FINITE = -1, -2
@@ -34,12 +36,14 @@ class NativeExecutor(Executor):
 
     def _prepare(self) -> None:
         self._program = _native.Program(ctypes.addressof(self._clock), self.marker.ctypes.data, self._on_status)
-        turns = iter(self._turns)
-        for phase in self.plan.phases:
+        for gather, line in self._delays.items():
+            if not gather.source.dtype.hasobject:
+                line.rewind(self.finished)
+        for phase, turns in zip(self.plan.phases, self._stages, strict=True):
             for gather in phase.gathers:
                 self._add_move(gather)
-            for _ in phase.steps:
-                self._add_turn(next(turns))
+            for turn in turns:
+                self._add_turn(turn)
         watched = {array.dtype.itemsize: array for array in self.watched}
         self._program.watch(*(part for size in (8, 4) for part in _extent(watched.get(size, np.zeros(0)))))
         self._add_recording()
@@ -120,6 +124,9 @@ class NativeExecutor(Executor):
             recorder.extend()
         self._program.row(recorder.chunk.ctypes.data + recorder.used)
         return (recorder.room + 1) * recorder.every - self.finished % recorder.every - 1
+
+    def _measured(self) -> dict[int, float]:
+        return {self._turn_of(number)[0].first: nanoseconds * 1e-9 for number, nanoseconds in self._program.durations()}
 
     def _record(self, n: int) -> None:
         self.recorder.record(n)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..component import Component, Variable
-from ..system import Connection, Endpoint, Group, Stage, System, members
+from ..system import Connection, Endpoint, Group, Parallel, Stage, System, members
 from ..timing import Grid
 from .layout import Layout, Slot, lay_out
 
@@ -50,6 +50,7 @@ class Phase:
 
     gathers: tuple[Gather, ...]
     steps: tuple[Step, ...]
+    parallel: Parallel = "auto"
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +67,7 @@ class Plan:
 def compile_plan(system: System, grid: Grid, recorded: Iterable[Endpoint] = ()) -> Plan:
     """Lay out the arrays and order the work. The system must have no problems, its periods must fit the grid."""
     phases = list(_phases(system))
-    inputs = _inputs(system, [connection for connections, _ in phases for connection in connections])
+    inputs = _inputs(system, [connection for connections, _, _ in phases for connection in connections])
     signals = _signals(system, recorded)
     gathering = _Gathering(system, inputs, signals)
     return Plan(
@@ -75,8 +76,8 @@ def compile_plan(system: System, grid: Grid, recorded: Iterable[Endpoint] = ()) 
         inputs,
         signals,
         [
-            Phase(tuple(gathering.gathers(connections)), tuple(_step(system, grid, name) for name in names))
-            for connections, names in phases
+            Phase(tuple(gathering.gathers(connections)), tuple(_step(system, grid, name) for name in names), parallel)
+            for connections, names, parallel in phases
         ],
     )
 
@@ -86,28 +87,36 @@ def _step(system: System, grid: Grid, name: str) -> Step:
     return Step(name, system.components[name], divisor, float(grid.step * divisor))
 
 
-def _phases(system: System) -> Iterator[tuple[list[Connection], list[str]]]:
-    """(connections to read, components to step) of every phase, in order."""
+_RawPhase = tuple[list[Connection], list[str], Parallel]
+
+
+def _phases(system: System) -> Iterator[_RawPhase]:
+    """(connections to read, components to step, whether at the same time) of every phase, in order."""
     incoming: dict[str, list[Connection]] = defaultdict(list)
     for connection in system.connections:
         incoming[connection.target.component].append(connection)
-    yield from _run(system.stages, frozenset(system.components), incoming)
+    yield from _run(system.stages, system.parallel, frozenset(system.components), incoming)
 
 
 def _run(
-    stages: Sequence[Stage], inside: frozenset[str], incoming: Mapping[str, Sequence[Connection]]
-) -> Iterator[tuple[list[Connection], list[str]]]:
+    stages: Sequence[Stage], parallel: Parallel, inside: frozenset[str], incoming: Mapping[str, Sequence[Connection]]
+) -> Iterator[_RawPhase]:
     """Phases of stages whose members read from `inside` now; everything else was read before."""
     for stage in stages:
         groups = [member for member in stage if isinstance(member, Group)]
         own_group = {name: frozenset(members(group.stages)) for group in groups for name in members(group.stages)}
         readers = [connection for name in members([stage]) for connection in incoming.get(name, ())]
         yield (
-            [c for c in readers if c.source.component in inside - own_group.get(c.target.component, frozenset())],
+            [
+                c
+                for c in readers
+                if c.source.component in inside and c.source.component not in own_group.get(c.target.component, ())
+            ],
             [member for member in stage if not isinstance(member, Group)],
+            parallel,
         )
         for group in groups:
-            yield from _run(group.stages, frozenset(members(group.stages)), incoming)
+            yield from _run(group.stages, group.parallel, frozenset(members(group.stages)), incoming)
 
 
 def _inputs(system: System, connections: Iterable[Connection]) -> Layout:

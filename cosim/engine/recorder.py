@@ -15,7 +15,7 @@ from ..system import Endpoint
 from .layout import Slot
 from .moves import FEW
 from .plan import Plan
-from .rows import FileRows, Rows
+from .rows import filled, rows_for
 
 
 class Piece(NamedTuple):
@@ -30,11 +30,13 @@ class Recorder:
     """Keeps the values of `columns` (recorded name -> output) at every `every`-th communication point.
 
     A row is the whole block of signals when at least half of it is wanted (one copy of memory), else only what is wanted,
-    packed. With `file` the rows lie in that file. Texts are kept apart, in memory.
+    packed. With `file` the rows lie in that file; very many lie in a temporary one. Texts are kept apart, in memory.
     """
 
     def __init__(self, plan: Plan, columns: Mapping[str, Endpoint], every: int = 1, file: Path | None = None):
-        self._plan, self._columns, self.every = plan, columns, every
+        self._plan, self.every = plan, every
+        #: recorded name -> the variable it belongs to
+        self.variables = {name: plan.system.place(endpoint).variable for name, endpoint in columns.items()}
         self._places = {name: plan.signals.places[endpoint] for name, endpoint in columns.items()}
         slots = sorted({slot for slot in self._places.values() if not slot.dtype.hasobject}, key=_order)
         #: the whole block of signals is a row
@@ -42,7 +44,7 @@ class Recorder:
         #: what a row consists of otherwise
         self.pieces: Sequence[Piece] = () if self.whole else list(self._pack(slots))
         dtype, expected = self._row_dtype(slots), plan.grid.count // every + 1
-        self.store = FileRows(dtype, expected, file) if file else Rows(dtype, expected)
+        self.store = rows_for(dtype, expected, file)
         #: rows recorded so far
         self.rows = 0
         self._texts = {name: _Texts(plan.signals.arrays[slot.dtype], slot.offset) for name, slot in self._texts_of().items()}
@@ -120,13 +122,24 @@ class Recorder:
     def recording(self) -> Recording:
         """Everything recorded so far; columns in the order they were asked for."""
         rows = self.store.first(self.rows)
-        variables = {name: self._plan.system.place(endpoint).variable for name, endpoint in self._columns.items()}
         columns: dict[str, np.ndarray] = {}
-        for name, variable in variables.items():
+        for name, variable in self.variables.items():
             values = self._texts[name].column(self.rows) if name in self._texts else rows[name]
-            columns[name] = values.astype(bool) if variable.type == "Boolean" else values
-        time = self._plan.grid.times(range(0, self.rows * self.every, self.every))
-        return Recording(time, columns, {name: v.unit.name if v.unit else "" for name, v in variables.items()})
+            columns[name] = values.astype(bool, copy=False) if variable.type == "Boolean" else values
+        return Recording(self._times(), columns, self.units)
+
+    def _times(self) -> np.ndarray:
+        every = self.every
+        return filled(
+            self.rows,
+            lambda rows: self._plan.grid.times(range(rows.start * every, rows.stop * every, every)),
+            np.dtype(np.float64),
+        )
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each column, "" where it is unknown."""
+        return {name: variable.unit.name if variable.unit else "" for name, variable in self.variables.items()}
 
 
 def _order(slot: Slot) -> tuple[int, str, int]:

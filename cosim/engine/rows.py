@@ -1,37 +1,40 @@
-"""Where recorded rows lie: in chunks of memory, or in a file that outlives a crash and may be larger than memory."""
+"""Where recorded rows lie: in memory, or chunk by chunk in a file that outlives a crash and may be larger than memory."""
 
 from __future__ import annotations
 
 import mmap
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryFile
+from typing import IO, Any
 
 import numpy as np
 
-#: a chunk is at most this large (bytes)
-CHUNK = 1 << 26
+#: a chunk of a file is at most this large (bytes); so many values are computed at a time
+CHUNK, PIECE = 1 << 24, 1 << 18
+
+#: more than this (bytes) is not kept in memory
+LARGE = 100_000_000
 
 
 class Rows:
-    """Rows of one structured dtype, in chunks of memory; `expected` rows are all that will come."""
+    """Rows of one structured dtype, in memory; `expected` rows are all that will come."""
 
     def __init__(self, dtype: np.dtype[Any], expected: int):
         self.dtype = dtype
         #: rows of a chunk
-        self.chunk_rows = max(1, min(expected, CHUNK // max(1, dtype.itemsize)))
-        self._chunks: list[np.ndarray] = []
+        self.chunk_rows = max(1, expected)
+        self._chunk = np.zeros(0, dtype)
 
     def extend(self) -> np.ndarray:
         """A new chunk at the end, to be filled."""
-        self._chunks.append(np.zeros(self.chunk_rows, self.dtype))
-        return self._chunks[-1]
+        self._chunk = np.zeros(self.chunk_rows, self.dtype)
+        return self._chunk
 
     def first(self, count: int) -> np.ndarray:
         """The first `count` rows."""
-        if not self._chunks:
-            return np.zeros(0, self.dtype)
-        return (self._chunks[0] if len(self._chunks) == 1 else np.concatenate(self._chunks))[:count]
+        return self._chunk[:count]
 
 
 class FileRows(Rows):
@@ -41,28 +44,46 @@ class FileRows(Rows):
     OSError and no crash.
     """
 
-    def __init__(self, dtype: np.dtype[Any], expected: int, path: Path):
-        super().__init__(dtype, expected)
-        self._path, self._rows = path, 0
-        path.write_bytes(b"")
+    def __init__(self, dtype: np.dtype[Any], expected: int, file: IO[bytes]):
+        super().__init__(dtype, min(expected, CHUNK // max(1, dtype.itemsize)))
+        self._file, self._rows = file, 0
 
     def extend(self) -> np.ndarray:
+        if not self.dtype.itemsize:
+            return np.zeros(self.chunk_rows, self.dtype)
         begin = self._rows * self.dtype.itemsize
         self._rows += self.chunk_rows
         end = self._rows * self.dtype.itemsize
-        with self._path.open("r+b") as file:
-            _claim(file.fileno(), begin, end)
-            page = begin - begin % mmap.ALLOCATIONGRANULARITY
-            mapped = mmap.mmap(file.fileno(), end - page, offset=page)
+        _claim(self._file.fileno(), begin, end)
+        page = begin - begin % mmap.ALLOCATIONGRANULARITY
+        mapped = mmap.mmap(self._file.fileno(), end - page, offset=page)
         return np.frombuffer(mapped, self.dtype, self.chunk_rows, begin - page)
 
     def first(self, count: int) -> np.ndarray:
-        return read_rows(self._path, self.dtype, count)
+        return read_rows(self._file, self.dtype, count)
 
 
-def read_rows(path: Path, dtype: np.dtype[Any], count: int) -> np.ndarray:
+def rows_for(dtype: np.dtype[Any], expected: int, path: Path | None) -> Rows:
+    """Rows in the file at `path`; without one in memory, or in a temporary file that nobody sees when they are many."""
+    if path is None and expected * dtype.itemsize <= LARGE:
+        return Rows(dtype, expected)
+    return FileRows(dtype, expected, path.open("w+b") if path else TemporaryFile())  # type: ignore[arg-type]
+
+
+def filled(count: int, fill: Callable[[range], np.ndarray], dtype: np.dtype[Any]) -> np.ndarray:
+    """The values 0 ... count - 1 that `fill` makes piece by piece; many of them lie in a temporary file."""
+    store = rows_for(dtype, count, None)
+    for begin in range(0, count, store.chunk_rows):
+        chunk = store.extend()[: count - begin]
+        for first in range(0, len(chunk), PIECE):
+            piece = fill(range(begin + first, begin + min(len(chunk), first + PIECE)))
+            chunk[first : first + len(piece)] = piece
+    return store.first(count)
+
+
+def read_rows(file: Path | IO[bytes], dtype: np.dtype[Any], count: int) -> np.ndarray:
     """The first `count` rows of a file of rows, read when they are used."""
-    return np.memmap(path, dtype, "r", shape=(count,)) if count and dtype.itemsize else np.zeros(count, dtype)
+    return np.memmap(file, dtype, "r", shape=(count,)) if count and dtype.itemsize else np.zeros(count, dtype)
 
 
 def _claim(file: int, begin: int, end: int) -> None:

@@ -1,8 +1,8 @@
 """Equations written with CasADi -> C -> a `Block`.
 
-A `ContinuousModel` describes x' = f(x, u, p) with y = g(x, u, p). The generated `model_step` integrates it with the classical
-Runge-Kutta method of fourth order in sub-steps of at most `max_sub_step`. Further CasADi functions can be exported from the
-same binary, for programs that use the equations without FMI: each becomes
+A `ContinuousModel` describes x' = f(x, u, p) with y = g(x, u, p); x may be empty (`static_model`). The generated `model_step`
+integrates it with the classical Runge-Kutta method of fourth order in sub-steps of at most `max_sub_step`. Further CasADi
+functions can be exported from the same binary, for programs that use the equations without FMI: each becomes
 
     void NAME(const double *const in[], double *const out[]);
 
@@ -11,7 +11,6 @@ where `in[i]` and `out[i]` point to the elements of the i-th argument and result
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +20,7 @@ import casadi as ca
 from ..component import Variable
 from .block import Block, BlockVariable
 from .equations_c import c_function
+from .equations_glue import INCLUDES, glue
 
 _SIGNATURE = "void {}(const double *const in[], double *const out[])"
 
@@ -58,6 +58,26 @@ class ContinuousModel:
     def slots(self, causality: str) -> list[Variable]:
         """Variables of a causality, repeated for each of their elements."""
         return [variable for variable in self.variables if variable.causality == causality for _ in variable.slots]
+
+    def flags(self) -> list[bool]:
+        """For each output slot whether it is Boolean."""
+        return [variable.type == "Boolean" for variable in self.slots("output")]
+
+
+def static_model(
+    identifier: str, description: str, variables: Sequence[Variable], outputs: Callable[[ca.SX, ca.SX], ca.SX]
+) -> ContinuousModel:
+    """A model without states, y = g(u, p): `outputs` maps inputs and parameters to outputs."""
+    nothing = ca.SX(0, 1)
+    return ContinuousModel(
+        identifier,
+        description,
+        variables,
+        (),
+        lambda parameters: nothing,
+        lambda state, inputs, parameters: nothing,
+        lambda state, inputs, parameters: outputs(inputs, parameters),
+    )
 
 
 def runge_kutta_4(rate: Callable[[ca.SX], ca.SX], state: ca.SX, step: ca.SX) -> ca.SX:
@@ -108,7 +128,7 @@ def _block_variable(variable: Variable, member: str) -> BlockVariable:
 
 
 def _header(model: ContinuousModel) -> str:
-    flags = _flags(model)
+    flags = model.flags()
     sizes = {
         "parameter": len(model.slots("parameter")),
         "input": len(model.slots("input")),
@@ -122,16 +142,11 @@ def _header(model: ContinuousModel) -> str:
     return f"/* {model.description} */\n#include <stdbool.h>\n\ntypedef struct {{\n{lines}\n}} Model;\n"
 
 
-def _flags(model: ContinuousModel) -> list[bool]:
-    """For each output slot whether it is Boolean."""
-    return [variable.type == "Boolean" for variable in model.slots("output")]
-
-
 def _source(model: ContinuousModel, exported: Sequence[ca.Function]) -> str:
     """The text of model.c."""
     functions = [f"static {_SIGNATURE.format(f.name())}\n{c_function(f)}" for f in _functions(model)]
     functions += [f"MODEL_EXPORT {_SIGNATURE.format(f.name())}\n{c_function(f)}" for f in exported]
-    return "\n".join([_INCLUDES, *functions, _glue(model)])
+    return "\n".join([INCLUDES, *functions, glue(model)])
 
 
 def _functions(model: ContinuousModel) -> list[ca.Function]:
@@ -140,110 +155,14 @@ def _functions(model: ContinuousModel) -> list[ca.Function]:
     state = ca.SX.sym("state", len(model.states))
     step = ca.SX.sym("step")
     outputs = ca.vertsplit(model.outputs(state, inputs, parameters))
-    flags = _flags(model)
+    flags = model.flags()
     numbers = ca.vertcat(*(y for y, flag in zip(outputs, flags, strict=True) if not flag))
     truths = ca.vertcat(*(y for y, flag in zip(outputs, flags, strict=True) if flag))
+    observe = ca.Function("observe", [state, inputs, parameters], [numbers, truths])
+    if not model.states:
+        return [observe]
     return [
         ca.Function("initial_state", [parameters], [model.initial_state(parameters)]),
         ca.Function("sub_step", [state, inputs, parameters, step], [model.advance(state, inputs, parameters, step)]),
-        ca.Function("observe", [state, inputs, parameters], [numbers, truths]),
+        observe,
     ]
-
-
-def _glue(model: ContinuousModel) -> str:
-    """The functions of the block's interface, around the generated ones."""
-    messages = ",\n".join(f'    "the state {name} is not finite"' for name in model.states)
-    member = {kind: f"m->{kind}" if model.slots(kind) else "NULL" for kind in ("parameter", "input")}
-    flags = sum(_flags(model))
-    numbers = "m->output" if flags < len(_flags(model)) else "NULL"
-    return _GLUE % {
-        "messages": messages,
-        "states": len(model.states),
-        "parameter": member["parameter"],
-        "input": member["input"],
-        "output": numbers,
-        "flag_slots": max(flags, 1),
-        "take_flags": f"    for (int i = 0; i < {flags}; ++i) m->flag[i] = flags[i] != 0;\n" if flags else "",
-        "starts": _starts(model),
-        "max_sub_step": repr(model.max_sub_step),
-    }
-
-
-def _starts(model: ContinuousModel) -> str:
-    """Assignments of the start values that differ from zero; the rest of the structure is cleared before."""
-    lines = []
-    for kind in ("parameter", "input"):
-        values = [start for v in model.variables if v.causality == kind for start in _start(v)]
-        lines += [f"    m->{kind}[{k}] = {value!r};\n" for k, value in enumerate(values) if value != 0]
-    return "".join(lines)
-
-
-def _start(variable: Variable) -> Sequence[float]:
-    count = math.prod(variable.shape)
-    if variable.start is None:
-        return [0.0] * count
-    return [float(value) for value in variable.start] if variable.shape else [float(variable.start)]
-
-
-_INCLUDES = """#include <math.h>
-#include <stddef.h>
-
-#include "export.h"
-#include "model.h"
-"""
-
-_GLUE = """static const char *const FAILURES[] = {
-%(messages)s
-};
-
-static void publish(Model *m)
-{
-    double flags[%(flag_slots)d];
-    const double *in[] = {m->state, %(input)s, %(parameter)s};
-    double *out[] = {%(output)s, flags};
-    observe(in, out);
-%(take_flags)s}
-
-static const char *failure(const Model *m)
-{
-    for (int i = 0; i < %(states)d; ++i)
-        if (!isfinite(m->state[i])) return FAILURES[i];
-    return NULL;
-}
-
-void model_start(Model *m)
-{
-    *m = (Model){0};
-%(starts)s}
-
-void model_parameters(Model *m)
-{
-    (void)m; /* nothing depends on parameters before initialization */
-}
-
-const char *model_initialize(Model *m, double time)
-{
-    const double *in[] = {%(parameter)s};
-    double *out[] = {m->state};
-    (void)time;
-    initial_state(in, out);
-    publish(m);
-    return failure(m);
-}
-
-const char *model_step(Model *m, double time, double step_size)
-{
-    const long count = (long)fmax(1.0, ceil(step_size / %(max_sub_step)s - 1e-9));
-    const double sub_step_size = step_size / (double)count;
-    double next[%(states)d];
-    const double *in[] = {m->state, %(input)s, %(parameter)s, &sub_step_size};
-    double *out[] = {next};
-    (void)time;
-    for (long k = 0; k < count; ++k) {
-        sub_step(in, out);
-        for (int i = 0; i < %(states)d; ++i) m->state[i] = next[i];
-    }
-    publish(m);
-    return failure(m);
-}
-"""

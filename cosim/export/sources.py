@@ -80,7 +80,7 @@ def _write_python(path: Path, target: Path) -> list[Path]:
 KINDS = (
     Kind("Modelica model", "controllers/modelica/*.mo", "rumoca", _load_modelica),
     Kind("PythonFMU class", "controllers/python/*.py", "pythonfmu", None, "python", _write_python, compiled=False),
-    Kind("equations", "plant_src/vehicles/*/equations.py", "casadi", _load_equations),
+    Kind("equations", "plant_src/**/equations.py", "casadi", _load_equations),
     Kind("C controller", f"controllers/c/*/{DESCRIPTION}", "fmpy", None, "c", write_c_fmu),
 )
 

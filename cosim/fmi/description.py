@@ -8,18 +8,20 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile, ZipFile
 
 import numpy as np
-from lxml import etree
 
 from ..component import Variable
-from ..errors import InputError
 from ..timing import exact
 from ..units import BASE, Unit
+from .preflight import LIMITS, Examination, Limits, examine, refuse
+from .preflight.binary import platforms
+from .preflight.model import Model, ModelVariable, UnitDefinition
+from .preflight.rules_values import dimension_size, read_limit
+from .preflight.values import value
 
-_FMI2_TYPES = {"Real": "Float64", "Integer": "Int32"}
 _C_INT = np.dtype(np.int32)
+_TRUE = ("true", "1")
 
 
 @dataclass(frozen=True)
@@ -54,121 +56,88 @@ class Description:
         return int(self.fmi_version.split(".")[0])
 
 
-def read_description(path: Path) -> Description:
-    """Read an FMU's description without extracting it.
+def read_description(path: Path, limits: Limits = LIMITS) -> Description:
+    """Read an FMU's description after the FMU was examined; nothing is extracted.
 
-    Raises InputError when the file is no FMU, or none that offers FMI 2.0 or 3.0 Co-Simulation.
+    Raises InputError with everything that is wrong when the file is no FMU, no safe one, or none that offers FMI 2.0 or
+    3.0 Co-Simulation. Whether it has a binary for this machine does not matter here.
     """
-    from fmpy import read_model_description, supported_platforms
-
-    if not path.is_file():
-        raise InputError(f'FMU "{path}" does not exist')
-    fmi_version = _fmi_version(path)
-    if fmi_version.partition(".")[0] not in ("2", "3"):
-        raise InputError(f'"{path}" is an FMI {fmi_version} FMU; FMI 2.0 and 3.0 are supported')
-    try:
-        model = read_model_description(path, validate=False)
-        platforms = supported_platforms(path)
-    except Exception as error:
-        raise InputError(f'the model description of "{path}" cannot be read: {error}') from error
-    if model.coSimulation is None:
-        raise InputError(f'"{path}" offers no Co-Simulation interface')
-    if not model.instantiationToken:
-        attribute = "guid" if model.fmiMajorVersion == 2 else "instantiationToken"
-        raise InputError(f'the model description of "{path}" lacks the attribute {attribute}')
-    return _description(path, model, platforms)
+    return describe(path, examine(path, limits))
 
 
-def _fmi_version(path: Path) -> str:
-    """What the root element says. Raises InputError when the file is no FMU at all."""
-    try:
-        with ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
-            parser = etree.XMLParser(resolve_entities=False, no_network=True)
-            root = etree.parse(file, parser).getroot()
-    except (BadZipFile, KeyError) as error:
-        raise InputError(f'"{path}" is no FMU: {error.args[0]}') from None
-    except etree.XMLSyntaxError as error:
-        raise InputError(f'the model description of "{path}" is no XML: {error.msg}') from None
-    return root.get("fmiVersion") or "of unknown version"
-
-
-def _description(path: Path, model: Any, platforms: Sequence[str]) -> Description:
-    units = {unit.name: _unit(unit) for unit in model.unitDefinitions}
-    try:
-        variables = [_variable(variable, units, model.fmiMajorVersion) for variable in model.modelVariables]
-        experiment = _experiment(model.defaultExperiment)
-    except (ValueError, KeyError) as error:
-        raise InputError(f'the model description of "{path}" is wrong: {error}') from None
-    interface = model.coSimulation
+def describe(path: Path, examination: Examination) -> Description:
+    """The description of an FMU that was examined. Raises InputError with the errors that were found."""
+    refuse(path, examination.findings)
+    model = examination.model
+    assert model is not None and model.interface is not None  # anything else is an error that was found
+    units = {unit.name: _unit(unit) for unit in model.units}
+    variables = [variable for source in model.variables for variable in _variables(model, source, units)]
     return Description(
-        model.fmiVersion,
-        model.modelName,
-        interface.modelIdentifier,
-        model.instantiationToken,
-        model.description or "",
-        model.generationTool or "",
+        model.root["fmiVersion"],
+        model.root.get("modelName", ""),
+        model.interface["modelIdentifier"],
+        model.root["guid" if model.major == 2 else "instantiationToken"],
+        model.root.get("description", ""),
+        model.root.get("generationTool", ""),
         variables,
-        {variable.name: variable.valueReference for variable in model.modelVariables},
-        experiment,
-        interface.canGetAndSetFMUstate,
-        interface.canBeInstantiatedOnlyOncePerProcess,
-        interface.needsExecutionTool,
-        platforms,
+        {name: int(source.attributes["valueReference"]) for source in model.variables for name in _names(source)},
+        _experiment(model.experiment),
+        any(model.interface.get(name) in _TRUE for name in ("canGetAndSetFMUstate", "canGetAndSetFMUState")),
+        model.interface.get("canBeInstantiatedOnlyOncePerProcess") in _TRUE,
+        model.interface.get("needsExecutionTool") in _TRUE,
+        platforms(examination.members),
     )
 
 
-def _unit(definition: Any) -> Unit | None:
-    base = definition.baseUnit
+def _unit(definition: UnitDefinition) -> Unit | None:
+    base = definition.base
     if base is None:
         return None
-    return Unit(definition.name, tuple(int(getattr(base, name)) for name in BASE), float(base.factor), float(base.offset))
+    exponents = tuple(int(base.get(name, 0)) for name in BASE)
+    return Unit(definition.name, exponents, float(base.get("factor", 1)), float(base.get("offset", 0)))
 
 
-def _variable(variable: Any, units: Mapping[str, Unit | None], major: int) -> Variable:
-    kind = _FMI2_TYPES.get(variable.type, variable.type)
-    declared = variable.declaredType
-    unit = variable.unit or (declared.unit if declared else None)
-    as_c_int = major == 2 and kind in ("Boolean", "Enumeration")
-    return Variable(
-        variable.name,
-        kind,
-        variable.causality or "local",
-        variable.variability or ("continuous" if kind in ("Float64", "Float32") else "discrete"),
-        _start(variable.start, kind, variable.name),
-        units.get(unit) if unit else None,
-        tuple(variable.shape or ()),
-        variable.description or (declared.description if declared else None) or "",
-        _limit(variable.min or (declared.min if declared else None)),
-        _limit(variable.max or (declared.max if declared else None)),
-        _C_INT if as_c_int else None,  # type: ignore[arg-type]
-    )
+def _names(source: ModelVariable) -> list[str]:
+    return [source.name, *(alias["name"] for alias in source.aliases)]
 
 
-def _start(text: str | None, kind: str, name: str) -> Any:
-    if text is None or kind in ("String", "Binary"):
-        return text
-    try:
-        values = [_number(word, kind) for word in text.split()]
-    except (ValueError, KeyError):
-        raise ValueError(f'start value "{text}" of variable "{name}" is no {kind}') from None
+def _variables(model: Model, source: ModelVariable, units: Mapping[str, Unit | None]) -> list[Variable]:
+    """The variable and its aliases."""
+    as_c_int = model.major == 2 and source.kind in ("Boolean", "Enumeration")
+    texts = [source.attribute("description"), *(alias.get("description") for alias in source.aliases)]
+    return [
+        Variable(
+            name,
+            source.kind,
+            source.causality,  # type: ignore[arg-type]
+            source.variability,  # type: ignore[arg-type]
+            _start(source),
+            units.get(source.attribute("unit") or ""),
+            tuple(dimension_size(model, dimension) or 0 for dimension in source.dimensions),
+            text or texts[0] or "",
+            _limit(source, "min"),
+            _limit(source, "max"),
+            _C_INT if as_c_int else None,  # type: ignore[arg-type]
+        )
+        for name, text in zip(_names(source), texts, strict=True)
+    ]
+
+
+def _start(source: ModelVariable) -> Any:
+    """One value, or a tuple of them in row-major order."""
+    if not source.starts:
+        return None
+    texts = source.kind in ("String", "Binary", "Clock")
+    values = [word if texts else value(word, source.kind) for word in source.starts]
     return values[0] if len(values) == 1 else tuple(values)
 
 
-def _number(word: str, kind: str) -> float | int | bool:
-    if kind == "Boolean":
-        return {"true": True, "1": True, "false": False, "0": False}[word]
-    return float(word) if kind.startswith("Float") else int(word)
+def _limit(source: ModelVariable, name: str) -> float | None:
+    text = source.attribute(name)
+    limit = None if text is None or source.kind == "Boolean" else read_limit(text)
+    return limit if limit is not None and math.isfinite(limit) else None
 
 
-def _limit(text: str | None) -> float | None:
-    if text is None:
-        return None
-    value = float(text)
-    return value if math.isfinite(value) else None
-
-
-def _experiment(experiment: Any) -> DefaultExperiment:
-    if experiment is None:
-        return DefaultExperiment()
-    times = (experiment.startTime, experiment.stopTime, experiment.stepSize)
-    return DefaultExperiment(*(None if time is None else exact(str(time)) for time in times))
+def _experiment(experiment: Mapping[str, str]) -> DefaultExperiment:
+    times = (experiment.get(name) for name in ("startTime", "stopTime", "stepSize"))
+    return DefaultExperiment(*(None if time is None else exact(time.strip()) for time in times))

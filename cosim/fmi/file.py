@@ -1,52 +1,72 @@
-"""An FMU file: described once, extracted once, however many instances it has."""
+"""An FMU file: examined and described once, extracted once, however many instances it has."""
 
 from __future__ import annotations
 
 from functools import cached_property
-from hashlib import sha256
+from hashlib import file_digest
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from ..errors import InputError
-from .description import Description, read_description
+from .description import Description, describe
+from .preflight import LIMITS, Examination, Limits, examine, extract, open_file, refuse
 
 
 class FmuFile:
-    """One FMU on disk. Instances `acquire` the extracted folder and `release` it; the last one removes it."""
+    """One FMU on disk. Instances `acquire` the extracted folder and `release` it; the last one unloads and removes it.
 
-    def __init__(self, path: Path):
-        self.path = path
+    Nothing of the FMU is extracted before it was examined and found to be good; `limits` bound what that may cost.
+    """
+
+    def __init__(self, path: Path, limits: Limits = LIMITS):
+        self.path, self.limits = path, limits
         self._folder: TemporaryDirectory[str] | None = None
         self._users = 0
+        #: FMPy's object with the loaded library, which all instances share
+        self.library: Any = None
+        #: an instance reported a fatal error: nothing of this FMU may be called any more
+        self.corrupt = False
+
+    @cached_property
+    def examination(self) -> Examination:
+        return examine(self.path, self.limits)
 
     @cached_property
     def description(self) -> Description:
-        return read_description(self.path)
+        return describe(self.path, self.examination)
 
     @cached_property
     def sha256(self) -> str:
-        return sha256(self.path.read_bytes()).hexdigest()
+        with open_file(self.path) as file:
+            return file_digest(file, "sha256").hexdigest()
 
     def check_platform(self) -> None:
-        """Raises InputError when the FMU has no binary for this machine."""
-        from fmpy import platform, platform_tuple
-
-        if platform not in self.description.platforms:
-            found = ", ".join(self.description.platforms) or "no binaries"
-            raise InputError(f'"{self.path}" has no binary for {platform_tuple} ({platform}); it has: {found}')
+        """Raises InputError when the FMU has no binary for this machine, or one that cannot be loaded."""
+        refuse(self.path, [*self.examination.findings, *self.examination.binary])
 
     def acquire(self) -> Path:
-        """The folder with the extracted FMU, until it is released."""
-        from fmpy import extract
-
+        """The folder with the extracted FMU, until it is released. Raises InputError when it cannot be extracted."""
         if self._folder is None:
-            self._folder = TemporaryDirectory(prefix="cosim-fmu-")
-            extract(self.path, self._folder.name)
+            self.check_platform()
+            folder = TemporaryDirectory(prefix="cosim-fmu-")
+            try:
+                extract(self.path, self.examination, Path(folder.name), self.limits)
+            except OSError as error:
+                folder.cleanup()
+                raise InputError(f'"{self.path}" cannot be extracted: {error.strerror or error}') from None
+            except InputError:
+                folder.cleanup()
+                raise
+            self._folder = folder
         self._users += 1
         return Path(self._folder.name)
 
     def release(self) -> None:
         self._users -= 1
+        if self._users == 0 and self.library is not None and not self.corrupt:
+            self.library.freeLibrary()
+            self.library = None
         if self._users == 0 and self._folder is not None:
             self._folder.cleanup()
             self._folder = None

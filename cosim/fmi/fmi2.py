@@ -16,6 +16,7 @@ class Fmi2Instance(FmuInstance):
     """An instance of an FMI 2.0 FMU."""
 
     prefix, major = "fmi2", 2
+    _instantiation = "fmi2Instantiate"
     accessors = {"Float64": "Real", "Int32": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
 
     def _slave(self, **arguments: Any) -> Any:
@@ -34,7 +35,7 @@ class Fmi2Instance(FmuInstance):
         try:
             self._fmu.instantiate(callbacks=callbacks, loggingOn=self._logging_on)
         except Exception:
-            raise ComponentError(self.name, "fmi2Instantiate", self._message or "the FMU gave no reason") from None
+            raise ComponentError(self.name, self._instantiation, self._message or "the FMU gave no reason") from None
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
         self._clock.value = start_time

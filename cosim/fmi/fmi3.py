@@ -16,6 +16,7 @@ class Fmi3Instance(FmuInstance):
     """An instance of an FMI 3.0 FMU."""
 
     prefix, major = "fmi3", 3
+    _instantiation = "fmi3InstantiateCoSimulation"
     accessors = {name: name for name in DTYPES} | {"Enumeration": "Int64"}
 
     def _slave(self, **arguments: Any) -> Any:
@@ -28,7 +29,7 @@ class Fmi3Instance(FmuInstance):
             self._fmu.instantiate(loggingOn=self._logging_on, logMessage=lambda _, status, __, text: self.log(status, text))
         except Exception:
             reason = self._message or "the FMU gave no reason"
-            raise ComponentError(self.name, "fmi3InstantiateCoSimulation", reason) from None
+            raise ComponentError(self.name, self._instantiation, reason) from None
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
         self._clock.value = start_time

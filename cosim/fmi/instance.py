@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
+from copy import copy
 from itertools import groupby
 from pathlib import Path
 from typing import Any, NoReturn
@@ -17,6 +18,8 @@ import numpy as np
 from .. import log
 from ..component import Access, Call, Component, Ports, StepResult, Variable
 from ..errors import ComponentError, InputError
+from ..journal import calling
+from ..process_state import contained
 from .file import FmuFile
 
 STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
@@ -37,14 +40,17 @@ class FmuInstance(Component):
     accessors: Mapping[str, str]
 
     def __init__(self, file: FmuFile, instance_name: str, logging_on: bool):
-        self.name, self._file = instance_name, file
+        self.name, self._file, self.code = instance_name, file, file
         self.description = file.description
         self.variables = self.description.variables
         self.has_state = self.description.has_state
         self._by_name = {variable.name: variable for variable in self.variables}
         self._message = ""
         self._clock = ctypes.c_double()
-        self._dead = False
+        #: instantiated, and neither freed nor corrupt
+        self._alive, self._holds_folder = False, False
+        #: the deadline of calls that are not steps
+        self._kind = "initialization"
         self._logging_on = logging_on
         self._fmu: Any = None
         file.check_platform()
@@ -57,6 +63,9 @@ class FmuInstance(Component):
     def _instantiate(self) -> None:
         raise NotImplementedError
 
+    #: the C function that makes an instance
+    _instantiation: str
+
     def _step_calls(self, step_size: ctypes.c_double) -> list[Call]:
         """doStep from the time in `self._clock`."""
         raise NotImplementedError
@@ -66,13 +75,12 @@ class FmuInstance(Component):
     def _start(self) -> None:
         """Load the library and instantiate the FMU. Raises InputError or ComponentError."""
         folder = self._file.acquire()
-        try:
+        self._holds_folder = True
+        with contained(self.name), calling(self.name, "loading the binary", "load"):
             self._fmu = self._load(folder)
+        with contained(self.name), calling(self.name, self._instantiation, "load"):
             self._instantiate()
-        except BaseException:
-            self._dead = True
-            self._file.release()
-            raise
+        self._alive = True
         self._handle: int = self._fmu.component
         self._library = ctypes.PyDLL(None, handle=self._fmu.dll._handle)
         # doStep may take long: it is called without holding the interpreter lock
@@ -82,14 +90,17 @@ class FmuInstance(Component):
         self._steps = self._step_calls(self._step_size)
 
     def _load(self, folder: Path) -> Any:
+        """FMPy's object for this instance: a copy of one that is made once for all instances, which takes milliseconds."""
+        if self._file.library is None:
+            self._file.library = self._open(folder)
+        fmu = copy(self._file.library)
+        fmu.instanceName = self.name
+        return fmu
+
+    def _open(self, folder: Path) -> Any:
         description = self.description
         try:
-            return self._slave(
-                guid=description.token,
-                modelIdentifier=description.identifier,
-                unzipDirectory=str(folder),
-                instanceName=self.name,
-            )
+            return self._slave(guid=description.token, modelIdentifier=description.identifier, unzipDirectory=str(folder))
         except Exception as error:
             reason = str(error).replace(f"{folder}/", "")
             raise InputError(f'the binary of "{self._file.path}" cannot be loaded: {reason}') from None
@@ -98,14 +109,16 @@ class FmuInstance(Component):
         """Call one of FMPy's methods; a bad status becomes a ComponentError with the FMU's own last message."""
         from fmpy.fmi1 import FMICallException
 
-        try:
-            return getattr(self._fmu, function)(*arguments)
-        except FMICallException as error:
-            self.fail(error.function, error.status)
+        name = self.prefix + function[0].upper() + function[1:]
+        with calling(self.name, name, self._kind, self._clock.value):
+            try:
+                return getattr(self._fmu, function)(*arguments)
+            except FMICallException as error:
+                self.fail(error.function, error.status)
 
     def fail(self, function: str, status: int) -> NoReturn:
-        """Raise the error for a status. After fatal nothing of this instance may be called any more."""
-        self._dead = self._dead or status == FATAL
+        """Raise the error for a status. After fatal nothing of any instance of this FMU may be called (FMI 3.0 section 2.2.3)."""
+        self._file.corrupt = self._file.corrupt or status == FATAL
         label = STATUS[status] if 0 <= status < len(STATUS) else "not defined by FMI"
         reason = f"status {status} ({label})" + (f": {self._message}" if self._message else "")
         raise ComponentError(self.name, function, reason, self._clock.value)
@@ -118,16 +131,21 @@ class FmuInstance(Component):
 
     def exit_initialization_mode(self) -> None:
         self.call("exitInitializationMode")
+        self._kind = "step"
 
     def terminate(self) -> None:
-        self.call("terminate")
+        self._kind = "end"
+        if not self._file.corrupt:
+            self.call("terminate")
 
     def free(self) -> None:
-        if self._fmu is None or self._dead:
-            return
-        self._dead = True
-        self._fmu.freeInstance()
-        self._file.release()
+        if self._alive and not self._file.corrupt:
+            with calling(self.name, f"{self.prefix}FreeInstance", "end"):
+                getattr(self._fmu, f"{self.prefix}FreeInstance")(self._handle)
+        self._alive = False
+        if self._holds_folder:
+            self._holds_folder = False
+            self._file.release()
 
     # -- access off the hot path ---------------------------------------------------------------------------------------
 
@@ -206,7 +224,8 @@ class FmuInstance(Component):
 
     def _make(self, calls: Sequence[Call]) -> StepResult | None:
         for call in calls:
-            status = call.function(*call.arguments)
+            with calling(self.name, call.name, self._kind, self._clock.value):
+                status = call.function(*call.arguments)
             if status > WARNING:
                 return self.failed(call.name, status)
         return None

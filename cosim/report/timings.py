@@ -11,6 +11,7 @@ from ..results import Result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+COLUMN, PAGE, BAR = 3.5, 7.16, 0.8  # in
 #: real-time factors of the published simulator (Simulink and V-REP over TCP): figure 18 and section 6.3 of the paper
 PUBLISHED = (0.5, 0.7)
 
@@ -18,13 +19,14 @@ PUBLISHED = (0.5, 0.7)
 def timings(result: Result, others: Sequence[Result] = ()) -> Figure:
     """Bars of simulated over elapsed time (of the stepping loop) of `result` and `others`, above the band of the paper.
 
-    The axis is logarithmic. Raises InputError for a result that holds no wall time.
+    The axis is logarithmic; the width grows with the runs, from a column to a page. Raises InputError for a result that holds
+    no wall time.
     """
     from matplotlib.figure import Figure
 
     runs = [result, *others]
     names, factors = [_name(run) for run in runs], [real_time_factor(run) for run in runs]
-    figure = Figure(layout="constrained")
+    figure = Figure(figsize=(min(PAGE, max(COLUMN, BAR * len(runs))), 2.6), layout="constrained")
     axes = figure.add_subplot(yscale="log", ylabel="simulated time / elapsed time")
     axes.axhspan(*PUBLISHED, color="#D55E00", alpha=0.35, linewidth=0, label="published simulator")
     bars = axes.bar(range(len(runs)), factors, width=0.6, color="#0072B2", label="cosim")

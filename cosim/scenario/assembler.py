@@ -8,14 +8,14 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
-from ..component import Component
+from ..component import Component, Variable
 from ..errors import InputError, Problem, did_you_mean
 from ..simulate import Event, Settings, problems
-from ..system import Connection, Endpoint, Group, Stage, System
+from ..system import Connection, Endpoint, Group, Parallel, Stage, System
 from ..table import read_table
 from .functions import function_problem
-from .names import Target, Unknown, assign, resolve, under
-from .schema import kept
+from .names import Slots, Target, Unknown, assign, resolve
+from .schema import SystemSpec, kept
 from .selection import Selection
 from .sources import Workshop
 from .tree import Node, Scenario
@@ -33,10 +33,11 @@ class Assembler:
         self.problems: list[Problem] = list(scenario.problems)
         self.workshop = Workshop()
         self.components: dict[str, Component] = {}
+        self._by_name: dict[str, Mapping[str, Variable]] = {}
         self.start_values: dict[str, dict[str, Any]] = defaultdict(dict)
 
-    def run(self) -> None:
-        self._make_components()
+    def wire(self) -> None:
+        """Everything that follows once the components are made."""
         self._set_start_values()
         aliases = self._aliases()
         connections = list(self._connections())
@@ -47,6 +48,7 @@ class Assembler:
             dict(self._periods(self.root)),
             self.start_values,
             aliases,
+            _parallel(self.spec),
         )
         self.settings = Settings(
             self.spec.start_time,
@@ -55,6 +57,7 @@ class Assembler:
             self._columns(aliases),
             self.spec.record.interval,
             list(self._events()),
+            finite=self.spec.non_finite == "error",
         )
         self.problems += [
             self._located(problem) for problem in problems(self.system, self.settings) if not self._follows(problem)
@@ -63,7 +66,8 @@ class Assembler:
 
     # -- components and their start values -----------------------------------------------------------------------------
 
-    def _make_components(self) -> None:
+    def make_components(self) -> None:
+        """The components of the scenario and of its nested systems, and the tables of its input profiles."""
         for node, name in self.root.leaves():
             try:
                 self.components[node.full_name(name)] = self.workshop.make(node, name)
@@ -93,11 +97,16 @@ class Assembler:
         try:
             for target in resolve(node, name, ("parameters", "inputs"), hidden=True):
                 if target.component in self.components:
-                    component = self.components[target.component]
-                    values[target.component] |= assign(target.component, component, target.prefix, value)
+                    variables = self._variables(target.component)
+                    values[target.component] |= assign(target.component, variables, target.prefix, value)
         except (Unknown, ValueError) as error:
             if str(error):
                 self.problems.append(Problem(str(error), where))
+
+    def _variables(self, name: str) -> Mapping[str, Variable]:
+        if name not in self._by_name:
+            self._by_name[name] = {variable.name: variable for variable in self.components[name].variables}
+        return self._by_name[name]
 
     # -- wiring --------------------------------------------------------------------------------------------------------
 
@@ -130,7 +139,8 @@ class Assembler:
 
     def _member(self, node: Node, name: str) -> str | Group:
         if name in node.children:
-            return Group(node.full_name(name), self._stages(node.children[name]))
+            child = node.children[name]
+            return Group(node.full_name(name), self._stages(child), _parallel(child.spec))
         return node.full_name(name)
 
     def _periods(self, node: Node, inherited: Fraction | None = None) -> Iterator[tuple[str, Fraction]]:
@@ -159,7 +169,7 @@ class Assembler:
     def _slots(self, target: Target, alias: str) -> dict[str, Endpoint]:
         if target.component not in self.components:
             return {}
-        slots = under(self.components[target.component], target.prefix, "output")
+        slots = Slots(self.components[target.component], "output").under(target.prefix)
         return {alias + rest: Endpoint(target.component, slot) for rest, slot in slots.items()}
 
     # -- what is recorded, set and computed ----------------------------------------------------------------------------
@@ -220,3 +230,7 @@ class Assembler:
                 if problem.subject[:2] == ("components", node.full_name(name)):
                     return replace(problem, where=node.where("components", name, *problem.subject[2:]), subject=())
         return replace(problem, where=self.root.where(*problem.subject), subject=())
+
+
+def _parallel(spec: SystemSpec) -> Parallel:
+    return spec.algorithm.parallel if spec.algorithm else "auto"

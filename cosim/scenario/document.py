@@ -9,8 +9,10 @@ from __future__ import annotations
 import json
 import math
 import re
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from json.decoder import scanstring  # type: ignore[attr-defined]
 from pathlib import Path
 from typing import Any
@@ -38,10 +40,17 @@ class Document:
         known = tuple(path)
         while known and known not in self.offsets:
             known = known[:-1]
-        offset = self.offsets.get(known, 0)
-        line = self.text.count("\n", 0, offset) + 1
-        column = offset - self.text.rfind("\n", 0, offset)
-        return f"{self.file}:{line}:{column}: {json_path(path)}"
+        return f"{self.position(self.offsets.get(known, 0))}: {json_path(path)}"
+
+    def position(self, offset: int) -> str:
+        """ "file:line:column" of an offset in the text."""
+        line = bisect_right(self._lines, offset)
+        return f"{self.file}:{line}:{offset - self._lines[line - 1] + 1}"
+
+    @cached_property
+    def _lines(self) -> list[int]:
+        """Where each line begins."""
+        return [0, *(match.end() for match in re.finditer("\n", self.text))]
 
 
 def json_path(path: Sequence[str | int]) -> str:
@@ -50,9 +59,9 @@ def json_path(path: Sequence[str | int]) -> str:
 
 
 def _step(key: str | int) -> str:
-    if isinstance(key, str) and _NAME.fullmatch(key):
-        return f".{key}"
-    return f"[{json.dumps(key)}]"
+    if isinstance(key, int):
+        return f"[{key}]"
+    return f".{key}" if _NAME.fullmatch(key) else f"[{json.dumps(key)}]"
 
 
 def read_document(file: Path) -> Document:
@@ -84,9 +93,7 @@ class _Reader:
 
     def error(self, offset: int, message: str) -> InputError:
         self.document.offsets.setdefault((), 0)
-        line = self.text.count("\n", 0, offset) + 1
-        column = offset - self.text.rfind("\n", 0, offset)
-        return InputError(f"{self.document.file}:{line}:{column}: {message}")
+        return InputError(f"{self.document.position(offset)}: {message}")
 
     def value(self, offset: int, path: Path_) -> tuple[Any, int]:
         self.document.offsets[path] = offset

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from bisect import bisect_left
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from ..component import Component, Variable
@@ -63,20 +64,44 @@ def _ports(node: Node, kinds: Sequence[str]) -> Mapping[str, Sequence[str]]:
     return shown
 
 
-def under(component: Component, prefix: str, causality: str) -> dict[str, str]:
-    """Slots of a component below a prefix, by the rest of their names: "" for the prefix itself, ".position.x" below it."""
-    slots = [slot for variable in component.variables if variable.causality == causality for slot in variable.slots]
-    if not prefix:
-        return {f".{slot}": slot for slot in slots}
-    return {slot[len(prefix) :]: slot for slot in slots if slot == prefix or slot.startswith((prefix + ".", prefix + "["))}
+class Heads:
+    """Names by how they begin, found without a look at all of them."""
+
+    def __init__(self, names: Iterable[str]):
+        self._sorted = sorted(names)
+
+    def starting(self, head: str) -> Sequence[str]:
+        """All names that start with `head`, sorted."""
+        if not head:
+            return self._sorted
+        first = bisect_left(self._sorted, head)
+        return self._sorted[first : bisect_left(self._sorted, head[:-1] + chr(ord(head[-1]) + 1), first)]
 
 
-def assign(name: str, component: Component, text: str, value: Any) -> dict[str, Any]:
+class Slots:
+    """The slots of one causality of a component, in order, found by prefix without a look at all of them."""
+
+    def __init__(self, component: Component, causality: str):
+        slots = (slot for variable in component.variables if variable.causality == causality for slot in variable.slots)
+        self._places = {slot: place for place, slot in enumerate(slots)}
+        self._heads = Heads(self._places)
+
+    def under(self, prefix: str) -> dict[str, str]:
+        """Slots below a prefix, by the rest of their names: "" for the prefix itself, ".position.x" below it."""
+        if not prefix:
+            return {f".{slot}": slot for slot in self._places}
+        found = [prefix] if prefix in self._places else []
+        found += [slot for separator in ".[" for slot in self._heads.starting(prefix + separator)]
+        return {slot[len(prefix) :]: slot for slot in sorted(found, key=self._places.__getitem__)}
+
+
+def assign(name: str, variables: Mapping[str, Variable], text: str, value: Any) -> dict[str, Any]:
     """Values by variable name for `text` = value; a list sets an array, or the scalars text[1], text[2], ...
+
+    `variables` are those of the component `name`, by their names.
 
     Raises Unknown when there is no such variable, ValueError when it does not take the value.
     """
-    variables = {variable.name: variable for variable in component.variables}
     value = value.tolist() if hasattr(value, "tolist") else value
     if text in variables:
         return {text: _checked(variables[text], value)}
@@ -88,7 +113,7 @@ def assign(name: str, component: Component, text: str, value: Any) -> dict[str, 
             size = sum(other.startswith(f"{text}[") for other in variables)
             raise ValueError(f'"{text}" takes at most {size} values, found {len(value)}')
         return {each: _checked(variables[each], element) for each, element in zip(names, value, strict=True)}
-    settable = [v.name for v in component.variables if v.causality in ("parameter", "input")]
+    settable = [v.name for v in variables.values() if v.causality in ("parameter", "input")]
     raise Unknown(f'component "{name}" has no variable "{text}"{did_you_mean(text, settable)}')
 
 

@@ -126,6 +126,11 @@ class AlgorithmSpec(Spec):
 
     kind: Literal["staged"] = "staged"
     stages: list[list[Name]]
+    parallel: Literal["auto"] | bool = Field(
+        "auto",
+        description="whether the FMUs of a stage step at the same time, on threads, with the same result: where their measured "
+        "steps are long enough (instances of one file never at once), always, or never",
+    )
 
 
 class RecordSpec(Spec):
@@ -198,6 +203,15 @@ class PortsSpec(Spec):
     parameters: dict[Name, Names] = {}
 
 
+class DeadlinesSpec(Spec):
+    """How long one call into a component may take in a supervised run (s of wall time)."""
+
+    load: float = Field(10.0, gt=0, description="load and instantiate")
+    initialization: float = Field(10.0, gt=0, description="until the end of initialization mode")
+    step: float = Field(5.0, gt=0, description="while stepping")
+    end: float = Field(5.0, gt=0, description="terminate and free")
+
+
 class SystemSpec(Spec):
     """Components and how they are connected: the core of scenarios and nested systems."""
 
@@ -231,6 +245,8 @@ class ScenarioSpec(SystemSpec):
     checks: list[CheckSpec] = []
     figures: list[FunctionSpec] = []
     reference: ReferenceSpec | None = None
+    deadlines: DeadlinesSpec = DeadlinesSpec(load=10.0, initialization=10.0, step=5.0, end=5.0)
+    non_finite: Literal["error", "allow"] = Field("error", description="what NaN or infinity on a connected output is")
 
 
 def json_schema(nested: bool = False) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from ..component import Component
 from ..errors import Problem, did_you_mean
 from ..system import Endpoint
+from .names import Heads
 
 
 class Selection:
@@ -20,17 +21,18 @@ class Selection:
     def __init__(self, components: Mapping[str, Component], aliases: Mapping[str, Endpoint], broken: Sequence[str]):
         self._outputs = {**_signals(components, ("output",)), **aliases}
         self._others = _signals(components, ("local", "parameter", "calculatedParameter", "structuralParameter", "independent"))
+        self._output_heads, self._other_heads = Heads(self._outputs), Heads(self._others)
         self._broken = broken
         self.problems: list[Problem] = []
 
     def choose(self, patterns: Iterable[tuple[str, str]]) -> dict[str, Endpoint]:
         """The signals that match (pattern, where it stands) pairs, in the order of components and variables."""
-        chosen: dict[str, Endpoint] = {}
+        chosen: set[str] = set()
         for pattern, where in patterns:
-            matches = _matching(pattern, self._outputs) or _matching(pattern, self._others)
+            matches = _matching(pattern, self._output_heads) or _matching(pattern, self._other_heads)
             if not matches and not self._may_be_broken(pattern):
                 self.problems.append(Problem(f'no output matches "{pattern}"{did_you_mean(pattern, self._outputs)}', where))
-            chosen |= matches
+            chosen.update(matches)
         return {name: end for name, end in {**self._outputs, **self._others}.items() if name in chosen}
 
     def _may_be_broken(self, pattern: str) -> bool:
@@ -48,6 +50,8 @@ def _signals(components: Mapping[str, Component], causalities: Sequence[str]) ->
     }
 
 
-def _matching(pattern: str, names: Mapping[str, Endpoint]) -> dict[str, Endpoint]:
-    expression = re.compile(".*".join(map(re.escape, pattern.split("*"))))
-    return {name: end for name, end in names.items() if expression.fullmatch(name)}
+def _matching(pattern: str, names: Heads) -> list[str]:
+    if "*" not in pattern:
+        return [name for name in names.starting(pattern)[:1] if name == pattern]
+    matches = re.compile(".*".join(map(re.escape, pattern.split("*")))).fullmatch
+    return [name for name in names.starting(pattern.partition("*")[0]) if matches(name)]

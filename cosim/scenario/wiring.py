@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ..component import Component
 from ..errors import Problem, did_you_mean
 from ..system import Connection, Endpoint
-from .names import Target, Unknown, resolve, under
+from .names import Slots, Target, Unknown, resolve
 from .schema import ConnectionSpec, kept
 from .tree import Node
 
@@ -28,6 +28,7 @@ class Wiring:
     def __init__(self, components: Mapping[str, Component], set_inputs: set[Endpoint]):
         self._components = components
         self._set_inputs = set_inputs
+        self._slots: dict[tuple[str, str], Slots] = {}
         self._fed: dict[Endpoint, _Candidate] = {}
         self._unfed: dict[Endpoint, Problem] = {}
         self.problems: list[Problem] = []
@@ -48,10 +49,11 @@ class Wiring:
         return (candidate.connection for candidate in self._fed.values())
 
     def _expand(self, node: Node, i: int, spec: ConnectionSpec) -> None:
-        sources = self._resolve(node, spec.source, "outputs", node.where("connections", i, "from"))
-        targets = self._resolve(node, spec.target, "inputs", node.where("connections", i, "to"))
-        outputs = self._under(sources, "output", node.where("connections", i, "from"))
-        inputs = self._under(targets, "input", node.where("connections", i, "to"))
+        where_from, where_to = (node.where("connections", i, key) for key in ("from", "to"))
+        sources = self._resolve(node, spec.source, "outputs", where_from)
+        targets = self._resolve(node, spec.target, "inputs", where_to)
+        outputs = self._under(sources, "output", where_from)
+        inputs = self._under(targets, "input", where_to)
         for source, own_outputs in outputs:
             for target, own_inputs in inputs:
                 self._match(source, own_outputs, target, own_inputs, spec.delay, node.where("connections", i))
@@ -94,15 +96,21 @@ class Wiring:
 
     def _under(self, targets: Sequence[Target], causality: str, where: str) -> list[tuple[Target, dict[str, str]]]:
         """Slots of the wanted causality below each prefix; a problem if there are none at all."""
-        found = [(target, under(self._components[target.component], target.prefix, causality)) for target in targets]
+        found = [(target, self._below(target, causality)) for target in targets]
         if targets and not any(slots for _, slots in found):
             self.problems.append(Problem(self._nothing_under(targets[0], causality), where))
         return [(target, slots) for target, slots in found if slots]
 
+    def _below(self, target: Target, causality: str) -> dict[str, str]:
+        key = target.component, causality
+        if key not in self._slots:
+            self._slots[key] = Slots(self._components[target.component], causality)
+        return self._slots[key].under(target.prefix)
+
     def _nothing_under(self, target: Target, causality: str) -> str:
         component = self._components[target.component]
         for other in ("input", "output", "parameter"):
-            if other != causality and under(component, target.prefix, other):
+            if other != causality and self._below(target, other):
                 return f"{target.component}.{target.prefix} is an {other}, expected an {causality}"
         valid = (v.name for v in component.variables if v.causality == causality)
         return f'component "{target.component}" has no {causality} "{target.prefix}"{did_you_mean(target.prefix, valid)}'

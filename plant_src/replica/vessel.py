@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from .forces import body_velocity
 from .pid import Pid
 from .unit import Unit
 
@@ -59,5 +58,10 @@ class Autopilot(Unit):
         value = self.value
         error = (value["vehicle.attitude.yaw"] - value["course_command"] + math.pi) % (2 * math.pi) - math.pi
         value["rudder_angle"] = self._heading.step(error, step_size)
-        value["thrust"] = self._speed.step(value["speed_command"] - body_velocity(value)[0], step_size)
+        value["thrust"] = self._speed.step(value["speed_command"] - self._surge(), step_size)
         return True
+
+    def _surge(self) -> float:
+        """Velocity (m/s) along the heading."""
+        yaw = self.value["vehicle.attitude.yaw"]
+        return math.cos(yaw) * self.value["vehicle.velocity.x"] + math.sin(yaw) * self.value["vehicle.velocity.y"]

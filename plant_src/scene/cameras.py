@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,15 @@ from .mission import Mission
 
 NEAR, FAR = 0.4, 900.0  # m
 UP = np.array([0.0, 0.0, 1.0])
+
+
+class Window(NamedTuple):
+    """Pixels of a picture from left (top) up to and without right (bottom)."""
+
+    left: int
+    right: int
+    top: int
+    bottom: int
 
 
 @dataclass(frozen=True)
@@ -27,9 +37,12 @@ class View:
         """World to camera, as Bullet and OpenGL want it."""
         return list(pybullet.computeViewMatrix(self.eye.tolist(), self.target.tolist(), UP.tolist()))
 
-    def projection(self, aspect: float) -> list[float]:
-        """Camera to picture, for a picture `aspect` times as wide as high."""
-        return list(pybullet.computeProjectionMatrixFOV(math.degrees(self.angle), aspect, NEAR, FAR))
+    def projection(self, width: int, height: int, window: Window) -> list[float]:
+        """Camera to a window of a picture of that size."""
+        pixel = 2 * NEAR * math.tan(self.angle / 2) / height
+        left, right = ((x - width / 2) * pixel for x in (window.left, window.right))
+        bottom, top = ((height / 2 - y) * pixel for y in (window.bottom, window.top))
+        return list(pybullet.computeProjectionMatrix(left, right, bottom, top, NEAR, FAR))
 
     def axes(self) -> np.ndarray:
         """Right, up and forward of the camera in the world, shape (3, 3), one a row."""
@@ -44,10 +57,45 @@ class View:
         scale = height / (2 * math.tan(self.angle / 2))
         return np.stack([width / 2 + scale * right / forward, height / 2 - scale * up / forward], axis=1)
 
+    def window(self, centres: np.ndarray, radii: np.ndarray, width: int, height: int) -> Window:
+        """The part of a picture that holds all balls with `centres` (n, 3) and `radii` (n,) as far as they are seen."""
+        places = (centres - self.eye) @ self.axes().T
+        seen = self._in_sight(places, radii, width / height)
+        if not seen.any():
+            return Window(0, 0, 0, 0)
+        (right, up, forward), radii = places[seen].T, radii[seen]
+        if (forward - radii).min() <= NEAR:
+            return Window(0, width, 0, height)
+        scale = height / (2 * math.tan(self.angle / 2))
+        across, down = (_spread(values, radii, forward) * scale for values in (right, -up))
+        return Window(*_pixels(across, width), *_pixels(down, height))
+
+    def _in_sight(self, places: np.ndarray, radii: np.ndarray, aspect: float) -> np.ndarray:
+        """Which balls at `places` (n, 3), camera axes, reach into the pyramid that the picture shows."""
+        right, up, forward = places.T
+        upwards, sideways = self.angle / 2, math.atan(aspect * math.tan(self.angle / 2))
+        seen = forward + radii > NEAR
+        for distance, angle in ((np.abs(right), sideways), (np.abs(up), upwards)):
+            seen &= distance * math.cos(angle) - forward * math.sin(angle) < radii
+        return seen
+
     def mirrored(self) -> View:
         """The view from below the water whose picture, upside down, is what the water reflects."""
         flip = np.array([1.0, 1.0, -1.0])
         return View(self.eye * flip, self.target * flip, self.angle)
+
+
+def _spread(sideways: np.ndarray, radii: np.ndarray, forward: np.ndarray) -> np.ndarray:
+    """Smallest and largest tangent of the angles under which balls appear."""
+    ends = np.stack([sideways - radii, sideways + radii])
+    tangents = np.stack([ends / (forward - radii), ends / (forward + radii)])
+    return np.array([tangents.min(), tangents.max()])
+
+
+def _pixels(spread: np.ndarray, count: int) -> list[int]:
+    """The range of pixels about the middle of `count` that holds a spread of pixels."""
+    low, high = np.clip([math.floor(spread[0] + count / 2) - 1, math.ceil(spread[1] + count / 2) + 1], 0, count).tolist()
+    return [low, high]
 
 
 def overview(mission: Mission, row: int) -> View:

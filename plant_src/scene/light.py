@@ -2,6 +2,7 @@
 
 Water reflects the sky and the solids (whose mirror image is drawn from below the surface), disturbed by small ripples that
 fade with distance. Colours are linear mixes of red, green and blue in 0 ... 1; frame: world, z up, the water at z = 0.
+Colours and directions of n pixels have the shape (3, n): NumPy is several times slower on (n, 3).
 """
 
 from __future__ import annotations
@@ -13,9 +14,14 @@ import numpy as np
 
 from .cameras import View
 
-ZENITH, HORIZON = np.array([0.36, 0.58, 0.84], np.float32), np.array([0.86, 0.91, 0.95], np.float32)
-HILLS_FAR, HILLS_NEAR = np.array([0.62, 0.72, 0.80], np.float32), np.array([0.45, 0.58, 0.60], np.float32)
-DEEP = np.array([0.10, 0.33, 0.40], np.float32)
+
+def _colour(red: float, green: float, blue: float) -> np.ndarray:
+    return np.array([[red], [green], [blue]], np.float32)
+
+
+ZENITH, HORIZON = _colour(0.36, 0.58, 0.84), _colour(0.86, 0.91, 0.95)
+HILLS_FAR, HILLS_NEAR = _colour(0.62, 0.72, 0.80), _colour(0.45, 0.58, 0.60)
+DEEP = _colour(0.10, 0.33, 0.40)
 HAZE = 450.0  # m, distance at which a solid keeps 1/e of its colour
 
 #: ripples: direction (rad), wave number (1/m), slope
@@ -23,7 +29,7 @@ RIPPLES = ((0.4, 2.3, 0.016), (1.5, 3.7, 0.013), (2.6, 5.9, 0.010), (0.9, 9.7, 0
 
 
 class Rays(NamedTuple):
-    """Unit vectors through the pixels (height, width, 3), and how much of each is along the view's axis (height, width)."""
+    """Unit vectors through the pixels (3, height, width), and how much of each is along the view's axis (height, width)."""
 
     direction: np.ndarray
     along_axis: np.ndarray
@@ -34,20 +40,19 @@ def rays(view: View, width: int, height: int) -> Rays:
     half = math.tan(view.angle / 2)
     right = (2 * (np.arange(width, dtype=np.float32) + 0.5) / width - 1) * half * width / height
     up = (1 - 2 * (np.arange(height, dtype=np.float32) + 0.5) / height) * half
-    axes = view.axes().astype(np.float32)
-    through = right[None, :, None] * axes[0] + up[:, None, None] * axes[1] + axes[2]
-    length = np.sqrt((through**2).sum(axis=2))
-    return Rays(through / length[..., None], 1 / length)
+    axes = view.axes().astype(np.float32)[:, :, None, None]
+    along_axis = 1 / np.sqrt(1 + right**2 + up[:, None] ** 2)
+    return Rays((axes[0] * right + axes[1] * up[:, None] + axes[2]) * along_axis, along_axis)
 
 
 def sky(direction: np.ndarray) -> np.ndarray:
-    """Colour of the sky and of two ranges of far hills in a direction (..., 3)."""
-    elevation = np.maximum(direction[..., 2], 0)
-    colour = HORIZON + (ZENITH - HORIZON) * np.sqrt(np.minimum(elevation * 1.4, 1))[..., None]
-    azimuth = np.arctan2(direction[..., 1], direction[..., 0])
-    for ridge, tint in ((_ridge(azimuth, 3.0, 0.075), HILLS_FAR), (_ridge(azimuth, 7.0, 0.045), HILLS_NEAR)):
-        cover = np.clip((ridge - elevation) * 700 + 0.5, 0, 1)[..., None]
-        colour = colour + (tint - colour) * cover
+    """Colour (3, n) of the sky and of two ranges of far hills in a direction (3, n)."""
+    x, y, z = direction
+    elevation = np.maximum(z, 0)
+    colour = HORIZON + (ZENITH - HORIZON) * np.sqrt(np.minimum(elevation * 1.4, 1))
+    place = (np.arctan2(y, x) * (AZIMUTHS.size / (2 * math.pi))).astype(np.int32)  # negative ones count from the end
+    for ridge, tint in RANGES:
+        colour += (tint - colour) * np.clip((ridge[place] - elevation) * 700 + 0.5, 0, 1)
     return colour
 
 
@@ -57,38 +62,61 @@ def _ridge(azimuth: np.ndarray, phase: float, height: float) -> np.ndarray:
     return height * (0.75 + 0.25 * waves)
 
 
+AZIMUTHS = np.linspace(0, 2 * math.pi, 8192, endpoint=False, dtype=np.float32)  # finer than pixels
+RANGES = ((_ridge(AZIMUTHS, 3.0, 0.075), HILLS_FAR), (_ridge(AZIMUTHS, 7.0, 0.045), HILLS_NEAR))
+
+
+def horizon_row(light: Rays) -> int:
+    """The first row of a picture whose rays meet the water; a view is never tilted sideways."""
+    return int((light.direction[2, :, 0] >= 0).sum())
+
+
 def water_distance(view: View, light: Rays) -> np.ndarray:
     """Depth of the water along the view's axis per pixel (m), infinite above the horizon."""
-    down = light.direction[..., 2]
+    down = light.direction[2]
     with np.errstate(divide="ignore"):
         distance = np.where(down < 0, -np.float32(view.eye[2]) / down, np.float32(np.inf))
     return distance * light.along_axis
 
 
-def water(view: View, light: Rays, mirrored: np.ndarray, cover: np.ndarray) -> np.ndarray:
-    """Colour of the water in every pixel, (height, width, 3); meaningless where no water is.
+class Surface(NamedTuple):
+    """Water in n pixels of a picture: the pixels of the mirrored picture that they reflect (flat indices), the reflected sky
+    (3, n) and the share of reflected light (n,)."""
 
-    `mirrored` (height, width, 3), premultiplied by its `cover` (height, width), are the reflected solids in the same pixels.
+    sources: np.ndarray
+    sky: np.ndarray
+    share: np.ndarray
+
+    def part(self, which: np.ndarray) -> Surface:
+        """Those of its pixels with these indices."""
+        return Surface(*(values[..., which] for values in self))
+
+    def colour(self, mirrored: np.ndarray, cover: np.ndarray) -> np.ndarray:
+        """Colour of the pixels (3, n) that reflect solids (height, width, 3), premultiplied by their cover (height, width)."""
+        solids, hidden = mirrored.reshape(-1, 3)[self.sources].T, cover.ravel()[self.sources]
+        return DEEP + (solids + self.sky * (1 - hidden) - DEEP) * self.share
+
+
+def surface(view: View, light: Rays, horizon: int) -> Surface:
+    """The water in all pixels of the rows from `horizon` on."""
+    height, width = light.along_axis.shape
+    x, y, z = light.direction[:, horizon:].reshape(3, -1)
+    reach = -float(view.eye[2]) / np.minimum(z, -1e-4)
+    slope_x, slope_y = _ripples(float(view.eye[0]) + reach * x, float(view.eye[1]) + reach * y, reach)
+    tilt = x * slope_x + y * slope_y
+    reflected = np.stack([x - 2 * slope_x * z, y - 2 * slope_y * z, -z - 2 * tilt])
+    share = 0.06 + 0.94 * (1 - np.clip(tilt - z, 0, 1)) ** 5
+    return Surface(_reflected_pixels(tilt.reshape(-1, width), height), sky(reflected), share)
+
+
+def _reflected_pixels(tilt: np.ndarray, height: int) -> np.ndarray:
+    """Where the mirrored picture, upside down, has what the water reflects: a little above or below, by its tilt.
+
+    `tilt` is that of the lowest rows of the picture.
     """
-    direction = light.direction
-    reach = -np.float32(view.eye[2]) / np.minimum(direction[..., 2], -1e-4)
-    east, north = float(view.eye[0]), float(view.eye[1])
-    slope_x, slope_y = _ripples(east + reach * direction[..., 0], north + reach * direction[..., 1], reach)
-    tilt = direction[..., 0] * slope_x + direction[..., 1] * slope_y
-    reflected = direction - 2 * direction[..., 2:] * np.array([0, 0, 1], np.float32)
-    reflected = reflected + np.stack([-2 * slope_x * direction[..., 2], -2 * slope_y * direction[..., 2], -2 * tilt], axis=2)
-    colour = _disturbed(mirrored, cover, tilt, sky(np.clip(reflected, -1, 1)))
-    grazing = (1 - np.clip(-direction[..., 2] + tilt, 0, 1)) ** 5
-    share = (0.06 + 0.94 * grazing)[..., None]
-    return DEEP + (colour - DEEP) * share
-
-
-def _disturbed(mirrored: np.ndarray, cover: np.ndarray, tilt: np.ndarray, behind: np.ndarray) -> np.ndarray:
-    """The reflected solids, each row's pixels taken from a little above or below, in front of the reflected sky."""
-    height, width = cover.shape
-    rows = np.clip(np.arange(height)[:, None] + np.rint(tilt * 1.2 * height).astype(np.int32), 0, height - 1)
-    columns = np.arange(width)[None, :]
-    return mirrored[rows, columns] + behind * (1 - cover[rows, columns])[..., None]
+    count, width = tilt.shape
+    rows = np.arange(height - count, height, dtype=np.int32)[:, None] + np.rint(tilt * (1.2 * height)).astype(np.int32)
+    return ((height - 1 - np.clip(rows, 0, height - 1)) * width + np.arange(width, dtype=np.int32)).ravel()
 
 
 def _ripples(x: np.ndarray, y: np.ndarray, distance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -96,5 +124,6 @@ def _ripples(x: np.ndarray, y: np.ndarray, distance: np.ndarray) -> tuple[np.nda
     slope_x, slope_y = np.zeros_like(x), np.zeros_like(x)
     for angle, number, slope in RIPPLES:
         wave = slope * np.exp(-((distance * number / 120) ** 2)) * np.cos(number * (x * math.cos(angle) + y * math.sin(angle)))
-        slope_x, slope_y = slope_x + wave * math.cos(angle), slope_y + wave * math.sin(angle)
+        slope_x += wave * math.cos(angle)
+        slope_y += wave * math.sin(angle)
     return slope_x, slope_y

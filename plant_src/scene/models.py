@@ -1,4 +1,4 @@
-"""What things look like: vehicles, take-off decks, shore and trees, made from boxes, cylinders and spheres.
+"""What things look like: vehicles, take-off decks and trees, made from boxes, cylinders and spheres.
 
 Appearance only; the dynamics know none of it. The vehicles' dimensions are those of their geometry where that names them.
 """
@@ -23,7 +23,7 @@ BETWEEN_ARMS: Quaternion = (0.0, 0.0, -math.sin(math.pi / 8), math.cos(math.pi /
 WHITE, BLACK, GREY, SILVER = (0.95, 0.95, 0.95), (0.09, 0.09, 0.10), (0.35, 0.36, 0.38), (0.70, 0.72, 0.75)
 ORANGE, RED, YELLOW, BLUE = (0.96, 0.48, 0.08), (0.84, 0.18, 0.12), (0.98, 0.80, 0.18), (0.10, 0.32, 0.58)
 PLANKS = ((0.64, 0.47, 0.30), (0.58, 0.42, 0.26), (0.68, 0.51, 0.33))
-BARK, SAND, GRASS = (0.36, 0.26, 0.17), (0.80, 0.73, 0.55), (0.42, 0.55, 0.27)
+BARK = (0.36, 0.26, 0.17)
 LEAVES = ((0.22, 0.42, 0.17), (0.28, 0.48, 0.19), (0.18, 0.36, 0.18), (0.36, 0.50, 0.20))
 
 
@@ -36,6 +36,16 @@ class Part(NamedTuple):
     position: Vector
     colour: Vector
     orientation: Quaternion = UPRIGHT
+
+    def reach(self) -> float:
+        """Largest distance of its points from its centre (m)."""
+        match self.shape:
+            case "box":
+                return math.hypot(*self.size) / 2
+            case "cylinder":
+                return math.hypot(self.size[0], self.size[1] / 2)
+            case "sphere":
+                return self.size[0]
 
 
 def ar_drone() -> list[Part]:
@@ -124,12 +134,9 @@ def platform(size: Sequence[float], position: Sequence[float], plank: float = 0.
             yield Part("cylinder", (0.09, post), (x + east * length, y + north * width, post / 2), BARK)
 
 
-def shore(seed: int = 4) -> Iterator[Part]:
-    """Two banks, north and west of the lake, with trees."""
+def trees(seed: int = 4) -> Iterator[Part]:
+    """The trees on the banks north and west of the lake."""
     random = np.random.default_rng(seed)
-    for x, y, length, width in ((0.0, 334.0, 1400.0, 600.0), (-370.0, 0.0, 700.0, 1400.0)):
-        yield Part("box", (length + 2.4, width + 2.4, 0.12), (x, y, 0.06), SAND)
-        yield Part("box", (length, width, 0.4), (x, y, 0.2), GRASS)
     for x in np.arange(-44.0, 90.0, 3.4):
         yield from tree(x + random.uniform(-1.2, 1.2), 37.5 + random.uniform(0.0, 9.0), random)
     for y in np.arange(-34.0, 34.0, 3.6):
@@ -148,9 +155,9 @@ def tree(x: float, y: float, random: np.random.Generator) -> Iterator[Part]:
 
 
 def lake(platforms: Mapping[str, Mapping[str, Sequence[float]]]) -> list[Part]:
-    """Everything that keeps still; water and sky are no solids (see `light`)."""
+    """Everything that keeps still, but for land, water and sky (see `land` and `light`)."""
     decks = [part for one in platforms.values() for part in platform(one["size"], one["position"])]
-    return [*shore(), *decks]
+    return [*trees(), *decks]
 
 
 VEHICLES = {"ar_drone": ar_drone, "strider": strider}

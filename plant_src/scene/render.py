@@ -10,29 +10,90 @@ import numpy as np
 from cosim.errors import InputError, did_you_mean
 
 from .cameras import CAMERAS, View
-from .light import HAZE, HILLS_FAR, Rays, rays, sky, water, water_distance
+from .land import add_land
+from .light import HAZE, HILLS_FAR, Rays, horizon_row, rays, sky, surface, water_distance
 from .mission import Mission
 from .models import VEHICLES, lake
 from .stage import Picture, Stage
 
 
 class Layer:
-    """Solids in haze in front of nothing: colour times cover (height, width, 3), cover in 0 ... 1 and depth (m)."""
+    """A picture that ghosts are painted on: colour times cover (height, width, 3), cover in 0 ... 1 and depth (m)."""
 
-    def __init__(self, solids: Picture):
+    def __init__(self, colour: np.ndarray, cover: np.ndarray, depth: np.ndarray):
+        self.colour, self.cover, self.depth = colour, cover, depth
+
+    @classmethod
+    def of(cls, solids: Picture) -> Layer:
+        """Solids in haze in front of nothing."""
         seen = np.isfinite(solids.depth)
-        far = (1 - np.exp(-solids.depth[seen] / HAZE))[:, None]
-        own = solids.colour[seen].astype(np.float32) / 255
-        self.colour = np.zeros((*seen.shape, 3), np.float32)
-        self.colour[seen] = own + (HILLS_FAR - own) * far
-        self.cover = seen.astype(np.float32)
-        self.depth = solids.depth
+        pixels = np.flatnonzero(seen)
+        haze = np.exp(-solids.depth.ravel()[pixels] / HAZE)
+        own = solids.colour.reshape(-1, 3)[pixels].T * np.float32(1 / 255)
+        colour = np.zeros((*seen.shape, 3), np.float32)
+        colour.reshape(-1, 3)[pixels] = (HILLS_FAR + (own - HILLS_FAR) * haze).T
+        return cls(colour, seen.astype(np.float32), solids.depth)
 
-    def blend(self, ghost: Picture, share: float) -> None:
-        """Paint a ghost over what is behind it and not nearer than it; `share` 1 hides that, 0 is invisible."""
-        seen = ghost.depth < self.depth
-        self.colour[seen] += share * (ghost.colour[seen].astype(np.float32) / 255 - self.colour[seen])
-        self.cover[seen] += share * (1 - self.cover[seen])
+    def copy(self) -> Layer:
+        """The same to paint on; ghosts leave the depth alone."""
+        return Layer(self.colour.copy(), self.cover.copy(), self.depth)
+
+    def blend(self, ghost: Picture, share: float) -> np.ndarray:
+        """Paint a ghost over what is behind it and not nearer than it; `share` 1 hides that, 0 is invisible.
+
+        Returns the pixels (flat indices) where it is seen.
+        """
+        pixels = np.flatnonzero(ghost.depth < self.depth)
+        colour, cover = self.colour.reshape(-1, 3), self.cover.reshape(-1)
+        colour[pixels] += share * (ghost.colour.reshape(-1, 3)[pixels].astype(np.float32) / 255 - colour[pixels])
+        cover[pixels] += share * (1 - cover[pixels])
+        return pixels
+
+
+class Backdrop:
+    """All that keeps still, as a view shows it; `size`: width and height, even.
+
+    Water has half the resolution: ripples blur what it reflects anyway.
+    """
+
+    def __init__(self, still: Stage, view: View, size: tuple[int, int]):
+        self.view, self.size = view, size
+        half, mirrored = (size[0] // 2, size[1] // 2), view.mirrored()
+        light = rays(view, *size)
+        solids, depth = _solids(still, view, light), water_distance(view, light)
+        self.wet, self.horizon = depth < solids.depth, horizon_row(light)
+        self.below = Layer.of(_solids(still, mirrored, rays(mirrored, *half)))
+        self.surface = surface(view, rays(view, *half), self.horizon // 2)
+        solids.depth[self.wet] = np.inf
+        self.picture = self._painted(Layer.of(solids), light, np.minimum(solids.depth, depth))
+
+    def _painted(self, solids: Layer, light: Rays, depth: np.ndarray) -> Layer:
+        """Solids in front of water and sky."""
+        width, height = self.size
+        colour = np.empty((height, width, 3), np.float32)
+        water = self.surface.colour(self.below.colour, self.below.cover).reshape(3, -1, 1, width // 2, 1)
+        colour.reshape(height // 2, 2, width // 2, 2, 3)[self.horizon // 2 :] = water.transpose(1, 2, 3, 4, 0)
+        colour[: self.horizon] = sky(light.direction[:, : self.horizon].reshape(3, -1)).T.reshape(-1, width, 3)
+        hidden = np.flatnonzero(solids.cover)
+        colour.reshape(-1, 3)[hidden] = solids.colour.reshape(-1, 3)[hidden]
+        return Layer(colour, np.ones_like(depth), depth)
+
+    def fits(self, view: View, size: tuple[int, int]) -> bool:
+        """Whether it is what that view shows."""
+        same = np.array_equal(view.eye, self.view.eye) and np.array_equal(view.target, self.view.target)
+        return same and view.angle == self.view.angle and size == self.size
+
+    def with_reflections(self, below: Layer, changed: np.ndarray) -> Layer:
+        """The picture with what the water reflects from `below`, which has `changed` (height, width)."""
+        layer, width = self.picture.copy(), self.size[0]
+        touched = np.flatnonzero(changed.ravel()[self.surface.sources])
+        colour = self.surface.part(touched).colour(below.colour, below.cover).T
+        rows, columns = np.divmod(touched, width // 2)
+        for i, j in np.ndindex(2, 2):
+            pixels = (2 * (rows + self.horizon // 2) + i) * width + 2 * columns + j
+            wet = self.wet.ravel()[pixels]
+            layer.colour.reshape(-1, 3)[pixels[wet]] = colour[wet]
+        return layer
 
 
 class Scene:
@@ -42,6 +103,7 @@ class Scene:
         self.mission = mission
         self.still = Stage(lake(mission.platforms))
         self.moving = Stage(*(VEHICLES[model]() for model in mission.vehicles.values()))
+        self._last: Backdrop | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -58,23 +120,28 @@ class Scene:
         `shares` says how opaque the vehicles of each row are. Every pixel is the mean of `fineness` by `fineness`; `width` and
         `height` are even.
         """
-        view = find_camera(camera)(self.mission, rows[-1])
-        size = (fineness * width, fineness * height)
-        light = rays(view, *size)
-        depth = water_distance(view, light)
-        upright = self._layer(view, rows, shares, size, depth)
-        below = self._layer(view.mirrored(), rows, shares, (size[0] // 2, size[1] // 2))
-        return _reduced(_painted(view, light, depth, upright, below), fineness)
+        view, size = find_camera(camera)(self.mission, rows[-1]), (fineness * width, fineness * height)
+        backdrop = self._backdrop(view, size)
+        below = backdrop.below.copy()
+        reflected = self._paint(below, view.mirrored(), rows, shares)
+        picture = backdrop.with_reflections(below, reflected)
+        self._paint(picture, view, rows, shares)
+        return _reduced(picture.colour, fineness)
 
-    def _layer(
-        self, view: View, rows: Sequence[int], shares: Sequence[float], size: tuple[int, int], limit: np.ndarray | None = None
-    ) -> Layer:
-        """All solids nearer than `limit` (m), with the shadows that vehicles cast on each other."""
-        layer = Layer(_cut(self.still.picture(view, *size), limit))
+    def _backdrop(self, view: View, size: tuple[int, int]) -> Backdrop:
+        """What keeps still; the last one is kept for cameras that keep still as well."""
+        if self._last is None or not self._last.fits(view, size):
+            self._last = Backdrop(self.still, view, size)
+        return self._last
+
+    def _paint(self, layer: Layer, view: View, rows: Sequence[int], shares: Sequence[float]) -> np.ndarray:
+        """Paint the vehicles of each row, with the shadows that they cast on each other; returns where they are seen."""
+        height, width = layer.depth.shape
+        seen = np.zeros((height, width), bool)
         for row, share in zip(rows, shares, strict=True):
             self._pose(row)
-            layer.blend(_cut(self.moving.picture(view, *size, shadow=True), limit), share)
-        return layer
+            seen.reshape(-1)[layer.blend(self.moving.picture(view, width, height, shadow=True), share)] = True
+        return seen
 
     def _pose(self, row: int) -> None:
         for thing, vehicle in enumerate(self.mission.vehicles):
@@ -88,23 +155,12 @@ def find_camera(name: str) -> Callable[[Mission, int], View]:
     return CAMERAS[name]
 
 
-def _cut(picture: Picture, limit: np.ndarray | None) -> Picture:
-    if limit is not None:
-        picture.depth[picture.depth >= limit] = np.inf
+def _solids(still: Stage, view: View, light: Rays) -> Picture:
+    """What keeps still and is no water or sky."""
+    height, width = light.along_axis.shape
+    picture = still.picture(view, width, height)
+    add_land(picture, view, light)
     return picture
-
-
-def _painted(view: View, light: Rays, depth: np.ndarray, upright: Layer, below: Layer) -> np.ndarray:
-    """Solids in front of water and sky; reflections, blurred anyway, come in half the resolution."""
-    above = np.isinf(depth)
-    background = water(view, light, _doubled(below.colour[::-1]), _doubled(below.cover[::-1]))
-    background[above] = sky(light.direction[above])
-    return upright.colour + background * (1 - upright.cover)[..., None]
-
-
-def _doubled(pixels: np.ndarray) -> np.ndarray:
-    """Each pixel as two by two."""
-    return pixels.repeat(2, axis=0).repeat(2, axis=1)
 
 
 def _reduced(colour: np.ndarray, fineness: int) -> np.ndarray:

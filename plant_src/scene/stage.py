@@ -9,10 +9,11 @@ import numpy as np
 
 from ..bullet import pybullet
 from ..vehicles.shapes import Quaternion, Vector
-from .cameras import FAR, NEAR, View
+from .cameras import FAR, NEAR, View, Window
 from .models import Part
 
 SUN: Vector = (-0.45, -0.6, 0.66)  # direction to it
+AMBIENT = DIFFUSE = 0.55  # light from everywhere, and from the sun
 
 
 class Picture(NamedTuple):
@@ -29,6 +30,9 @@ class Stage:
     def __init__(self, *things: Sequence[Part]):
         self.client = pybullet.connect(pybullet.DIRECT)
         self.things = [[(self._create(part), part) for part in thing] for thing in things]
+        parts = [part for thing in self.things for _, part in thing]
+        self._centres = np.array([part.position for part in parts])  # in the order of Bullet's numbers: 0, 1, ...
+        self._radii = np.array([part.reach() for part in parts])
 
     def __enter__(self) -> Self:
         return self
@@ -60,24 +64,37 @@ class Stage:
         for body, part in self.things[thing]:
             pose = pybullet.multiplyTransforms(position, orientation, part.position, part.orientation)
             pybullet.resetBasePositionAndOrientation(body, *pose, physicsClientId=self.client)
+            self._centres[body] = pose[0]
 
     def picture(self, view: View, width: int, height: int, shadow: bool = False) -> Picture:
-        """What `view` sees, in pixels; `shadow` lets things cast shadows on each other."""
+        """What `view` sees, in pixels; `shadow` lets things cast shadows on each other.
+
+        Drawn is only where things are: TinyRenderer takes its time for every pixel.
+        """
+        whole = Picture(np.zeros((height, width, 3), np.uint8), np.full((height, width), np.inf, np.float32))
+        window = view.window(self._centres, self._radii, width, height)
+        if window.left < window.right and window.top < window.bottom:
+            part = (slice(window.top, window.bottom), slice(window.left, window.right))
+            whole.colour[part], whole.depth[part] = self._drawn(view, width, height, window, shadow)
+        return whole
+
+    def _drawn(self, view: View, width: int, height: int, window: Window, shadow: bool) -> Picture:
+        columns, rows = window.right - window.left, window.bottom - window.top
         _, _, colour, depth, found = pybullet.getCameraImage(
-            width,
-            height,
+            columns,
+            rows,
             view.matrix(),
-            view.projection(width / height),
+            view.projection(width, height, window),
             lightDirection=SUN,
             lightDistance=60.0,
-            lightAmbientCoeff=0.55,
-            lightDiffuseCoeff=0.55,
+            lightAmbientCoeff=AMBIENT,
+            lightDiffuseCoeff=DIFFUSE,
             lightSpecularCoeff=0.05,
             shadow=int(shadow),
             renderer=pybullet.ER_TINY_RENDERER,
             physicsClientId=self.client,
         )
-        solid = np.asarray(found).reshape(height, width) >= 0
-        metres = np.full((height, width), np.inf, np.float32)
-        metres[solid] = FAR * NEAR / (FAR - (FAR - NEAR) * np.asarray(depth, np.float32).reshape(height, width)[solid])
-        return Picture(np.asarray(colour, np.uint8).reshape(height, width, 4)[..., :3], metres)
+        solid = np.asarray(found).reshape(rows, columns) >= 0
+        metres = np.full((rows, columns), np.inf, np.float32)
+        metres[solid] = FAR * NEAR / (FAR - (FAR - NEAR) * np.asarray(depth, np.float32).reshape(rows, columns)[solid])
+        return Picture(np.asarray(colour, np.uint8).reshape(rows, columns, 4)[..., :3], metres)

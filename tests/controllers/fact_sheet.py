@@ -118,14 +118,11 @@ def mix(i: dict[str, float]) -> dict[str, float]:
     }
 
 
-class Autopilot:
-    """Line of sight to the active waypoint; proportional thrust; PD rudder on heading minus reference."""
+class Guidance:
+    """Line of sight to the active waypoint; no speed after a list that ends with a stop."""
 
     def __init__(self, p: dict[str, Any]):
         self.p, self.active, self.finished, self.course = p, 1, False, 0.0
-        self.surge = Pid(p["speed_P"], limits=(-p["thrust_limit"], p["thrust_limit"]))
-        rudder = (-p["rudder_limit"], p["rudder_limit"])
-        self.heading = Pid(p["heading_P"], 0.0, p["heading_D"], p["heading_N"], rudder)
 
     def ahead(self, i: dict[str, float]) -> tuple[float, float]:
         k = self.active - 1
@@ -143,15 +140,48 @@ class Autopilot:
         dx, dy = self.ahead(i)
         if not self.finished:
             self.course = math.atan2(dy, dx)
-        speed = 0.0 if self.finished and self.p["end_policy"] == stop else self.p["speed_command"]
         return {
-            "thrust": self.surge(speed - i["vehicle.velocity_body.u"]),
-            "rudder_angle": self.heading(wrap(i["vehicle.attitude.yaw"] - self.course)),
             "heading_reference": self.course,
+            "speed_reference": 0.0 if self.finished and self.p["end_policy"] == stop else self.p["speed_command"],
             "distance": math.hypot(dx, dy),
             "active_waypoint": self.active,
             "finished": self.finished,
         }
+
+
+class Speed:
+    """Proportional thrust."""
+
+    def __init__(self, p: dict[str, float]):
+        self.pid = Pid(p["speed_P"], limits=(-p["thrust_limit"], p["thrust_limit"]))
+
+    def __call__(self, i: dict[str, Any]) -> dict[str, float]:
+        return {"thrust": self.pid(i["speed_reference"] - i["vehicle.velocity_body.u"])}
+
+
+class Heading:
+    """PD rudder on heading minus reference, the short way round."""
+
+    def __init__(self, p: dict[str, float]):
+        limits = (-p["rudder_limit"], p["rudder_limit"])
+        self.pid = Pid(p["heading_P"], 0.0, p["heading_D"], p["heading_N"], limits)
+
+    def __call__(self, i: dict[str, Any]) -> dict[str, float]:
+        return {"rudder_angle": self.pid(wrap(i["vehicle.attitude.yaw"] - i["heading_reference"]))}
+
+
+class Autopilot:
+    """Guidance, then both loops on its references."""
+
+    def __init__(self, p: dict[str, Any]):
+        self.guidance, self.loops = Guidance(p), (Speed(p), Heading(p))
+
+    def __call__(self, i: dict[str, Any]) -> dict[str, Any]:
+        references = self.guidance(i)
+        outputs = {name: value for name, value in references.items() if name != "speed_reference"}
+        for loop in self.loops:
+            outputs |= loop(i | references)
+        return outputs
 
 
 def slew(value: float, destination: float, rate: float) -> float:

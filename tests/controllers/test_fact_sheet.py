@@ -46,17 +46,16 @@ GAINS: dict[str, dict[str, float]] = {
         "yaw_limit": 10.0,
     },
     "mixer": {},
-    "strider_autopilot": {
-        "speed_command": 1.0,
-        "acceptance_radius": 0.5,
-        "speed_P": 82.65,
-        "thrust_limit": 3.0,
+    "waypoint_guidance": {"speed_command": 1.0, "acceptance_radius": 0.5},
+    "speed_controller": {"speed_P": 82.65, "thrust_limit": 3.0},
+    "heading_controller": {
         "heading_P": 1.5,
         "heading_D": 0.8,
         "heading_N": 21.4165136740303,
         "rudder_limit": np.radians(35.0),
     },
 }
+GAINS["strider_autopilot"] = GAINS["waypoint_guidance"] | GAINS["speed_controller"] | GAINS["heading_controller"]
 #: half the width of the random walk of every input, and where it is centred when not at 0
 INPUTS: dict[str, dict[str, float | tuple[float, float]]] = {
     "position_controller": {
@@ -86,6 +85,9 @@ INPUTS: dict[str, dict[str, float | tuple[float, float]]] = {
         "yaw_difference": 15.0,
         "motor_share": (0.5, 0.5),
     },
+    "waypoint_guidance": {"vehicle.position.x": 3.0, "vehicle.position.y": 3.0},
+    "speed_controller": {"vehicle.velocity_body.u": (0.9, 0.03), "speed_reference": (0.9, 0.03)},
+    "heading_controller": {"vehicle.attitude.yaw": 3.1, "heading_reference": 3.1},
     "strider_autopilot": {
         "vehicle.position.x": 3.0,
         "vehicle.position.y": 3.0,
@@ -98,6 +100,9 @@ REFERENCES: dict[str, Callable[..., Any]] = {
     "altitude_controller": fact_sheet.Altitude,
     "attitude_controller": fact_sheet.Attitude,
     "mixer": lambda parameters: fact_sheet.mix,
+    "waypoint_guidance": fact_sheet.Guidance,
+    "speed_controller": fact_sheet.Speed,
+    "heading_controller": fact_sheet.Heading,
     "strider_autopilot": fact_sheet.Autopilot,
 }
 RESETTABLE = {"position_controller", "altitude_controller", "attitude_controller"}
@@ -133,7 +138,7 @@ def assert_agreement(fmu: Any, reference: Callable[..., dict[str, Any]], ticks: 
 @pytest.mark.parametrize("name", GAINS)
 def test_shipped_gains_are_those_of_the_fact_sheet(controller: Any, name: str) -> None:
     rng = np.random.default_rng(1)
-    extra = waypoints(rng, end_policy=1) if name == "strider_autopilot" else {}
+    extra = waypoints(rng, end_policy=1) if "acceptance_radius" in GAINS[name] else {}
     assert_agreement(controller(name, extra), REFERENCES[name](GAINS[name] | extra), wandering(name, rng))
 
 
@@ -142,7 +147,7 @@ def test_shipped_gains_are_those_of_the_fact_sheet(controller: Any, name: str) -
 def test_every_gain_is_a_parameter(controller: Any, name: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     gains = {gain: value * float(rng.uniform(0.5, 1.5)) for gain, value in GAINS[name].items()}
-    extra = waypoints(rng, end_policy=seed - 1) if name == "strider_autopilot" else {}
+    extra = waypoints(rng, end_policy=seed - 1) if "acceptance_radius" in GAINS[name] else {}
     assert_agreement(controller(name, gains | extra), REFERENCES[name](gains | extra), wandering(name, rng))
 
 

@@ -26,6 +26,9 @@ TWINS = {
     "attitude_controller": "AttitudeController",
     "mixer": "Mixer",
     "inverse_kinematics": "InverseKinematics",
+    "waypoint_guidance": "WaypointGuidance",
+    "speed_controller": "SpeedController",
+    "heading_controller": "HeadingController",
     "strider_autopilot": "StriderAutopilot",
 }
 TICKS = 2500

@@ -69,6 +69,12 @@ def test_keep_course_sails_on(controller: Any) -> None:
     assert out["thrust"] == pytest.approx(82.65 * 0.01)
 
 
+@pytest.mark.parametrize(("end_policy", "speeds"), [(STOP, [2.0, 2.0, 0.0]), (REPEAT, [2.0] * 3), (KEEP_COURSE, [2.0] * 3)])
+def test_guidance_commands_no_speed_after_a_stop_only(controller: Any, end_policy: int, speeds: list[float]) -> None:
+    fmu = controller("waypoint_guidance", SQUARE | {"speed_command": 2.0, "end_policy": end_policy})
+    assert [out["speed_reference"] for out in tour(fmu)] == speeds
+
+
 def test_on_top_of_a_waypoint_nothing_is_undefined(controller: Any) -> None:
     out = controller("strider_autopilot", {"waypoint_x": [1.0]}).step(at(1, 0))
     assert out["finished"] and out["rudder_angle"] == 0.0

@@ -136,6 +136,7 @@ def test_values_that_nobody_reads_may_be_anything(kind):
 @pytest.mark.parametrize("kind", EXECUTORS)
 def test_many_rows_do_not_fit_into_one_chunk(kind, monkeypatch):
     monkeypatch.setattr("cosim.engine.rows.CHUNK", 1000)
+    monkeypatch.setattr("cosim.engine.rows.LARGE", 0)
     count = Fake([Variable("y", causality="output")], lambda v, t, h: v.update(y=v["y"] + 1), start={"y": 0.0})
     outcome = simulate(System({"a": count}, (), (("a",),)), Settings(exact(0), exact(10000), exact(1), {"a.y": end("a.y")}))
     assert outcome.recording.columns["a.y"].tolist() == list(range(10001))

@@ -163,6 +163,12 @@ def test_two_sources_of_one_fmu_are_refused(root):
         find_sources(root)
 
 
+@pytest.mark.parametrize("folder", ["plant_src/vehicles/raft", "plant_src/replica/forces/sail", "plant_src/wind"])
+def test_equations_are_found_anywhere_in_the_plant_and_named_by_their_folder(tmp_path, folder):
+    (source,) = find_sources(write(tmp_path, {f"{folder}/equations.py": EQUATIONS, "elsewhere/equations.py": EQUATIONS}))
+    assert (source.key, source.kind.name) == (folder.split("/")[-1], "equations")
+
+
 def test_a_fresh_build_passes_the_check(built_once):
     assert check(built_once) == []
 

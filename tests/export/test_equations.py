@@ -170,6 +170,35 @@ def test_projection_is_applied_after_each_sub_step(tmp_path: Path) -> None:
     assert math.hypot(*compiled.model.state) == pytest.approx(1.0, abs=1e-15)
 
 
+@pytest.fixture
+def spring(tmp_path: Path) -> Compiled:
+    """A force that follows a displacement at once."""
+    variables = (
+        Variable("stiffness", causality="parameter", variability="tunable", start=4.0),
+        Variable("x", causality="input", start=0.5, unit=parse("m")),
+        Variable("force", causality="output", unit=parse("N")),
+        Variable("pulls", "Boolean", "output", "discrete"),
+    )
+    model = equations.static_model("spring", "Spring", variables, lambda x, k: ca.vertcat(-k * x, x > 0))
+    return Compiled(equations.block(model), tmp_path)
+
+
+def test_a_model_without_states_has_its_outputs_from_the_start(spring: Compiled) -> None:
+    assert spring.initialize() is None
+    assert (list(spring.model.output), list(spring.model.flag)) == ([-2.0], [True])
+
+
+def test_a_model_without_states_follows_inputs_and_parameters_in_every_step(spring: Compiled) -> None:
+    spring.initialize()
+    spring.model.input[0], spring.model.parameter[0] = -0.25, 10.0
+    assert spring.step(0.01) is None
+    assert (list(spring.model.output), list(spring.model.flag)) == ([2.5], [False])
+
+
+def test_a_model_without_states_keeps_none(spring: Compiled) -> None:
+    assert not hasattr(spring.model, "state")
+
+
 a, b = ca.SX.sym("a"), ca.SX.sym("b")
 OPERATIONS: list[tuple[ca.SX, Callable[[float, float], float]]] = [
     (a + b, lambda a, b: a + b),

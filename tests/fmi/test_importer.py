@@ -128,6 +128,7 @@ def test_a_snapshot_brings_everything_back_bit_for_bit(probe):
     plan = compile_plan(built, Grid.of(exact(0), exact(3), exact(0.01)), [end("b.y")])
     recorder = Recorder(plan, {"b.y": end("b.y")})
     executor = executor_kind("auto")(plan, recorder)
+    executor.instantiate()
     executor.initialize()
     executor.run(100)
     states = {name: component.get_state() for name, component in built.components.items()}

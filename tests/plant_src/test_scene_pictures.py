@@ -8,7 +8,8 @@ from scene_recording import scene_mission
 
 from cosim.errors import InputError
 from plant_src.bullet import pybullet
-from plant_src.scene.cameras import CAMERAS, View
+from plant_src.scene.cameras import CAMERAS, NEAR, View
+from plant_src.scene.land import add_land, bank
 from plant_src.scene.light import rays, water_distance
 from plant_src.scene.mission import recorded
 from plant_src.scene.models import VEHICLES, Part
@@ -59,9 +60,94 @@ def test_water_is_where_rays_meet_it():
     assert np.isfinite(level[40:]).all()
 
 
+ONE_BANK = bank(7.0, -3.0, 200.0, 50.0, beach=0.5)
+
+
+@pytest.mark.parametrize("eye", [(0.0, 0.0, 3.0), (0.0, 3.0, 1.5), (3.0, -6.0, 2.0)])
+def test_banks_look_like_boxes_of_their_size(eye, monkeypatch):
+    """Rays against TinyRenderer, which draws half a pixel elsewhere: its depth is one of those around."""
+    view = View(np.array(eye), np.array([9.0, 0.5, 0.1]))
+    monkeypatch.setattr("plant_src.scene.land.BANKS", [ONE_BANK])
+    found = Picture(np.zeros((80, 160, 3), np.uint8), np.full((80, 160), np.inf, np.float32))
+    add_land(found, view, rays(view, *SIZE))
+    with Stage([as_part(step) for step in ONE_BANK]) as stage:
+        drawn = stage.picture(view, *SIZE)
+    seen = np.isfinite(found.depth)
+    assert seen.sum() > 1000
+    assert (seen != np.isfinite(drawn.depth)).sum() < 0.08 * seen.sum()
+    both = seen & np.isfinite(drawn.depth)
+    around = np.stack([np.roll(found.depth, shift, (0, 1)) for shift in np.ndindex(3, 3)])
+    around = np.roll(around, (-1, -1), (1, 2))[:, both]
+    hit = (drawn.depth[both] > 0.999 * around.min(axis=0)) & (drawn.depth[both] < 1.001 * around.max(axis=0))
+    assert hit.mean() > 0.98
+    assert np.mean(np.abs(found.colour[both].astype(int) - drawn.colour[both]).max(axis=1) > 20) < 0.08
+
+
+def test_the_mirror_image_of_a_bank_shows_its_shore(monkeypatch):
+    """Seen from below the water, in the picture upside down, land ends where it ends seen from above."""
+    monkeypatch.setattr("plant_src.scene.land.BANKS", [ONE_BANK])
+    view, pictures = View(np.array([0.0, 0.0, 3.0]), np.array([9.0, 0.5, 0.1])), []
+    for one in (view, view.mirrored()):
+        pictures.append(Picture(np.zeros((80, 160, 3), np.uint8), np.full((80, 160), np.inf, np.float32)))
+        add_land(pictures[-1], one, rays(one, *SIZE))
+    upright, mirrored = (np.isfinite(picture.depth) for picture in pictures)
+    assert np.abs(upright.sum(axis=0) - mirrored[::-1].sum(axis=0)).max() <= 6
+
+
+def test_land_hides_only_what_is_behind_it(monkeypatch):
+    monkeypatch.setattr("plant_src.scene.land.BANKS", [ONE_BANK])
+    view = View(np.array([0.0, 0.0, 3.0]), np.array([9.0, 0.5, 0.1]))
+    near, far = (Picture(np.zeros((80, 160, 3), np.uint8), np.full((80, 160), depth, np.float32)) for depth in (2.0, 50.0))
+    for picture in (near, far):
+        add_land(picture, view, rays(view, *SIZE))
+    assert not near.colour.any()
+    assert far.colour.any()
+
+
+def as_part(step):
+    low, high = np.array(step.low), np.array(step.high)
+    return Part("box", tuple(high - low), tuple((low + high) / 2), step.colour)
+
+
+@pytest.mark.parametrize("place", [(6.0, 0.0, 2.0), (8.0, 2.6, 1.4), (3.0, -1.3, 2.4), (0.2, 0.2, 2.0), (-5.0, 0.0, 2.0)])
+def test_a_window_holds_all_of_a_ball(place):
+    """All points of it that are in the picture."""
+    window = AHEAD.window(np.array([place]), np.array([0.3]), *SIZE)
+    turns = np.random.default_rng(1).standard_normal((5000, 3))
+    points = place + 0.3 * turns / np.linalg.norm(turns, axis=1)[:, None]
+    x, y = AHEAD.pixels(points[points[:, 0] > NEAR], *SIZE).T
+    inside = (x > 0) & (x < 160) & (y > 0) & (y < 80)
+    assert ((x >= window.left) & (x <= window.right) & (y >= window.top) & (y <= window.bottom))[inside].all()
+
+
+def test_a_window_is_not_much_larger_than_its_ball():
+    left, right, top, bottom = AHEAD.window(np.array([[6.0, 0.0, 2.0]]), np.array([0.3]), *SIZE)
+    width = 2 * 0.3 / 6.0 * 80 / (2 * math.tan(0.3))
+    assert width <= right - left <= width + 6
+    assert width <= bottom - top <= width + 6
+
+
+def test_a_kept_backdrop_gives_the_same_pictures():
+    mission = recorded(scene_mission())
+    with Scene(mission) as scene:
+        scene.render("landing", [900], [1.0], *SIZE)
+        kept = scene.render("landing", [1100], [1.0], *SIZE)
+    with Scene(mission) as scene:
+        assert np.array_equal(scene.render("landing", [1100], [1.0], *SIZE), kept)
+
+
+def test_a_moved_camera_has_a_backdrop_of_its_own():
+    mission = recorded(scene_mission())
+    with Scene(mission) as scene:
+        scene.render("chase", [600], [0.0], *SIZE)
+        after = scene.render("chase", [1100], [0.0], *SIZE)
+    with Scene(mission) as scene:
+        assert np.array_equal(scene.render("chase", [1100], [0.0], *SIZE), after)
+
+
 def layer_and_ghost(ghost_depth):
     grey, white = np.full((1, 1, 3), 51, np.uint8), np.full((1, 1, 3), 255, np.uint8)
-    layer = Layer(Picture(grey, np.full((1, 1), 5.0, np.float32)))
+    layer = Layer.of(Picture(grey, np.full((1, 1), 5.0, np.float32)))
     before = float(layer.colour[0, 0, 0])
     layer.blend(Picture(white, np.full((1, 1), ghost_depth, np.float32)), 0.25)
     return before, float(layer.colour[0, 0, 0])
@@ -78,7 +164,7 @@ def test_a_ghost_behind_something_is_hidden():
 
 
 def test_a_ghost_covers_the_sky_by_its_share():
-    layer = Layer(Picture(np.zeros((1, 1, 3), np.uint8), np.full((1, 1), np.inf, np.float32)))
+    layer = Layer.of(Picture(np.zeros((1, 1, 3), np.uint8), np.full((1, 1), np.inf, np.float32)))
     for share in (0.5, 0.5):
         layer.blend(Picture(np.full((1, 1, 3), 255, np.uint8), np.full((1, 1), 4.0, np.float32)), share)
     assert layer.cover[0, 0] == pytest.approx(0.75)

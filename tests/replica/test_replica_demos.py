@@ -119,6 +119,17 @@ def test_on_a_straight_course_it_lands_earlier() -> None:
     assert result["plant.uav.velocity.z"][down - 1] == pytest.approx(-1.39, rel=0.2)
 
 
+def test_on_a_vessel_at_rest_it_lands_earlier_still() -> None:
+    """Started at 2 m near the vessel, where the approach altitude is the last thing to wait for."""
+    start = {"/components/plant/arguments/vehicles/uav/position": [-2.1, 0.075, 2.0]}
+    result = cosim.run("demo1_replica", stop_time=8.0, parameters={"usv.autopilot.speed_command": 0.0, **start})
+    late = result.time > 5
+    commanded = np.flatnonzero((result["uav.altitude_reference"] == 0) & late)[0]
+    down = np.flatnonzero((result["plant.uav.position.z"] < 0.33) & late)[0]
+    assert result.time[[commanded, down]] == pytest.approx([5.62, 6.04], abs=0.02)
+    assert result["plant.uav.velocity.z"][down - 1] == pytest.approx(-1.54, rel=0.05)
+
+
 def test_with_the_nose_elsewhere_world_velocities_make_it_diverge() -> None:
     """The published flaw: 14 m off after 6 s, 19 m after 9 s."""
     result = cosim.run("demo1_replica", stop_time=9.0, parameters={"uav.psi_command": -np.pi / 2})
@@ -127,5 +138,16 @@ def test_with_the_nose_elsewhere_world_velocities_make_it_diverge() -> None:
 
 
 def test_with_the_physical_rudder_other_gains_sail_the_box_in_38_seconds() -> None:
-    changes = {"usv.forces.rudder_inflow_sign": -1.0, "usv.autopilot.heading.P": 1.5, "usv.autopilot.heading.D": 0.8}
+    changes = {"usv.rudder_inflow_sign": -1.0, "usv.autopilot.heading.P": 1.5, "usv.autopilot.heading.D": 0.8}
     assert cosim.run("demo1_replica", parameters=changes).kpis["waypoints.time[5]"] == pytest.approx(38.0, abs=0.1)
+
+
+def test_with_the_physical_rudder_and_the_published_gains_it_sails_far_off() -> None:
+    result = cosim.run("demo1_replica", stop_time=46.0, parameters={"usv.rudder_inflow_sign": -1.0, "uav.vtol.enabled": 0.0})
+    assert result.kpis["waypoints.time[5]"] == pytest.approx(45.6, abs=0.1)
+    assert max(result.kpis[f"overshoots.leg[{leg}]"] for leg in range(1, 6)) == pytest.approx(3.5, abs=0.1)
+
+
+def test_with_one_hull_it_then_circles_round_a_waypoint() -> None:
+    changes = {"usv.rudder_inflow_sign": -1.0, "usv.hulls": 1.0, "uav.vtol.enabled": 0.0}
+    assert cosim.run("demo1_replica", stop_time=40.0, parameters=changes).kpis["waypoints.reached"] == 0

@@ -1,83 +1,146 @@
-"""The force models of the published simulator, against its formulas written out with its numbers."""
+"""The force models of the published simulator, as FMUs of both versions, against its formulas written out with its numbers."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 
 import pytest
+from fakes import Fake, outputs
 
-from plant_src.replica.forces import RotorMap, VesselForces
+from cosim import resources
+from cosim.fmi import FmuFile, instantiate
+from cosim.simulate import Settings, simulate
+from cosim.system import Connection, Endpoint, System
+from cosim.timing import exact
+
+Loads = Callable[..., dict[str, float]]
 
 
-def rotors(throttle: float) -> tuple[float, float]:
-    unit = RotorMap(instance_name="rotors")
-    unit.value["throttle[3]"] = throttle
-    assert unit.do_step(0.0, 0.01)
-    return unit.value["thrust[3]"], unit.value["torque[3]"]
+@pytest.fixture(params=["fmus", "fmus/fmi3"])
+def loads(request: pytest.FixtureRequest) -> Loads:
+    """What an FMU (by name) makes of its inputs, with parameters."""
+
+    def evaluated(name: str, inputs: Mapping[str, float], **parameters: float) -> dict[str, float]:
+        file = FmuFile(resources.root() / request.param / f"{name}.fmu")
+        source = Fake(outputs(*inputs), lambda values, time, step_size: None, start=inputs)
+        connected = [Connection(Endpoint("in", slot), Endpoint("fmu", slot)) for slot in inputs]
+        components = {"in": source, "fmu": instantiate(file, "fmu")}
+        wired = System(components, connected, (("in", "fmu"),), start_values={"fmu": parameters})
+        slots = [slot for v in file.description.variables if v.causality == "output" for slot in v.slots]
+        recording = simulate(
+            wired, Settings(exact(0), exact(0.01), exact(0.01), {s: Endpoint("fmu", s) for s in slots})
+        ).recording
+        return {slot: float(recording.columns[slot][-1]) for slot in slots}
+
+    return evaluated
 
 
-def vessel(u: float, v: float, r: float, rudder_angle: float = 0.0, yaw: float = 0.0, **parameters: float) -> dict[str, float]:
-    """Loads at a body velocity."""
-    unit = VesselForces(instance_name="forces")
+def rotors(loads: Loads, *throttles: float) -> list[tuple[float, float]]:
+    """(thrust, torque) of each rotor."""
+    found = loads("rotor_map", {f"throttle[{i}]": throttle for i, throttle in enumerate(throttles, start=1)})
+    return [(found[f"thrust[{i}]"], found[f"torque[{i}]"]) for i in range(1, len(throttles) + 1)]
+
+
+def motion(u: float, v: float, r: float, yaw: float = 0.0) -> dict[str, float]:
+    """What the bus says about a vessel with a body velocity (m/s) and a yaw rate (rad/s)."""
     velocity = complex(u, v) * complex(math.cos(yaw), math.sin(yaw))
-    unit.value |= {"vehicle.velocity.x": velocity.real, "vehicle.velocity.y": velocity.imag, "vehicle.attitude.yaw": yaw}
-    unit.value |= {"vehicle.angular_velocity.z": r, "rudder_angle": rudder_angle, **parameters}
-    assert unit.do_step(0.0, 0.01)
-    return unit.value
+    return {
+        "vehicle.velocity.x": velocity.real,
+        "vehicle.velocity.y": velocity.imag,
+        "vehicle.angular_velocity.z": r,
+        "vehicle.attitude.yaw": yaw,
+    }
 
 
-def test_full_throttle_gives_the_published_maximum() -> None:
-    assert rotors(100.0) == pytest.approx((2.508, 2.508 * 2.38e-7 / 9.148e-6), rel=2e-4)
+def rudder(loads: Loads, u: float, v: float, r: float, angle: float, **parameters: float) -> tuple[float, float]:
+    found = loads("rudder", {**motion(u, v, r), "rudder_angle": angle}, **parameters)
+    return found["force.x"], found["force.y"]
 
 
-def test_hover_takes_65_88_percent() -> None:
-    assert 4 * rotors(65.88)[0] == pytest.approx(0.443892 * 9.81, rel=3e-4)
+def test_full_throttle_gives_the_published_maximum(loads: Loads) -> None:
+    for thrust, torque in rotors(loads, *[100.0] * 4):
+        assert (thrust, torque) == pytest.approx((2.508, 2.508 * 2.38e-7 / 9.148e-6), rel=2e-4)
 
 
-def test_throttle_is_limited() -> None:
-    assert rotors(-5.0) == (0.0, 0.0)
-    assert rotors(130.0) == rotors(100.0)
+def test_hover_takes_65_88_percent(loads: Loads) -> None:
+    assert sum(thrust for thrust, _ in rotors(loads, *[65.88] * 4)) == pytest.approx(0.443892 * 9.81, rel=3e-4)
 
 
-def test_thrust_grows_with_the_square_of_the_throttle() -> None:
-    assert rotors(80.0)[0] == pytest.approx(4 * rotors(40.0)[0])
+def test_throttles_are_limited(loads: Loads) -> None:
+    below, none, most, above = rotors(loads, -5.0, 0.0, 100.0, 130.0)
+    assert below == none == (0.0, 0.0)
+    assert above == most
 
 
-def test_water_and_air_act_on_two_hulls() -> None:
-    """Equations 12 and 13 twice, and 0.1 v |v| of air."""
-    loads = vessel(u=0.9, v=-0.2, r=0.3)
-    assert loads["water.x"] == pytest.approx(-0.1 * 0.81)
-    assert loads["water.y"] == pytest.approx(2 * (-3.899501881 * -0.2 + 1.774273356 * 0.3) + 0.1 * 0.04)
-    assert loads["water.n"] == pytest.approx(2 * (-1.774273356 * -0.2 - 0.807294377 * 0.3))
+def test_each_thrust_grows_with_the_square_of_its_own_throttle(loads: Loads) -> None:
+    thrusts = [thrust for thrust, _ in rotors(loads, 20.0, 40.0, 60.0, 80.0)]
+    assert [thrust / thrusts[0] for thrust in thrusts] == pytest.approx([1, 4, 9, 16])
 
 
-def test_loads_do_not_depend_on_the_compass() -> None:
-    north, east = vessel(0.7, 0.1, -0.2, 0.1, yaw=0.0), vessel(0.7, 0.1, -0.2, 0.1, yaw=2.1)
-    for name in ("rudder.x", "rudder.y", "water.x", "water.y", "water.n"):
-        assert east[name] == pytest.approx(north[name], abs=1e-12)
+def test_rotors_of_other_coefficients(loads: Loads) -> None:
+    changes = {"thrust_coefficient": 2e-6, "torque_coefficient": 3e-8, "max_speed": 1000.0}
+    found = loads("rotor_map", {"throttle[1]": 50.0}, **changes)
+    assert (found["thrust[1]"], found["torque[1]"]) == pytest.approx((0.5, 0.0075))
 
 
-def test_a_stalled_rudder_gives_3_83_newton_at_one_metre_per_second() -> None:
+def test_the_water_acts_on_two_hulls(loads: Loads) -> None:
+    """Equations 12 and 13 twice."""
+    found = loads("hull_hydrodynamics", motion(u=0.9, v=-0.2, r=0.3))
+    assert found["load.x"] == 0
+    assert found["load.y"] == pytest.approx(2 * (-3.899501881 * -0.2 + 1.774273356 * 0.3))
+    assert found["load.n"] == pytest.approx(2 * (-1.774273356 * -0.2 - 0.807294377 * 0.3))
+
+
+def test_hulls_and_their_coefficients_are_parameters(loads: Loads) -> None:
+    changes = {"hulls": 1.0, "Y_v": -1.0, "Y_r": -2.0, "N_v": -3.0, "N_r": -4.0}
+    found = loads("hull_hydrodynamics", motion(u=0.9, v=0.1, r=0.01), **changes)
+    assert (found["load.y"], found["load.n"]) == pytest.approx((-0.12, -0.34))
+
+
+def test_air_drag_joins_the_load_of_the_water(loads: Loads) -> None:
+    found = loads("air_drag", {**motion(u=0.9, v=-0.2, r=0.3), "water.x": 1.0, "water.y": 2.0, "water.n": 3.0})
+    assert (found["load.x"], found["load.y"], found["load.n"]) == pytest.approx((1 - 0.1 * 0.81, 2 + 0.1 * 0.04, 3))
+
+
+def test_without_a_coefficient_there_is_no_drag(loads: Loads) -> None:
+    found = loads("air_drag", motion(2.0, 1.0, 0.0), coefficient=0.0)
+    assert not any(found.values())
+
+
+@pytest.mark.parametrize("model", ["rudder", "hull_hydrodynamics", "air_drag"])
+def test_loads_do_not_depend_on_the_compass(loads: Loads, model: str) -> None:
+    east, west = (loads(model, motion(0.7, 0.1, -0.2, yaw)) for yaw in (0.0, 2.1))
+    assert any(east.values())
+    assert west == pytest.approx(east, abs=1e-12)
+
+
+def test_a_stalled_rudder_gives_3_83_newton_at_one_metre_per_second(loads: Loads) -> None:
     angle = math.radians(35)
-    loads = vessel(u=1.0, v=0.0, r=0.0, rudder_angle=angle)
-    assert loads["rudder.x"] == pytest.approx(-3.832 * math.sin(angle), rel=1e-3)
-    assert loads["rudder.y"] == pytest.approx(3.832 * math.cos(angle), rel=1e-3)
+    found = rudder(loads, 1.0, 0.0, 0.0, angle)
+    assert found == pytest.approx((-3.832 * math.sin(angle), 3.832 * math.cos(angle)), rel=1e-3)
 
 
-def test_lift_is_a_sine_of_the_angle_of_attack_up_to_30_degrees() -> None:
-    half = vessel(u=1.0, v=0.0, r=0.0, rudder_angle=math.radians(15))["rudder.y"] / math.cos(math.radians(15))
-    assert half == pytest.approx(3.83232 * math.sin(math.pi / 4), rel=1e-9)
+def test_lift_is_a_sine_of_the_angle_of_attack_up_to_30_degrees(loads: Loads) -> None:
+    angle = math.radians(15)
+    assert rudder(loads, 1.0, 0.0, 0.0, angle)[1] / math.cos(angle) == pytest.approx(3.83232 * math.sin(math.pi / 4), rel=1e-9)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_inflow_of_a_turn_has_the_published_sign_or_the_physical_one(sign: float) -> None:
+def test_the_inflow_of_a_turn_has_the_published_sign_or_the_physical_one(loads: Loads, sign: float) -> None:
     inflow = math.atan((0.05 + sign * 0.34727 * 0.4) / 0.8)
     lift = 0.5 * 998 * 1.2 * 0.0064 * 0.64 * math.sin(math.pi / 2 * (0.1 - inflow) / math.radians(30))
-    loads = vessel(0.8, 0.05, 0.4, 0.1, rudder_inflow_sign=sign)
-    assert loads["rudder.y"] == pytest.approx(lift * math.cos(0.1))
-    assert loads["rudder.x"] == pytest.approx(-lift * math.sin(0.1))
+    found = rudder(loads, 0.8, 0.05, 0.4, 0.1, inflow_sign=sign)
+    assert found == pytest.approx((-lift * math.sin(0.1), lift * math.cos(0.1)))
 
 
-def test_a_vessel_at_rest_has_no_loads() -> None:
-    loads = vessel(0.0, 0.0, 0.0, 0.3)
-    assert not any(loads[name] for name in ("rudder.x", "rudder.y", "water.x", "water.y", "water.n"))
+def test_a_rudder_of_other_size_and_shape(loads: Loads) -> None:
+    changes = {"area": 0.02, "max_lift_coefficient": 1.0, "stall_angle": 0.4, "density": 1000.0, "arm": 1.0}
+    lift = 0.5 * 1000 * 0.02 * 4 * math.sin(math.pi / 2 * (0.1 - math.atan(0.1)) / 0.4)
+    assert rudder(loads, 2.0, 0.0, 0.2, 0.1, **changes)[1] == pytest.approx(lift * math.cos(0.1))
+
+
+def test_a_vessel_at_rest_has_no_loads(loads: Loads) -> None:
+    assert rudder(loads, 0.0, 0.0, 0.0, 0.3) == (0, 0)
+    for model in ("hull_hydrodynamics", "air_drag"):
+        assert not any(loads(model, motion(0.0, 0.0, 0.0)).values())

@@ -1,10 +1,14 @@
 """Real-time factors: simulated time over the wall time of the stepping loop."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from cosim.errors import InputError
 from cosim.recording import Recording
+from cosim.report.figures import draw
 from cosim.report.timings import timings
 from cosim.results import Result
 
@@ -33,3 +37,11 @@ def test_the_published_band_is_drawn_and_within_the_axis():
 def test_a_result_without_wall_time_is_refused():
     with pytest.raises(InputError, match=r"^foreign: no wall time"):
         timings(run("foreign", 10.0, 0.0))
+
+
+def test_the_names_of_six_runs_do_not_overlap():
+    first, *others = (run(f"performance_{n}", 15.0, 0.1) for n in range(1, 7))
+    figure = draw(first, "timings", timings, {"others": others})
+    FigureCanvasAgg(figure).draw()
+    extents = [label.get_window_extent() for label in figure.axes[0].get_xticklabels()]
+    assert all(left.x1 < right.x0 for left, right in pairwise(extents))

@@ -3,40 +3,55 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from typing import Any
 
 from . import WAYPOINT_CAPACITY, EndPolicy, length
+from .sampled import Sampled
 
 
-class WaypointGuidance:
-    """`heading` (rad, counter-clockwise from east) and `distance` (m) to the waypoint number `active` (from 1)."""
+class Guidance(Sampled):
+    """Turns the position into heading reference and distance; a waypoint is reached within `acceptance_radius`."""
 
-    def __init__(self) -> None:
-        self.active, self.finished = 1, False
-        self.heading, self.distance = 0.0, 0.0
+    active_waypoint: int
+    finished: bool
 
-    def __call__(
-        self, x: float, y: float, waypoints: Sequence[tuple[float, float]], radius: float, end_policy: EndPolicy | int
-    ) -> None:
-        """One tick at the position (x, y) in m; a waypoint is reached within `radius` (m)."""
-        if not 1 <= len(waypoints) <= WAYPOINT_CAPACITY:
+    def __init__(self, **arguments: Any):
+        super().__init__(**arguments)
+        self.parameter("speed_command", 1.0, "m/s", "On the way")
+        self.parameter("acceptance_radius", 0.5, "m", "Of the circle around a waypoint that counts as reached")
+        self.parameter("waypoint_count", 1, description="Waypoints in use")
+        self.parameter("waypoint_x", [0.0] * WAYPOINT_CAPACITY, "m", "East")
+        self.parameter("waypoint_y", [0.0] * WAYPOINT_CAPACITY, "m", "North")
+        self.parameter("end_policy", 1, description="After the last waypoint: 1 stop, 2 repeat, 3 keep course")
+        self.input("vehicle.position.x", 0.0, "m", "East")
+        self.input("vehicle.position.y", 0.0, "m", "North")
+        self.output("heading_reference", 0.0, "rad", "Counter-clockwise from east")
+        self.output("distance", 0.0, "m", "To the active waypoint")
+        self.output("active_waypoint", 1)
+        self.output("finished", False, description="The last waypoint is reached and the list does not repeat")
+
+    def guide(self) -> float:
+        """Set the outputs for this tick; returns the speed reference in m/s, which is 0 after a list that ends with a stop."""
+        if not 1 <= self.waypoint_count <= WAYPOINT_CAPACITY:
             raise ValueError(f"waypoint_count is not between 1 and {WAYPOINT_CAPACITY}")
-        self.active = min(self.active, len(waypoints))
-        if not self.finished and length(*self._ahead(x, y, waypoints)) <= radius:
-            self._advance(len(waypoints), end_policy)
-        ahead_x, ahead_y = self._ahead(x, y, waypoints)
+        self.active_waypoint = min(self.active_waypoint, self.waypoint_count)
+        if not self.finished and length(*self._ahead()) <= self.acceptance_radius:
+            self._advance()
+        ahead_x, ahead_y = self._ahead()
         self.distance = length(ahead_x, ahead_y)
         if not self.finished:
-            self.heading = math.atan2(ahead_y, ahead_x)
+            self.heading_reference = math.atan2(ahead_y, ahead_x)
+        return 0.0 if self.finished and self.end_policy == EndPolicy.STOP else self.speed_command
 
-    def _ahead(self, x: float, y: float, waypoints: Sequence[tuple[float, float]]) -> tuple[float, float]:
-        waypoint_x, waypoint_y = waypoints[self.active - 1]
-        return waypoint_x - x, waypoint_y - y
+    def _ahead(self) -> tuple[float, float]:
+        """From the vessel to the active waypoint."""
+        position, active = self.vehicle.position, self.active_waypoint - 1
+        return self.waypoint_x[active] - position.x, self.waypoint_y[active] - position.y
 
-    def _advance(self, count: int, end_policy: int) -> None:
-        if self.active < count:
-            self.active += 1
-        elif end_policy == EndPolicy.REPEAT:
-            self.active = 1
+    def _advance(self) -> None:
+        if self.active_waypoint < self.waypoint_count:
+            self.active_waypoint += 1
+        elif self.end_policy == EndPolicy.REPEAT:
+            self.active_waypoint = 1
         else:
             self.finished = True

@@ -1,0 +1,3 @@
+block HeadingController "Heading loop: from heading reference to the rudder angle of a vessel"
+  extends Fleet.HeadingController;
+end HeadingController;

@@ -1,0 +1,25 @@
+"""Speed loop of a vessel."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .pid import Pid
+from .sampled import Sampled
+
+
+class SpeedControl(Sampled):
+    """Thrust proportional to the speed error. Gain of the published simulator."""
+
+    def __init__(self, **arguments: Any):
+        super().__init__(**arguments)
+        self.parameter("speed_P", 82.65, "N.s/m", "Thrust per speed error")
+        self.parameter("thrust_limit", 3.0, "N")
+        self.input("vehicle.velocity_body.u", 0.0, "m/s", "Forward")
+        self.output("thrust", 0.0, "N")
+        self.surge = self.block("surge", Pid())
+
+    def control_speed(self, reference: float) -> None:
+        """Set the thrust for this tick; `reference` in m/s, forward."""
+        limits = (-self.thrust_limit, self.thrust_limit)
+        self.thrust = self.surge(reference - self.vehicle.velocity_body.u, P=self.speed_P, limits=limits)

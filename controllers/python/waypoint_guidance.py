@@ -1,0 +1,20 @@
+"""Line of sight to the active waypoint, which a circle of acceptance switches on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .fleet.waypoint_guidance import Guidance
+
+
+class WaypointGuidance(Guidance):
+    """Path command of the vessel: heading and speed reference from its position and a list of waypoints."""
+
+    description = "Line of sight to the active waypoint, which a circle of acceptance switches on"
+
+    def __init__(self, **arguments: Any):
+        super().__init__(**arguments)
+        self.output("speed_reference", 0.0, "m/s", "Forward")
+
+    def tick(self, time: float) -> None:
+        self.speed_reference = self.guide()

@@ -1,0 +1,130 @@
+"""Components of one stage that step at the same time, on threads.
+
+A stage has read everything before its first component steps, so the order in which its components step has no influence on any
+value; neither has stepping them at once. Python components take no part: they would only wait for each other.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from queue import SimpleQueue
+from threading import Event, Thread
+from typing import Generic, TypeVar
+
+from ..component import DoStep
+from ..system import Parallel
+from .turns import Turn
+
+#: macro steps in which the steps of components are measured before anything runs on threads
+TRIALS = 3
+#: a component whose step takes as long as this (s) is worth a thread: handing over takes some 20 us
+LONG = 50e-6
+
+Work = TypeVar("Work")
+Outcome = TypeVar("Outcome")
+
+
+@dataclass(eq=False)
+class SideBySide:
+    """The turns of one stage that may be taken at the same time, and the lanes in which they are once that was decided."""
+
+    turns: Sequence[Turn]
+    parallel: Parallel
+    lanes: Sequence[Sequence[Turn]] = ()
+
+    def groups(self) -> Mapping[object, list[Turn]]:
+        """Turns that may not be taken at the same time, together."""
+        groups: dict[object, list[Turn]] = defaultdict(list)
+        for turn in self.turns:
+            groups[turn.first if self.parallel is True else turn.step.component.code].append(turn)
+        return groups
+
+    def decide(self, seconds: Mapping[int, float], processors: int) -> None:
+        """Choose the lanes from the measured step of each turn, by the turn's first number.
+
+        "auto" asks for two lanes of long steps at least, and puts instances of one FMU file into one lane, for their code may
+        have state in common; True takes every component as independent and worth a thread.
+        """
+        groups = self.groups()
+        costs = {key: sum(seconds[turn.first] for turn in group) for key, group in groups.items()}
+        worthy = [key for key, cost in costs.items() if self.parallel is True or cost >= LONG]
+        if len(worthy) > 1 and processors > 1:
+            self.lanes = _spread(groups, costs, min(processors, len(worthy)))
+
+
+def _spread(groups: Mapping[object, Sequence[Turn]], costs: Mapping[object, float], count: int) -> list[list[Turn]]:
+    """The groups in `count` lanes of about equal cost: the longest first, each to the lane that has least to do."""
+    lanes: list[list[Turn]] = [[] for _ in range(count)]
+    loads = [0.0] * count
+    for key in sorted(groups, key=lambda key: -costs[key]):
+        least = loads.index(min(loads))
+        lanes[least] += groups[key]
+        loads[least] += costs[key]
+    return [sorted(lane, key=lambda turn: turn.first) for lane in lanes if lane]
+
+
+def may_overlap(turn: Turn) -> bool:
+    """Whether the turn steps in C, without the interpreter."""
+    return any(isinstance(call.native, DoStep) for call in turn.calls)
+
+
+def processors() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@dataclass(eq=False)
+class _Task(Generic[Work, Outcome]):
+    work: Work
+    outcome: Outcome | None = None
+    error: BaseException | None = None
+    done: Event = field(default_factory=Event)
+
+    def perform(self, function: Callable[[Work], Outcome]) -> None:
+        try:
+            self.outcome = function(self.work)
+        except BaseException as error:
+            self.error = error
+        self.done.set()
+
+
+class Crew(Generic[Work, Outcome]):
+    """Threads that do pieces of work at the same time as the calling thread."""
+
+    def __init__(self, size: int, function: Callable[[Work], Outcome]):
+        self._function = function
+        self._tasks: SimpleQueue[_Task[Work, Outcome] | None] = SimpleQueue()
+        self._threads = [Thread(target=self._serve, name=f"cosim-{i}", daemon=True) for i in range(size)]
+        for thread in self._threads:
+            thread.start()
+
+    def _serve(self) -> None:
+        while task := self._tasks.get():
+            task.perform(self._function)
+
+    def run(self, works: Sequence[Work]) -> list[Outcome]:
+        """The outcomes, in order; raises the first error. Returns, and is interrupted, only when nobody works any more."""
+        tasks: list[_Task[Work, Outcome]] = [_Task(work) for work in works]
+        for task in tasks[1:]:
+            self._tasks.put(task)
+        tasks[0].perform(self._function)
+        interrupt = None
+        for task in tasks:
+            while not task.done.is_set():
+                try:
+                    task.done.wait()
+                except KeyboardInterrupt as error:
+                    interrupt = error
+        if failure := interrupt or next((task.error for task in tasks if task.error), None):
+            raise failure
+        return [task.outcome for task in tasks]  # type: ignore[misc]
+
+    def close(self) -> None:
+        """Let the threads end."""
+        for _ in self._threads:
+            self._tasks.put(None)
+        for thread in self._threads:
+            thread.join()

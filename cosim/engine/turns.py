@@ -1,0 +1,49 @@
+"""One component's turn in a macro step, and how it may end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from ..component import Call
+from .plan import Step
+
+#: the highest FMI status that lets a simulation go on
+WARNING = 1
+
+
+class Turn(NamedTuple):
+    """One component's turn as calls that return an FMI status; `first` is the number of the first call."""
+
+    step: Step
+    calls: Sequence[Call]
+    first: int
+
+
+class Ending(NamedTuple):
+    """A turn that did not end well: which call, and its status; None: the floating-point mode was changed."""
+
+    turn: Turn
+    call: Call
+    status: int | None
+
+
+def take(turns: Sequence[Turn], n: int) -> list[Ending]:
+    """Take the turns that are due in macro step n, one after the other; those that did not end well are returned."""
+    return [ending for turn in turns if n % turn.step.divisor == 0 for ending in _take(turn)]
+
+
+def _take(turn: Turn) -> Iterator[Ending]:
+    for call in turn.calls:
+        status = call.function(*call.arguments)
+        if status > WARNING:
+            yield Ending(turn, call, status)
+            break
+    if _float_state_changed():
+        yield Ending(turn, turn.calls[-1], None)
+
+
+def _float_state_changed() -> bool:
+    """Equal in the default rounding mode only, and the least denormal is no zero only if it is not flushed."""
+    one, little, least = 1.0, 2.0**-54, 5e-324
+    return one + little != one - little or not least + least

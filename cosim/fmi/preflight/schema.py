@@ -1,0 +1,38 @@
+"""The standard's own XML schemas: they find every misspelt or misplaced element and attribute."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from lxml import etree
+
+from .findings import DESCRIPTION, Finding, Rule
+
+SCHEMA = Rule("xml.schema", "XML schemas of FMI 2.0.5 and 3.0.2", "warning")
+#: member of the archive -> its schema, by FMI version; only FMI 3.0 standardizes the others
+SCHEMAS = {
+    (2, DESCRIPTION): "fmi2/fmi2ModelDescription.xsd",
+    (3, DESCRIPTION): "fmi3/fmi3ModelDescription.xsd",
+    (3, "sources/buildDescription.xml"): "fmi3/fmi3BuildDescription.xsd",
+    (3, "terminalsAndIcons/terminalsAndIcons.xml"): "fmi3/fmi3TerminalsAndIcons.xsd",
+}
+
+
+@cache
+def _schema(name: str) -> Any:
+    """A schema, from the copies that FMPy brings."""
+    fmpy = find_spec("fmpy")
+    assert fmpy is not None and fmpy.origin is not None
+    return etree.XMLSchema(file=str(Path(fmpy.origin).parent / "schema" / name))
+
+
+def check_schema(root: Any, member: str, major: int) -> Iterator[Finding]:
+    """What an XML document has that its schema does not allow, and what it lacks."""
+    schema = _schema(SCHEMAS[major, member])
+    if not schema.validate(root):
+        for error in schema.error_log:
+            yield SCHEMA(error.message.rstrip("."), member, error.line)

@@ -1,0 +1,109 @@
+"""What foreign code may change in the process it is loaded into, and how to change it back."""
+
+from __future__ import annotations
+
+import ctypes
+import locale
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from . import log
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGSEGV, signal.SIGFPE, signal.SIGABRT, signal.SIGPIPE, signal.SIGCHLD)
+_SIGACTION_SIZE = 512  # more than any platform's struct sigaction, which begins with the handler
+_POINTER = ctypes.sizeof(ctypes.c_void_p)
+
+
+@dataclass(frozen=True)
+class ProcessState:
+    """Working directory, file mode mask, locale of the C library, environment and signal handlers of a process."""
+
+    directory: str
+    mask: int
+    locale: bytes
+    environment: dict[bytes, bytes]
+    handlers: dict[int, bytes]
+
+    @classmethod
+    def now(cls) -> ProcessState:
+        mask = os.umask(0)
+        os.umask(mask)
+        return cls(str(Path.cwd()), mask, _locale(), _environment(), {number: _handler(number) for number in _SIGNALS})
+
+    def restore(self) -> list[str]:
+        """Bring everything back to this state; says what had been changed."""
+        return list(self._restored())
+
+    def _restored(self) -> Iterator[str]:
+        if _directory() != self.directory:
+            os.chdir(self.directory)
+            yield "the working directory"
+        if os.umask(self.mask) != self.mask:
+            yield "the file mode mask"
+        if _locale() != self.locale:
+            _c().setlocale(locale.LC_ALL, self.locale)
+            yield "the locale"
+        if (now := _environment()) != self.environment:
+            for name in {*now, *self.environment}:
+                value = self.environment.get(name)
+                _c().unsetenv(name) if value is None else _c().setenv(name, value, 1)
+            yield "the environment"
+        changed = [n for n in _SIGNALS if _handler(n)[:_POINTER] != self.handlers[n][:_POINTER]]
+        for number in changed:
+            _c().sigaction(int(number), self.handlers[number], None)
+        if changed:
+            yield f"what is done upon {', '.join(signal.Signals(number).name for number in changed)}"
+
+
+@contextmanager
+def contained(who: str) -> Iterator[None]:
+    """What components change in the process while the block lasts is changed back, and `who` is named."""
+    state = ProcessState.now()
+    try:
+        yield
+    finally:
+        for what in state.restore():
+            log.message(who, log.WARNING, f"changed {what} of the process; it was changed back")
+
+
+def _c() -> Any:
+    library = ctypes.CDLL(None)
+    library.setlocale.restype = ctypes.c_char_p
+    return library
+
+
+def _directory() -> str:
+    with suppress(OSError):
+        return str(Path.cwd())
+    return ""
+
+
+def _locale() -> bytes:
+    return bytes(_c().setlocale(locale.LC_ALL, None) or b"C")
+
+
+def _environment() -> dict[bytes, bytes]:
+    """The C library's environment; Python's own copy is not changed by foreign code."""
+    if sys.platform != "linux":
+        return {}
+    entries = ctypes.POINTER(ctypes.c_char_p).in_dll(ctypes.CDLL(None), "environ")
+    found, i = {}, 0
+    while entries and entries[i] is not None:
+        name, _, value = entries[i].partition(b"=")
+        found[name] = value
+        i += 1
+    return found
+
+
+def _handler(number: int) -> bytes:
+    if sys.platform == "win32":
+        return b""
+    action = ctypes.create_string_buffer(_SIGACTION_SIZE)
+    _c().sigaction(int(number), None, action)
+    return action.raw

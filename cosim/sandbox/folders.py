@@ -1,0 +1,25 @@
+"""What a Python process must be able to read."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+#: shared libraries and what the loader and C library look up
+_SYSTEM = (
+    "/usr/lib",
+    "/usr/lib64",
+    "/usr/local/lib",
+    "/lib",
+    "/lib64",
+    "/etc/ld.so.cache",
+    "/dev/urandom",
+    "/usr/share/zoneinfo",
+)
+
+
+def interpreter_folders() -> tuple[Path, ...]:
+    """Existing folders and files that this interpreter, its packages and shared libraries are read from."""
+    own = str(Path(__file__).parents[1])
+    places = [Path(text) for text in (*_SYSTEM, sys.prefix, sys.base_prefix, *sys.path, own) if text]
+    return tuple(dict.fromkeys(path.absolute() for path in places if path.exists()))

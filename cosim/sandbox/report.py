@@ -1,0 +1,80 @@
+"""What this machine offers and what holds for this process, each tried out and not assumed."""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import os
+import resource
+import socket
+from dataclasses import dataclass
+
+from . import landlock
+from .bubblewrap import bubblewrap
+
+PR_GET_NO_NEW_PRIVS = 39
+#: the discard port: nobody listens, so that a connection which is permitted is refused at once
+_NOWHERE = ("127.0.0.1", 9)
+
+
+@dataclass(frozen=True)
+class Available:
+    """What sandboxes can be built from here: Landlock version (0: none) and path of a working bubblewrap (empty: none)."""
+
+    landlock: int
+    bubblewrap: str
+
+
+@dataclass(frozen=True)
+class Active:
+    """What holds for this process. Limits are None where there is none; memory and file size in bytes, time in s.
+
+    `files_confined`: by Landlock; bubblewrap shows other files instead.
+    """
+
+    files_confined: bool
+    tcp_closed: bool
+    own_session: bool
+    no_new_privileges: bool
+    memory: int | None
+    open_files: int | None
+    file_size: int | None
+    cpu_seconds: int | None
+
+
+def available() -> Available:
+    return Available(landlock.version(), bubblewrap())
+
+
+def active() -> Active:
+    """Look and try: lists the root folder and knocks at a port of this machine."""
+    return Active(
+        files_confined=_root_closed(),
+        tcp_closed=_tcp_closed(),
+        own_session=os.getsid(0) == os.getpid(),
+        no_new_privileges=ctypes.CDLL(None).prctl(PR_GET_NO_NEW_PRIVS, 0, 0, 0, 0) == 1,
+        memory=_limit(resource.RLIMIT_AS),
+        open_files=_limit(resource.RLIMIT_NOFILE),
+        file_size=_limit(resource.RLIMIT_FSIZE),
+        cpu_seconds=_limit(resource.RLIMIT_CPU),
+    )
+
+
+def _root_closed() -> bool:
+    """Anyone may list the root folder unless Landlock forbids it."""
+    try:
+        os.close(os.open("/", os.O_RDONLY | os.O_DIRECTORY))
+    except PermissionError:
+        return True
+    return False
+
+
+def _tcp_closed() -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as knocking:
+        knocking.settimeout(0.5)
+        return knocking.connect_ex(_NOWHERE) in (errno.EACCES, errno.EPERM, errno.ENETUNREACH)
+
+
+def _limit(kind: int) -> int | None:
+    soft, _ = resource.getrlimit(kind)
+    return None if soft == resource.RLIM_INFINITY else soft

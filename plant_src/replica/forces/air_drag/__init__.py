@@ -1,0 +1,1 @@
+"""Drag of the air on the vessel."""

@@ -1,0 +1,30 @@
+"""Drag of still air, added to the load of the water: the plant takes both in one, as equation 10 of the paper has it."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from cosim.export.block import Block
+
+from ....vehicles.interface import scalar, vector
+from ....vehicles.strider import parameters as p
+from ..model import VESSEL, force_model, load, parameter, planar_velocity
+
+VARIABLES = (
+    *VESSEL,
+    *vector("water", "xy", "N", "hydrodynamic force, vessel body frame, at the centre of mass", "input"),
+    scalar("water.n", "N.m", "hydrodynamic moment about z"),
+    parameter("coefficient", p.AIR_DRAG, "kg/m", "drag per square of the velocity, along and across"),
+    *load("load of water and air"),
+)
+
+
+def loads(inputs: ca.SX, coefficient: ca.SX) -> ca.SX:
+    """X, Y (N) and N (N m)."""
+    u, v, _ = ca.vertsplit(planar_velocity(inputs[0:4]))
+    return inputs[4:7] - coefficient * ca.vertcat(u * ca.fabs(u), v * ca.fabs(v), 0)
+
+
+def block() -> Block:
+    """The vessel above the water."""
+    return force_model("air_drag", "Drag of still air on a vessel, added to the load of the water", VARIABLES, loads)

@@ -1,0 +1,32 @@
+"""Equations 12 and 13 of the paper, once for each hull: the linear damping of sway and yaw. Surge meets no resistance."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from cosim.export.block import Block
+
+from ....vehicles.strider import parameters as p
+from ..model import VESSEL, force_model, load, parameter, planar_velocity
+
+VARIABLES = (
+    *VESSEL,
+    parameter("hulls", float(p.HULLS), "1", "number of hulls; 1: as the paper's equations read"),
+    parameter("Y_v", p.Y_V, "kg/s", "side force of one hull per sway velocity"),
+    parameter("Y_r", p.Y_R, "kg.m/s", "side force of one hull per yaw rate"),
+    parameter("N_v", p.N_V, "kg.m/s", "yaw moment of one hull per sway velocity"),
+    parameter("N_r", p.N_R, "kg.m2/s", "yaw moment of one hull per yaw rate"),
+    *load("hydrodynamic load"),
+)
+
+
+def loads(motion: ca.SX, parameters: ca.SX) -> ca.SX:
+    """X, Y (N) and N (N m)."""
+    _, v, r = ca.vertsplit(planar_velocity(motion))
+    hulls, y_v, y_r, n_v, n_r = ca.vertsplit(parameters)
+    return ca.vertcat(0, hulls * (y_v * v + y_r * r), hulls * (n_v * v + n_r * r))
+
+
+def block() -> Block:
+    """The hulls of the catamaran."""
+    return force_model("hull_hydrodynamics", "Hydrodynamic load on the hulls of a vessel", VARIABLES, loads)

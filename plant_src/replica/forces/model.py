@@ -1,0 +1,47 @@
+"""What the force models have in common: how they become FMUs, and the vessel's motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import casadi as ca
+
+from cosim.component import Variable
+from cosim.export.block import Block
+from cosim.export.equations import block, static_model
+from cosim.units import parse
+
+from ...vehicles.interface import scalar, vector
+
+#: inputs: the vessel's motion as the bus has it, the paper's equation 11
+VESSEL = (
+    *vector("vehicle.velocity", "xy", "m/s", "centre of mass, world frame", "input"),
+    scalar("vehicle.angular_velocity.z", "rad/s", "counter-clockwise"),
+    scalar("vehicle.attitude.yaw", "rad", "counter-clockwise from the world's x axis"),
+)
+
+
+def planar_velocity(motion: ca.SX) -> ca.SX:
+    """Surge u, sway v (m/s, body frame) and yaw rate r (rad/s) from the inputs `VESSEL`."""
+    x, y, rate, yaw = ca.vertsplit(motion)
+    return ca.vertcat(ca.cos(yaw) * x + ca.sin(yaw) * y, ca.cos(yaw) * y - ca.sin(yaw) * x, rate)
+
+
+def parameter(name: str, start: float, unit: str, description: str) -> Variable:
+    """A number that can be changed between steps."""
+    return Variable(name, "Float64", "parameter", "tunable", start, parse(unit), description=description)
+
+
+def load(what: str) -> tuple[Variable, ...]:
+    """Outputs X, Y (N) and N (N m) of a load on the vessel."""
+    return (
+        *vector("load", "xy", "N", f"{what}, vessel body frame, at the centre of mass"),
+        *vector("load", "n", "N.m", f"{what}, moment about z"),
+    )
+
+
+def force_model(
+    identifier: str, description: str, variables: Sequence[Variable], loads: Callable[[ca.SX, ca.SX], ca.SX]
+) -> Block:
+    """The block of a force model; `loads` maps inputs and parameters to outputs, each in the order of `variables`."""
+    return block(static_model(identifier, description, variables, loads))

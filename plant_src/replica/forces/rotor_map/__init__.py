@@ -1,0 +1,1 @@
+"""Thrusts and torques of the four rotors."""

@@ -1,0 +1,35 @@
+"""T = CT w^2 and Q = CD w^2 of each rotor, whose speed w follows the throttle at once."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from cosim.component import Variable
+from cosim.export.block import Block
+from cosim.units import parse
+
+from ....vehicles.ar_drone.parameters import THRUST_COEFFICIENT, TORQUE_COEFFICIENT
+from ..model import force_model, parameter
+
+MAX_SPEED = 5000 * 0.10471976  # rad/s; the factor from 1/min is rounded as published
+
+VARIABLES = (
+    Variable("throttle", causality="input", start=(0.0,) * 4, unit=parse("%"), shape=(4,), description="acts within 0 to 100"),
+    parameter("thrust_coefficient", THRUST_COEFFICIENT, "N.s2/rad2", "CT"),
+    parameter("torque_coefficient", TORQUE_COEFFICIENT, "N.m.s2/rad2", "CD"),
+    parameter("max_speed", MAX_SPEED, "rad/s", "rotor speed at full throttle"),
+    Variable("thrust", causality="output", unit=parse("N"), shape=(4,), description="along the body's up"),
+    Variable("torque", causality="output", unit=parse("N.m"), shape=(4,), description="of the propeller"),
+)
+
+
+def loads(throttle: ca.SX, parameters: ca.SX) -> ca.SX:
+    """Four thrusts (N), then four torques (N m)."""
+    thrust_coefficient, torque_coefficient, max_speed = ca.vertsplit(parameters)
+    speed = ca.fmin(100, ca.fmax(0, throttle)) / 100 * max_speed
+    return ca.vertcat(thrust_coefficient * speed**2, torque_coefficient * speed**2)
+
+
+def block() -> Block:
+    """Four rotors."""
+    return force_model("rotor_map", "Thrust and torque of four rotors from their throttles", VARIABLES, loads)

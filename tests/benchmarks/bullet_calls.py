@@ -1,0 +1,69 @@
+"""The bare PyBullet calls of a mission: recorded while it is flown, replayed without plant, controllers and importer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from inspect import getmembers, isbuiltin
+from time import process_time
+from typing import Any, NamedTuple
+
+import pytest
+
+from cosim.simulate import simulate
+from plant_src.bullet import pybullet
+
+
+class BulletCall(NamedTuple):
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    options: dict[str, Any]
+    result: Any
+
+
+@dataclass(frozen=True)
+class BulletCalls:
+    """All calls of a mission, `first` to `last` of them in the stepping loop, which has so many macro steps."""
+
+    calls: Sequence[BulletCall]
+    first: int
+    last: int
+    steps: int
+
+    def replay(self) -> float:
+        """CPU microseconds per macro step of the loop's calls; their results have to be the same, up to the last contact."""
+        begin, loop, end = self.calls[: self.first], self.calls[self.first : self.last], self.calls[self.last :]
+        _make(begin)
+        began = process_time()
+        results = _make(loop)
+        seconds = process_time() - began
+        _make(end)
+        assert results == [call.result for call in loop]
+        return seconds / self.steps * 1e6
+
+
+def _make(calls: Sequence[BulletCall]) -> list[Any]:
+    return [function(*arguments, **options) for function, arguments, options, _ in calls]
+
+
+def record(load: Callable[[], Any]) -> BulletCalls:
+    """Fly the scenario that `load` assembles and keep its calls of PyBullet."""
+    calls: list[BulletCall] = []
+    marks: list[int] = []
+    with pytest.MonkeyPatch.context() as patch:
+        for name, function in getmembers(pybullet, isbuiltin):
+            patch.setattr(pybullet, name, _recorded(function, calls))
+        assembly = load()
+        run = simulate(assembly.system, assembly.settings, [lambda *_: marks.append(len(calls))])
+    if run.failure:
+        raise run.failure
+    return BulletCalls(calls, marks[0], marks[-1], run.macro_steps)
+
+
+def _recorded(function: Callable[..., Any], calls: list[BulletCall]) -> Callable[..., Any]:
+    def recorded(*arguments: Any, **options: Any) -> Any:
+        result = function(*arguments, **options)
+        calls.append(BulletCall(function, arguments, options, result))
+        return result
+
+    return recorded

@@ -1,0 +1,67 @@
+"""Costs of contenders, measured in turns so that whatever else the machine does meets all of them alike."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from statistics import median
+from time import perf_counter, process_time
+
+ROUNDS = 5
+
+#: one measurement: CPU time, if nothing else is said in microseconds per macro step
+Cost = Callable[[], float]
+
+
+@dataclass(frozen=True)
+class Row:
+    """Median cost, and the median of its ratios to the first contender of the same round."""
+
+    name: str
+    cost: float
+    ratio: float
+
+
+def compare(contenders: Mapping[str, Cost], rounds: int = ROUNDS) -> list[Row]:
+    """Measure all contenders once in every round; the first is what the others are compared with."""
+    costs = [{name: cost() for name, cost in contenders.items()} for _ in range(rounds)]
+    first = next(iter(contenders))
+    return [
+        Row(name, median(found[name] for found in costs), median(found[name] / found[first] for found in costs))
+        for name in contenders
+    ]
+
+
+def heading(title: str, unit: str = "CPU us per step") -> None:
+    print(f"\n{title}: median of {ROUNDS} rounds in turns, load average {os.getloadavg()[0]:.2f}")
+    print(f"  {'workload':24}{'who':28}{unit:>16}{'ratio':>9}")
+
+
+def show(workload: str, rows: list[Row]) -> dict[str, float]:
+    """Print the rows of a workload; returns the ratios."""
+    for row in rows:
+        print(f"  {workload:24}{row.name:28}{row.cost:16.4g}{row.ratio:9.3g}", flush=True)
+    return {row.name: row.ratio for row in rows}
+
+
+class Stopwatch:
+    """An observer of a run: CPU time (all threads together) and wall time of its stepping loop, in microseconds per step."""
+
+    def __init__(self) -> None:
+        self._marks: list[tuple[int, float, float]] = []
+
+    def __call__(self, finished: int, count: int) -> None:
+        self._marks.append((finished, process_time(), perf_counter()))
+
+    @property
+    def cpu(self) -> float:
+        return self._per_step(1)
+
+    @property
+    def wall(self) -> float:
+        return self._per_step(2)
+
+    def _per_step(self, clock: int) -> float:
+        first, last = self._marks[0], self._marks[-1]
+        return (last[clock] - first[clock]) / (last[0] - first[0]) * 1e6

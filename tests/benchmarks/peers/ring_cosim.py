@@ -1,0 +1,18 @@
+"""cosim. Its fourth argument is the executor. Runs in the environment of the benchmarks."""
+
+import sys
+from pathlib import Path
+
+from driver import Outcome, Ring, main
+
+sys.path.append(str(Path(__file__).parents[1]))
+import importer
+
+
+def run(ring: Ring) -> Outcome:
+    watch = importer.watched(importer.ring(Path(ring.fmu), ring.size), ring.steps, ["s0.y1"], sys.argv[4])
+    return watch.cpu * ring.steps / 1e6, watch.wall * ring.steps / 1e6, 1.0
+
+
+if __name__ == "__main__":
+    main(run)

@@ -1,0 +1,36 @@
+"""N near-empty FMUs in a ring, Jacobi: 3 N FMI calls per macro step, so what is measured is the importer.
+
+Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_ring.py
+"""
+
+from __future__ import annotations
+
+import pytest
+from importer import cost, executors, label, ring
+from lag import lag_fmu
+from limit import Limit
+from measure import compare, heading, show
+
+SIZES = (2, 8, 32, 128, 1024)
+#: steps times FMUs
+BUDGETS = {"native": 1_000_000, "python": 50_000}
+#: generous: times the C limit
+LARGEST_RATIO = {"C limit": 2, "cosim, native": 20, "cosim, python": 2000}
+pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]
+
+
+@pytest.mark.parametrize("recorded", ["one signal", "all signals"])
+@pytest.mark.parametrize("version", [2, 3], ids=["fmi2", "fmi3"])
+def test_ring(version, recorded, tmp_path):
+    fmu = lag_fmu(tmp_path, version)
+    limit = Limit(fmu, tmp_path)
+    choices = executors()
+    heading(f"ring of FMI {version}.0 FMUs, {recorded} recorded")
+    for size in SIZES:
+        names = [f"s{i}.y1" for i in range(1 if recorded == "one signal" else size)]
+        contenders = {"C limit": lambda size=size, names=names: limit(size, 1_000_000 // size, recorded=len(names))}
+        for executor in choices:
+            steps = max(200, BUDGETS[executor] // size)
+            contenders[label(executor)] = lambda s=size, n=steps, r=names, e=executor: cost(ring(fmu, s), n, r, e)
+        ratios = show(f"ring {size}", compare(contenders))
+        assert all(ratio < LARGEST_RATIO[name] for name, ratio in ratios.items())

@@ -1,0 +1,110 @@
+"""`cosim doctor` against machines that lack something: other search paths, other metadata, another PATH."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import subprocess
+import sys
+from importlib import metadata
+
+import pytest
+
+from cosim.engine import available as native_available
+
+METADATA = """Metadata-Version: 2.1
+Name: fmi-cosim
+Version: 0.1.0
+Provides-Extra: wings
+Requires-Dist: {required}
+Requires-Dist: no-such-feathers>=2; extra == "wings"
+"""
+
+
+def doctor(*options, **environment):
+    command = [sys.executable, "-m", "cosim", "doctor", *options]
+    return subprocess.run(command, capture_output=True, text=True, check=False, cwd="/", env={**os.environ, **environment})
+
+
+def findings(**environment):
+    """(exit code, name -> finding)."""
+    done = doctor("--json", **environment)
+    return done.returncode, {finding["name"]: finding for finding in json.loads(done.stdout)}
+
+
+@pytest.fixture
+def requiring(tmp_path):
+    """An environment in which the distribution requires something else."""
+
+    def make(required):
+        folder = tmp_path / "fmi_cosim-0.1.0.dist-info"
+        folder.mkdir()
+        (folder / "METADATA").write_text(METADATA.format(required=required))
+        return {"PYTHONPATH": str(tmp_path)}
+
+    return make
+
+
+def test_it_finds_what_is_here():
+    code, found = findings()
+    assert code == 0
+    assert found["Python"]["found"].startswith(platform.python_version())
+    assert found["numpy"]["found"] == metadata.version("numpy")
+    assert found["executor"]["found"].startswith("native" if native_available() else "Python only")
+    assert str(os.cpu_count()) in found["processors"]["found"]
+
+
+def test_text_and_json_tell_the_same():
+    text = doctor().stdout
+    assert all(finding["found"] in text for finding in findings()[1].values())
+
+
+@pytest.mark.parametrize(
+    ("required", "words"),
+    [("no-such-package>=1", "not installed"), ("numpy>=1000", f"{metadata.version('numpy')}, needed is >=1000")],
+)
+def test_a_required_package_that_is_not_there_or_too_old_is_broken(requiring, required, words):
+    environment = requiring(required)
+    done = doctor(**environment)
+    assert done.returncode == 1
+    assert f"BROKEN: {words}" in done.stdout
+
+
+def test_an_extra_that_is_not_there_hurts_nobody(requiring):
+    code, found = findings(**requiring("numpy>=1"))
+    assert (code, found["wings"]["state"]) == (0, "missing")
+    assert found["wings"]["found"] == "no-such-feathers: not installed (pip install 'fmi-cosim[wings]')"
+
+
+def test_tools_are_looked_for_on_the_path(tmp_path):
+    code, found = findings(PATH=str(tmp_path), CC="")
+    assert code == 0
+    assert [found[name]["state"] for name in ("C compiler", "OpenModelica", "bubblewrap")] == ["missing"] * 3
+
+
+def test_a_program_is_believed_only_when_it_works(tmp_path):
+    for name, text in {"omc": "echo OpenModelica 1.26.0", "bwrap": "exit 1", "cc": "exit 0"}.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
+        (tmp_path / name).chmod(0o755)
+    _, found = findings(PATH=f"{tmp_path}:/bin", CC="")
+    assert found["OpenModelica"]["found"] == "OpenModelica 1.26.0"
+    assert found["bubblewrap"]["state"] == "missing"
+
+
+def test_the_cache_is_where_the_environment_puts_it(tmp_path):
+    _, found = findings(XDG_CACHE_HOME=str(tmp_path))
+    assert found["cache"]["found"] == str(tmp_path / "cosim")
+
+
+def test_in_a_sandbox_it_says_so():
+    """What holds for the process is tried out in a process for which it holds."""
+    code = (
+        "from cosim.sandbox import *; from cosim.cli import main; enter(Settings(readable=interpreter_folders(), open_files=77))"
+    )
+    words = [sys.executable, "-c", f"{code}; main(['doctor', '--json'])"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    found = {finding["name"]: finding["found"] for finding in json.loads(done.stdout)}
+    assert found["open files"] == "77"
+    assert found["no new privileges"] == "yes"
+    assert found["files confined"] == ("yes" if found["Landlock"].startswith("version") else "no")

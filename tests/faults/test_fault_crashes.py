@@ -1,0 +1,192 @@
+"""FMUs that crash, end the process, hang or leave something behind: the supervised run survives, names them and keeps the rows.
+
+Without supervision these runs end the importer itself, so they are skipped.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+
+import pytest
+from fault_fmu import COUNT, function_name, scenario
+from fault_runs import Outcome
+
+pytest.importorskip("cosim.supervise", reason="runs are not supervised yet")
+pytestmark = pytest.mark.supervised
+
+ALL = COUNT + 1
+#: a hang is found within its deadline and half a second; the process around it takes its time, too
+DEADLINES, SLACK = {"load": 1.0, "initialization": 1.0, "step": 1.0, "end": 1.0}, 3.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """An order, words of the message ({f}: the C function), possible exit codes, and the rows that are kept."""
+
+    order: str
+    words: str = ""
+    codes: tuple[int, ...] = (1,)
+    rows: int = 6
+    versions: tuple[int, ...] = (2, 3)
+
+
+def table(*cases: Case) -> pytest.MarkDecorator:
+    """Each case with one of the FMI versions in turn; with the other one in long runs."""
+    chosen = []
+    for n, case in enumerate(cases):
+        for version in case.versions:
+            marks = [] if len(case.versions) == 1 or version == 2 + n % 2 else [pytest.mark.long]
+            chosen.append(pytest.param(case, version, marks=marks, id=f"FMI{version} {case.order}"))
+    return pytest.mark.parametrize(("case", "version"), chosen)
+
+
+def check(done: Outcome, case: Case, version: int) -> None:
+    assert done.code in case.codes, done.err
+    assert len(done.rows) == case.rows, done.err
+    assert case.words.format(f=function_name(version, case.order.split()[0])) in done.err
+    assert "Traceback" not in done.err
+    assert [name for name in done.temporaries if name.startswith("cosim-")] == []
+    assert (done.processes, done.changes) == ([], [])
+
+
+FAILED = "lag: {f} failed"
+T5 = FAILED + " at t = 0.05 s: "
+SIGNAL, EXIT, LATE = "the process was ended by signal ", "it ended the process with exit code ", "did not return within 1 s"
+
+CRASHES = table(
+    Case("DoStep 6 segv", T5 + SIGNAL + "11 (SIGSEGV"),
+    Case("DoStep 6 bus", T5 + SIGNAL + "7 (SIGBUS"),
+    Case("DoStep 6 divide", T5 + SIGNAL + "8 (SIGFPE"),
+    Case("DoStep 6 illegal", T5 + SIGNAL + "4 (SIGILL"),
+    Case("DoStep 6 deep", T5 + SIGNAL + "11 (SIGSEGV"),
+    Case("DoStep 6 abort", T5 + SIGNAL + "6 (SIGABRT"),
+    Case("DoStep 6 free_twice", T5 + SIGNAL + "6 (SIGABRT"),
+    Case("DoStep 6 kill", T5 + SIGNAL + "9 (SIGKILL"),
+    Case("DoStep 6 exit_0", T5 + EXIT + "0"),
+    Case("DoStep 6 exit_3", T5 + EXIT + "3"),
+    Case("DoStep 6 exit_at_once", T5 + EXIT + "0"),
+    Case("GetReal 9 segv", T5 + SIGNAL),
+    Case("DoStep @0.02 segv", FAILED + " at t = 0.02 s: " + SIGNAL + "11 (SIGSEGV", rows=3),
+    Case("load 1 segv", SIGNAL + "11 (SIGSEGV", rows=0),
+    Case("load 1 exit_0", EXIT + "0", rows=0),
+    Case("Instantiate 1 segv", FAILED, rows=0),
+    Case("Instantiate 1 exit_0", FAILED, rows=0),
+    Case("EnterInitializationMode 1 segv", FAILED, rows=0),
+    Case("ExitInitializationMode 1 abort", FAILED, rows=0),
+    Case("GetReal 1 exit_0", "lag: ", rows=0),
+    Case("Terminate 1 segv", "{f}", codes=(0, 1), rows=ALL),
+    Case("Terminate 1 exit_0", "{f}", codes=(0, 1), rows=ALL),
+    Case("FreeInstance 1 segv", "{f}", codes=(0, 1), rows=ALL),
+    Case("FreeInstance 1 exit_0", "{f}", codes=(0, 1), rows=ALL),
+    Case("unload 1 segv", "lag", codes=(0, 1), rows=ALL),
+)
+
+
+@CRASHES
+def test_a_crash_is_named_and_the_rows_are_kept(fmus, runner, tmp_path, case, version):
+    check(runner.run(tmp_path, fmus(version, case.order)), case, version)
+
+
+def test_the_command_itself_survives(fmus, tmp_path, version):
+    """As a user starts it: the other runs of this room skip the imports."""
+    words = ["simulate", fmus(version, "DoStep 6 segv"), "--output-file", tmp_path / "result.csv"]
+    done = subprocess.run([sys.executable, "-m", "cosim", *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert f"fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.stderr
+    assert len((tmp_path / "result.csv").read_text().splitlines()) == 7
+
+
+@table(
+    Case("DoStep 6 loop", T5 + LATE),
+    Case("DoStep 6 sleep", T5 + LATE),
+    Case("EnterInitializationMode 1 loop", FAILED, rows=0),
+    Case("Instantiate 1 sleep", FAILED, rows=0),
+    Case("load 1 loop", LATE, rows=0),
+    Case("Terminate 1 loop", "{f}", codes=(0, 1), rows=ALL),
+    Case("FreeInstance 1 loop", "{f}", codes=(0, 1), rows=ALL),
+)
+def test_a_hang_is_found_at_its_deadline(fmus, runner, tmp_path, case, version):
+    done = runner.run(tmp_path, fmus(version, case.order), deadlines=DEADLINES, limit=20)
+    check(done, case, version)
+    assert done.seconds < 1.0 + 0.5 + SLACK
+
+
+@table(
+    Case("DoStep 6 change_folder", codes=(0, 1), rows=ALL),
+    Case("DoStep 6 change_locale", codes=(0, 1), rows=ALL),
+    Case("DoStep 6 change_umask", codes=(0, 1), rows=ALL),
+    Case("DoStep 6 change_environment", codes=(0, 1), rows=ALL),
+    Case("DoStep 6 ignore_interrupts", codes=(0, 1), rows=ALL),
+    Case("DoStep 6 round_up", "changed the floating-point mode"),
+    Case("DoStep 6 flush_to_zero", "changed the floating-point mode"),
+    Case("DoStep 6 fp_traps", "changed the floating-point mode"),
+    Case("DoStep 6 thread", codes=(0, 1), rows=ALL),
+    Case("DoStep 6 close_output", codes=(0,), rows=ALL),
+    Case("DoStep 6 log_thread", codes=(0,), rows=ALL),
+    Case("DoStep 6 flood_stdout", codes=(0,), rows=ALL),
+    Case("DoStep 6 tcp", codes=(0,), rows=ALL),
+)
+def test_what_an_fmu_does_to_its_process_does_not_reach_the_importer(fmus, runner, tmp_path, case, version):
+    done = runner.run(tmp_path, fmus(version, case.order), deadlines={"step": 3.0})
+    check(done, case, version)
+    assert (tmp_path / "out/result.csv").stat().st_mode & 0o400
+
+
+@pytest.mark.parametrize("what", ["close_all", "open_files"])
+def test_without_usable_descriptors_the_finished_rows_are_kept(fmus, runner, tmp_path, version, what):
+    done = runner.run(tmp_path, fmus(version, f"DoStep 6 {what}"))
+    assert done.code in (0, 1)
+    assert len(done.rows) >= 6
+    assert (done.temporaries, done.processes, done.changes) == ([], [], [])
+
+
+@pytest.mark.parametrize("what", ["fork", "daemon"])
+def test_no_process_of_an_fmu_outlives_the_run(fmus, runner, tmp_path, version, what):
+    done = runner.run(tmp_path, fmus(version, f"DoStep 6 {what}"))
+    assert fmus.lines("child")
+    assert done.processes == []
+    assert len(done.rows) == ALL
+
+
+def test_an_fmu_cannot_read_what_is_typed(fmus, runner, tmp_path, version):
+    os.mkfifo(tmp_path / "typed")
+    done = runner.run(tmp_path, fmus(version, "DoStep 6 read_stdin"), limit=10, stdin=str(tmp_path / "typed"))
+    assert (done.code, len(done.rows)) == (0, ALL)
+    assert fmus.lines("stdin") == ["stdin 0"]
+
+
+def test_many_messages_are_cut_and_counted(fmus, runner, tmp_path, version):
+    """1000 lines a second are passed on, the rest is counted."""
+    done = runner.run(tmp_path, fmus(version, "DoStep 1 log_20000"))
+    assert (done.code, len(done.rows)) == (0, ALL), done.err[-1000:]
+    assert done.err.count("again") < 10_000
+
+
+@pytest.mark.long
+def test_a_flood_of_messages_ends_by_the_deadline_at_the_latest(fmus, runner, tmp_path, version):
+    done = runner.run(tmp_path, fmus(version, "DoStep 6 flood_log"), limit=30)
+    assert done.code in (0, 1)
+    assert len(done.rows) >= 6
+    assert len(done.err) < 4_000_000
+
+
+@pytest.mark.parametrize("what", ["segv", "exit_0", pytest.param("loop", marks=pytest.mark.long)])
+def test_one_fmu_alone_is_supervised_too(fmus, runner, tmp_path, version, what):
+    done = runner.simulate(tmp_path, fmus(version, f"DoStep 6 {what}"), limit=20)
+    assert (done.code, len(done.rows)) == (1, 6), done.err
+    assert f"fmi{version}DoStep" in done.err
+    assert (done.temporaries, done.processes, done.changes) == ([], [], [])
+
+
+def test_the_innocent_are_not_accused(fmus, runner, tmp_path, version):
+    """Of two instances in one stage the one that crashed is named."""
+    components = {name: {"fmu": str(fmus(version))} for name in ("first", "second", "third")}
+    file = scenario(tmp_path, fmus.folder, components=components, algorithm={"stages": [list(components)]})
+    words = ("run", file, "--output-dir", "out", "--no-report", "--set", "second.fault=DoStep 6 segv")
+    done = runner.cosim(tmp_path, *words)
+    assert (done.code, len(done.rows)) == (1, 6)
+    assert f"second: fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.err
+    assert "first:" not in done.err and "third:" not in done.err

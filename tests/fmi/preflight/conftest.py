@@ -1,0 +1,14 @@
+"""The good FMUs that everything here is made from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from fmu_corpus import contents
+
+
+@pytest.fixture(scope="session")
+def good(probes: dict[int, Path]) -> dict[int, dict[str, bytes]]:
+    """Members of the hand-written FMUs, by FMI version."""
+    return {version: contents(path) for version, path in probes.items()}

@@ -1,0 +1,36 @@
+"""The progress bar shows on a terminal only."""
+
+import os
+import subprocess
+import sys
+
+CODE = """
+from cosim.cli.progress import progress_bar
+
+with progress_bar("chase.mp4") as progress:
+    if progress:
+        progress(3, 12)
+print(progress is None)
+"""
+
+
+def output(stderr):
+    return subprocess.run([sys.executable, "-c", CODE], stdout=subprocess.PIPE, stderr=stderr, text=True, check=True).stdout
+
+
+def test_a_terminal_sees_name_and_share():
+    ours, theirs = os.openpty()
+    try:
+        assert output(theirs) == "False\n"
+        shown = os.read(ours, 10000).decode()
+    finally:
+        os.close(ours)
+        os.close(theirs)
+    assert "chase.mp4" in shown
+    assert "25%" in shown
+
+
+def test_a_file_sees_nothing(tmp_path):
+    with (tmp_path / "errors").open("w+") as errors:
+        assert output(errors) == "True\n"
+        assert errors.tell() == 0

@@ -1,0 +1,52 @@
+"""Many components: what is done once, and where the time went."""
+
+import json
+
+import cosim
+import cosim.fmi.file
+
+
+def ring(folder, probe, size):
+    """`size` instances of one FMU, each reads the one before."""
+    names = [f"p{i}" for i in range(size)]
+    scenario = folder / "ring.json"
+    document = {
+        "name": "ring",
+        "stop_time": 0.1,
+        "step_size": 0.01,
+        "components": {name: {"fmu": str(probe)} for name in names},
+        "connections": [{"from": f"{a}.y", "to": f"{b}.u"} for a, b in zip(names, names[1:] + names[:1], strict=True)],
+        "algorithm": {"stages": [names]},
+    }
+    scenario.write_text(json.dumps(document))
+    return scenario
+
+
+def test_one_file_is_extracted_and_loaded_once(tmp_path, probe, monkeypatch):
+    extracted, loaded = [], []
+    extract, open_library = cosim.fmi.file.extract, cosim.fmi.instance.FmuInstance._open
+    monkeypatch.setattr(cosim.fmi.file, "extract", lambda *args: extracted.append(args) or extract(*args))
+    monkeypatch.setattr(
+        cosim.fmi.instance.FmuInstance, "_open", lambda self, *args: loaded.append(args) or open_library(self, *args)
+    )
+    result = cosim.run(ring(tmp_path, probe, 20))
+    assert (len(extracted), len(loaded)) == (1, 1)
+    assert all(result[f"p{i}.y"][-1] == 1.0 for i in range(20))
+
+
+def test_instances_of_one_library_keep_their_names_and_values(tmp_path, probe):
+    scenario = ring(tmp_path, probe, 3)
+    document = json.loads(scenario.read_text())
+    for i, component in enumerate(document["components"].values()):
+        component["parameters"] = {"y_start": float(i)}
+    scenario.write_text(json.dumps(document | {"connections": []}))
+    result = cosim.run(scenario, {"p1.u": 5.0})
+    assert [result[f"p{i}.y"][0] for i in range(3)] == [0.0, 1.0, 2.0]
+    assert result["p1.y"][1] == 1.0 + 0.01 * (5.0 - 1.0) / 0.5
+
+
+def test_the_time_of_a_run_is_told_part_by_part(tmp_path, probe):
+    timing = cosim.run(ring(tmp_path, probe, 2)).timing
+    parts = {"parse_seconds", "instantiate_seconds", "wiring_seconds", "initialize_seconds", "loop_seconds"}
+    assert set(timing) >= parts
+    assert 0 < sum(timing[part] for part in parts) <= timing["load_seconds"] + timing["simulate_seconds"]
