@@ -25,8 +25,8 @@ static void set_float_state(unsigned state) { fesetround((int)state); }
 
 enum { WARNING = 1, DISCARD = 2 };                      /* FMI statuses; OK is 0, everything above WARNING is bad */
 enum { FLOAT_STATE_CHANGED = -1, NOT_FINITE = -2 };     /* what is reported beside FMI statuses */
-enum { LONG_CALL = 20000, TRIALS = 3 };                 /* ns; a doStep that never was shorter releases the interpreter */
-enum { OPERATIONS_PER_LOOK = 4096 };                    /* between two looks for signals, such as an interrupt */
+enum { TRIALS = 3 };                                    /* so often the duration of a doStep is measured */
+enum { LOOK = 50000000, OPERATION = 20 };               /* ns between two looks for signals; of an operation, about */
 
 /* The C functions of FMI 2.0 and 3.0 that a step calls; values are of any type. */
 typedef int Access2(void *instance, const uint32_t *references, size_t count, void *values);
@@ -71,7 +71,7 @@ typedef struct {
     void *function, *instance;
     union {
         struct { const uint32_t *references; size_t count; void *values; size_t size; } access;
-        struct { StepMemory *memory; double size; int64_t careful; } step; /* careful: measured, or long */
+        struct { StepMemory *memory; double size; } step;
         Move *move;
         struct { const UsualTurn *first, *end; } turns;
         struct { PyObject *callable, *arguments; } python;
@@ -100,6 +100,7 @@ typedef struct {
     UsualTurn *turns;
     uint32_t *references;       /* of the usual turns */
     int packed;
+    PyThreadState *thread;      /* while the interpreter lock is released */
     int stop;                   /* a component asked to end the simulation after this macro step */
 } Program;
 
@@ -191,13 +192,18 @@ static bool all_finite(const Program *p) {
 
 /* ---- running --------------------------------------------------------------------------------------------------------- */
 
+/* Macro steps run without the interpreter lock: FMUs may take their time, and may call back from threads of their own. */
+static void enter_python(Program *p) { PyEval_RestoreThread(p->thread); }
+static void leave_python(Program *p) { p->thread = PyEval_SaveThread(); }
+
 /* Tell Python; returns -1 with an exception set when the run has failed. */
 static int report(Program *p, int number, int status) {
+    enter_python(p);
     PyObject *end = PyObject_CallFunction(p->on_status, "ii", number, status);
-    if (!end) return -1;
-    if (PyObject_IsTrue(end)) p->stop = 1;
-    Py_DECREF(end);
-    return 0;
+    if (end && PyObject_IsTrue(end)) p->stop = 1;
+    Py_XDECREF(end);
+    leave_python(p);
+    return end ? 0 : -1;
 }
 
 static int64_t nanoseconds(void) {
@@ -212,29 +218,24 @@ static int step_once(const Operation *op, double time) {
     return ((Step3 *)op->function)(op->instance, time, op->step.size, true, m->flags, m->flags + 1, m->flags + 2, m->reached);
 }
 
-/* A step that is being measured, or that is long: then other threads may run beside it. */
-static int step_carefully(Operation *op, double time) {
+static int step(const Operation *op, double time) {
     StepMemory *m = op->step.memory;
-    int status;
+    if (!m->trials) return step_once(op, time);
     int64_t began = nanoseconds();
-    Py_BEGIN_ALLOW_THREADS
-    status = step_once(op, time);
-    Py_END_ALLOW_THREADS
+    int status = step_once(op, time);
     int64_t took = nanoseconds() - began;
     if (took < m->shortest) m->shortest = took;
-    if (m->trials && !--m->trials) op->step.careful = m->shortest >= LONG_CALL;
+    m->trials--;
     return status;
 }
 
-static inline int step(Operation *op, double time) {
-    return op->step.careful ? step_carefully(op, time) : step_once(op, time);
-}
-
-static int call_python(const Operation *op) {
+/* Returns a status, or -1 with an exception set. */
+static int call_python(Program *p, const Operation *op) {
+    enter_python(p);
     PyObject *result = PyObject_Call(op->python.callable, op->python.arguments, NULL);
-    if (!result) return -1;
-    int status = (int)PyLong_AsLong(result);
-    Py_DECREF(result);
+    int status = result ? (int)PyLong_AsLong(result) : -1;
+    Py_XDECREF(result);
+    leave_python(p);
     return status;
 }
 
@@ -251,12 +252,12 @@ static inline int look_at(const Operation *op) {
     return flags[0] | flags[1] | flags[2] ? DISCARD : 0;
 }
 
-static int call(Operation *op, double time) {
+static int call(Program *p, const Operation *op, double time) {
     switch (op->kind) {
     case ACCESS2: return access2(op);
     case ACCESS3: return access3(op);
     case FLAGS: return look_at(op);
-    case PYTHON: return call_python(op);
+    case PYTHON: return call_python(p, op);
     default: return step(op, time);
     }
 }
@@ -270,8 +271,8 @@ static int float_state_changed(Program *p, int number) {
 static int turn(Program *p, Operation *op, const Operation *end, double time) {
     for (; op < end; op++) {
         p->marker[0] = op->number;
-        int status = call(op, time);
-        if (op->kind == PYTHON && status < 0 && PyErr_Occurred()) return -1;
+        int status = call(p, op, time);
+        if (op->kind == PYTHON && status < 0) return -1;
         if (float_state() != p->float_state && float_state_changed(p, op->number) < 0) return -1;
         if (status > WARNING) return report(p, op->number, status);
     }
@@ -349,8 +350,10 @@ static void copy_pieces(const Program *p) {
 static int record(Program *p, int64_t n) {
     if (p->every != 1 && n % p->every) return 0;
     if (p->record) {
+        enter_python(p);
         PyObject *result = PyObject_CallFunction(p->record, "L", (long long)n);
         Py_XDECREF(result);
+        leave_python(p);
         return result ? 0 : -1;
     }
     if (p->block) memcpy(p->row, p->block, (size_t)p->block_size);
@@ -366,8 +369,8 @@ static const Operation *get_of(const Operation *op) { return op[2].kind == STEP2
 
 static int is_usual(const Program *p, const Operation *op) {
     Py_ssize_t calls = op->kind == EVERY && op->divisor == 1 ? op->after - (op - p->operations) - 1 : 0;
-    if (calls == 3) return op[1].kind == ACCESS2 && op[2].kind == STEP2 && op[3].kind == ACCESS2 && !op[2].step.careful;
-    if (calls == 4) return op[1].kind == ACCESS3 && op[2].kind == STEP3 && op[4].kind == ACCESS3 && !op[2].step.careful;
+    if (calls == 3) return op[1].kind == ACCESS2 && op[2].kind == STEP2 && op[3].kind == ACCESS2;
+    if (calls == 4) return op[1].kind == ACCESS3 && op[2].kind == STEP3 && op[4].kind == ACCESS3;
     return 0;
 }
 
@@ -425,28 +428,52 @@ static int pack(Program *p) {
     return 0;
 }
 
+static int64_t macro_steps_per_look(const Program *p) {
+    int64_t duration = OPERATION * p->count;
+    for (const Operation *op = p->operations; op < p->operations + p->count; op++)
+        if (op->kind == STEP2 || op->kind == STEP3)
+            duration += op->step.memory->trials ? LOOK : op->step.memory->shortest;
+    return 1 + LOOK / (duration + 1);
+}
+
+static int look_for_signals(Program *p) {
+    enter_python(p);
+    int interrupted = PyErr_CheckSignals();
+    leave_python(p);
+    return interrupted;
+}
+
+static int run_steps(Program *p, int64_t first, int64_t count, double origin, double stride, double denominator) {
+    const int64_t per_look = macro_steps_per_look(p);
+    int64_t left = per_look;
+    for (int64_t n = first; n < first + count && !p->stop; n++) {
+        double time = (origin + (double)n * stride) / denominator;
+        *p->clock = time;
+        if (macro_step(p, n, time) < 0) return -1;
+        if (!all_finite(p) && report(p, -1, NOT_FINITE) < 0) return -1;
+        if (record(p, n + 1) < 0) return -1;
+        p->marker[1] = n + 1;
+        if (--left < 0) {
+            left = per_look;
+            if (look_for_signals(p) < 0) return -1;
+        }
+    }
+    return 0;
+}
+
 /* Macro steps first, first + 1, ... Step n begins at (origin + n * stride) / denominator: rounded once, since the numbers are
    integers that a double holds exactly. */
 static PyObject *run(Program *p, PyObject *arguments) {
     long long first, count;
     double origin, stride, denominator;
     if (!PyArg_ParseTuple(arguments, "LLddd", &first, &count, &origin, &stride, &denominator)) return NULL;
-    Py_ssize_t budget = OPERATIONS_PER_LOOK;
     p->stop = 0;
     p->float_state = float_state();
     if (!p->packed && all_measured(p) && pack(p) < 0) return NULL;
-    for (int64_t n = first; n < first + count && !p->stop; n++) {
-        double time = (origin + (double)n * stride) / denominator;
-        *p->clock = time;
-        if (macro_step(p, n, time) < 0) return NULL;
-        if (!all_finite(p) && report(p, -1, NOT_FINITE) < 0) return NULL;
-        if (record(p, n + 1) < 0) return NULL;
-        p->marker[1] = n + 1;
-        if ((budget -= p->count) < 0) {
-            budget = OPERATIONS_PER_LOOK;
-            if (PyErr_CheckSignals() < 0) return NULL;
-        }
-    }
+    leave_python(p);
+    int failed = run_steps(p, first, count, origin, stride, denominator);
+    enter_python(p);
+    if (failed) return NULL;
     Py_RETURN_NONE;
 }
 
@@ -537,7 +564,6 @@ static PyObject *add_step_like(Program *p, PyObject *arguments, Kind kind) {
     op->function = pointer(function);
     op->instance = pointer(instance);
     op->step.size = size;
-    op->step.careful = 1;
     *op->step.memory = (StepMemory){pointer(flags), pointer(reached), INT64_MAX, TRIALS};
     Py_RETURN_NONE;
 }

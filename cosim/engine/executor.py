@@ -108,27 +108,24 @@ class Executor(ABC):
 
     def _propagate(self, time: float) -> None:
         moves = [copy(gather) for phase in self.plan.phases for gather in phase.gathers]
-        components = self.plan.system.components
-        before = self._snapshot()
+        components, inputs, outputs = self.plan.system.components, self.plan.inputs.ports, self.plan.signals.ports
+        given: dict[str, object] = dict.fromkeys(components)
+        found = {name: _contents(outputs[name]) for name in components}
         for _ in range(len(components) + 1):
             for move in moves:
                 move()
-            for name, component in components.items():
+            fed = {name: now for name in components if (now := _contents(inputs[name])) != given[name]}
+            for name in fed:
                 with calling(name, "set_inputs and get_outputs", "initialization", time):
-                    component.set_inputs()
-                    component.get_outputs()
-            after = self._snapshot()
-            if after == before:
+                    components[name].set_inputs()
+                    components[name].get_outputs()
+            changed = {name: now for name in fed if (now := _contents(outputs[name])) != found[name]}
+            if not changed:
                 return
-            changed, before = [name for name in components if after[name] != before[name]], after
+            given |= fed
+            found |= changed
         reason = f"the outputs still change after {len(components)} rounds: an algebraic loop"
         raise ComponentError(" -> ".join(changed), "initialization", reason, time)
-
-    def _snapshot(self) -> dict[str, list[object]]:
-        return {
-            name: [array.tolist() if array.dtype.hasobject else array.tobytes() for array in ports.arrays.values()]
-            for name, ports in self.plan.signals.ports.items()
-        }
 
     # -- turns ---------------------------------------------------------------------------------------------------------
 
@@ -325,6 +322,11 @@ class PythonExecutor(Executor):
             marker[ROWS], marker[STEPS] = recorder.rows, n + 1
             if self.termination:
                 return
+
+
+def _contents(ports: Ports) -> list[object]:
+    """What stands in the arrays, bit for bit."""
+    return [array.tolist() if array.dtype.hasobject else array.tobytes() for array in ports.arrays.values()]
 
 
 def _take_start_values(component: Component, ports: Ports) -> None:

@@ -51,8 +51,8 @@ class SideBySide:
         groups = self.groups()
         costs = {key: sum(seconds[turn.first] for turn in group) for key, group in groups.items()}
         worthy = [key for key, cost in costs.items() if self.parallel is True or cost >= LONG]
-        if len(worthy) > 1 and processors > 1:
-            self.lanes = _spread(groups, costs, min(processors, len(worthy)))
+        count = min(max(2, processors) if self.parallel is True else processors, len(worthy))
+        self.lanes = _spread(groups, costs, count) if count > 1 else ()
 
 
 def _spread(groups: Mapping[object, Sequence[Turn]], costs: Mapping[object, float], count: int) -> list[list[Turn]]:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO, Any
+from weakref import finalize
 
 import numpy as np
 
@@ -47,6 +48,7 @@ class FileRows(Rows):
     def __init__(self, dtype: np.dtype[Any], expected: int, file: IO[bytes]):
         super().__init__(dtype, min(expected, CHUNK // max(1, dtype.itemsize)))
         self._file, self._rows = file, 0
+        finalize(self, file.close)
 
     def extend(self) -> np.ndarray:
         if not self.dtype.itemsize:

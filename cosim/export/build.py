@@ -39,7 +39,8 @@ def build(sources: Sequence[Path] | None, root: Path, report: Callable[[Built], 
     for source in selected:
         fmus = fmu_files(source, root)
         files = export(source, fmus)
-        manifest[source.key] = _entry(source, files, fmus, root)
+        entry = _entry(source, files, fmus, root)
+        manifest = (manifest if sources is None else read_manifest(root)) | {source.key: entry}
         _write_manifest(manifest, root)
         finished.append(Built(source.path, fmus))
         report(finished[-1])
