@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from . import __version__
 from .errors import ComponentError, CosimError
@@ -33,16 +33,20 @@ def load(
     step_size: float | str | None = None,
     real_time: float | None = None,
     late: Late = "warn",
+    isolation: Literal["fmu", "none"] = "none",
+    sandbox: bool = False,
 ) -> Assembly:
     """A scenario, read, wired and checked, ready to run once.
 
     `scenario` is a path, or the name of a shipped scenario. `parameters` sets variables ("uav.vtol.landing_time") or, by
     JSON pointer ("/components/plant/arguments/environment/seed"), anything in the file. `real_time` is the number of simulated
     seconds per second on the wall (None: as fast as possible); with `late="fail"` a run that falls more than one step behind ends
-    with a LateError. Raises InputError with all problems.
+    with a LateError. With `isolation="fmu"` every FMU runs in a process of its own; with `sandbox` also, and such processes read
+    and write only what is theirs and have no TCP. Raises InputError with all problems.
     """
     times = {"/stop_time": stop_time, "/step_size": step_size}
-    assembly = assemble(scenario, {**{key: value for key, value in times.items() if value is not None}, **(parameters or {})})
+    settings = {**{key: value for key, value in times.items() if value is not None}, **(parameters or {})}
+    assembly = assemble(scenario, settings, apart=isolation == "fmu", sandbox=sandbox)
     return replace(assembly, settings=replace(assembly.settings, real_time=real_time, late=late))
 
 
@@ -54,6 +58,8 @@ def run(
     step_size: float | str | None = None,
     real_time: float | None = None,
     late: Late = "warn",
+    isolation: Literal["fmu", "none"] = "none",
+    sandbox: bool = False,
     observers: Sequence[Observer] = (),
 ) -> Result:
     """Run a scenario in this process (see `load`) and evaluate its KPIs.
@@ -61,7 +67,16 @@ def run(
     Raises InputError when it cannot start. When a component fails while running, the ComponentError carries everything
     recorded until then as its attribute `result`.
     """
-    assembly = load(scenario, parameters, stop_time=stop_time, step_size=step_size, real_time=real_time, late=late)
+    assembly = load(
+        scenario,
+        parameters,
+        stop_time=stop_time,
+        step_size=step_size,
+        real_time=real_time,
+        late=late,
+        isolation=isolation,
+        sandbox=sandbox,
+    )
     return execute(assembly, observers)
 
 

@@ -4,6 +4,7 @@ CosimError
 ├── InputError        the user's input is refused: usage, scenario, FMU (exit code 2); carries all problems at once
 ├── ComponentError    a component failed while it ran (exit code 1)
 ├── LateError         a real-time run could not keep up (exit code 1)
+├── OutputError       a result could not be written, as on a full disk (exit code 1)
 └── CheckError        a check, comparison or `build --check` was not met (exit code 3)
 """
 
@@ -12,6 +13,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 
 class CosimError(Exception):
@@ -67,6 +69,12 @@ class LateError(CosimError):
     exit_code = 1
 
 
+class OutputError(CosimError):
+    """A result could not be written to a place that was good when the work began: the disk is full, or it failed."""
+
+    exit_code = 1
+
+
 class CheckError(CosimError):
     """A result does not meet a check, a reference or a manifest."""
 
@@ -79,7 +87,11 @@ def did_you_mean(name: str, valid: Iterable[str]) -> str:
     >>> did_you_mean("stop_tme", ["start_time", "stop_time"])
     '; did you mean "stop_time"?'
     """
-    names = list(valid)
+    return _did_you_mean(name, tuple(valid))
+
+
+@lru_cache(16)  # a name that is wrong in one place often is so in the next ones
+def _did_you_mean(name: str, names: tuple[str, ...]) -> str:
     if near := difflib.get_close_matches(name, names, n=1):
         return f'; did you mean "{near[0]}"?'
     if 0 < len(names) <= 8:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import struct
+import time as clock
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,15 +17,21 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 #: bytes of a journal; its fields: int64 until 64, the time as double, then two texts
-SIZE = 4096
-CALL, STEPS, ROWS, PHASE, CHANGES, DEADLINE, CODE = range(7)
-_TIME, _COMPONENT, _FUNCTION, _FOLDER, _LIVE, _TEXT = 64, 128, 928, 1728, 2528, 796
+SIZE = 5 * 4096
+CALL, STEPS, ROWS, PHASE, CHANGES, DEADLINE, CODE, SHOWING = range(8)
+_TIME, _COMPONENT, _FUNCTION, _FOLDER, _LIVE, _TEXT = 64, 4096, 8192, 12288, 16384, 4092
 
 
 class Phase(IntEnum):
-    """What kind of thing is going on: nothing foreign, a call, the stepping loop, a call with all results written, the end."""
+    """What kind of thing is going on: nothing foreign, a call, the stepping loop, a call with all results written, the end,
+    or that the stepping loop waits for something that is no component."""
 
-    QUIET, CALLING, STEPPING, LEAVING, DONE = range(5)
+    QUIET, CALLING, STEPPING, LEAVING, DONE, WAITING = range(6)
+
+    @property
+    def in_loop(self) -> bool:
+        """Rows are being recorded."""
+        return self in (Phase.STEPPING, Phase.WAITING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +78,20 @@ class Journal:
 
     def enter(self, phase: Phase, deadline: float = math.inf) -> None:
         """From now on this is going on, for at most `deadline` s at a time."""
+        self[CHANGES] += 1  # first: whoever sees the new deadline sees that something has changed
         self[DEADLINE] = -1 if math.isinf(deadline) else int(deadline * 1000)
         self[PHASE] = phase
-        self[CHANGES] += 1
+        while self[SHOWING]:
+            clock.sleep(1e-4)
+
+    @contextmanager
+    def showing(self) -> Iterator[bool]:
+        """Within this block the supervisor may change the result file, if True comes of it: the run does not touch it yet."""
+        self[SHOWING] = 1
+        try:
+            yield self.phase.in_loop
+        finally:
+            self[SHOWING] = 0
 
     def note(self, component: str, function: str, time: float = math.nan) -> None:
         """Which call is being made."""
@@ -89,7 +107,8 @@ class Journal:
     @property
     def deadline(self) -> float:
         """How long what is going on may take (s)."""
-        return math.inf if self[DEADLINE] < 0 else self[DEADLINE] / 1000
+        milliseconds = self[DEADLINE]
+        return math.inf if milliseconds < 0 else milliseconds / 1000
 
     def put_files(self, folder: Path, csv: Path | None) -> None:
         """The run's files lie in `folder`; the user waits for its rows in `csv`."""
@@ -108,7 +127,7 @@ class Journal:
 
     def _write(self, place: int, text: str) -> None:
         data = text.encode("utf-8", "replace")[:_TEXT]
-        struct.pack_into(f"I{_TEXT}s", self.memory, place, len(data), data)
+        struct.pack_into(f"I{len(data)}s", self.memory, place, len(data), data)
 
     def _text(self, place: int) -> str:
         size, data = struct.unpack_from(f"I{_TEXT}s", self.memory, place)
@@ -154,7 +173,7 @@ def waiting() -> Iterator[None]:
         yield
         return
     phase, deadline = journal.phase, journal.deadline
-    journal.enter(Phase.QUIET)
+    journal.enter(Phase.WAITING)
     try:
         yield
     finally:

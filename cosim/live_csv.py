@@ -1,42 +1,54 @@
 """A run's rows as CSV while it goes on, so that even the loss of both processes leaves a readable file.
 
-Whole lines are appended several times per second. The final file replaces it.
+The file the user sees is whole at every moment: new lines are appended to a second copy, which then takes its place in one
+step. So the copies take turns. The final file replaces it.
 """
 
 from __future__ import annotations
 
+import os
 import struct
 import time
+from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
+from shutil import copyfileobj
+from typing import IO
 
-from .journal import ROWS, Journal, Phase
+from .journal import ROWS, Journal
 from .unfinished import ROWS_FILE, Header, read_header
 
-#: short runs are left alone for this long, long ones get new lines this often (s)
-FIRST, EVERY = 0.7, 0.4
+#: short runs are left alone for this long, long ones get new lines this often, and no longer than this at a time (s)
+FIRST, EVERY, AT_MOST = 0.5, 0.3, 0.2
 
-_ROWS_AT_A_TIME = 2000
+_ROWS_AT_A_TIME = 500
+
+
+@dataclass
+class _Copy:
+    """A file, and how much of it is sound (bytes)."""
+
+    path: Path
+    size: int = 0
 
 
 class LiveCsv:
-    """Appends to the journal's CSV file what was recorded since the last update; needs nothing but the standard library."""
+    """Appends to the journal's CSV file what was recorded since the last update; without NumPy, which is slow to import."""
 
     def __init__(self, journal: Journal):
         self._journal = journal
-        self._folder, self._target = Path(), Path()
-        self._header: Header | None = None
-        self._written, self._next = 0, 0.0
+        self._next = 0.0
+        self._lines: Lines | None = None
 
     def update(self) -> None:
         """Append what is new, if it is time; a file that cannot be written is the business of the run itself."""
         now = time.monotonic()
-        if self._journal.phase != Phase.STEPPING or now < self._next:
+        if not self._journal.phase.in_loop or now < self._next:
             return
-        if self._header is None and not self._begin(now):
-            return
-        self._next = now + EVERY
         try:
-            self._append(min(self._journal[ROWS], self._written + 100 * _ROWS_AT_A_TIME))
+            if self._lines is None and not self._begin(now):
+                return
+            self._append(now + AT_MOST)
         except OSError:
             self._next = float("inf")
 
@@ -45,32 +57,83 @@ class LiveCsv:
             self._next = now + FIRST
             return False
         folder, target = self._journal.folder, self._journal.csv
-        if folder is None or target is None:
+        header = read_header(folder)
+        if folder is None or target is None or header is None:
             return False
-        self._header, self._folder, self._target = read_header(folder), folder, target
-        return self._header is not None
+        self._target, self._rows_file, self._lines = target, folder / ROWS_FILE, Lines(header)
+        self._shown, self._hidden = (_Copy(folder / f"live-{name}.csv") for name in "ab")
+        self._shown.path.write_bytes(self._lines.first())
+        self._shown.size = len(self._lines.first())
+        self._hidden.path.touch()
+        return True
 
-    def _append(self, rows: int) -> None:
-        header = self._header
-        assert header is not None
+    def _append(self, until: float) -> None:
+        """Bring the hidden copy up to date, as far as time allows, and show it."""
+        assert self._lines is not None
+        written, rows = self._lines.written, self._journal[ROWS]
+        try:
+            with self._hidden.path.open("r+b") as target:
+                self._catch_up(target)
+                with self._rows_file.open("rb") as source:
+                    while self._lines.written < rows and time.monotonic() < until:
+                        target.write(self._lines.next(source, rows))
+                self._hidden.size = target.tell()
+            shown = self._show()
+        except BaseException:
+            self._lines.written = written
+            raise
+        if shown:
+            self._shown, self._hidden = self._hidden, self._shown
+        self._next = time.monotonic() + (EVERY if self._lines.written == rows else 0)
+
+    def _catch_up(self, target: IO[bytes]) -> None:
+        """What the shown copy has and the hidden one lacks; an append that was interrupted is undone."""
+        size = min(self._hidden.size, self._shown.size)
+        target.truncate(size)
+        target.seek(size)
+        with self._shown.path.open("rb") as shown:
+            shown.seek(size)
+            copyfileobj(shown, target)
+
+    def _show(self) -> bool:
+        """Put the hidden copy in its place, unless the run has left the stepping loop: then the final file is on its way."""
+        link = self._hidden.path.with_suffix(".link")
+        link.unlink(missing_ok=True)
+        os.link(self._hidden.path, link)
+        with self._journal.showing() as allowed:
+            if allowed:
+                link.replace(self._target)
+        return allowed
+
+
+class Lines:
+    """The rows of a run as lines of CSV, in the format of `results.csv_files`."""
+
+    def __init__(self, header: Header):
+        self._header = header
         places = sorted({column.offset for column in header.columns})
         order = [places.index(column.offset) for column in header.columns]
-        unpack = struct.Struct(_format(header)).iter_unpack
-        with (self._folder / ROWS_FILE).open("rb") as source, self._target.open("a" if self._written else "w") as target:
-            if not self._written:
-                names = ("time", *(column.name.replace('"', '""') for column in header.columns))
-                target.write(",".join(f'"{name}"' for name in names) + "\n")
-            source.seek(self._written * header.row_size)
-            while self._written < rows:
-                count = min(rows - self._written, _ROWS_AT_A_TIME)
-                lines = []
-                for row, values in enumerate(unpack(source.read(count * header.row_size)), start=self._written):
-                    cells = [values[i] for i in order]
-                    texts = (repr(int(cell) if isinstance(cell, bool) else cell) for cell in cells)
-                    lines.append(",".join((repr(header.seconds(row * header.every)), *texts)) + "\n")
-                target.writelines(lines)
-                target.flush()
-                self._written += count
+        self._ordered = itemgetter(*order) if len(order) > 1 else lambda values: tuple(values[i] for i in order)
+        self._unpack = struct.Struct(_format(header)).iter_unpack
+        #: rows that were given out
+        self.written = 0
+
+    def first(self) -> bytes:
+        """The line of names."""
+        names = ("time", *(column.name.replace('"', '""') for column in self._header.columns))
+        return (",".join(f'"{name}"' for name in names) + "\n").encode()
+
+    def next(self, source: IO[bytes], rows: int) -> bytes:
+        """Lines of some of the rows that follow, of `rows` that there are in the file."""
+        from pydantic_core import to_json
+
+        header, first = self._header, self.written
+        count = min(rows - first, _ROWS_AT_A_TIME)
+        source.seek(first * header.row_size)
+        values = self._unpack(source.read(count * header.row_size)) if header.row_size else [()] * count
+        table = [(header.seconds(n * header.every), *self._ordered(row)) for n, row in enumerate(values, start=first)]
+        self.written += len(table)
+        return to_json(table, inf_nan_mode="constants")[2:-2].replace(b"],[", b"\n") + b"\n"
 
 
 def _format(header: Header) -> str:
@@ -83,15 +146,15 @@ def _format(header: Header) -> str:
 
 
 def struct_kind(dtype: str) -> str:
-    """The struct module's character for a numpy dtype such as "<f8".
+    """The struct module's character for a numpy dtype such as "<f8"; Booleans are 0 and 1.
 
     >>> struct_kind("<f8"), struct_kind("|b1"), struct_kind("<u4")
-    ('d', '?', 'I')
+    ('d', 'B', 'I')
     """
     kind, size = dtype[1], int(dtype[2:])
     if kind == "f":
         return {4: "f", 8: "d"}[size]
     if kind == "b":
-        return "?"
+        return "B"
     signed = {1: "b", 2: "h", 4: "i", 8: "q"}[size]
     return signed if kind == "i" else signed.upper()

@@ -9,21 +9,23 @@ from __future__ import annotations
 import ctypes
 import mmap
 import os
+import resource
 import select
 import signal
 import sys
 import tempfile
+import threading
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from . import journal as journals
 from .errors import ComponentError
 from .journal import CALL, CHANGES, CODE, ROWS, STEPS, Journal, Phase
 from .live_csv import LiveCsv
+from .temporary import run_folder
 from .unfinished import read_header
 
 #: the supervisor looks after the child this often (s)
@@ -35,9 +37,13 @@ PATIENCE = 3.0
 #: so much of what components print is passed on (bytes)
 LARGEST_OUTPUT = 1 << 16
 
+#: a supervised run may have so much memory of its own (bytes); files of rows do not count
+MEMORY = 4 << 30
+
 #: orphans of orphans are looked for so often
 _GENERATIONS = 10
 
+_POLITE = (signal.SIGTERM, signal.SIGHUP)
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 
 
@@ -45,7 +51,8 @@ _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 class Outcome:
     """What became of the child: its exit code, or the failure that ended it; `rows` were recorded.
 
-    `warning`: something failed when all results had been written. `journal` is what the child left.
+    `warning`: something failed when all results had been written. `interrupted`: the user ended a child that could not end in
+    order. `journal` is what the child left.
     """
 
     code: int
@@ -53,16 +60,14 @@ class Outcome:
     journal: Journal
     failure: ComponentError | None = None
     warning: str = ""
+    interrupted: bool = False
 
 
 def supervised(entry: Callable[[], int]) -> Outcome:
-    """Run `entry` in a child process that keeps a journal (see `journal.current`); it returns an exit code and never raises.
-
-    Raises KeyboardInterrupt when the user interrupted the run and the child could not end it in order.
-    """
+    """Run `entry` in a child process that keeps a journal (see `journal.current`); it returns an exit code and never raises."""
     journal = Journal(mmap.mmap(-1, journals.SIZE))
     _adopt_orphans()
-    with TemporaryDirectory(prefix="cosim-run-", ignore_cleanup_errors=True) as folder:
+    with run_folder() as folder, _polite_ends():
         sys.stdout.flush()
         sys.stderr.flush()
         reader, writer = os.pipe()
@@ -72,6 +77,20 @@ def supervised(entry: Callable[[], int]) -> Outcome:
             _be_the_child(entry, journal, writer, folder)
         os.close(writer)
         return _Supervisor(child, journal, reader).watch()
+
+
+@contextmanager
+def _polite_ends() -> Iterator[None]:
+    """Within the block a closed terminal, or a service manager that ends the run, counts as an interrupt by the user."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    former = {number: signal.signal(number, signal.default_int_handler) for number in _POLITE}
+    try:
+        yield
+    finally:
+        for number, handler in former.items():
+            signal.signal(number, handler)
 
 
 def _adopt_orphans() -> None:
@@ -99,10 +118,15 @@ def _be_the_child(entry: Callable[[], int], journal: Journal, foreign_output: in
 
 
 def _detach(foreign_output: int) -> None:
-    """A session of its own that ends with the supervisor, nothing to read, and a pipe for what foreign code prints."""
+    """A session of its own that ends with the supervisor, nothing to read, and a pipe for what foreign code prints.
+
+    Memory is limited, so that a component that never has enough ends alone, and core files are not written.
+    """
     os.setsid()
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    _limit(resource.RLIMIT_DATA, MEMORY)
+    _limit(resource.RLIMIT_CORE, 0)
     sys.stdout, sys.stderr = _kept(sys.stdout), _kept(sys.stderr)
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
@@ -110,6 +134,11 @@ def _detach(foreign_output: int) -> None:
     os.dup2(foreign_output, 2)
     os.close(nothing)
     os.close(foreign_output)
+
+
+def _limit(kind: int, value: int) -> None:
+    _, hard = resource.getrlimit(kind)
+    resource.setrlimit(kind, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
 
 
 def _kept(stream):  # type: ignore[no-untyped-def]
@@ -166,11 +195,12 @@ class _Supervisor:
     def _look(self) -> None:
         """End a child that takes longer than it may."""
         journal, now = self.journal, time.monotonic()
+        deadline = journal.deadline  # before `seen`: a deadline that is newer than `seen` would be another call's
         seen = journal[CHANGES], journal[STEPS], journal[CALL]
         if seen != self._seen:
             self._seen, self._since = seen, now
-        elif now - self._since > journal.deadline:
-            self._hang = f"did not return within {journal.deadline:g} s"
+        elif now - self._since > deadline:
+            self._hang = f"did not return within {deadline:g} s"
             os.kill(self.child, signal.SIGKILL)
         if self._interrupted and now - self._interrupted > PATIENCE:
             os.kill(self.child, signal.SIGKILL)
@@ -217,8 +247,8 @@ class _Supervisor:
         if phase == Phase.DONE:
             return Outcome(code, rows, journal)
         if self._interrupted:
-            raise KeyboardInterrupt
-        failure = self._failure(self._hang or _ending(status))
+            return Outcome(130, rows, journal, interrupted=True)
+        failure = self._failure(self._hang or ending(status))
         if phase == Phase.LEAVING:
             return Outcome(code, rows, journal, warning=f"{failure}; all results were written before")
         return Outcome(1, rows, journal, failure)
@@ -245,7 +275,7 @@ def _children() -> list[int]:
         return []
 
 
-def _ending(status: int) -> str:
+def ending(status: int) -> str:
     """How a process ended, in words."""
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)

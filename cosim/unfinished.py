@@ -119,7 +119,14 @@ def unfinished(folder: Path, csv: Path | None = None) -> Iterator[None]:
     folder.mkdir(parents=True)
     journal.put_files(folder, csv)
     yield
-    shutil.rmtree(folder, ignore_errors=True)
+    saved()
+
+
+def saved() -> None:
+    """The rows of this process's run are where the user wants them: its folder is not needed any more."""
+    journal = current()
+    if journal and journal.folder:
+        shutil.rmtree(journal.folder, ignore_errors=True)
 
 
 def recover(folder: Path | None, rows: int) -> Recording:

@@ -2,15 +2,18 @@
 
 For each step the equations say where a vehicle would be after it if nothing were in the way. A rigid body moved with the
 constant mean motion of the step arrives exactly there, so this is the velocity that Bullet is given, instead of forces.
-Contact makes Bullet change it; the change is the contact impulse, which the equations take over. The pose belongs to Bullet,
-because contact may change it; the velocity belongs to the vehicle. Gravity is part of the equations and zero in Bullet.
+Contact makes Bullet change it; the change is the contact impulse, which the equations take over, and the pose to which the
+changed motion leads. Gravity is part of the equations and zero in Bullet.
 
-A step of the world is `predict` and then `push` for every vehicle, one step of Bullet, and `correct` for every vehicle.
+Where nothing can be in the way there is nothing to ask, because what Bullet would answer is known: Bullet takes part only for
+vehicles that are near something (`clearance.py`). The bodies of the others are parked meanwhile.
+
+A step of the world is `predict` for every vehicle, then for those near something `push`, one step of Bullet and `measure`,
+and at last `correct` for every vehicle.
 """
 
 from __future__ import annotations
 
-import ctypes
 import math
 import struct
 from abc import ABC, abstractmethod
@@ -21,22 +24,25 @@ import numpy as np
 
 from .binary import bound, load
 from .bullet import pybullet
+from .clearance import Enclosure
+from .vehicles.alarms import LARGEST_STATE
 from .vehicles.shapes import Body, Box
 
 if TYPE_CHECKING:
+    from .arguments import Spawn
     from .catalogue import Model
-
-#: a state beyond this (m, m/s, rad/s) is an explosion
-LARGEST_STATE = 1e5
 
 #: friction of every surface; Bullet multiplies those of the two bodies in contact
 FRICTION = 1.0
 
+#: bodies that do not take part stand in a row from here on (m), where no vehicle can be
+PARKING, PARKING_SPACE = 2 * LARGEST_STATE, 100.0
+
 _MAX_VELOCITY = 1e6  # Bullet limits velocities silently, by default at 100 m/s and rad/s
-_DOUBLE = struct.calcsize("d")
 _vector = struct.Struct("3d").unpack_from
-_write_body = struct.Struct("13d").pack_into
-_write_joints = struct.Struct("6d").pack_into
+_ANGULAR = struct.calcsize("3d")  # where the angular part of a motion begins
+_write_twist = struct.Struct("6d").pack_into
+_write_rates = struct.Struct("3d").pack_into
 
 Names = tuple[Sequence[str], Sequence[str]]  # of the arguments and of the results of a compiled function
 
@@ -48,120 +54,111 @@ class UnsoundError(Exception):
 class Shadow(ABC):
     """One vehicle: its body in Bullet and its compiled equations (`vehicles/shadow_maps.py`).
 
-    All its numbers lie in one block, `memory`, in named pieces: a copy of it is a snapshot. `inputs` and `outputs` hold the
-    real variables of the model in order; the outputs after the published motion are left to others. `step` (s) is shared.
+    `pieces` are its numbers by name, as many as `sizes` says, and "step" (s), which all vehicles share. `inputs` and `outputs`
+    hold the real variables of the model in order; the outputs after the published motion are left to others. `predict`
+    foresees the "motion" that Bullet would measure, and `measure` replaces it by what Bullet made of it.
     """
 
     PIECES: ClassVar[Mapping[str, int]]  # name -> size
+    SPAWN: ClassVar[Sequence[str]] = ("predicted", "twist", "motion", "pose")  # results
     BEFORE: ClassVar[Names]
     AFTER: ClassVar[Names]
+    #: pose in Bullet of a body at rest in the origin
+    AT_ORIGIN: ClassVar[Sequence[float]]
 
-    def __init__(self, client: int, name: str, model: Model, initial: Sequence[float], step: np.ndarray):
-        self.name, self.model, self._client = name, model, client
-        self._sizes = {**self.PIECES, "inputs": len(model.slots("input")), "outputs": len(model.slots("output"))}
-        self.memory = bytearray(_DOUBLE * sum(self._sizes.values()))
-        self._arrays = {**self._pieces(), "step": step, "initial": np.array(initial, np.float64)}
-        self.inputs, self.outputs = self._arrays["inputs"], self._arrays["outputs"]
-        library = load(model.name)
-        self._before = self._bound(library.shadow_before, self.BEFORE)
-        self._after = self._bound(library.shadow_after, self.AFTER)
-        self._soundness = ctypes.c_double.from_buffer(self.memory, self._place("soundness"))
-        self._impulse = ctypes.c_double.from_buffer(self.memory, self._place("impulse"))
-        self._bound(library.shadow_spawn, (("initial",), ("measured", "predicted")))()
-        self.body = self._create(model.body, self._arrays["measured"].tolist())
-        self._start()
+    def __init__(self, client: int, spawn: Spawn, pieces: Mapping[str, np.ndarray]):
+        self.name, self.model, self._client, self._pieces = spawn.name, spawn.model, client, pieces
+        self.inputs, self.outputs = pieces["inputs"], pieces["outputs"]
+        self._motion, self._twist = pieces["motion"].data, pieces["twist"].data
+        library = load(spawn.model.name)
+        #: where a free step leads
+        self.predict = self._bound(library.shadow_before, self.BEFORE)
+        #: take over what became of the step, and publish it
+        self.correct = self._bound(library.shadow_after, self.AFTER)
+        bound(library.shadow_spawn, [np.array(spawn.initial)], [pieces[name] for name in self.SPAWN])()
+        self.correct()
+        self.body = self._create(spawn.model.body)
+        self._place(pieces["pose"].tolist())
 
-    def _pieces(self) -> dict[str, np.ndarray]:
-        return {name: np.frombuffer(self.memory, np.float64, n, self._place(name)) for name, n in self._sizes.items()}
-
-    def _place(self, piece: str) -> int:
-        """Where a piece begins in the memory, in bytes."""
-        names = list(self._sizes)
-        return _DOUBLE * sum(self._sizes[name] for name in names[: names.index(piece)])
+    @classmethod
+    def sizes(cls, model: Model) -> dict[str, int]:
+        """How many numbers a vehicle has in which pieces."""
+        slots = {"inputs": len(model.slots("input")), "outputs": len(model.slots("output"))}
+        return {**cls.PIECES, **slots, "path": 6, "anchor": 3, "leash": 3, "alarm": 1, "impulse": 1}
 
     def _bound(self, function: Callable[..., None], names: Names) -> Callable[[], None]:
-        arguments, results = ([self._arrays[name] for name in side] for side in names)
+        arguments, results = ([self._pieces[name] for name in side] for side in names)
         return bound(function, arguments, results)
-
-    def _start(self) -> None:
-        """Publish the initial values, as if a free step had led to them."""
-        self._measure()
-        twist = self._arrays["twist"]
-        twist[:] = self._arrays["measured"][-len(twist) :]
-        self._after()
-
-    def predict(self) -> None:
-        """Where a free step leads. Raises UnsoundError when an input or that is not finite; nothing has moved then."""
-        self._before()
-        if not self._soundness.value < LARGEST_STATE:
-            raise UnsoundError(self._fault())
 
     @abstractmethod
     def push(self) -> None:
         """Give Bullet the mean motion of the step."""
 
-    def correct(self) -> bool:
-        """Take over what Bullet made of the step, and publish. Returns whether there was contact; may raise UnsoundError."""
-        self._measure()
-        self._after()
-        impulse = self._impulse.value
-        if impulse == 0.0:
-            return False
-        if math.isnan(impulse):
-            raise UnsoundError(f"{self.name}: the contact forces are not finite")
-        return True
+    @abstractmethod
+    def measure(self) -> None:
+        """Read the motion from Bullet."""
+
+    @staticmethod
+    @abstractmethod
+    def enclosure(body: Body) -> Enclosure:
+        """What holds the body in every attitude it can take."""
 
     @abstractmethod
-    def _measure(self) -> None:
-        """Read pose and velocity from Bullet."""
+    def _create(self, body: Body) -> int:
+        """Make the body in Bullet; returns its number."""
 
     @abstractmethod
-    def _create(self, body: Body, measured: Sequence[float]) -> int:
-        """Make the body in Bullet, with the pose and velocity it has to measure; returns its number."""
+    def _place(self, pose: Sequence[float]) -> None:
+        """Set the body in Bullet to a pose in Bullet's terms."""
 
-    def _fault(self) -> str:
+    def engage(self, engaged: bool) -> None:
+        """Let Bullet take part in the motion, or not any more."""
+        parked = [PARKING + PARKING_SPACE * self.body, *self.AT_ORIGIN[1:]]
+        self._place(self._pieces["pose"].tolist() if engaged else parked)
+
+    def fault(self) -> str:
+        """What keeps the vehicle from going on: an input that is not finite, or where the free step leads."""
         for name, value in zip(self.model.slots("input"), self.inputs, strict=True):
             if not math.isfinite(value):
                 return f"{self.name}.{name} is {value}, expected a finite number"
-        sizes = np.nan_to_num(np.abs(self._arrays["predicted"]), nan=np.inf)
-        worst = int(np.argmax(sizes))
-        return f"{self.name}.{self.model.states[worst]} became {self._arrays['predicted'][worst]:g}: the motion has exploded"
+        predicted = self._pieces["predicted"]
+        worst = int(np.argmax(np.nan_to_num(np.abs(predicted), nan=np.inf)))
+        return f"{self.name}.{self.model.states[worst]} became {predicted[worst]:g}: the motion has exploded"
 
 
 class FreeBody(Shadow):
     """A vehicle that moves freely in space; its frame in Bullet has the principal axes of inertia."""
 
-    PIECES = {
-        "measured": 13,
-        "velocity": 6,
-        "predicted": 13,
-        "twist": 6,
-        "torque": 3,
-        "start": 4,
-        "soundness": 1,
-        "impulse": 1,
-    }
-    BEFORE = (("measured", "velocity", "inputs", "step"), ("predicted", "twist", "torque", "start", "soundness"))
-    AFTER = (("measured", "predicted", "twist", "start"), ("velocity", "impulse", "outputs"))
+    PIECES = {"state": 13, "start": 13, "predicted": 13, "twist": 6, "motion": 6, "torque": 3, "pose": 7}
+    BEFORE = (
+        ("state", "inputs", "step", "anchor", "leash"),
+        ("start", "predicted", "twist", "motion", "torque", "pose", "path", "alarm"),
+    )
+    AFTER = (("start", "predicted", "twist", "motion", "step"), ("state", "impulse", "outputs"))
+    AT_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
-    def _create(self, body: Body, measured: Sequence[float]) -> int:
-        number = pybullet.createMultiBody(
-            body.mass, compound(body.boxes, self._client), -1, measured[0:3], measured[3:7], physicsClientId=self._client
-        )
+    @staticmethod
+    def enclosure(body: Body) -> Enclosure:
+        radius = float(max(np.linalg.norm(box.corners(), axis=1).max() for box in body.boxes))
+        return Enclosure((-radius, -radius, -radius), (radius, radius, radius))
+
+    def _create(self, body: Body) -> int:
+        number = pybullet.createMultiBody(body.mass, compound(body.boxes, self._client), -1, physicsClientId=self._client)
         set_dynamics(self._client, number, -1, body)
-        self._linear = self._place("twist")
-        self._angular, self._torque = self._linear + 3 * _DOUBLE, self._place("torque")
+        self._torque = self._pieces["torque"].data
         return number
 
-    def push(self) -> None:
-        memory, client = self.memory, self._client
-        pybullet.resetBaseVelocity(self.body, _vector(memory, self._linear), _vector(memory, self._angular), client)
-        pybullet.applyExternalTorque(self.body, -1, _vector(memory, self._torque), pybullet.WORLD_FRAME, client)
+    def _place(self, pose: Sequence[float]) -> None:
+        pybullet.resetBasePositionAndOrientation(self.body, pose[0:3], pose[3:7], self._client)
 
-    def _measure(self) -> None:
-        position, orientation = pybullet.getBasePositionAndOrientation(self.body, self._client)
+    def push(self) -> None:
+        body, client = self.body, self._client
+        pybullet.resetBaseVelocity(body, _vector(self._twist), _vector(self._twist, _ANGULAR), client)
+        pybullet.applyExternalTorque(body, -1, _vector(self._torque), pybullet.WORLD_FRAME, client)
+
+    def measure(self) -> None:
         linear, angular = pybullet.getBaseVelocity(self.body, self._client)
-        _write_body(self.memory, 0, *position, *orientation, *linear, *angular)
+        _write_twist(self._motion, 0, *linear, *angular)
 
 
 class PlanarChain(Shadow):
@@ -170,22 +167,32 @@ class PlanarChain(Shadow):
     The joints carry heave, roll and pitch; loads in these directions have no effect.
     """
 
-    PIECES = {"measured": 6, "velocity": 3, "predicted": 6, "twist": 3, "effort": 3, "soundness": 1, "impulse": 1}
-    BEFORE = (("measured", "velocity", "inputs", "step"), ("predicted", "twist", "effort", "soundness"))
-    AFTER = (("measured", "predicted", "twist"), ("velocity", "impulse", "outputs"))
+    PIECES = {"state": 6, "start": 6, "predicted": 6, "twist": 3, "motion": 3, "effort": 3, "pose": 6, "rates": 3}
+    BEFORE = (
+        ("state", "inputs", "step", "anchor", "leash", "rates"),
+        ("start", "predicted", "twist", "motion", "effort", "pose", "path", "alarm"),
+    )
+    AFTER = (("start", "predicted", "twist", "motion", "step"), ("state", "impulse", "outputs", "rates"))
+    AT_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     _JOINTS = (0, 1, 2)
 
-    def _create(self, body: Body, measured: Sequence[float]) -> int:
+    @staticmethod
+    def enclosure(body: Body) -> Enclosure:
+        corners = np.concatenate([box.corners() for box in body.boxes])
+        radius = float(np.hypot(corners[:, 0], corners[:, 1]).max())
+        low, high = float(corners[:, 2].min()), float(corners[:, 2].max())
+        return Enclosure((-radius, -radius, low), (radius, radius, high))
+
+    def _create(self, body: Body) -> int:
         number = self._create_chain(body)
         for joint in self._JOINTS:
             options = {"physicsClientId": self._client}
             pybullet.setJointMotorControl2(number, joint, pybullet.VELOCITY_CONTROL, force=0, **options)
-            pybullet.resetJointState(number, joint, measured[joint], measured[3 + joint], **options)
             pybullet.changeDynamics(number, joint, jointDamping=0, **options)
         for joint in (-1, *self._JOINTS[:2]):
             set_dynamics(self._client, number, joint)
         set_dynamics(self._client, number, self._JOINTS[2], body)
-        self._effort = self._place("effort")
+        self._effort = self._pieces["effort"].data
         return number
 
     def _create_chain(self, body: Body) -> int:
@@ -209,18 +216,18 @@ class PlanarChain(Shadow):
             physicsClientId=self._client,
         )
 
+    def _place(self, pose: Sequence[float]) -> None:
+        for joint in self._JOINTS:
+            pybullet.resetJointState(self.body, joint, pose[joint], pose[3 + joint], self._client)
+
     def push(self) -> None:
         pybullet.setJointMotorControlArray(
-            self.body,
-            self._JOINTS,
-            pybullet.TORQUE_CONTROL,
-            forces=_vector(self.memory, self._effort),
-            physicsClientId=self._client,
+            self.body, self._JOINTS, pybullet.TORQUE_CONTROL, forces=_vector(self._effort), physicsClientId=self._client
         )
 
-    def _measure(self) -> None:
+    def measure(self) -> None:
         x, y, yaw = pybullet.getJointStates(self.body, self._JOINTS, self._client)
-        _write_joints(self.memory, 0, x[0], y[0], yaw[0], x[1], y[1], yaw[1])
+        _write_rates(self._motion, 0, x[1], y[1], yaw[1])
 
 
 def compound(boxes: Sequence[Box], client: int) -> int:

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from cosim.component import DTYPES, Component, Ports, Variable
+from cosim.component import DTYPES, Call, Component, Ports, Variable
 from cosim.errors import ComponentError, InputError, Problem, did_you_mean
 
 from . import arguments
 from .arguments import Arguments, Platform
 from .bullet import pybullet
-from .contacts import Contacts
-from .shadow import Shadow, UnsoundError, compound, set_dynamics
+from .fleet import Fleet, Snapshot
+from .shadow import UnsoundError, compound, set_dynamics
 from .vehicles.shapes import Box
 
 #: a step of Bullet is at most this long (s); a longer do_step is split into equal ones
@@ -27,15 +28,6 @@ LARGEST_OVERLAP = 1e-3
 
 _FLOAT, _FLAG = DTYPES["Float64"], DTYPES["Boolean"]
 _BODY_A, _BODY_B, _DISTANCE = 1, 2, 8  # fields of Bullet's contact points
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """The state of a world: Bullet's, which Bullet keeps under a number, and ours."""
-
-    bullet: int
-    memories: Sequence[bytes]
-    flags: np.ndarray
 
 
 class World(Component):
@@ -63,8 +55,7 @@ class World(Component):
         self._name = instance_name
         self._step, self._step_size, self._step_count = np.zeros(1), math.nan, 1
         self._flags = np.zeros((len(read.vehicles), 2), _FLAG)
-        self._incoming: list[tuple[memoryview, memoryview]] = []
-        self._outgoing: list[tuple[memoryview, memoryview]] = []
+        self._flags_data = self._flags.reshape(-1).data
         self._bound_inputs: dict[str, np.ndarray] = {}
         self._client = pybullet.connect(pybullet.DIRECT)
         try:
@@ -77,12 +68,9 @@ class World(Component):
 
     def _populate(self, read: Arguments) -> None:
         names = {self._add_platform(platform): f"platforms.{platform.name}" for platform in read.platforms}
-        self._shadows: list[Shadow] = [
-            spawn.model.shadow(self._client, spawn.name, spawn.model, spawn.initial, self._step) for spawn in read.vehicles
-        ]
-        names |= {shadow.body: f"vehicles.{shadow.name}" for shadow in self._shadows}
+        self._fleet = Fleet(self._client, read, self._step, self._flags)
+        names |= {shadow.body: f"vehicles.{shadow.name}" for shadow in self._fleet.shadows}
         self._refuse_overlaps(names)
-        self._contacts = Contacts(self._client, self._shadows, self._flags)
 
     def _add_platform(self, platform: Platform) -> int:
         x, y, z = platform.size
@@ -109,7 +97,7 @@ class World(Component):
 
     def _lay_out(self) -> Iterator[tuple[Variable, np.ndarray]]:
         """Every variable and where its values lie."""
-        for shadow, flags in zip(self._shadows, self._flags, strict=True):
+        for shadow, flags in zip(self._fleet.shadows, self._flags, strict=True):
             prefixed = [replace(variable, name=f"{shadow.name}.{variable.name}") for variable in shadow.model.variables]
             yield from _views([v for v in prefixed if v.causality == "input"], {_FLOAT: shadow.inputs})
             yield from _views([v for v in prefixed if v.causality == "output"], {_FLOAT: shadow.outputs, _FLAG: flags})
@@ -133,17 +121,27 @@ class World(Component):
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         self._bound_inputs = {variable.name: values for variable, values in _views(inputs.variables, inputs.arrays)}
-        self._incoming = _pairs([shadow.inputs for shadow in self._shadows], inputs.arrays[_FLOAT])
-        self._outgoing = _pairs([shadow.outputs for shadow in self._shadows], outputs.arrays[_FLOAT])
-        self._outgoing += _pairs(list(self._flags), outputs.arrays[_FLAG])
+        # memoryviews: numpy takes longer for so few numbers
+        self._incoming = self._fleet.inputs.data, inputs.arrays[_FLOAT].data
+        self._outgoing = outputs.arrays[_FLOAT].data, self._fleet.outputs.data
+        self._outgoing_flags = outputs.arrays[_FLAG].data, self._flags.reshape(-1).data
 
     def set_inputs(self) -> None:
-        for own, given in self._incoming:
-            own[:] = given
+        own, given = self._incoming
+        own[:] = given
 
     def get_outputs(self) -> None:
-        for own, wanted in self._outgoing:
+        for wanted, own in (self._outgoing, self._outgoing_flags):
             wanted[:] = own
+
+    def turn(self, clock: ctypes.c_double, step_size: float) -> Sequence[Call]:
+        return [Call(self._turn, (clock, step_size), "do_step")]
+
+    def _turn(self, clock: ctypes.c_double, step_size: float) -> int:
+        self.set_inputs()
+        self.do_step(clock.value, step_size)
+        self.get_outputs()
+        return 0
 
     # -- life cycle ----------------------------------------------------------------------------------------------------
 
@@ -154,11 +152,11 @@ class World(Component):
     def do_step(self, time: float, step_size: float) -> None:
         if step_size != self._step_size:
             self._set_step_size(time, step_size)
-        if self._contacts.any:
-            self._contacts.clear()
+        if self._fleet.contacts.any:
+            self._fleet.contacts.clear()
         try:
             for _ in range(self._step_count):
-                self._advance()
+                self._fleet.advance(1 / self._step_count)
         except UnsoundError as error:
             raise ComponentError(self._name, "do_step", str(error), time) from None
 
@@ -171,20 +169,6 @@ class World(Component):
         pybullet.setPhysicsEngineParameter(fixedTimeStep=self._step[0], physicsClientId=self._client)
         self._step_size = step_size
 
-    def _advance(self) -> None:
-        """One step of Bullet; nothing has moved when a vehicle is unsound before it."""
-        for shadow in self._shadows:
-            shadow.predict()
-        for shadow in self._shadows:
-            shadow.push()
-        pybullet.stepSimulation(self._client)
-        touched = False
-        for shadow in self._shadows:
-            if shadow.correct():
-                touched = True
-        if touched:
-            self._contacts.add(1 / self._step_count)
-
     def terminate(self) -> None: ...
 
     def free(self) -> None:
@@ -195,18 +179,13 @@ class World(Component):
     # -- state ---------------------------------------------------------------------------------------------------------
 
     def get_state(self) -> Snapshot:
-        memories = [bytes(shadow.memory) for shadow in self._shadows]
-        return Snapshot(pybullet.saveState(self._client), memories, self._flags.copy())
+        return self._fleet.get_state()
 
     def set_state(self, state: Snapshot) -> None:
-        pybullet.restoreState(state.bullet, physicsClientId=self._client)
-        for shadow, memory in zip(self._shadows, state.memories, strict=True):
-            shadow.memory[:] = memory
-        self._flags[:] = state.flags
-        self._contacts.any = bool(state.flags.any())
+        self._fleet.set_state(state)
 
     def free_state(self, state: Snapshot) -> None:
-        pybullet.removeState(state.bullet, physicsClientId=self._client)
+        self._fleet.free_state(state)
 
 
 def _views(variables: Sequence[Variable], arrays: Mapping[np.dtype[Any], np.ndarray]) -> Iterator[tuple[Variable, np.ndarray]]:
@@ -216,9 +195,3 @@ def _views(variables: Sequence[Variable], arrays: Mapping[np.dtype[Any], np.ndar
         first = filled[variable.dtype]
         filled[variable.dtype] = first + len(variable.slots)
         yield variable, arrays[variable.dtype][first : filled[variable.dtype]]
-
-
-def _pairs(own: Sequence[np.ndarray], array: np.ndarray) -> list[tuple[memoryview, memoryview]]:
-    """Arrays of vehicles, and the consecutive parts of a bound array that belong to them."""
-    ends = np.cumsum([len(part) for part in own])
-    return [(part.data, array[end - len(part) : end].data) for part, end in zip(own, ends, strict=True)]

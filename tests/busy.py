@@ -14,12 +14,12 @@ from foreign import FOREIGN, HEADERS
 SOURCE = Path(__file__).parent / "engine" / "busy.c"
 
 
-def busy_fmu(folder: Path, name: str, seconds: float, wait: bool = False) -> Path:
-    """The FMI 2.0 probe with a doStep that takes so long, working or waiting (see busy.c)."""
+def busy_fmu(folder: Path, name: str, seconds: float, wait: bool = False, *macros: str) -> Path:
+    """The FMI 2.0 probe with a doStep that takes so long, working or waiting (see busy.c, also for further macros)."""
     compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
     library, target = folder / f"{name}.so", folder / f"{name}.fmu"
-    macros = [f"-DBUSY_NS={round(seconds * 1e9)}LL", *(["-DWAIT"] if wait else [])]
-    flags = ["-shared", "-fPIC", "-O2", "-w", *macros, f"-I{HEADERS}", f"-I{FOREIGN}"]
+    defined = [f"BUSY_NS={round(seconds * 1e9)}LL", *(["WAIT"] if wait else []), *macros]
+    flags = ["-shared", "-fPIC", "-O2", "-w", *(f"-D{macro}" for macro in defined), f"-I{HEADERS}", f"-I{FOREIGN}"]
     subprocess.run([compiler, *flags, SOURCE, "-o", library], check=True)
     with ZipFile(target, "w") as archive:
         archive.write(FOREIGN / "probe2.xml", "modelDescription.xml")

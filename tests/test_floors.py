@@ -11,7 +11,7 @@ PACKAGE = Path(__file__).parents[1] / "cosim"
 
 #: rooms from the ground up; a room imports only from its own floor or from below
 FLOORS = [
-    {"errors", "resources", "log", "stopwatch", "journal"},
+    {"errors", "resources", "log", "stopwatch", "journal", "temporary"},
     {"timing", "units", "sandbox", "process_state"},
     {"component", "pacer"},
     {"system", "recording"},
@@ -23,7 +23,7 @@ FLOORS = [
     {"export"},
     {"scenario"},
     {"results"},
-    {"kpi"},
+    {"kpi", "compare"},
     {"api", "report"},
     {"cli"},
     {"__main__"},

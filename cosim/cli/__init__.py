@@ -18,6 +18,7 @@ COMMANDS = {
     "run": ("run", "Run a scenario; write results and figures."),
     "check": ("check", "Load, wire and validate a scenario; print the expanded system."),
     "simulate": ("simulate", "Simulate one FMU alone."),
+    "compare": ("compare", "Compare a result with a reference, signal by signal."),
     "plot": ("plot", "Draw the figures of finished runs again."),
     "info": ("info", "Print what an FMU says about itself."),
     "validate": ("validate", "Examine FMUs against the FMI standard without running them."),

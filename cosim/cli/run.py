@@ -7,8 +7,6 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from shutil import rmtree
-from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -28,6 +26,8 @@ _LATENESS = {"max": "max_lateness", "mean": "mean_lateness", "99 %": "lateness_9
 
 #: folder of a run that is going on, inside its output directory
 UNFINISHED = ".unfinished"
+
+RESULTS = ("result.csv", "result.parquet", "kpis.json", "run.json")
 
 
 @click.command()
@@ -51,15 +51,17 @@ UNFINISHED = ".unfinished"
     show_default=True,
     help="What happens when a real-time run falls more than one step behind.",
 )
+@click.option("--parquet", is_flag=True, help="Write result.parquet too (extra `parquet`).")
 @click.option("--no-report", is_flag=True, help="Write no figures.")
 @supervision.option
-def command(isolation: str, **options: Any) -> int:
+def command(isolation: str, sandbox: bool, **options: Any) -> int:
     """Run SCENARIO, a JSON file or the name of a shipped scenario.
 
     Writes result.csv, kpis.json, run.json and figures to the output directory. Exit code 0: all is well; 1: a component
     failed, the results until then are kept; 2: the scenario was refused; 3: a check was not met.
     """
-    return supervision.protected(lambda: _run(**options), isolation, _salvage)
+    apart: dict[str, Any] = {"isolation": "fmu" if isolation == "fmu" else "none", "sandbox": sandbox}
+    return supervision.protected(lambda: _run(**options, **apart), isolation, _salvage)
 
 
 def _run(
@@ -69,16 +71,20 @@ def _run(
     step_size: str | None,
     settings: tuple[str, ...],
     no_report: bool,
-    **pace: Any,
+    parquet: bool,
+    **conditions: Any,
 ) -> int:
     from ..api import executed, load
+    from ..results.parquet_files import require_parquet
     from ..scenario.tree import parse_settings
     from ..unfinished import unfinished
     from . import messages
 
     messages.show()
+    if parquet:
+        require_parquet()
     began = time.perf_counter()
-    assembly = load(scenario, parse_settings(settings), stop_time=stop_time, step_size=step_size, **pace)
+    assembly = load(scenario, parse_settings(settings), stop_time=stop_time, step_size=step_size, **conditions)
     supervision.configure(assembly.spec.deadlines)
     directory = (output_dir or Path("runs") / assembly.spec.name).absolute()
     shown = output_dir or Path("runs") / assembly.spec.name
@@ -92,7 +98,10 @@ def _run(
         _progress(assembly) as observers,
         executed(assembly, observers) as execution,
     ):
-        return supervision.leaving(_finish(execution, assembly, directory, shown, no_report, began))
+        code = _finish(execution, assembly, directory, shown, no_report, began)
+        if parquet:
+            execution.result.to_parquet(directory / "result.parquet")
+        return supervision.leaving(code)
 
 
 def _finish(execution: Execution, assembly: Assembly, directory: Path, shown: Path, no_report: bool, began: float) -> int:
@@ -102,12 +111,15 @@ def _finish(execution: Execution, assembly: Assembly, directory: Path, shown: Pa
     from ..report.figures import draw_figures
     from ..report.tables import print_kpis
     from ..results.result import write_run
+    from ..unfinished import saved
 
     result = execution.result
     if execution.failure:
         _keep(result, directory, shown)
+        saved()
         return report(execution.failure)
     write_run(result, directory)
+    saved()
     outcomes = checks(assembly, result)
     print_kpis(result.kpis, outcomes, kpi_units(assembly.kpis(), result.kpis))
     figures = [] if no_report else draw_figures(result, assembly.figures(), directory)
@@ -122,24 +134,17 @@ def _salvage(outcome: Outcome) -> None:
 
     folder = outcome.journal.folder
     if folder is not None:
-        metadata = {**read_metadata(folder), "macro_steps": outcome.journal[STEPS], "failure": str(outcome.failure)}
+        failure = "interrupted" if outcome.interrupted else str(outcome.failure)
+        metadata = {**read_metadata(folder), "macro_steps": outcome.journal[STEPS], "failure": failure}
         _keep(Result(supervision.recovered(outcome), metadata=metadata), folder.parent, folder.parent)
-        rmtree(folder, ignore_errors=True)
 
 
 def _prepare(directory: Path, figures: Sequence[str]) -> None:
-    """Make sure that results can be written before anything runs, and remove the figures of an earlier run."""
-    from ..errors import InputError
+    """Make sure that results can be written before anything runs, and remove those of an earlier run."""
+    from ..results.files import prepare, remove
 
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile(dir=directory):
-            pass
-        for name in figures:
-            for suffix in (".png", ".svg", ".csv"):
-                (directory / f"{name}{suffix}").unlink(missing_ok=True)
-    except OSError as error:
-        raise InputError(f'cannot write to "{directory}": {error.strerror or error}') from None
+    prepare(directory)
+    remove(directory, *RESULTS, *(f"{name}{suffix}" for name in figures for suffix in (".png", ".svg", ".csv")))
 
 
 def _keep(partial: Result, directory: Path, shown: Path) -> None:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from fractions import Fraction
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..temporary import run_folder
 from . import report, supervision
 
 if TYPE_CHECKING:
     from ..component import Component
+    from ..fmi import Isolation
     from ..recording import Recording
     from ..simulate import Settings
     from ..system import System
@@ -28,12 +29,13 @@ NAME, PROFILE = "fmu", "profile"
 @click.option("--start-value", "start_values", multiple=True, metavar="name=value", help="Set a parameter or start value.")
 @click.option("--input-file", type=click.Path(path_type=Path), help='CSV file with "time" and columns named as inputs.')
 @supervision.option
-def command(isolation: str, output_file: Path | None, **options: Any) -> int:
+def command(isolation: str, sandbox: bool, output_file: Path | None, **options: Any) -> int:
     """Simulate FMU (FMI 2.0 or 3.0 Co-Simulation) from its default start time."""
     output = output_file.absolute() if output_file else None
-    with TemporaryDirectory(prefix="cosim-run-") as folder:
+    with run_folder() as folder:
+        unfinished = output.with_name(f".{output.name}.unfinished") if output else Path(folder) / "run"
         return supervision.protected(
-            lambda: _simulate(Path(folder) / "run", output, output_file, **options),
+            lambda: _simulate(unfinished, output, output_file, _apart(isolation, sandbox), **options),
             isolation,
             lambda outcome: _save(supervision.recovered(outcome), output, output_file),
         )
@@ -43,22 +45,29 @@ def _simulate(
     folder: Path,
     output: Path | None,
     shown: Path | None,
+    apart: Isolation | None,
     fmu: Path,
     stop_time: str | None,
     step_size: str | None,
     start_values: tuple[str, ...],
     input_file: Path | None,
 ) -> int:
+    from ..results.files import prepare, remove
     from ..scenario.tree import parse_settings
     from ..simulate import simulation
-    from ..unfinished import unfinished
+    from ..unfinished import saved, unfinished
     from . import messages
 
     messages.show()
-    system, settings = _prepare(fmu, stop_time, step_size, parse_settings(start_values), input_file)
+    if output:
+        prepare(output.parent)
+    system, settings = _prepare(fmu, apart, stop_time, step_size, parse_settings(start_values), input_file)
+    if output:
+        remove(output.parent, output.name)
     with unfinished(folder, output), simulation(system, settings) as run:
         if output:
             _save(run.recording, output, shown)
+            saved()
         if run.failure:
             return supervision.leaving(report(run.failure))
         if not output:
@@ -80,8 +89,19 @@ def _print_last(recording: Recording) -> None:
         click.echo(f"{name} = {values.tolist()[-1]!r} {recording.units[name]}".rstrip())
 
 
+def _apart(isolation: str, sandbox: bool) -> Isolation | None:
+    from ..fmi import Isolation
+
+    return Isolation(sandbox=sandbox) if sandbox or isolation == "fmu" else None
+
+
 def _prepare(
-    fmu: Path, stop_time: str | None, step_size: str | None, start_values: dict[str, Any], input_file: Path | None
+    fmu: Path,
+    apart: Isolation | None,
+    stop_time: str | None,
+    step_size: str | None,
+    start_values: dict[str, Any],
+    input_file: Path | None,
 ) -> tuple[System, Settings]:
     """The FMU, and the profile if there is one, as a system of their own."""
     from ..fmi import FmuFile, instantiate
@@ -93,7 +113,7 @@ def _prepare(
     start = experiment.start_time or Fraction(0)
     stop = _seconds(stop_time) if stop_time else experiment.stop_time or start + 1
     step = _seconds(step_size) if step_size else experiment.step_size or (stop - start) / 100
-    components: dict[str, Component] = {NAME: instantiate(file, file.description.model_name)}
+    components: dict[str, Component] = {NAME: instantiate(file, file.description.model_name, isolation=apart)}
     connections, stages = [], [(NAME,)]
     if input_file:
         components[PROFILE] = _profile(input_file, components[NAME])

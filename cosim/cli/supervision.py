@@ -3,29 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
+from shutil import rmtree
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..errors import CosimError
 from . import guarded
 
 if TYPE_CHECKING:
     from ..recording import Recording
     from ..supervise import Outcome
 
-option = click.option(
+_isolation = click.option(
     "--isolation",
-    type=click.Choice(["run", "none"]),
+    type=click.Choice(["run", "fmu", "none"]),
     default="run",
     show_default=True,
-    help="Run in a supervised child process, or in this one.",
+    help="Run in a supervised child process, every FMU in one of its own, too, or in this process.",
+)
+_sandbox = click.option(
+    "--sandbox",
+    is_flag=True,
+    help="Every FMU in a process of its own that reads only its own files, writes only to its temporary folder, has no TCP.",
 )
 
 
-def protected(entry: Callable[[], int], isolation: str, salvage: Callable[[Outcome], None]) -> int:
-    """Run a command's work and return its exit code; when foreign code ends the child, `salvage` saves what it has left.
+def option(command: Callable[..., int]) -> Callable[..., int]:
+    """Where foreign code runs: `isolation` and `sandbox`."""
+    return _isolation(_sandbox(command))
 
-    Raises ComponentError for the component that was to blame.
+
+def protected(entry: Callable[[], int], isolation: str, salvage: Callable[[Outcome], None]) -> int:
+    """Run a command's work and return its exit code; when the child could not save its rows, `salvage` does.
+
+    Raises ComponentError for the component that was to blame, KeyboardInterrupt when the user ended the child.
     """
     if isolation == "none":
         return entry()
@@ -35,11 +48,24 @@ def protected(entry: Callable[[], int], isolation: str, salvage: Callable[[Outco
     if outcome.warning:
         click.echo(f"WARNING {outcome.warning}", err=True)
     folder = outcome.journal.folder
-    if folder and folder.is_dir():  # the child could not finish what it began
-        salvage(outcome)
+    if folder and folder.is_dir():
+        _salvage(outcome, salvage, folder)
+    if outcome.interrupted:
+        raise KeyboardInterrupt
     if outcome.failure:
         raise outcome.failure
     return outcome.code
+
+
+def _salvage(outcome: Outcome, salvage: Callable[[Outcome], None], folder: Path) -> None:
+    """What the child has reported itself, such as a full disk, is not said again."""
+    try:
+        salvage(outcome)
+    except CosimError as error:
+        if outcome.failure or outcome.interrupted:
+            click.echo(str(error), err=True)
+    finally:
+        rmtree(folder, ignore_errors=True)
 
 
 def leaving(code: int) -> int:

@@ -2,9 +2,10 @@
 
 from typing import Literal
 
-from .executor import MARKER_SIZE, Executor, PythonExecutor, Termination
+from .executor import MARKER_SIZE, Executor, Termination
 from .native import NativeExecutor, available
 from .plan import Plan, compile_plan
+from .python import PythonExecutor
 from .recorder import Recorder
 from .rows import read_rows
 

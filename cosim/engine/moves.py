@@ -20,12 +20,17 @@ def copy(gather: Gather) -> Move:
     """The gather, its delay left aside, as one call that allocates as little as numpy allows."""
     first, count = int(gather.target_indices[0]), len(gather.target_indices)
     together = np.array_equal(gather.target_indices, np.arange(first, first + count))
-    if count <= FEW and gather.factor is None and not gather.source.dtype.hasobject:
+    if count <= FEW and gather.factor is None and _assignable(gather.source.dtype, gather.target.dtype):
         places = list(zip(gather.target_indices.tolist(), gather.source_indices.tolist(), strict=True))
         return partial(_assign, gather.target.data, gather.source.data, places)
     if gather.factor is not None or gather.source.dtype != gather.target.dtype or not together:
         return partial(_scatter, gather, gather.source, gather.source_indices)
     return partial(gather.source.take, gather.source_indices, None, gather.target[first : first + count], "clip")
+
+
+def _assignable(source: np.dtype[Any], target: np.dtype[Any]) -> bool:
+    """Whether every value of `source` may be assigned through a memoryview, which refuses what does not fit."""
+    return not source.hasobject and (target.kind == "b" or bool(np.can_cast(source, target, "safe")))
 
 
 def _assign(target: memoryview, source: memoryview, places: Sequence[tuple[int, int]]) -> None:

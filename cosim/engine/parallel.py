@@ -20,8 +20,8 @@ from .turns import Turn
 
 #: macro steps in which the steps of components are measured before anything runs on threads
 TRIALS = 3
-#: a component whose step takes as long as this (s) is worth a thread: handing over takes some 20 us
-LONG = 50e-6
+#: a component whose step takes as long as this (s) is worth a thread: handing over takes some 50 us
+LONG = 100e-6
 
 Work = TypeVar("Work")
 Outcome = TypeVar("Outcome")

@@ -16,7 +16,7 @@ import numpy as np
 CHUNK, PIECE = 1 << 24, 1 << 18
 
 #: more than this (bytes) is not kept in memory
-LARGE = 100_000_000
+LARGE = 1 << 26
 
 
 class Rows:

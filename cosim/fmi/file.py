@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+from dataclasses import dataclass
 from functools import cached_property
 from hashlib import file_digest
 from pathlib import Path
@@ -13,6 +15,16 @@ from .description import Description, describe
 from .preflight import LIMITS, Examination, Limits, examine, extract, open_file, refuse
 
 
+@dataclass(frozen=True)
+class _LentFolder:
+    """An extracted FMU that somebody else removes."""
+
+    name: str
+
+    def cleanup(self) -> None:
+        pass
+
+
 class FmuFile:
     """One FMU on disk. Instances `acquire` the extracted folder and `release` it; the last one unloads and removes it.
 
@@ -21,7 +33,7 @@ class FmuFile:
 
     def __init__(self, path: Path, limits: Limits = LIMITS):
         self.path, self.limits = path, limits
-        self._folder: TemporaryDirectory[str] | None = None
+        self._folder: TemporaryDirectory[str] | _LentFolder | None = None
         self._users = 0
         #: FMPy's object with the loaded library, which all instances share
         self.library: Any = None
@@ -61,6 +73,13 @@ class FmuFile:
             self._folder = folder
         self._users += 1
         return Path(self._folder.name)
+
+    def lent(self) -> FmuFile:
+        """The same extracted FMU for another process, which loads the library itself."""
+        assert self._folder is not None
+        other = copy(self)
+        other._folder, other._users, other.library, other.corrupt = _LentFolder(self._folder.name), 0, None, False
+        return other
 
     def release(self) -> None:
         self._users -= 1

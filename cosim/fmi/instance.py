@@ -129,6 +129,11 @@ class FmuInstance(Component):
         level = log.INFO if status == OK else log.WARNING if status in (WARNING, DISCARD) else log.ERROR
         log.message(self.name, level, self._message)
 
+    @property
+    def corrupt(self) -> bool:
+        """A fatal error was reported by an instance of this FMU."""
+        return self._file.corrupt
+
     def exit_initialization_mode(self) -> None:
         self.call("exitInitializationMode")
         self._kind = "step"

@@ -13,7 +13,7 @@ import pydantic_core
 
 from ..errors import InputError, Problem
 from ..recording import Recording
-from .files import replacing
+from .files import pieces, replacing
 
 ROWS_AT_A_TIME = 2000
 
@@ -23,8 +23,8 @@ def write_csv(recording: Recording, path: str | Path) -> None:
     columns = [recording.time, *recording.columns.values()]
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
         file.write(",".join(map(_quoted, ("time", *recording.columns))) + "\n")
-        for first in range(0, len(recording.time), ROWS_AT_A_TIME):
-            cells = [_cells(column[first : first + ROWS_AT_A_TIME]) for column in columns]
+        for piece in pieces(columns, ROWS_AT_A_TIME):
+            cells = [_cells(column[piece]) for column in columns]
             file.writelines(",".join(row) + "\n" for row in zip(*cells, strict=True))
 
 

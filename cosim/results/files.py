@@ -2,36 +2,88 @@
 
 from __future__ import annotations
 
+import errno
+import glob
 import json
 import math
+import mmap
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import CosimError, InputError, OutputError
+
+#: what the disk is to blame for, and not the path
+_DISK = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+
+#: end of the names of files that are being written
+_PART = ".part"
+
+
+def pieces(arrays: Sequence[np.ndarray], size: int) -> Iterator[slice]:
+    """Slices of at most `size` rows that cover arrays of equal length, to read them in bounded memory.
+
+    What was read of arrays that lie in files is let go of after each piece.
+    """
+    files = {id(file): file for array in arrays if (file := _mapped(array))}
+    for first in range(0, len(arrays[0]), size):
+        yield slice(first, first + size)
+        for file in files.values():
+            file.madvise(mmap.MADV_DONTNEED)
+
+
+def _mapped(array: Any) -> mmap.mmap | None:
+    while array is not None and not isinstance(array, mmap.mmap):
+        array = getattr(array, "base", None)
+    return array if hasattr(mmap, "MADV_DONTNEED") else None
 
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
     """A temporary path beside `path`; what is written there becomes `path` when the block ends well, else it disappears.
 
-    Missing folders are made. Raises InputError when the file cannot be written.
+    Missing folders are made. Raises InputError when nothing can be written there, OutputError when the disk is full or failed.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}{_PART}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield temporary
         temporary.replace(path)
     except OSError as error:
-        raise InputError(f"cannot write {path}: {error}") from error
+        raise _refusal(f"cannot write {path}: {error}", error) from error
     finally:
         with suppress(OSError):
             temporary.unlink()
+
+
+def _refusal(text: str, error: OSError) -> CosimError:
+    return OutputError(text) if error.errno in _DISK else InputError(text)
+
+
+def prepare(directory: Path) -> None:
+    """Make sure that files can be written to `directory` before the work begins; raises as `replacing`."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=directory):
+            pass
+    except OSError as error:
+        raise _refusal(f'cannot write to "{directory}": {error.strerror or error}', error) from None
+
+
+def remove(directory: Path, *names: str) -> None:
+    """Remove the files `names` of earlier work, and what a killed process has left of writing them; raises as `replacing`."""
+    try:
+        for name in names:
+            for path in (directory / name, *directory.glob(f".{glob.escape(name)}.*{_PART}")):
+                path.unlink(missing_ok=True)
+    except OSError as error:
+        raise _refusal(f'cannot replace "{path}": {error.strerror or error}', error) from None
 
 
 def write_json(data: Mapping[str, Any], path: str | Path) -> None:

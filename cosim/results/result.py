@@ -14,6 +14,7 @@ from ..errors import InputError, did_you_mean
 from ..recording import Recording
 from .csv_files import read_csv, write_csv
 from .files import write_json
+from .parquet_files import write_parquet
 
 
 class SignalError(InputError, KeyError):
@@ -70,6 +71,10 @@ class Result:
     def to_csv(self, path: str | Path) -> None:
         """Write all signals to a CSV file (see `cosim.results.csv_files`)."""
         write_csv(self.recording, path)
+
+    def to_parquet(self, path: str | Path) -> None:
+        """Write all signals to a Parquet file (see `cosim.results.parquet_files`)."""
+        write_parquet(self.recording, path)
 
     @classmethod
     def from_csv(cls, path: str | Path) -> Result:

@@ -2,10 +2,14 @@
 
     enter(Settings(readable=(fmu_folder, *interpreter_folders()), writable=(temporary,), confine="required"))
 
-Always: limits of memory, files and processor time; no core file; a session of its own; the end of the parent is its own end;
-standard input is empty; no privileges can be gained. With `confine`: files are read and executed only below `readable`, written
-only below `writable`; TCP needs `network` (Landlock, Linux 5.13, TCP rules 6.7). UDP and raw sockets are not blocked by
-Landlock; `bubblewrap` (strict mode) blocks them, too. What remains: a worker can use up its limits and lie in its outputs.
+Always: limits of memory, files and processor time; no core file; a session of its own (unless it leads a group already); the
+end of the parent is its own end; standard input is empty; no privileges can be gained. With `confine`: files are read, and
+programs started, only below `readable`; files are written only below `writable`; TCP needs `network` (Landlock, Linux 5.13, its
+TCP rules 6.7).
+
+What remains: Landlock blocks neither UDP and raw sockets nor looking at names, sizes and modes of files, nor changing the modes
+of one's own. `command` (bubblewrap, strict mode) shows no other files and no network at all. A worker can use up its limits,
+leave children behind in sessions of their own, which the parent has to end, and lie in its outputs.
 """
 
 from __future__ import annotations

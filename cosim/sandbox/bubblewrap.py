@@ -19,8 +19,11 @@ def bubblewrap() -> str:
     if program is None:
         return ""
     trial = [program, *_CLOSED, "--ro-bind", "/", "/", "true"]
-    done = subprocess.run(trial, capture_output=True, check=False, timeout=5)  # noqa: S603
-    return program if done.returncode == 0 else ""
+    try:
+        subprocess.run(trial, capture_output=True, check=True, timeout=5)  # noqa: S603
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return program
 
 
 def command(arguments: Sequence[str], readable: Sequence[Path], writable: Sequence[Path] = ()) -> list[str]:

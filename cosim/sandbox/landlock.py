@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import os
 import stat
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -24,7 +25,6 @@ OF_FILES = EXECUTE | WRITE_FILE | READ_FILE | TRUNCATE | IOCTL_DEV
 FILE_RIGHTS = {1: 13, 2: 14, 3: 15, 4: 15, 5: 16}
 TCP = 1 << 0 | 1 << 1
 OUTSIDE_SIGNALS_AND_SOCKETS = 1 << 0 | 1 << 1
-PR_SET_NO_NEW_PRIVS = 38
 
 _LIBC = ctypes.CDLL(None, use_errno=True)
 
@@ -40,6 +40,8 @@ class _PathBeneath(ctypes.Structure):
 
 def version() -> int:
     """The Landlock version of this kernel; 0 where there is none."""
+    if sys.platform != "linux":
+        return 0
     found: int = _LIBC.syscall(CREATE_RULESET, None, ctypes.c_size_t(0), ctypes.c_uint32(CREATE_VERSION))
     return max(found, 0)
 
@@ -48,7 +50,7 @@ def confine(readable: Iterable[Path], writable: Iterable[Path], *, network: bool
     """From now on this thread and its children read and execute only below `readable` and write only below `writable`.
 
     Without `network` TCP is closed (version 4), and signals and abstract sockets do not leave the confinement (version 6).
-    Open files stay open. Raises OSError when the kernel refuses.
+    Open files stay open. The process must have given up new privileges, or be privileged. Raises OSError when the kernel refuses.
     """
     found = version()
     rights = (1 << FILE_RIGHTS[min(found, max(FILE_RIGHTS))]) - 1
@@ -63,7 +65,6 @@ def confine(readable: Iterable[Path], writable: Iterable[Path], *, network: bool
         for path in writable:
             _allow(ruleset, path, rights & ~EXECUTE)
         _allow(ruleset, Path(os.devnull), rights & (READ_FILE | WRITE_FILE))
-        _LIBC.prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
         _call(RESTRICT_SELF, ctypes.c_int(ruleset), ctypes.c_uint32(0))
     finally:
         os.close(ruleset)

@@ -6,26 +6,23 @@ import ctypes
 import os
 import resource
 import signal
+import sys
 from pathlib import Path
 
-from .landlock import PR_SET_NO_NEW_PRIVS
-
-PR_SET_PDEATHSIG = 1
-
-_LIBC = ctypes.CDLL(None, use_errno=True)
+PR_SET_PDEATHSIG, PR_SET_NO_NEW_PRIVS, PR_GET_NO_NEW_PRIVS = 1, 38, 39
 
 
 def detach(parent: int | None) -> None:
-    """A session of its own, killed when the parent's thread that started it ends, no new privileges, nothing to read.
+    """A session of its own, killed when the parent's thread that started it ends (Linux), no new privileges, nothing to read.
 
     Ends the process when `parent` is gone already.
     """
     if os.getpgrp() != os.getpid():
         os.setsid()
-    _LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    _control(PR_SET_PDEATHSIG, signal.SIGKILL)
     if parent is not None and os.getppid() != parent:
         os.kill(os.getpid(), signal.SIGKILL)
-    _LIBC.prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
+    _control(PR_SET_NO_NEW_PRIVS, 1)
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     if nothing != 0:
@@ -49,8 +46,20 @@ def _lower(kind: int, value: int) -> None:
     resource.setrlimit(kind, (value, value))
 
 
+def no_new_privileges() -> bool:
+    """Whether this process has given up to gain privileges."""
+    return _control(PR_GET_NO_NEW_PRIVS, 0) == 1
+
+
+def _control(option: int, value: int) -> int:
+    """prctl, which only Linux has."""
+    return int(ctypes.CDLL(None).prctl(option, value, 0, 0, 0)) if sys.platform == "linux" else -1
+
+
 def mapped() -> int:
-    """Address space of this process in bytes."""
+    """Address space of this process in bytes (0 where the system does not say)."""
+    if sys.platform != "linux":
+        return 0
     return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import ctypes
 import errno
 import os
 import resource
 import socket
 from dataclasses import dataclass
 
-from . import landlock
+from . import landlock, process
 from .bubblewrap import bubblewrap
 
-PR_GET_NO_NEW_PRIVS = 39
 #: the discard port: nobody listens, so that a connection which is permitted is refused at once
 _NOWHERE = ("127.0.0.1", 9)
 
@@ -52,7 +50,7 @@ def active() -> Active:
         files_confined=_root_closed(),
         tcp_closed=_tcp_closed(),
         own_session=os.getsid(0) == os.getpid(),
-        no_new_privileges=ctypes.CDLL(None).prctl(PR_GET_NO_NEW_PRIVS, 0, 0, 0, 0) == 1,
+        no_new_privileges=process.no_new_privileges(),
         memory=_limit(resource.RLIMIT_AS),
         open_files=_limit(resource.RLIMIT_NOFILE),
         file_size=_limit(resource.RLIMIT_FSIZE),

@@ -10,6 +10,8 @@ from typing import Any
 
 from ..component import Component, Variable
 from ..errors import InputError, Problem, did_you_mean
+from ..fmi import Isolation
+from ..journal import Deadlines
 from ..simulate import Event, Settings, problems
 from ..system import Connection, Endpoint, Group, Parallel, Stage, System
 from ..table import read_table
@@ -28,10 +30,11 @@ PROFILES = "inputs"
 class Assembler:
     """The steps of assembling, each adding to `problems`."""
 
-    def __init__(self, scenario: Scenario):
+    def __init__(self, scenario: Scenario, apart: bool, sandbox: bool):
         self.root, self.spec, self.outside = scenario.root, scenario.spec, scenario.assignments
         self.problems: list[Problem] = list(scenario.problems)
-        self.workshop = Workshop()
+        deadlines = Deadlines(**self.spec.deadlines.model_dump())
+        self.workshop = Workshop(Isolation(deadlines, sandbox), apart or sandbox)
         self.components: dict[str, Component] = {}
         self._by_name: dict[str, Mapping[str, Variable]] = {}
         self.start_values: dict[str, dict[str, Any]] = defaultdict(dict)

@@ -77,20 +77,24 @@ class Assembly:
             component.free()
 
 
-def assemble(scenario: str | Path, settings: Mapping[str, Any] | None = None) -> Assembly:
+def assemble(
+    scenario: str | Path, settings: Mapping[str, Any] | None = None, *, apart: bool = False, sandbox: bool = False
+) -> Assembly:
     """Read, wire and check a scenario; `settings` are changes from outside (see `tree.load`).
+
+    With `apart` every FMU runs in a process of its own; with `sandbox` also, and those that do are confined.
 
     Raises InputError with every problem found, each with file, line and JSON path.
     """
     watch = Stopwatch()
     with watch.measure("load_seconds"):
-        return _assemble(scenario, settings, watch)
+        return _assemble(scenario, settings, watch, apart, sandbox)
 
 
-def _assemble(scenario: str | Path, settings: Mapping[str, Any] | None, watch: Stopwatch) -> Assembly:
+def _assemble(scenario: str | Path, settings: Mapping[str, Any] | None, watch: Stopwatch, apart: bool, sandbox: bool) -> Assembly:
     with watch.measure("parse_seconds"):
         loaded = load(scenario, settings)
-    assembler = Assembler(loaded)
+    assembler = Assembler(loaded, apart, sandbox)
     try:
         with watch.measure("instantiate_seconds"):
             assembler.make_components()

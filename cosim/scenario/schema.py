@@ -45,6 +45,12 @@ def _assignable(value: Any) -> Any:
     return value
 
 
+def _choice(value: Any) -> Any:
+    if value != "auto" and not isinstance(value, bool):
+        raise ValueError('expected "auto", true or false')
+    return value
+
+
 def _names(value: Any) -> Any:
     return [value] if isinstance(value, str) else value
 
@@ -62,6 +68,7 @@ Value = Annotated[
     BeforeValidator(_assignable),
     WithJsonSchema({"anyOf": [*_scalar, {"type": "array", "items": {"anyOf": _scalar}, "minItems": 1}]}),
 ]
+Choice = Annotated[Literal["auto"] | bool, BeforeValidator(_choice), WithJsonSchema({"enum": ["auto", True, False]})]
 Names = Annotated[
     list[str],
     BeforeValidator(_names),
@@ -102,6 +109,7 @@ class ComponentSpec(Spec):
     arguments: dict[str, Any] = Field({}, description="for the constructor of a Python component")
     parameters: dict[str, Value] = Field({}, description="parameters and start values by variable name")
     period: Period | None = Field(None, description="seconds between two steps; default: every macro step")
+    isolation: Literal["fmu"] | None = Field(None, description="the FMU runs in a process of its own")
 
     @model_validator(mode="after")
     def _one_source(self) -> ComponentSpec:
@@ -110,6 +118,8 @@ class ComponentSpec(Spec):
             raise ValueError(f"expected exactly one of {', '.join(SOURCES)}; found {' and '.join(given) or 'none'}")
         if self.arguments and self.python is None:
             raise ValueError('"arguments" are for components with "python"; variables are set with "parameters"')
+        if self.isolation and self.fmu is None and self.modelica is None:
+            raise ValueError('"isolation" is for components with "fmu" or "modelica"')
         return self
 
 
@@ -126,7 +136,7 @@ class AlgorithmSpec(Spec):
 
     kind: Literal["staged"] = "staged"
     stages: list[list[Name]]
-    parallel: Literal["auto"] | bool = Field(
+    parallel: Choice = Field(
         "auto",
         description="whether the FMUs of a stage step at the same time, on threads, with the same result: where their measured "
         "steps are long enough (instances of one file never at once), always, or never",

@@ -7,17 +7,21 @@ from pathlib import Path
 
 from ..component import Component
 from ..errors import InputError
-from ..fmi import FmuFile, instantiate
+from ..fmi import FmuFile, Isolation, instantiate
 from .schema import ComponentSpec
 from .tree import Node
 
 
 class Workshop:
-    """Makes components; every FMU file is read once, however many components use it."""
+    """Makes components; every FMU file is read once, however many components use it.
 
-    def __init__(self) -> None:
+    `isolation` is how FMUs run that run in processes of their own: those that ask for it, with `apart` all of them, and the
+    further instances of an FMU that allows one per process.
+    """
+
+    def __init__(self, isolation: Isolation, apart: bool) -> None:
+        self._isolation, self._apart = isolation, apart
         self.fmus: dict[Path, FmuFile] = {}
-        self._users: dict[Path, str] = {}
         #: source files of components
         self.python: list[Path] = []
         self.modelica: list[Path] = []
@@ -30,7 +34,7 @@ class Workshop:
 
     def from_fmu(self, folder: Path, spec: ComponentSpec, name: str) -> Component:
         assert spec.fmu is not None
-        return self._instance(folder / spec.fmu, name)
+        return self._instance(folder / spec.fmu, spec, name)
 
     def from_modelica(self, folder: Path, spec: ComponentSpec, name: str) -> Component:
         """Built on demand: the FMU comes from the per-user cache when source and tools are unchanged."""
@@ -43,7 +47,7 @@ class Workshop:
         if not (folder / file).is_file():
             raise InputError(f'file "{file}" does not exist')
         self.modelica.append(folder / file)
-        return self._instance(cached_fmu(folder / file, model), name)
+        return self._instance(cached_fmu(folder / file, model), spec, name)
 
     def from_python(self, folder: Path, spec: ComponentSpec, name: str) -> Component:
         from ..python_component import load_component
@@ -52,13 +56,13 @@ class Workshop:
         self.python.append(folder / spec.python.rpartition(":")[0])
         return load_component(spec.python, folder, name, spec.arguments)
 
-    def _instance(self, path: Path, name: str) -> Component:
-        file = self.fmus.setdefault(path.resolve(), FmuFile(path))
-        component = instantiate(file, name)
-        first = self._users.setdefault(path.resolve(), name)
-        if first != name and file.description.only_once_per_process:
-            raise InputError(f'"{path}" allows one instance per process only, which "{first}" already is')
-        return component
+    def _instance(self, path: Path, spec: ComponentSpec, name: str) -> Component:
+        file = self.fmus.get(path.resolve())
+        alone = file is not None and file.description.only_once_per_process
+        if file is None or alone:  # a library that was loaded before would be the same one in a worker
+            file = self.fmus[path.resolve()] = FmuFile(path)
+        apart = self._apart or spec.isolation is not None or alone
+        return instantiate(file, name, isolation=self._isolation if apart else None)
 
 
 _MAKERS: Mapping[str, Callable[[Workshop, Path, ComponentSpec, str], Component]] = {

@@ -56,6 +56,14 @@ def rotation_vector(q: ca.SX) -> ca.SX:
     return factor * shorter[1:4]
 
 
+def turned_by(vector: ca.SX) -> ca.SX:
+    """The quaternion of a rotation vector (axis times angle, rad); a series where the angle is tiny."""
+    angle_squared = ca.dot(vector, vector)
+    angle = ca.sqrt(angle_squared + 1e-300)
+    factor = ca.if_else(angle_squared < 1e-6, 0.5 - angle_squared / 48 + angle_squared**2 / 3840, ca.sin(angle / 2) / angle)
+    return ca.vertcat(ca.cos(angle / 2), factor * vector)
+
+
 def motion(position: ca.SX, orientation: ca.SX, velocity: ca.SX, rates: ca.SX) -> ca.SX:
     """The published motion of a vehicle (the order of `interface.MOTION`) from world velocity and body rates."""
     velocity_body = ca.mtimes(matrix(orientation).T, velocity)

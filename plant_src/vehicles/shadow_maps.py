@@ -2,15 +2,17 @@
 
 Each vehicle exports three functions beside its FMU:
 
-    shadow_spawn   initial parameters -> where Bullet has to place the body, state
-    shadow_before  what Bullet measures, own velocity, inputs, step
-                   -> state after a free step, the constant motion that leads there, what Bullet needs to make it
-    shadow_after   what Bullet measures after the step
-                   -> own velocity, contact impulse (zero for a free step), published variables
+    shadow_spawn   initial parameters -> state at the start, as if a free step had led to it, and pose in Bullet's terms
+    shadow_before  state, inputs, step, the box in which the vehicle comes near nothing
+                   -> state after a free step, the constant motion that leads there and what Bullet needs to make it,
+                      path of the centre of mass, alarm
+    shadow_after   these, and the motion that Bullet made of it
+                   -> state, contact impulse (zero for a free step), published variables
 
-Bullet's solver changes the velocity when something is in the way. That change times Bullet's inertia is the contact impulse;
+Bullet's solver changes the motion when something is in the way. That change times Bullet's inertia is the contact impulse;
 divided by the vehicle's inertia it is added to the velocity that the equations predicted. The published velocity is that
-of Bullet while there is contact: the own velocity is a label for the end of the step and not zero at rest.
+of Bullet while there is contact: the own velocity is a label for the end of the step and not zero at rest. Bullet moves a
+body by the motion at the end of its step, so the pose after contact is known from that as well.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ import numpy as np
 from cosim.export.equations import ContinuousModel
 
 from . import kinematics
+from .alarms import ADRIFT, LARGEST_STATE, UNSOUND
 from .shapes import quaternion
 
 #: at most 5 ms long, since the world makes steps of at most 10 ms
@@ -38,8 +41,8 @@ class FreeBody:
     """A free rigid body with the state (position, orientation, world velocity, body rates).
 
     `mass` in kg; `inertia` (3, 3) in kg m2 about the centre of mass; `principal_axes` (3, 3) turns Bullet's body frame into the
-    vehicle's; `observe` gives the published variables of a state. Bullet measures (position, quaternion x y z w, velocity,
-    angular velocity), all in the world frame.
+    vehicle's; `observe` gives the published variables of a state. A pose in Bullet's terms is (position, quaternion x y z w), a
+    motion (velocity, angular velocity), all in the world frame.
     """
 
     model: ContinuousModel
@@ -55,41 +58,39 @@ class FreeBody:
     def _spawn(self) -> ca.Function:
         (parameters,) = _symbols(parameters=len(self.model.slots("parameter")))
         state = self.model.initial_state(parameters)
-        turned = kinematics.product(state[3:7], self._from_principal())
-        return ca.Function("shadow_spawn", [parameters], [ca.vertcat(state[0:3], turned[1:4], turned[0]), state])
+        motion = ca.vertcat(state[7:10], kinematics.matrix(state[3:7]) @ state[10:13])
+        return ca.Function("shadow_spawn", [parameters], [state, motion, motion, self._pose(state)])
 
     def _before(self) -> ca.Function:
-        measured, velocity, inputs, step = _symbols(measured=13, velocity=6, inputs=len(self.model.slots("input")), step=1)
-        start = self._orientation(measured)
-        end = self.model.advance(ca.vertcat(measured[0:3], start, velocity), inputs, ca.SX(), step, SUB_STEPS)
-        linear = (end[0:3] - measured[0:3]) / step
-        angular = kinematics.rotation_vector(kinematics.product(end[3:7], kinematics.conjugate(start))) / step
+        state, inputs, step, anchor, leash = arguments = _symbols_before(self.model, 13)
+        end = self.model.advance(state, inputs, ca.SX(), step, SUB_STEPS)
+        linear = (end[0:3] - state[0:3]) / step
+        angular = kinematics.rotation_vector(kinematics.product(end[3:7], kinematics.conjugate(state[3:7]))) / step
         # Bullet adds the gyroscopic torque of its body by itself: this one cancels it
-        torque = ca.cross(angular, self._inertia_in_world(start) @ angular)
-        results = [end, ca.vertcat(linear, angular), torque, start, _soundness(end, inputs)]
-        return ca.Function("shadow_before", [measured, velocity, inputs, step], results)
+        torque = ca.cross(angular, self._inertia_in_world(state) @ angular)
+        twist, path = ca.vertcat(linear, angular), ca.vertcat(state[0:3], end[0:3])
+        results = [state, end, twist, twist, torque, self._pose(state), path, _alarm(end, inputs, path, anchor, leash)]
+        return ca.Function("shadow_before", arguments, results)
 
     def _after(self) -> ca.Function:
-        measured, predicted, twist, start = _symbols(measured=13, predicted=13, twist=6, start=4)
-        linear, angular = ca.vertsplit(measured[7:13] - twist, 3)
+        start, predicted, twist, motion, step = arguments = _symbols(start=13, predicted=13, twist=6, motion=6, step=1)
+        linear, angular = ca.vertsplit(motion - twist, 3)
         to_body = kinematics.matrix(predicted[3:7]).T
         turned = ca.inv(ca.SX(self.inertia)) @ (to_body @ (self._inertia_in_world(start) @ angular))
         velocity = predicted[7:13] + ca.vertcat(linear, turned)
         impulse = _contact(self.mass * ca.norm_2(linear))
-        orientation = self._orientation(measured)
-        mean = ca.vertcat(measured[7:10], kinematics.matrix(orientation).T @ measured[10:13])
-        state = ca.vertcat(measured[0:3], orientation, ca.if_else(impulse > 0, mean, velocity))
-        return ca.Function("shadow_after", [measured, predicted, twist, start], [velocity, impulse, self.observe(state)])
+        orientation = kinematics.product(kinematics.turned_by(motion[3:6] * step), start[3:7])
+        pose = ca.vertcat(start[0:3] + motion[0:3] * step, kinematics.normalised(orientation))
+        seen = ca.vertcat(pose, motion[0:3], kinematics.matrix(orientation).T @ motion[3:6])
+        return _outcome(arguments, impulse, predicted, ca.vertcat(pose, velocity), self.observe, seen)
 
-    def _from_principal(self) -> ca.SX:
+    def _pose(self, state: ca.SX) -> ca.SX:
         x, y, z, w = quaternion(self.principal_axes)
-        return ca.SX([w, x, y, z])
+        turned = kinematics.product(state[3:7], ca.SX([w, x, y, z]))
+        return ca.vertcat(state[0:3], turned[1:4], turned[0])
 
-    def _orientation(self, measured: ca.SX) -> ca.SX:
-        return kinematics.product(ca.vertcat(measured[6], measured[3:6]), kinematics.conjugate(self._from_principal()))
-
-    def _inertia_in_world(self, orientation: ca.SX) -> ca.SX:
-        to_world = kinematics.matrix(orientation)
+    def _inertia_in_world(self, state: ca.SX) -> ca.SX:
+        to_world = kinematics.matrix(state[3:7])
         return to_world @ ca.SX(self.inertia) @ to_world.T
 
 
@@ -98,7 +99,8 @@ class PlanarChain:
     """A vessel in the horizontal plane with the state (x, y, yaw, surge, sway, yaw rate).
 
     In Bullet it is a chain of the joints x, y and yaw. `mass` (kg) and `moment` (kg m2, about z) are those of the hull, whose
-    centre of mass lies on the yaw axis, so that the joints are decoupled. Bullet measures (x, y, yaw) and their rates.
+    centre of mass lies on the yaw axis, so that the joints are decoupled. A pose in Bullet's terms is (x, y, yaw) and their
+    rates, a motion the rates alone.
     """
 
     model: ContinuousModel
@@ -114,36 +116,60 @@ class PlanarChain:
         (parameters,) = _symbols(parameters=len(self.model.slots("parameter")))
         state = self.model.initial_state(parameters)
         rates = ca.vertcat(_turn(state[2]) @ state[3:5], state[5])
-        return ca.Function("shadow_spawn", [parameters], [ca.vertcat(state[0:3], rates), state])
+        return ca.Function("shadow_spawn", [parameters], [state, rates, rates, ca.vertcat(state[0:3], rates)])
 
     def _before(self) -> ca.Function:
-        measured, velocity, inputs, step = _symbols(measured=6, velocity=3, inputs=len(self.model.slots("input")), step=1)
-        end = self.model.advance(ca.vertcat(measured[0:3], velocity), inputs, ca.SX(), step, SUB_STEPS)
-        twist = (end[0:3] - measured[0:3]) / step
-        effort = self._inertia() * (twist - measured[3:6]) / step
-        results = [end, twist, effort, _soundness(end, inputs)]
-        return ca.Function("shadow_before", [measured, velocity, inputs, step], results)
+        state, inputs, step, anchor, leash = arguments = _symbols_before(self.model, 6)
+        (rates,) = _symbols(rates=3)
+        end = self.model.advance(state, inputs, ca.SX(), step, SUB_STEPS)
+        twist = (end[0:3] - state[0:3]) / step
+        effort = self._inertia() * (twist - rates) / step
+        path = ca.vertcat(self.observe(state)[0:3], self.observe(end)[0:3])
+        pose = ca.vertcat(state[0:3], rates)
+        results = [state, end, twist, twist, effort, pose, path, _alarm(end, inputs, path, anchor, leash)]
+        return ca.Function("shadow_before", [*arguments, rates], results)
 
     def _after(self) -> ca.Function:
-        measured, predicted, twist = _symbols(measured=6, predicted=6, twist=3)
-        change = measured[3:6] - twist
+        start, predicted, twist, motion, step = arguments = _symbols(start=6, predicted=6, twist=3, motion=3, step=1)
+        change = motion - twist
         velocity = predicted[3:6] + ca.vertcat(_turn(predicted[2]).T @ change[0:2], change[2])
         impulse = _contact(ca.norm_2(self._inertia() * change))
-        mean = ca.vertcat(_turn(measured[2]).T @ measured[3:5], measured[5])
-        state = ca.vertcat(measured[0:3], ca.if_else(impulse > 0, mean, velocity))
-        return ca.Function("shadow_after", [measured, predicted, twist], [velocity, impulse, self.observe(state)])
+        pose = start[0:3] + motion * step
+        seen = ca.vertcat(pose, _turn(pose[2]).T @ motion[0:2], motion[2])
+        return _outcome(arguments, impulse, predicted, ca.vertcat(pose, velocity), self.observe, seen, motion)
 
     def _inertia(self) -> ca.SX:
         return ca.SX([self.mass, self.mass, self.moment])
+
+
+def _symbols_before(model: ContinuousModel, state: int) -> list[ca.SX]:
+    """State, inputs, step, and middle and half edges (world frame, m) of the box in which the vehicle comes near nothing."""
+    return _symbols(state=state, inputs=len(model.slots("input")), step=1, anchor=3, leash=3)
+
+
+def _outcome(
+    arguments: list[ca.SX],
+    impulse: ca.SX,
+    free: ca.SX,
+    touched: ca.SX,
+    observe: Callable[[ca.SX], ca.SX],
+    seen: ca.SX,
+    *more: ca.SX,
+) -> ca.Function:
+    """The state after a free step or one with contact, where `seen` is published instead of it."""
+    state, published = (ca.if_else(impulse > 0, other, free) for other in (touched, seen))
+    return ca.Function("shadow_after", arguments, [state, impulse, observe(published), *more])
 
 
 def _symbols(**sizes: int) -> list[ca.SX]:
     return [ca.SX.sym(name, size) for name, size in sizes.items()]
 
 
-def _soundness(state: ca.SX, inputs: ca.SX) -> ca.SX:
-    """Norm of the state; infinite when an input is not finite, not a number when the state is not."""
-    return ca.if_else(ca.sum1(ca.fabs(inputs)) < ca.inf, ca.norm_2(state), ca.inf)
+def _alarm(state: ca.SX, inputs: ca.SX, path: ca.SX, anchor: ca.SX, leash: ca.SX) -> ca.SX:
+    """Zero when all is well, ADRIFT when the path leaves the box, UNSOUND when inputs or state are unusable."""
+    sound = ca.logic_and(ca.sum1(ca.fabs(inputs)) < ca.inf, ca.norm_2(state) < LARGEST_STATE)
+    excess = ca.fabs(path - ca.vertcat(anchor, anchor)) - ca.vertcat(leash, leash)
+    return ca.if_else(sound, ca.if_else(ca.mmax(excess) > 0, ADRIFT, 0), UNSOUND)
 
 
 def _contact(impulse: ca.SX) -> ca.SX:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,13 @@ class Box(NamedTuple):
     half_extents: Vector
     position: Vector
     orientation: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+    def corners(self) -> np.ndarray:
+        """Positions (8, 3) of the corners in the frame of the body."""
+        local = np.array(list(product((-1, 1), repeat=3))) * self.half_extents
+        axis, w = np.array(self.orientation[:3]), self.orientation[3]
+        turned = np.cross(axis, local)
+        return self.position + local + 2 * (w * turned + np.cross(axis, turned))
 
 
 class Body(NamedTuple):

@@ -1,4 +1,4 @@
-"""Ten million rows from one FMU to a CSV file, and the memory that takes.
+"""Ten million rows from one FMU to CSV and Parquet files, and the memory that takes.
 
 Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_many_rows.py
 """
@@ -20,24 +20,32 @@ from fractions import Fraction
 from pathlib import Path
 from cosim.fmi import FmuFile, instantiate
 from cosim.results.csv_files import write_csv
+from cosim.results.parquet_files import write_parquet
 from cosim.simulate import Settings, simulate
 from cosim.system import Endpoint, System
-steps, step = int(sys.argv[3]) - 1, Fraction(1, 100)
+steps, step = int(sys.argv[2]) - 1, Fraction(1, 100)
+outputs = {f"a.y{k}": Endpoint("a", f"y{k}") for k in range(1, int(sys.argv[3]) + 1)}
 system = System({"a": instantiate(FmuFile(Path(sys.argv[1])), "a")}, (), (("a",),))
-run = simulate(system, Settings(Fraction(0), steps * step, step, {"a.y1": Endpoint("a", "y1")}))
-began = time.perf_counter()
-write_csv(run.recording, sys.argv[2])
-print(run.loop_seconds, time.perf_counter() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+run = simulate(system, Settings(Fraction(0), steps * step, step, outputs))
+print(run.loop_seconds)
+for name, write in (("csv", write_csv), ("parquet", write_parquet)):
+    began = time.perf_counter()
+    write(run.recording, f"result.{name}")
+    print(time.perf_counter() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 """
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]
 
 
-def test_ten_million_rows(tmp_path):
-    fmu, target = lag_fmu(tmp_path), tmp_path / "result.csv"
-    command = [sys.executable, "-c", PROGRAM, fmu, target, str(ROWS)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    loop, writing, peak = map(float, done.stdout.split())
-    print(f"\n{ROWS} rows: stepping {loop:.1f} s, CSV {writing:.1f} s ({target.stat().st_size / 1e6:.0f} MB), peak {peak:.0f} MB")
-    with target.open() as file:
+@pytest.mark.parametrize("signals", [1, 5])
+def test_ten_million_rows(signals, tmp_path):
+    fmu = lag_fmu(tmp_path, width=signals)
+    command = [sys.executable, "-c", PROGRAM, fmu, str(ROWS), str(signals)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=tmp_path)
+    loop, csv, csv_peak, parquet, parquet_peak = map(float, done.stdout.split())
+    print(f"\n{ROWS} rows of {signals} signals: stepping {loop:.1f} s")
+    for name, seconds, peak in (("csv", csv, csv_peak), ("parquet", parquet, parquet_peak)):
+        size = (tmp_path / f"result.{name}").stat().st_size / 1e6
+        print(f"  {name:8} {seconds:5.1f} s, {size:5.0f} MB, peak {peak:4.0f} MB")
+        assert peak < LARGEST_PEAK
+    with (tmp_path / "result.csv").open() as file:
         assert sum(1 for _ in file) == ROWS + 1
-    assert peak < LARGEST_PEAK

@@ -1,4 +1,4 @@
-/* The foreign FMI 2.0 probe, whose doStep takes BUSY_NS of processor time, or of waiting.
+/* The foreign FMI 2.0 probe, whose doStep takes BUSY_NS of processor time, or of waiting; FATAL_TIME: when it aborts.
    i_out: the most instances of this file that ever were in doStep at once; e_out: 1 on another thread than the first one. */
 #define _GNU_SOURCE
 #include <stdatomic.h>
@@ -25,6 +25,9 @@ static void be_busy(void) {
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_set_state) {
+#ifdef FATAL_TIME
+    if (t > FATAL_TIME) abort();
+#endif
     int now = atomic_fetch_add(&inside, 1) + 1;
     if (now > atomic_load(&most)) atomic_store(&most, now);
     be_busy();

@@ -2,6 +2,7 @@
 
 import random
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,8 +11,9 @@ from helpers import end
 
 from cosim.component import DTYPES, Variable
 from cosim.engine import EXECUTORS, available
+from cosim.engine.parallel import Crew
 from cosim.errors import ComponentError
-from cosim.fmi import FmuFile, instantiate
+from cosim.fmi import FmuFile, Isolation, instantiate
 from cosim.simulate import Settings, simulate
 from cosim.system import Connection, Endpoint, Group, System, incompatibility
 from cosim.timing import exact
@@ -98,11 +100,33 @@ def test_random_systems(seed, share, interval):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_random_systems_with_foreign_fmus_of_all_types(seed, probes):
-    def build():
-        files = [FmuFile(path) for path in probes.values()]
-        return random_system(seed, {f"f{i}": instantiate(file, f"f{i}") for i, file in enumerate([*files, *files])})
+    def build(isolation=None):
+        files = [FmuFile(path) for path in probes.values()] * 2
+        fmus = {f"f{i}": instantiate(file, f"f{i}", isolation=isolation) for i, file in enumerate(files)}
+        return random_system(seed, fmus)
 
-    assert recorded("native", build) == recorded("python", build)
+    def build_apart():
+        return build(Isolation())
+
+    native = recorded("native", build)
+    assert native == recorded("python", build)
+    assert native == recorded("native", build_apart)
+    assert native == recorded("python", build_apart)
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+@pytest.mark.parametrize("seed", range(4))
+def test_random_systems_with_fmus_on_threads(seed, kind, probes, monkeypatch):
+    crews = []
+    monkeypatch.setattr("cosim.engine.executor.Crew", lambda *arguments: crews.append(Crew(*arguments)) or crews[-1])
+
+    def build(parallel):
+        files = [FmuFile(path) for path in probes.values()]
+        built, outputs = random_system(seed, {f"f{i}": instantiate(file, f"f{i}") for i, file in enumerate(3 * files)})
+        return replace(built, parallel=parallel), outputs
+
+    assert recorded(kind, lambda: build(True)) == recorded(kind, lambda: build(False))
+    assert len(crews) == 1
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)

@@ -1,4 +1,4 @@
-"""The misbehaving FMU, compiled once per session; the markers of this room."""
+"""The misbehaving FMU, compiled once per session."""
 
 from __future__ import annotations
 
@@ -6,21 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from fault_fmu import SUPERVISED, FaultFmus, build_library
+from fault_fmu import FaultFmus, build_library
 from fault_runs import Runner
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "supervised: needs runs in a child process")
-    config.addinivalue_line("markers", "long: takes minutes; run with `pytest -m long`")
-
-
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    for item in items:
-        if item.get_closest_marker("supervised") and not SUPERVISED:
-            item.add_marker(pytest.mark.skip("runs are not supervised yet"))
-        if item.get_closest_marker("long") and "long" not in config.option.markexpr:
-            item.add_marker(pytest.mark.skip("long: run with -m long"))
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,6 @@ import os
 import shutil
 import subprocess
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
@@ -21,7 +20,6 @@ PLATFORMS = {2: fmpy.platform, 3: fmpy.platform_tuple}
 STEP, COUNT = 0.01, 10
 #: functions that have another name in FMI 3.0
 IN_FMI3 = {"Instantiate": "InstantiateCoSimulation", "GetReal": "GetFloat64", "SetReal": "SetFloat64"}
-SUPERVISED = find_spec("cosim.supervise") is not None
 
 
 def function_name(version: int, name: str) -> str:

@@ -77,6 +77,6 @@ class Runner:
         words = ("run", scenario(folder, fmu, deadlines), "--output-dir", "out", "--no-report")
         return self.cosim(folder, *words, **conditions)
 
-    def simulate(self, folder: Path, fmu: Path, **conditions: Any) -> Outcome:
+    def simulate(self, folder: Path, fmu: Path, *words: str, **conditions: Any) -> Outcome:
         """`cosim simulate` of the FMU alone; results in folder/result.csv."""
-        return self.cosim(folder, "simulate", fmu, "--output-file", "result.csv", **conditions)
+        return self.cosim(folder, "simulate", fmu, "--output-file", "result.csv", *words, **conditions)

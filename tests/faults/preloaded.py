@@ -7,6 +7,7 @@ the file "changes" of the folder says what the command changed in its process.
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import gc
 import json
@@ -47,7 +48,7 @@ def serve() -> dict[str, Any] | None:
 def prepare(folder: str, stdin: str, executor: Kind, **_: Any) -> None:
     os.setsid()
     os.chdir(folder)
-    os.environ["TMPDIR"], tempfile.tempdir = f"{folder}/tmp", None
+    os.environ["TMPDIR"], tempfile.tempdir = str(Path(folder, "tmp")), None
     simulate.executor_kind = lambda kind: executor_kind(executor)
     for number, name, flags in ((0, stdin, os.O_RDWR), (1, "stdout", os.O_WRONLY), (2, "stderr", os.O_WRONLY)):
         file = os.open(name, flags | os.O_CREAT, 0o666)
@@ -83,6 +84,19 @@ def end_orphans(grace: float = 0.2) -> list[int]:
     return left
 
 
+def end(request: dict[str, Any]) -> None:
+    """Run the command and end like an interpreter, but for taking its modules apart, which takes longer than the command."""
+    code = 0
+    try:
+        confined(**request) if request["sandbox"] else observed(request["arguments"])
+    except SystemExit as ended:
+        code = ended.code if isinstance(ended.code, int) else 1
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
 def state() -> dict[str, Any]:
     """What belongs to the whole process and no FMU may change."""
     own = ctypes.CDLL(None)
@@ -103,10 +117,10 @@ def state() -> dict[str, Any]:
     }
 
 
-def confined(arguments: list[str], settings: dict[str, Any]) -> None:
+def confined(arguments: list[str], sandbox: dict[str, Any], **_: Any) -> None:
     """The command in a process that reads what Python needs and the folder, and writes only to the listed folders."""
-    places = {"readable": (*interpreter_folders(), Path.cwd()), "writable": tuple(map(Path, settings.pop("writable")))}
-    enter(Settings(**places, **settings, confine="required"))
+    places = {"readable": (*interpreter_folders(), Path.cwd()), "writable": tuple(map(Path, sandbox.pop("writable")))}
+    enter(Settings(**places, **sandbox, confine="required"))
     main(arguments)
 
 
@@ -128,7 +142,5 @@ if __name__ == "__main__":
         import_module(module)
     gc.freeze()
     request = serve()
-    if request and request["sandbox"]:
-        confined(request["arguments"], request["sandbox"])
-    elif request:
-        observed(request["arguments"])
+    if request:
+        end(request)

@@ -15,7 +15,7 @@ def test_a_life_is_as_the_standard_draws_it(fmus, runner, tmp_path, version):
     assert violations(fmus.lines()) == []
 
 
-@pytest.mark.parametrize("status", ["discard", "error", "fatal"])
+@pytest.mark.parametrize("status", ["error", "fatal"])
 @pytest.mark.parametrize("place", PLACES)
 def test_nothing_forbidden_follows_a_bad_status(fmus, runner, tmp_path, version, place, status):
     assert runner.run(tmp_path, fmus(version, f"{place} {status}")).code == 1

@@ -11,26 +11,32 @@ from foreign import build_foreign
 from helpers import end, run, system
 
 from cosim.errors import ComponentError, InputError
-from cosim.fmi import FmuFile, instantiate
+from cosim.fmi import FmuFile, Isolation, instantiate
 from cosim.simulate import Settings, simulate
 from cosim.timing import exact
 
 pytestmark = pytest.mark.usefixtures("executor")
 
 
-def copies(path, *names):
-    file = FmuFile(path)
-    return {name: instantiate(file, name) for name in names}
+@pytest.fixture(params=[None, Isolation()], ids=["here", "apart"])
+def copies(request):
+    """Instances of one FMU by name, in this process or each in one of its own: it makes no difference."""
+
+    def made(path, *names):
+        file = FmuFile(path)
+        return {name: instantiate(file, name, isolation=request.param) for name in names}
+
+    return made
 
 
 @pytest.mark.parametrize("stages", [[("a", "b")], [("a",), ("b",)]], ids=["jacobi", "gauss-seidel"])
-def test_two_lags_in_a_ring_that_start_at_one_stay_at_one(probe, stages):
+def test_two_lags_in_a_ring_that_start_at_one_stay_at_one(copies, probe, stages):
     built = system(copies(probe, "a", "b"), "a.y > b.u, b.y > a.u", stages)
     recording = run(built, 100, 0.01, ["a.y", "b.y"])
     assert set(recording.columns["a.y"]) == set(recording.columns["b.y"]) == {1.0}
 
 
-def test_a_lag_equals_fmpy_and_the_closed_form(probe):
+def test_a_lag_equals_fmpy_and_the_closed_form(copies, probe):
     from fmpy import simulate_fmu
 
     recording = run(system(copies(probe, "a")), 2, 0.01, ["a.y"])
@@ -39,7 +45,7 @@ def test_a_lag_equals_fmpy_and_the_closed_form(probe):
     np.testing.assert_allclose(recording.columns["a.y"], (1 - 0.01 / 0.5) ** np.arange(201), rtol=1e-12)
 
 
-def test_every_type_is_set_and_read(probe):
+def test_every_type_is_set_and_read(copies, probe):
     a = copies(probe, "a")["a"]
     values = {"b_in": True, "s_in": "hello", "e_in": 2, ("i_in" if a.description.major == 2 else "int32_in"): 41}
     outputs = [v.name for v in a.variables if v.causality == "output" and not v.shape]
@@ -51,7 +57,7 @@ def test_every_type_is_set_and_read(probe):
     assert recording.columns["a.b_out"].dtype == bool
 
 
-def test_every_type_is_connected(probe):
+def test_every_type_is_connected(copies, probe):
     built_from = copies(probe, "a", "b")
     pairs = [("b_out", "b_in"), ("s_out", "s_in"), ("e_out", "e_in"), ("y", "u")]
     pairs.append(("i_out", "i_in") if built_from["a"].description.major == 2 else ("int64_out", "int64_in"))
@@ -64,7 +70,7 @@ def test_every_type_is_connected(probe):
 INTEGERS = {"int8": -8, "uint8": 200, "int16": -300, "uint16": 60000, "uint32": 4 * 10**9, "int64": -(2**62), "uint64": 2**63}
 
 
-def test_integers_of_all_widths_keep_every_bit(probes):
+def test_integers_of_all_widths_keep_every_bit(copies, probes):
     values = {f"{name}_in": value for name, value in INTEGERS.items()}
     built = system(copies(probes[3], "a"), start_values={"a": values})
     recording = run(built, 0.01, 0.01, [f"a.{name}_out" for name in INTEGERS])
@@ -73,13 +79,13 @@ def test_integers_of_all_widths_keep_every_bit(probes):
     }
 
 
-def test_arrays_are_set_whole_and_connected_by_element(probes):
+def test_arrays_are_set_whole_and_connected_by_element(copies, probes):
     built = system({**copies(probes[3], "a"), "count": counter()}, "count.y > a.v_in[2]", [("count",), ("a",)])
     recording = run(built, 0.02, 0.01, ["a.v_out[1]", "a.v_out[2]", "a.v_out[3]"])
     assert [column[-1] for column in recording.columns.values()] == [0.0, 4.0, 0.0]
 
 
-def test_a_failure_names_component_function_status_time_and_the_fmus_own_words(probe):
+def test_a_failure_names_component_function_status_time_and_the_fmus_own_words(copies, probe):
     built = system(copies(probe, "lag"), start_values={"lag": {"fail_time": 0.035}})
     major = 2 if probe.stem.endswith("2") else 3
     with pytest.raises(ComponentError) as failure:
@@ -88,21 +94,21 @@ def test_a_failure_names_component_function_status_time_and_the_fmus_own_words(p
     assert str(failure.value) == words
 
 
-def test_log_messages_reach_the_user_as_they_are(probe, caplog):
+def test_log_messages_reach_the_user_as_they_are(copies, probe, caplog):
     built = system(copies(probe, "lag"), start_values={"lag": {"fail_time": 0.0}})
     with caplog.at_level(logging.INFO, "cosim"), pytest.raises(ComponentError):
         run(built, 1, 0.01)
     assert [(r.levelname, r.getMessage()) for r in caplog.records] == [("ERROR", "lag: told to fail, 100%s sure")]
 
 
-def test_rows_until_a_failure_are_kept(probe):
+def test_rows_until_a_failure_are_kept(copies, probe):
     built = system(copies(probe, "a"), start_values={"a": {"fail_time": 0.035}})
     outcome = simulate(built, Settings(exact(0), exact(1), exact(0.01), {"a.y": end("a.y")}))
     assert outcome.recording.time.tolist() == [0, 0.01, 0.02, 0.03]
 
 
 @pytest.mark.parametrize(("status", "freed"), [(3, True), (4, False)], ids=["error", "fatal"])
-def test_after_fatal_not_even_free_is_called(probes, caplog, status, freed):
+def test_after_fatal_not_even_free_is_called(copies, probes, caplog, status, freed):
     start = {"fail_time": 0.0, "fail_status": status, "i_in": 9}
     built = system(copies(probes[2], "a"), start_values={"a": start})
     with caplog.at_level(logging.INFO, "cosim"), pytest.raises(ComponentError, match=f"status {status}"):
@@ -110,7 +116,7 @@ def test_after_fatal_not_even_free_is_called(probes, caplog, status, freed):
     assert ("a: freed" in caplog.messages) is freed
 
 
-def test_an_fmu_may_end_the_simulation(probe):
+def test_an_fmu_may_end_the_simulation(copies, probe):
     major = 2 if probe.stem.endswith("2") else 3
     asked = {"i_in": 7, "fail_status": 2} if major == 2 else {"b_in": True}
     built = system(copies(probe, "a"), start_values={"a": {"fail_time": 0.025, **asked}})
@@ -120,7 +126,7 @@ def test_an_fmu_may_end_the_simulation(probe):
     assert len(outcome.recording.time) == 4
 
 
-def test_a_snapshot_brings_everything_back_bit_for_bit(probe):
+def test_a_snapshot_brings_everything_back_bit_for_bit(copies, probe):
     from cosim.engine import Recorder, compile_plan, executor_kind
     from cosim.timing import Grid
 
@@ -144,13 +150,13 @@ def test_a_snapshot_brings_everything_back_bit_for_bit(probe):
         component.free()
 
 
-def test_an_fmu_is_extracted_once_and_leaves_nothing_behind(probe, tmp_path, monkeypatch):
+def test_an_fmu_is_extracted_once_and_leaves_nothing_behind(copies, probe, tmp_path, monkeypatch):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", None)
     seen = []
     built = system(copies(probe, "a", "b", "c"))
     outcome = simulate(
-        built, Settings(exact(0), exact(1), exact(0.01)), [lambda n, total: seen.append(len(list(tmp_path.iterdir())))]
+        built, Settings(exact(0), exact(1), exact(0.01)), [lambda n, total: seen.append(len(list(tmp_path.glob("cosim-fmu-*"))))]
     )
     assert outcome.failure is None
     assert set(seen) == {1}
@@ -195,13 +201,13 @@ def test_an_fmu_for_another_machine_says_what_it_has(probes, tmp_path):
         instantiate(FmuFile(foreign), "a")
 
 
-def test_a_binary_under_a_wrong_name_is_an_input_error(tmp_path):
+def test_a_binary_under_a_wrong_name_is_an_input_error(copies, tmp_path):
     misnamed = build_foreign(2, tmp_path, identifier="other")
     with pytest.raises(InputError, match=r"cannot be loaded: .*probe\.so"):
         run(system(copies(misnamed, "a")), 1, 0.01)
 
 
-def test_a_wrong_guid_ends_with_the_fmus_own_words(probes, tmp_path):
+def test_a_wrong_guid_ends_with_the_fmus_own_words(copies, probes, tmp_path):
     changed = tmp_path / "changed.fmu"
     with ZipFile(probes[2]) as source, ZipFile(changed, "w") as target:
         for name in source.namelist():

@@ -24,6 +24,32 @@ def mission() -> Trial:
     return trial
 
 
+def visit() -> Trial:
+    """Drop from 0.6 m onto the deck, take-off: Bullet takes part from the 34th step to the 81st."""
+    trial = Trial({"uav": quadcopter([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.6]), "usv": vessel([0.0, 0.0])})
+    trial["uav.external_force.z"] = 1.0
+    return trial
+
+
+@pytest.mark.parametrize("steps", [0, 20, 30, 45, 60])
+def test_a_state_is_returned_to_from_where_bullet_takes_part_or_not(steps: int) -> None:
+    trial = visit().step(steps)
+    state, before = trial.world.get_state(), trial.bytes
+
+    def up_and_away() -> list[bytes]:
+        trial["uav.external_force.z"] = 1.0
+        rows = [trial.step().bytes for _ in range(30)]
+        trial["uav.external_force.z"] = 8.0
+        return rows + [trial.step().bytes for _ in range(60)]
+
+    expected = up_and_away()
+    for _ in range(2):
+        trial.world.set_state(state)
+        trial.world.get_outputs()
+        assert trial.bytes == before
+        assert up_and_away() == expected
+
+
 @pytest.mark.parametrize("steps", [0, 5, 17, 18, 19, 20, 60, 200])
 def test_a_saved_state_is_returned_to_bit_for_bit(steps: int) -> None:
     trial = mission().step(steps)

@@ -1,0 +1,83 @@
+"""The pure Python executor: always available, C functions are called through ctypes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ..component import Call, DoStep
+from .executor import CALL, ROWS, STEPS, Executor
+from .moves import Move, copy
+from .parallel import TRIALS
+from .plan import Gather
+from .turns import WARNING, Turn
+
+
+class PythonExecutor(Executor):
+    """The executor that needs no compiler: C functions are called through ctypes."""
+
+    def __init__(self, *arguments: Any, **named: Any):
+        super().__init__(*arguments, **named)
+        self._shortest: dict[int, float] = {}
+
+    def _prepare(self) -> None:
+        self._phases = [
+            ([self._move(gather) for gather in phase.gathers], [self._numbered(turn) for turn in turns])
+            for phase, turns in zip(self.plan.phases, self._stages, strict=True)
+        ]
+        self._watched = [(floats, np.zeros_like(floats)) for floats in self.watched]
+
+    def _move(self, gather: Gather) -> Move:
+        return self._delays[gather].move if gather.delay else copy(gather)
+
+    def _numbered(self, turn: Turn) -> tuple[int, list[tuple[Any, Any, int]], Turn]:
+        measure = self._joint and self.finished < TRIALS
+        functions = [self._timed(c, turn.first) if measure and isinstance(c.native, DoStep) else c.function for c in turn.calls]
+        calls = [(f, c.arguments, turn.first + i) for i, (f, c) in enumerate(zip(functions, turn.calls, strict=True))]
+        return turn.step.divisor, calls, turn
+
+    def _timed(self, call: Call, first: int) -> Callable[..., int]:
+        def timed(*arguments: Any) -> int:
+            began = perf_counter()
+            status = call.function(*arguments)
+            self._shortest[first] = min(self._shortest.get(first, inf), perf_counter() - began)
+            return status
+
+        return timed
+
+    def _measured(self) -> dict[int, float]:
+        return self._shortest
+
+    def _run(self, end: int) -> None:
+        seconds, phases, record, clock = self.plan.grid.seconds, self._phases, self.recorder.record, self._clock
+        marker, recorder, warning = self.marker.data, self.recorder, WARNING
+        watched = self._watched
+        # equal in the default rounding mode only, and the least denormal is no zero only if it is not flushed
+        one, little, least = 1.0, 2.0**-54, 5e-324
+        for n in range(self.finished, end):
+            clock.value = seconds(n)
+            for moves, turns in phases:
+                for move in moves:
+                    move()
+                for divisor, calls, turn in turns:
+                    if divisor != 1 and n % divisor:
+                        continue
+                    for function, arguments, number in calls:
+                        marker[CALL] = number
+                        status = function(*arguments)
+                        if status > warning:
+                            self._bad_status(turn, turn.calls[number - turn.first], status)
+                            break
+                    if one + little != one - little or not least + least:
+                        self._float_state_changed(turn, turn.calls[-1])
+            for floats, zeros in watched:
+                if floats.dot(zeros):  # NaN unless all are finite
+                    self._check_finite()
+            record(n + 1)
+            marker[ROWS], marker[STEPS] = recorder.rows, n + 1
+            if self.termination:
+                return

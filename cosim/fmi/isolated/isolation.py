@@ -1,0 +1,26 @@
+"""How an FMU is kept apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ...journal import Deadlines
+from ...sandbox import Settings, enter, interpreter_folders
+
+
+@dataclass(frozen=True)
+class Isolation:
+    """How long calls into the FMU may take; with `sandbox` it reads only its own files and libraries, writes only to its
+    temporary folder, and has no TCP."""
+
+    deadlines: Deadlines = field(default_factory=Deadlines)
+    sandbox: bool = False
+
+    def entrance(self, fmu: Path, temporary: Path, importer: int) -> Callable[[], None]:
+        """What a worker of the process `importer` does before it loads foreign code; raises InputError where it cannot."""
+        readable = (fmu, *interpreter_folders()) if self.sandbox else ()
+        confine = "required" if self.sandbox else "never"
+        settings = Settings(readable=readable, writable=(temporary,), confine=confine, parent=importer)  # type: ignore[arg-type]
+        return lambda: enter(settings)

@@ -1,0 +1,158 @@
+"""What a worker process does: it serves one instance of an FMU until that is freed or the importer is gone."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import logging
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from itertools import count
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+from ... import journal as journals
+from ... import log
+from ...component import Call, StepResult
+from ...errors import ComponentError, InputError
+from ...journal import CALL, Phase
+from ..instance import WARNING, FmuInstance
+from .block import Block, texts
+from .lines import DONE, TURN, decode, encode, read_line, write
+
+FLOAT_STATE = "changed the floating-point mode (rounding, flush to zero or traps) and did not restore it"
+
+
+class Worker:
+    """Answers each command of the importer with one line; messages of the FMU go before it."""
+
+    def __init__(self, instance: FmuInstance, block: Block, enter: Callable[[], None]):
+        self._instance, self._block, self._enter = instance, block, enter
+        self._in, self._out = texts(block.inputs), texts(block.outputs)
+        self._calls: Sequence[tuple[int, Callable[..., int], tuple[Any, ...], Call]] = ()
+        self._states: dict[int, Any] = {}
+        self._numbers = count()
+        self._commands: dict[str, Callable[..., Any]] = {
+            "bind": self._bind,
+            "set": instance.set,
+            "get": instance.get,
+            "enter_initialization_mode": instance.enter_initialization_mode,
+            "exit_initialization_mode": instance.exit_initialization_mode,
+            "set_inputs": self._set_inputs,
+            "do_step": instance.do_step,
+            "get_outputs": self._get_outputs,
+            "prepare": self._prepare,
+            "turn": self._turn_with_texts,
+            "get_state": self._get_state,
+            "set_state": lambda number: instance.set_state(self._states[number]),
+            "free_state": lambda number: instance.free_state(self._states.pop(number)),
+            "terminate": instance.terminate,
+            "free": instance.free,
+        }
+
+    def serve(self, commands: int, answers: int, temporary: Path) -> None:
+        """Until there is nobody any more who commands; `temporary` is where the FMU may put temporary files."""
+        gc.freeze()
+        self._block.keep_others_out()
+        journals.keep(self._block.journal)
+        tempfile.tempdir = os.environ["TMPDIR"] = str(temporary)
+        voice = _Voice(answers)
+        speaker = logging.getLogger("cosim.component")
+        speaker.handlers, speaker.propagate, speaker.level = [voice], False, logging.INFO
+        while line := read_line(commands):
+            voice.say(self._answer(line))
+
+    def _answer(self, line: bytes) -> bytes:
+        try:
+            if line == TURN:
+                result = self._turn()
+            else:
+                command, *arguments = decode(line)
+                result = self._commands[command](*arguments)
+                log.tell_what_was_cut()
+            return DONE if result is None else encode({"value": result})
+        except ComponentError as error:
+            failed = error.component, error.function, error.reason, error.time
+            return encode({"failed": failed, "corrupt": self._instance.corrupt})
+        except InputError as error:
+            return encode({"refused": [str(problem) for problem in error.problems]})
+        except Exception as error:
+            return encode({"failed": (self._instance.name, "its own process", f"{type(error).__name__}: {error}", None)})
+
+    def _bind(self) -> None:
+        self._enter()
+        self._instance.bind(self._block.inputs, self._block.outputs)
+
+    # -- texts do not lie in shared memory -----------------------------------------------------------------------------
+
+    def _set_inputs(self, given: list[Any]) -> None:
+        self._in[:] = given
+        self._instance.set_inputs()
+
+    def _get_outputs(self) -> list[Any] | None:
+        self._instance.get_outputs()
+        return self._out.tolist() or None
+
+    def _turn_with_texts(self, given: list[Any]) -> tuple[StepResult | None, list[Any]]:
+        self._in[:] = given
+        return self._turn(), self._out.tolist()
+
+    # -- the hot path --------------------------------------------------------------------------------------------------
+
+    def _prepare(self, step_size: float) -> list[str]:
+        """Names of the calls of a turn, by the number that stands in the journal."""
+        calls = self._instance.turn(self._block.clock, step_size)
+        self._calls = [(number, call.function, call.arguments, call) for number, call in enumerate(calls)]
+        self._block.journal.enter(Phase.STEPPING)
+        return [call.name for call in calls]
+
+    def _turn(self) -> StepResult | None:
+        journal, warning, traps = self._block.journal, WARNING, _traps
+        # equal in the default rounding mode only, and the least denormal is no zero only if it is not flushed
+        one, little, least = 1.0, 2.0**-54, 5e-324
+        for number, function, arguments, call in self._calls:
+            journal[CALL] = number
+            status = function(*arguments)
+            if status > warning:
+                return self._instance.failed(call.name, status)
+            if one + little != one - little or not least + least or traps():
+                raise ComponentError(self._instance.name, call.name, FLOAT_STATE, self._block.clock.value)
+        return None
+
+    # -- states stay here ----------------------------------------------------------------------------------------------
+
+    def _get_state(self) -> int:
+        number = next(self._numbers)
+        self._states[number] = self._instance.get_state()
+        return number
+
+
+class _Voice(logging.Handler):
+    """Messages of the FMU, from whatever thread, as lines to the importer."""
+
+    def __init__(self, writer: int):
+        super().__init__()
+        self._writer, self._lock = writer, Lock()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        arguments = record.args if isinstance(record.args, tuple) else ()
+        text = arguments[1] if len(arguments) == 2 else record.getMessage()
+        self.say(encode({"log": (record.levelno, text)}))
+
+    def say(self, line: bytes) -> None:
+        with self._lock:
+            write(self._writer, line)
+
+
+def _find_traps() -> Callable[[], int]:
+    """Which floating-point exceptions end the process, as the C library tells; 0 where it does not."""
+    try:
+        traps: Callable[[], int] = ctypes.PyDLL(None).fegetexcept
+    except AttributeError:
+        return lambda: 0
+    return traps
+
+
+_traps = _find_traps()

@@ -1,0 +1,46 @@
+"""Recordings as Parquet, column by column in the signals' own types: about a fifth of a CSV file's size (extra `parquet`)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..recording import Recording
+from .files import pieces, replacing
+
+ROWS_AT_A_TIME = 1 << 17
+
+
+def require_parquet() -> None:
+    """Raises InputError when the package that writes Parquet is not installed."""
+    try:
+        import pyarrow.parquet  # noqa: F401
+    except ImportError:
+        raise InputError('Parquet files need the package pyarrow: pip install "fmi-cosim[parquet]"') from None
+
+
+def write_parquet(recording: Recording, path: str | Path) -> None:
+    """Write `recording` to `path`, which is replaced only when the file is complete; rows go to disk group by group.
+
+    The first column is `time` (s); the unit of a column stands in the metadata of its field. Raises InputError when the file
+    cannot be written or the package pyarrow is not installed.
+    """
+    require_parquet()
+    import pyarrow as pa
+    from pyarrow.parquet import ParquetWriter
+
+    columns = {"time": recording.time, **recording.columns}
+    units = {"time": "s", **recording.units}
+    schema = pa.schema([pa.field(name, _type(pa, values), metadata={"unit": units[name]}) for name, values in columns.items()])
+    with replacing(path) as temporary, ParquetWriter(temporary, schema) as writer:
+        for piece in pieces(list(columns.values()), ROWS_AT_A_TIME):
+            values = (np.ascontiguousarray(column[piece]) for column in columns.values())
+            arrays = [pa.array(part, field.type) for part, field in zip(values, schema, strict=True)]
+            writer.write_batch(pa.record_batch(arrays, schema=schema))
+
+
+def _type(pa: Any, values: np.ndarray) -> Any:
+    return pa.string() if values.dtype == object else pa.from_numpy_dtype(values.dtype)

@@ -1,0 +1,126 @@
+"""The vehicles of a world: one step of all of them together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .arguments import Arguments, Platform
+from .bullet import pybullet
+from .clearance import Clearance, Enclosure
+from .contacts import Contacts
+from .memory import Memory
+from .shadow import Shadow, UnsoundError
+from .vehicles.alarms import UNSOUND
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The state of a fleet: Bullet's, which Bullet keeps under a number, and ours."""
+
+    bullet: int
+    memory: np.ndarray
+    flags: np.ndarray
+    near: Sequence[bool]
+
+
+class Fleet:
+    """Vehicles that move by their own equations, and meet each other and the platforms in Bullet.
+
+    `step` holds the length of a step (s); `flags` has a row (touching, vessel) for each vehicle. `inputs` and `outputs` are
+    the real variables of all vehicles, in order.
+    """
+
+    def __init__(self, client: int, read: Arguments, step: np.ndarray, flags: np.ndarray):
+        self._client, self._flags = client, flags
+        self._memory = memory = Memory([spawn.model.shadow.sizes(spawn.model) for spawn in read.vehicles])
+        self.shadows: list[Shadow] = [
+            spawn.model.shadow(client, spawn, pieces | {"step": step})
+            for spawn, pieces in zip(read.vehicles, memory.parts, strict=True)
+        ]
+        self.inputs, self.outputs = memory.whole["inputs"], memory.whole["outputs"]
+        self.contacts = Contacts(client, self.shadows, self.outputs, flags)
+        vehicles = [shadow.enclosure(shadow.model.body) for shadow in self.shadows]
+        platforms = [_enclosure(platform) for platform in read.platforms]
+        self.clearance = Clearance(vehicles, platforms, *(memory.whole[name] for name in ("path", "anchor", "leash")))
+        self._predict, self._correct = [shadow.predict for shadow in self.shadows], [shadow.correct for shadow in self.shadows]
+        # memoryviews: numpy takes longer for so few numbers
+        self._alarms: Any = memory.whole["alarm"].data
+        self._impulses: Any = memory.whole["impulse"].data
+        #: whether a vehicle may have left what it was near
+        self._leaving = True
+        self._choose([True] * len(self.shadows))
+
+    def advance(self, share: float) -> None:
+        """One step, which is this share of the component's. Raises UnsoundError; if before the step, nothing has moved."""
+        for predict in self._predict:
+            predict()
+        if self._leaving or any(self._alarms):
+            self._look_around()
+        if self._push:
+            self._collide()
+        for correct in self._correct:
+            correct()
+        if self._push:
+            self._find_contacts(share)
+
+    def _look_around(self) -> None:
+        """Let Bullet take part for those that are near something."""
+        if UNSOUND in self._alarms:
+            raise UnsoundError(self.shadows[self._alarms.tolist().index(UNSOUND)].fault())
+        near = self.clearance.survey()
+        if near != self._near:
+            for shadow, is_near, was_near in zip(self.shadows, near, self._near, strict=True):
+                if is_near != was_near:
+                    shadow.engage(is_near)
+            self._choose(near)
+        self._leaving = False
+
+    def _choose(self, near: Sequence[bool]) -> None:
+        """Make steps of Bullet ready, in which these vehicles take part."""
+        self._near = near
+        engaged = [shadow for shadow, is_near in zip(self.shadows, near, strict=True) if is_near]
+        self._push, self._measure = [shadow.push for shadow in engaged], [shadow.measure for shadow in engaged]
+        self._parked = len(self.shadows) - len(engaged)
+
+    def _collide(self) -> None:
+        """One step of Bullet."""
+        for push in self._push:
+            push()
+        pybullet.stepSimulation(self._client)
+        for measure in self._measure:
+            measure()
+
+    def _find_contacts(self, share: float) -> None:
+        impulses = self._impulses.tolist()
+        self._leaving = impulses.count(0.0) > self._parked
+        if total := sum(impulses):
+            if math.isnan(total):
+                culprit = next(shadow for shadow, value in zip(self.shadows, impulses, strict=True) if math.isnan(value))
+                raise UnsoundError(f"{culprit.name}: the contact forces are not finite")
+            self.contacts.add(share)
+
+    # -- state ---------------------------------------------------------------------------------------------------------
+
+    def get_state(self) -> Snapshot:
+        return Snapshot(pybullet.saveState(self._client), self._memory.block.copy(), self._flags.copy(), self._near)
+
+    def set_state(self, state: Snapshot) -> None:
+        pybullet.restoreState(state.bullet, physicsClientId=self._client)
+        self._memory.block[:], self._flags[:] = state.memory, state.flags
+        self._choose(state.near)
+        self._leaving = True
+        self.contacts.any = bool(state.flags.any())
+
+    def free_state(self, state: Snapshot) -> None:
+        pybullet.removeState(state.bullet, physicsClientId=self._client)
+
+
+def _enclosure(platform: Platform) -> Enclosure:
+    x, y, z = platform.position
+    half_x, half_y, half_z = (edge / 2 for edge in platform.size)
+    return Enclosure((x - half_x, y - half_y, z - half_z), (x + half_x, y + half_y, z + half_z))

@@ -1,0 +1,69 @@
+"""A component that takes its time, and a figure and a KPI that do."""
+
+import time
+from contextlib import suppress
+from pathlib import Path
+
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+
+def dawdle(where):
+    """Say that this place is reached, and stay for long."""
+    Path(f"reached-{where}").touch()
+    time.sleep(60)
+
+
+class Ticker(Fmi2Slave):
+    """Each step lasts `pause` s; `count` counts the steps and `clock` is the wall clock (s) at their ends.
+
+    `slow` names the place where it stays: load, initialization, step, stubborn (a step that no interrupt ends), or nowhere.
+    """
+
+    def __init__(self, pause=0.002, slow="", **arguments):
+        super().__init__(**arguments)
+        self.pause, self.slow, self.count, self.clock = pause, slow, 0.0, 0.0
+        for name in ("count", "clock"):
+            self.register_variable(Real(name, causality=Fmi2Causality.output))
+        if slow == "load":
+            dawdle("load")
+
+    def exit_initialization_mode(self):
+        if self.slow == "initialization":
+            dawdle("initialization")
+        self.clock = time.monotonic()
+        Path("started").write_text(repr(self.clock))
+
+    def do_step(self, current_time, step_size):
+        time.sleep(self.pause)
+        self.count, self.clock = self.count + 1, time.monotonic()
+        if self.count == 20:
+            self.twentieth_step()
+        return True
+
+    def twentieth_step(self):
+        if self.slow == "step":
+            dawdle("step")
+        while self.slow == "stubborn":
+            with suppress(KeyboardInterrupt):
+                dawdle("stubborn")
+
+
+def rows(result):
+    return {"number": len(result.time)}
+
+
+def slow_kpi(result):
+    dawdle("kpi")
+    return {"value": 1}
+
+
+def slow_figure(result):
+    dawdle("figure")
+
+
+def picture(result):
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    figure.add_subplot().plot(result.time, result["ticker.count"])
+    return figure
