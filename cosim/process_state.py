@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -72,6 +73,7 @@ def contained(who: str) -> Iterator[None]:
             log.message(who, log.WARNING, f"changed {what} of the process; it was changed back")
 
 
+@cache
 def _c() -> Any:
     library = ctypes.CDLL(None)
     library.setlocale.restype = ctypes.c_char_p
@@ -92,7 +94,7 @@ def _environment() -> dict[bytes, bytes]:
     """The C library's environment; Python's own copy is not changed by foreign code."""
     if sys.platform != "linux":
         return {}
-    entries = ctypes.POINTER(ctypes.c_char_p).in_dll(ctypes.CDLL(None), "environ")
+    entries = ctypes.POINTER(ctypes.c_char_p).in_dll(_c(), "environ")
     found, i = {}, 0
     while entries and entries[i] is not None:
         name, _, value = entries[i].partition(b"=")

@@ -30,9 +30,9 @@ def command(
 ) -> int:
     """Compare RESULT with REFERENCE, each of them a CSV file or a folder that `cosim run` wrote.
 
-    Every signal of the reference has to stay within the larger of the absolute and the relative tolerance in value, and within the
-    one in time; without any it has to be equal. REFERENCE may also be a scenario: then its reference and its tolerances
-    count. Ends with 3 when a signal leaves its tube, is missing, ends early, or is not finite.
+    Every signal of the reference has to stay within the larger of the absolute and the relative tolerance in value, and
+    within the one in time; without any it has to be equal. REFERENCE may also be a scenario: then its reference and its
+    tolerances count. Ends with 3 when a signal leaves its tube, is missing, ends early, or is not finite.
     """
     from ..compare import Tolerance, compare
 

@@ -19,9 +19,9 @@ from .tube import Points, Tolerance, Tube, Windows, slack
 class Verdict(NamedTuple):
     """What became of one signal: `problem` says how it fails, "" when it does not.
 
-    `time` (s) is when it first does, -inf when that has no time. `excess` is the largest distance from the tube in half widths of the
-    tube, inf where nothing can be compared or the tube has no width. Where nothing is outside, it is at most 0, and says how far
-    values are from the reference at their own time: -1 on it.
+    `time` (s) is when it first does: -inf when that has no time, inf when it never does. `excess` is the largest distance
+    outside the tube in half widths of the tube, inf where nothing can be compared or the tube has no width. Where nothing is
+    outside, it is at most 0, and says how far values are from the reference at their own time: -1 on it.
     """
 
     signal: str
@@ -68,9 +68,9 @@ class Comparison:
 def compare(result: Result, reference: Result, tolerances: Mapping[str, Tolerance]) -> Comparison:
     """Hold the signals of `reference` that match a pattern of `tolerances` against those of `result`.
 
-    "*" in a pattern matches anything, dots too; of several patterns that match, the last one counts. A signal fails when it leaves its
-    tube (see `tube`), is missing, does not cover the time of the reference, or is NaN or infinite in either; texts fail
-    where they are not equal. A pattern that matches nothing fails as well, so a comparison of nothing does not pass.
+    "*" in a pattern matches anything, dots too; of several patterns that match, the last one counts. A signal fails when it
+    leaves its tube (see `tube`), is missing, does not cover the time of the reference, or is NaN or infinite in either; texts
+    fail where they are not equal. A pattern that matches nothing fails as well, so a comparison of nothing does not pass.
     """
     chosen = matched(tolerances, list(reference))
     idle = [pattern for pattern in tolerances if not reference.signals(pattern)]

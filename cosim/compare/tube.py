@@ -61,7 +61,7 @@ class Windows:
         return tuple(self._chosen(choose, choose(begins, ends), reference) for choose in (np.minimum, np.maximum))  # type: ignore
 
     def _chosen(self, choose: np.ufunc, found: np.ndarray, row: np.ndarray) -> np.ndarray:
-        """Over all rows inside: after k rounds `row[i]` is the extreme of the 2**k rows from i on, and two of those make a window."""
+        """Over all rows inside: after k rounds `row[i]` is the extreme of the 2**k rows from i on; two of those make a window."""
         for k, (windows, left, right) in enumerate(self._levels):
             if k:
                 row = choose(row[: -(2 ** (k - 1))], row[2 ** (k - 1) :])

@@ -5,7 +5,7 @@ from .description import DefaultExperiment, Description
 from .file import FmuFile
 from .fmi2 import Fmi2Instance
 from .fmi3 import Fmi3Instance
-from .isolated import Isolation, RemoteFmu
+from .isolated import Isolation
 
 __all__ = ["DefaultExperiment", "Description", "FmuFile", "Isolation", "instantiate"]
 
@@ -17,5 +17,7 @@ def instantiate(file: FmuFile, instance_name: str, logging_on: bool = False, iso
     """
     kind = Fmi2Instance if file.description.major == 2 else Fmi3Instance
     if isolation:
+        from .isolated.remote import RemoteFmu
+
         return RemoteFmu(kind, file, instance_name, logging_on, isolation)
     return kind(file, instance_name, logging_on)

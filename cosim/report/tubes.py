@@ -28,7 +28,7 @@ def tubes(
     panels = figure.subplots(len(worst), sharex=True, squeeze=False)[:, 0]
     for axes, verdict in zip(panels, worst, strict=True):
         _panel(axes, comparer, verdict, chosen[verdict.signal], result, reference)
-    panels[0].legend(loc="best", ncols=3)
+    panels[0].legend(loc="best", ncols=4)
     panels[-1].set_xlabel("time (s)")
     return figure
 

@@ -39,33 +39,32 @@ def test_a_crash_is_named_and_the_importer_goes_on(fmus, runner, tmp_path, case,
     Case("EnterInitializationMode 1 loop", FAILED, rows=0),
     Case("Instantiate 1 sleep", FAILED, rows=0),
     Case("load 1 loop", LATE, rows=0),
-    Case("Terminate 1 loop", "{f}", codes=(0,), rows=ALL),
-    Case("FreeInstance 1 loop", "{f}", codes=(0,), rows=ALL),
+    Case("Terminate 1 loop", "{f}", code=0, rows=ALL),
+    Case("FreeInstance 1 loop", "{f}", code=0, rows=ALL),
 )
 def test_a_hang_ends_at_its_deadline(fmus, runner, tmp_path, case, version):
     done = run(runner, tmp_path, {"lag": fmus(version, case.order)}, deadlines=DEADLINES, limit=20)
     check(done, case, version)
-    assert done.seconds < 1.0 + 0.5 + SLACK
+    assert done.seconds < 0.5 + 0.5 + SLACK
 
 
 @table(
-    Case("DoStep 6 change_folder", codes=(0,), rows=ALL),
-    Case("DoStep 6 change_environment", codes=(0,), rows=ALL),
-    Case("DoStep 6 ignore_interrupts", codes=(0,), rows=ALL),
+    Case("DoStep 6 change_folder", code=0, rows=ALL),
+    Case("DoStep 6 change_environment", code=0, rows=ALL),
+    Case("DoStep 6 ignore_interrupts", code=0, rows=ALL),
     Case("DoStep 6 round_up", T5 + "changed the floating-point mode"),
     Case("DoStep 6 flush_to_zero", T5 + "changed the floating-point mode"),
     Case("DoStep 6 fp_traps", T5 + "changed the floating-point mode"),
-    Case("DoStep 6 thread", codes=(0,), rows=ALL),
-    Case("DoStep 6 close_output", codes=(0,), rows=ALL),
-    Case("DoStep 6 log_thread", codes=(0,), rows=ALL),
-    Case("DoStep 6 flood_stdout", codes=(0,), rows=ALL),
-    Case("DoStep 6 flood_stderr", codes=(0,), rows=ALL),
-    Case("DoStep 6 read_stdin", codes=(0,), rows=ALL),
-    Case("DoStep 6 fork", codes=(0,), rows=ALL),
-    Case("DoStep 6 close_all", FAILED.format(f="lag"), rows=6),
+    Case("DoStep 6 thread", code=0, rows=ALL),
+    Case("DoStep 6 close_output", code=0, rows=ALL),
+    Case("DoStep 6 log_thread", code=0, rows=ALL),
+    Case("DoStep 6 flood_stdout", code=0, rows=ALL),
+    Case("DoStep 6 flood_stderr", code=0, rows=ALL),
+    Case("DoStep 6 read_stdin", code=0, rows=ALL),
+    Case("DoStep 6 fork", code=0, rows=ALL),
+    Case("DoStep 6 close_all", code=0, rows=ALL),
 )
 def test_what_an_fmu_does_to_its_process_stays_there(fmus, runner, tmp_path, case, version):
-    case = case if "close_all" not in case.order else Case(case.order, T5, case.codes, case.rows)
     done = run(runner, tmp_path, {"lag": fmus(version, case.order)}, deadlines={"step": 3.0})
     check(done, case, version)
     assert len(done.err) < 100_000
@@ -98,16 +97,15 @@ def test_the_others_end_in_order(fmus, runner, tmp_path, version):
     assert done.code == 1
     assert f"second: fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.err
     assert [row["first.y"] for row in done.rows] == [lag_output(n) for n in range(6)]
-    assert [who for who, what in calls(fmus.lines()) if what == "FreeInstance"] == ["first", "third"]
+    assert {who for who, what in calls(fmus.lines()) if what == "FreeInstance"} == {"first", "third"}
     assert (done.processes, done.changes, done.temporaries) == ([], [], [])
 
 
 @pytest.mark.parametrize("order", ["GetReal 9 discard", "DoStep 3 error", "DoStep 3 fatal", "EnterInitializationMode 1 fatal"])
 def test_nothing_forbidden_follows_a_bad_status(fmus, runner, tmp_path, version, order):
-    """The standard ends all instances of an FMU when one reports a fatal error: those in other processes, too."""
-    function, when, status = order.split()
+    function, _, status = order.split()
     names = {"GetReal": "GetFloat64"} if version == 3 else {}
-    done = run(runner, tmp_path, {"lag": fmus(version, order), "twin": fmus(version, name="other")})
+    done = run(runner, tmp_path, {"lag": fmus(version, order)})
     assert done.code == 1
     assert f"lag: fmi{version}{names.get(function, function)} failed at t = " in done.err
     assert f"status {['warning', 'discard', 'error', 'fatal'].index(status) + 1} ({status})" in done.err
@@ -115,6 +113,7 @@ def test_nothing_forbidden_follows_a_bad_status(fmus, runner, tmp_path, version,
 
 
 def test_fatal_of_one_instance_is_the_end_of_all_instances(fmus, runner, tmp_path, version):
+    """So the standard wants it: those in other processes, too."""
     components = dict.fromkeys(("lag", "twin"), fmus(version))
     assert run(runner, tmp_path, components, "--set", "lag.fault=DoStep 3 fatal").code == 1
     assert violations(fmus.lines()) == []

@@ -8,6 +8,5 @@ A worker is forked from the importer, which takes some milliseconds; a step is o
 """
 
 from .isolation import Isolation
-from .remote import RemoteFmu
 
-__all__ = ["Isolation", "RemoteFmu"]
+__all__ = ["Isolation"]

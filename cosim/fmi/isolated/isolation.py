@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ...journal import Deadlines
-from ...sandbox import Settings, enter, interpreter_folders
 
 
 @dataclass(frozen=True)
@@ -20,6 +19,8 @@ class Isolation:
 
     def entrance(self, fmu: Path, temporary: Path, importer: int) -> Callable[[], None]:
         """What a worker of the process `importer` does before it loads foreign code; raises InputError where it cannot."""
+        from ...sandbox import Settings, enter, interpreter_folders
+
         readable = (fmu, *interpreter_folders()) if self.sandbox else ()
         confine = "required" if self.sandbox else "never"
         settings = Settings(readable=readable, writable=(temporary,), confine=confine, parent=importer)  # type: ignore[arg-type]

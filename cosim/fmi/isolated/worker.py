@@ -6,6 +6,7 @@ import ctypes
 import gc
 import logging
 import os
+import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from itertools import count
@@ -21,6 +22,8 @@ from ...journal import CALL, Phase
 from ..instance import WARNING, FmuInstance
 from .block import Block, texts
 from .lines import DONE, TURN, decode, encode, read_line, write
+
+_LONGEST_MESSAGE = 1 << 20
 
 FLOAT_STATE = "changed the floating-point mode (rounding, flush to zero or traps) and did not restore it"
 
@@ -58,6 +61,7 @@ class Worker:
         self._block.keep_others_out()
         journals.keep(self._block.journal)
         tempfile.tempdir = os.environ["TMPDIR"] = str(temporary)
+        log.PER_SECOND, log.LONGEST = sys.maxsize, _LONGEST_MESSAGE  # the importer cuts and counts
         voice = _Voice(answers)
         speaker = logging.getLogger("cosim.component")
         speaker.handlers, speaker.propagate, speaker.level = [voice], False, logging.INFO
@@ -71,7 +75,6 @@ class Worker:
             else:
                 command, *arguments = decode(line)
                 result = self._commands[command](*arguments)
-                log.tell_what_was_cut()
             return DONE if result is None else encode({"value": result})
         except ComponentError as error:
             failed = error.component, error.function, error.reason, error.time

@@ -1,0 +1,75 @@
+"""`cosim compare`, as a user meets it."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+
+def cosim(*arguments):
+    command = [sys.executable, "-m", "cosim", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def csv(path, offset=0.0, delay=0.0):
+    """At rest for a second, then a sine."""
+    rows = (f"{t:.17g},{np.sin(max(t - delay - 1, 0)) + offset:.17g}" for t in np.arange(0, 601) / 100)
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("\n".join(['"time","plant.x"', *rows]) + "\n")
+    return path
+
+
+def test_equal_files_compare_equal(tmp_path):
+    done = cosim("compare", csv(tmp_path / "a.csv"), csv(tmp_path / "b.csv"))
+    assert (done.returncode, done.stdout) == (0, "all 1 signals stay in their tubes\n")
+
+
+def test_a_folder_of_a_run_is_a_result(tmp_path):
+    csv(tmp_path / "run" / "result.csv")
+    assert cosim("compare", tmp_path / "run", csv(tmp_path / "b.csv")).returncode == 0
+
+
+def test_leaving_the_tube_ends_with_three_and_says_where(tmp_path):
+    done = cosim("compare", csv(tmp_path / "a.csv", offset=0.2), csv(tmp_path / "b.csv"), "--absolute", "0.1")
+    assert done.returncode == 3
+    assert done.stderr.splitlines()[0] == "1 of 1 signals fail"
+    assert done.stderr.splitlines()[1].startswith("plant.x leaves its tube at t = 0 s: 0.2 is 0.1 above 0.1;")
+
+
+@pytest.mark.parametrize(("time", "code"), [("0.2", 0), ("0.05", 3)])
+def test_a_shift_is_forgiven_within_the_tolerance_in_time(tmp_path, time, code):
+    shifted, reference = csv(tmp_path / "a.csv", delay=0.1), csv(tmp_path / "b.csv")
+    assert cosim("compare", shifted, reference, "--time", time, "--relative", "0.01").returncode == code
+
+
+def test_a_scenario_brings_reference_and_tolerances(tmp_path):
+    csv(tmp_path / "reference.csv")
+    components = {"a": {"fmu": "a.fmu"}}
+    tolerances = {"plant.*": {"absolute": 0.3}}
+    scenario = {"name": "s", "stop_time": 6, "step_size": 0.01, "components": components}
+    path = tmp_path / "s.json"
+    path.write_text(json.dumps({**scenario, "reference": {"file": "reference.csv", "tolerances": tolerances}}))
+    assert cosim("compare", csv(tmp_path / "a.csv", offset=0.2), path).returncode == 0
+    assert cosim("compare", csv(tmp_path / "a.csv", offset=0.4), path).returncode == 3
+    path.write_text(json.dumps(scenario))
+    refused = cosim("compare", tmp_path / "a.csv", path)
+    assert (refused.returncode, refused.stderr) == (2, f'{path} names no "reference"\n')
+
+
+def test_the_picture_shows_the_tube_and_what_is_outside(tmp_path):
+    picture = tmp_path / "tubes.png"
+    outside = csv(tmp_path / "a.csv", offset=0.2)
+    assert cosim("compare", outside, csv(tmp_path / "b.csv"), "--absolute", "0.1", "--plot", picture).returncode == 3
+    pixels = 255 * imread(picture)[::2, ::2, :3].reshape(-1, 3)
+    for colour in ((213, 94, 0), (204, 227, 240)):  # points outside; a fifth of the reference's blue on white
+        assert np.abs(pixels - colour).max(axis=1).min() < 2
+
+
+def test_what_cannot_be_read_is_refused(tmp_path):
+    missing = cosim("compare", tmp_path / "none.csv", csv(tmp_path / "b.csv"))
+    assert (missing.returncode, "none.csv" in missing.stderr) == (2, True)
+    assert cosim("compare", tmp_path / "b.csv", tmp_path / "b.csv", "--plot", "x.pdf").returncode == 2
+    assert cosim("compare", tmp_path / "b.csv", tmp_path / "b.csv", "--absolute", "-1").returncode == 2

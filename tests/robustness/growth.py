@@ -1,0 +1,58 @@
+"""How much a process grows over many runs, or over the steps of one run: `python growth.py SCENARIO runs|steps COUNT`.
+
+Prints JSON: growth of the resident memory (bytes) after a tenth of the work, and of open descriptors, threads, child processes
+and temporary files.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import sys
+import tempfile
+from fractions import Fraction
+from pathlib import Path
+
+import cosim
+
+NOTHING = {"/record": {"signals": []}, "/kpis": [], "/checks": [], "/figures": []}
+
+
+def inventory() -> dict[str, int]:
+    gc.collect()
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return {
+        "memory": pages * os.sysconf("SC_PAGE_SIZE"),
+        "descriptors": len(os.listdir("/proc/self/fd")),
+        "threads": len(os.listdir("/proc/self/task")),
+        "children": len(Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()),
+        "temporaries": len(os.listdir(tempfile.gettempdir())),
+    }
+
+
+def over_runs(scenario: str, count: int) -> list[dict[str, int]]:
+    """After a tenth of the runs, and after all of them."""
+    looks = []
+    for n in range(1, count + 1):
+        cosim.run(scenario, NOTHING | {"/record": {"signals": ["*"]}}, stop_time=0.05)
+        if n in (count // 10, count):
+            looks.append(inventory())
+    return looks
+
+
+def over_steps(scenario: str, count: int) -> list[dict[str, int]]:
+    """After a tenth of the steps, and after all of them."""
+    looks = []
+
+    def look(finished: int, steps: int) -> None:
+        if finished in (steps // 10, steps):
+            looks.append(inventory())
+
+    cosim.run(scenario, NOTHING, stop_time=str(Fraction(count, 100)), observers=[look])
+    return looks
+
+
+if __name__ == "__main__":
+    before, after = {"runs": over_runs, "steps": over_steps}[sys.argv[2]](sys.argv[1], int(sys.argv[3]))
+    print(json.dumps({what: after[what] - before[what] for what in before}))
