@@ -63,6 +63,14 @@ class Outcome:
     interrupted: bool = False
 
 
+def possible() -> bool:
+    """Whether this process can fork, and prints to files that a child can share (a test's or a notebook's own streams are none)."""
+    try:
+        return hasattr(os, "fork") and sys.stdout.fileno() >= 0 and sys.stderr.fileno() >= 0
+    except (OSError, AttributeError):
+        return False
+
+
 def supervised(entry: Callable[[], int]) -> Outcome:
     """Run `entry` in a child process that keeps a journal (see `journal.current`); it returns an exit code and never raises."""
     journal = Journal(mmap.mmap(-1, journals.SIZE))

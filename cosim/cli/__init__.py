@@ -19,6 +19,7 @@ COMMANDS = {
     "check": ("check", "Load, wire and validate a scenario; print the expanded system."),
     "simulate": ("simulate", "Simulate one FMU alone."),
     "compare": ("compare", "Compare a result with a reference, signal by signal."),
+    "regress": ("regress", "Run all scenarios that have checks or references, and hold them against these."),
     "plot": ("plot", "Draw the figures of finished runs again."),
     "info": ("info", "Print what an FMU says about itself."),
     "validate": ("validate", "Examine FMUs against the FMI standard without running them."),

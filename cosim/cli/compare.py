@@ -36,6 +36,8 @@ def command(
     """
     from ..compare import Tolerance, compare
 
+    if plot and plot.suffix not in (".png", ".svg"):
+        raise click.BadParameter(f'"{plot}" is neither .png nor .svg', param_hint="--plot")
     if reference.suffix == ".json":
         file, tolerances = _of_scenario(reference)
     else:
@@ -70,7 +72,5 @@ def _draw(result: Result, reference: Result, tolerances: Mapping[str, Tolerance]
     from ..report.figures import draw, save
     from ..report.tubes import tubes
 
-    if path.suffix not in (".png", ".svg"):
-        raise click.BadParameter(f'"{path}" is neither .png nor .svg', param_hint="--plot")
     arguments = {"reference": reference, "tolerances": tolerances, "comparison": comparison}
     save(draw(result, "tubes", tubes, arguments), path)

@@ -40,10 +40,10 @@ def protected(entry: Callable[[], int], isolation: str, salvage: Callable[[Outco
 
     Raises ComponentError for the component that was to blame, KeyboardInterrupt when the user ended the child.
     """
-    if isolation == "none":
-        return entry()
-    from ..supervise import supervised
+    from ..supervise import possible, supervised
 
+    if isolation == "none" or not possible():
+        return entry()
     outcome = supervised(lambda: guarded(entry))
     if outcome.warning:
         click.echo(f"WARNING {outcome.warning}", err=True)

@@ -110,6 +110,11 @@ class Comparer:
         half_width = tolerance.half_width(reference)
         return Tube(time, lower - half_width, upper + half_width)
 
+    def outside(self, name: str, tolerance: Tolerance) -> np.ndarray:
+        """Whether the result is outside the tube around a signal, at each of `points`."""
+        tube, values = self.tube(name, tolerance), self.points.values(_numbers(self._result, name))
+        return (values < tube.lower) | (values > tube.upper)
+
     def verdict(self, name: str, tolerance: Tolerance) -> Verdict:
         if problem := next(self._obstacles(name), None):
             return problem

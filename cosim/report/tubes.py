@@ -41,8 +41,7 @@ def _panel(axes: Axes, comparer: Comparer, verdict: Verdict, tolerance: Toleranc
     axes.plot(result.time, result[name], color="black", label="result", linewidth=0.9)
     if not verdict.passed:
         axes.axvline(verdict.time, color=OUTSIDE, linewidth=0.8)
-        values = comparer.points.values(result[name])
-        outside = (values < tube.lower) | (values > tube.upper)
+        values, outside = comparer.points.values(result[name]), comparer.outside(name, tolerance)
         axes.plot(tube.time[outside], values[outside], ".", color=OUTSIDE, markersize=2, label="outside")
     axes.set_xlim(reference.time[0], reference.time[-1])
     axes.set_title(name, loc="left")

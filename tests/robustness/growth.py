@@ -1,7 +1,7 @@
 """How much a process grows over many runs, or over the steps of one run: `python growth.py SCENARIO runs|steps COUNT`.
 
-Prints JSON: growth of the resident memory (bytes) after a tenth of the work, and of open descriptors, threads, child processes
-and temporary files.
+Prints JSON: growth of the resident memory (bytes), and of open descriptors, threads, child processes and temporary files, from
+the end of a warm-up on (the first runs, or a tenth of the steps).
 """
 
 from __future__ import annotations
@@ -18,25 +18,31 @@ import cosim
 
 NOTHING = {"/record": {"signals": []}, "/kpis": [], "/checks": [], "/figures": []}
 
+WARM_UP = 20
+
 
 def inventory() -> dict[str, int]:
     gc.collect()
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return {
         "memory": pages * os.sysconf("SC_PAGE_SIZE"),
-        "descriptors": len(os.listdir("/proc/self/fd")),
-        "threads": len(os.listdir("/proc/self/task")),
+        "descriptors": entries("/proc/self/fd"),
+        "threads": entries("/proc/self/task"),
         "children": len(Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()),
-        "temporaries": len(os.listdir(tempfile.gettempdir())),
+        "temporaries": entries(tempfile.gettempdir()),
     }
 
 
+def entries(folder: str) -> int:
+    return sum(1 for _ in Path(folder).iterdir())
+
+
 def over_runs(scenario: str, count: int) -> list[dict[str, int]]:
-    """After a tenth of the runs, and after all of them."""
+    """After the first runs, in which caches and memory pools fill, and after as many as asked for."""
     looks = []
-    for n in range(1, count + 1):
+    for n in range(1, WARM_UP + count + 1):
         cosim.run(scenario, NOTHING | {"/record": {"signals": ["*"]}}, stop_time=0.05)
-        if n in (count // 10, count):
+        if n in (WARM_UP, WARM_UP + count):
             looks.append(inventory())
     return looks
 

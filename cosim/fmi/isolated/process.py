@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import NoReturn
 
 from ... import log
-from ...journal import waiting
-from ...supervise import LARGEST_OUTPUT, ending
+from ...journal import CALL, CHANGES, Journal, waiting
+from ...supervise import LARGEST_OUTPUT, LOOK, ending
 from .lines import DONE, PIECE, decode, write
 
 #: so long (ms) a wait is a usual one, which the supervisor of the run looks after, too
@@ -32,10 +32,13 @@ class Lost(Exception):
 
 
 class Process:
-    """A process that answers lines with lines. What it prints goes to standard error, up to a limit."""
+    """A process that answers lines with lines and keeps a journal. What it prints goes to standard error, up to a limit.
 
-    def __init__(self, name: str, serve: Callable[[int, int], None]):
-        self._name = name
+    `serve` runs in it, with the descriptors where commands come from and answers go to.
+    """
+
+    def __init__(self, name: str, journal: Journal, serve: Callable[[int, int], None]):
+        self._name, self._journal = name, journal
         commands, self._writer = os.pipe()
         self._reader, answers = os.pipe()
         self._output, printed = os.pipe()
@@ -50,6 +53,7 @@ class Process:
         for descriptor in (self._reader, self._output, self._died):
             if descriptor >= 0:
                 self._poll.register(descriptor, select.POLLIN)
+        self._opened = [d for d in (self._writer, self._reader, self._output, self._died) if d >= 0]
         self._usual = [(self._reader, select.POLLIN)]
         self._rest, self._printed = b"", 0
 
@@ -68,15 +72,28 @@ class Process:
             self._lost()
 
     def _answer(self, deadline: float) -> bytes:
-        end = time.monotonic() + deadline
+        """The deadline holds for each call into the FMU that the worker's journal tells of."""
+        seen, since = self._progress(), time.monotonic()
         while True:
-            while b"\n" in self._rest:
-                line, _, self._rest = self._rest.partition(b"\n")
-                if not self._is_message(line):
-                    return line + b"\n"
-            if (left := end - time.monotonic()) <= 0:
+            if (answer := self._taken()) is not None:
+                return answer
+            if (now := self._progress()) != seen:
+                seen, since = now, time.monotonic()
+            elif time.monotonic() - since > deadline:
                 raise Lost(f"did not return within {deadline:g} s")
-            self._receive({descriptor for descriptor, _ in self._poll.poll(left * 1000)})
+            self._receive({descriptor for descriptor, _ in self._poll.poll(min(LOOK, deadline) * 1000)})
+
+    def _progress(self) -> tuple[int, int]:
+        return self._journal[CHANGES], self._journal[CALL]
+
+    def _taken(self) -> bytes | None:
+        """The answer, if it has arrived; what the FMU said before is passed on."""
+        *lines, self._rest = self._rest.split(b"\n")
+        for place, line in enumerate(lines):
+            if not self._is_message(line):
+                self._rest = b"\n".join([*lines[place + 1 :], self._rest])
+                return line + b"\n"
+        return None
 
     def _receive(self, ready: set[int]) -> None:
         if self._output in ready:
@@ -133,13 +150,14 @@ class Process:
         if self._pid and self._reaped(patience) is None:
             os.kill(self._pid, signal.SIGKILL)
             self._reaped(float("inf"))
+        if not self._opened:
+            return
         with suppress(KeyError):
             self._pass_on()
         if (more := self._printed - LARGEST_OUTPUT) > 0:
             log.message(self._name, log.WARNING, f"printed {more} bytes more")
-        for descriptor in (self._writer, self._reader, self._output, self._died):
-            if descriptor >= 0:
-                os.close(descriptor)
+        while self._opened:
+            os.close(self._opened.pop())
 
 
 def _be_the_worker(serve: Callable[[int, int], None], commands: int, answers: int, printed: int) -> NoReturn:

@@ -71,7 +71,7 @@ class RemoteFmu(Component):
             instance = self._kind(self._file.lent(), self.name, self._logging_on)
             Worker(instance, self._block, enter).serve(commands, answers, temporary)
 
-        self._process = Process(self.name, serve)
+        self._process = Process(self.name, self._block.journal, serve)
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
         self._ask("enter_initialization_mode", start_time, stop_time)
@@ -207,13 +207,23 @@ class RemoteFmu(Component):
     def _value(self, answer: bytes) -> Any:
         if answer == DONE:
             return None
-        message = decode(answer)
+        message = self._decoded(answer)
         self._file.corrupt = self._file.corrupt or bool(message.get("corrupt"))
         if "failed" in message:
             raise ComponentError(*message["failed"])
         if "refused" in message:
             raise InputError(message["refused"])
         return message["value"]
+
+    def _decoded(self, answer: bytes) -> dict[str, Any]:
+        try:
+            message = decode(answer)
+        except ValueError:
+            message = None
+        if not isinstance(message, dict) or not {"value", "failed", "refused"} & message.keys():
+            self._end()
+            raise Ended(self.name, self._command, "its process answered with something that is no answer")
+        return message
 
     def _blame(self, reason: str) -> NoReturn:
         """Raise the error for what the worker was doing when it ended, as its journal says."""

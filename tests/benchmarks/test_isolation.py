@@ -1,0 +1,116 @@
+"""What it costs to give each FMU a process of its own: per FMU and step, to start, and in memory.
+
+Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_isolation.py
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+import pytest
+from importer import STEP, executors
+from lag import lag_fmu
+from measure import ROUNDS, heading
+
+from cosim.engine import Kind
+from cosim.fmi import FmuFile, Isolation, instantiate
+from cosim.simulate import Run, Settings, simulate
+from cosim.system import Endpoint, System
+
+STEPS, WIDTH, ROUND_TRIPS, STARTS = 5_000, 16, 5_000, 20
+#: what is promised on a quiet machine: us per FMU and step over in process, ms to start; a busy one takes longer
+PROMISED_STEP, PROMISED_START = 15, 60
+BUSY = 4
+pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(900)]
+
+
+def lags(fmu: Path, size: int, isolation: Isolation | None) -> System:
+    """`size` FMUs with 16 inputs and outputs each, unconnected."""
+    file = FmuFile(fmu)
+    names = [f"s{i}" for i in range(size)]
+    return System({name: instantiate(file, name, isolation=isolation) for name in names}, (), (tuple(names),))
+
+
+def run(system: System, steps: int, executor: Kind, look: Callable[[int, int], None] | None = None) -> Run:
+    columns = {"y": Endpoint("s0", "y1")}
+    settings = Settings(Fraction(0), steps * STEP, STEP, columns, executor=executor)
+    outcome = simulate(system, settings, [look] if look else [])
+    assert outcome.failure is None, outcome.failure
+    return outcome
+
+
+def per_step(fmu: Path, isolation: Isolation | None, executor: Kind, size: int = 1) -> float:
+    """Wall time in us per FMU and step."""
+    return run(lags(fmu, size, isolation), STEPS, executor).loop_seconds / STEPS / size * 1e6
+
+
+def round_trip() -> float:
+    """Wall time in us of a line there and back between two processes that do nothing else: the floor."""
+    here, there = os.pipe(), os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(here[1])
+        while line := os.read(here[0], 100):
+            os.write(there[1], line)
+        os._exit(0)
+    began = perf_counter()
+    for _ in range(ROUND_TRIPS):
+        os.write(here[1], b"\n")
+        os.read(there[0], 100)
+    seconds = perf_counter() - began
+    for descriptor in (*here, *there):
+        os.close(descriptor)
+    os.waitpid(child, 0)
+    return seconds / ROUND_TRIPS * 1e6
+
+
+@pytest.mark.parametrize("version", [2, 3], ids=["fmi2", "fmi3"])
+def test_steps(version, tmp_path):
+    fmu = lag_fmu(tmp_path, version, WIDTH)
+    heading(f"one FMI {version}.0 FMU, {WIDTH} inputs and outputs, {STEPS} steps", "us per step")
+    for executor in executors():
+        rounds = [(per_step(fmu, None, executor), per_step(fmu, Isolation(), executor), round_trip()) for _ in range(ROUNDS)]
+        here, apart, floor = (median(column) for column in zip(*rounds, strict=True))
+        over = median(apart - here for here, apart, _ in rounds)
+        print(
+            f"  {executor:12} in process {here:.2f}, apart {apart:.2f}, over in process {over:.2f} (promised {PROMISED_STEP});"
+            f" two bare processes {floor:.2f}"
+        )
+        assert over < BUSY * PROMISED_STEP
+
+
+def test_starts(tmp_path):
+    fmu = lag_fmu(tmp_path, 2, WIDTH)
+    heading(f"to extract, load and instantiate {STARTS} instances of one FMU", "ms each")
+    run(lags(fmu, 1, Isolation()), 1, "auto")  # imports
+    costs = {}
+    for name, isolation in (("in process", None), ("apart", Isolation()), ("sandbox", Isolation(sandbox=True))):
+        rounds = [run(lags(fmu, STARTS, isolation), 1, "auto").timing["instantiate_seconds"] for _ in range(ROUNDS)]
+        costs[name] = median(rounds) / STARTS * 1e3
+        print(f"  {name:12} {costs[name]:.2f} (promised {PROMISED_START})")
+    assert costs["sandbox"] < PROMISED_START
+
+
+def own_memory(process: str) -> int:
+    """Bytes that belong to a process alone."""
+    text = Path(f"/proc/{process}/smaps_rollup").read_text()
+    return sum(1024 * int(size) for size in re.findall(r"^Private_\w+: +(\d+) kB", text, re.MULTILINE))
+
+
+def test_memory(tmp_path):
+    found: list[int] = []
+
+    def look(finished: int, count: int) -> None:
+        workers = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+        found.append(max(own_memory(worker) for worker in workers))
+
+    run(lags(lag_fmu(tmp_path, 2, WIDTH), 4, Isolation()), 100, "auto", look)
+    heading("memory of a worker that no other process has", "MB")
+    print(f"  {found[-1] / 1e6:.1f} (at the start {found[0] / 1e6:.1f})")
+    assert found[-1] < 30e6

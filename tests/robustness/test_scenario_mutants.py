@@ -1,0 +1,171 @@
+"""Random changes to good scenarios: they are loaded or refused with a place for each problem, soon, and nothing else happens."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from mutations import mutants
+
+import cosim
+from cosim import resources
+from cosim.scenario.document import read_document
+
+BLOCKS = Path(__file__).parents[1] / "scenario" / "blocks.py"
+KPIS = "def last(result, signal):\n    return {'value': float(result[signal][-1])}\n"
+#: what a problem may begin with: file, line and column, or what was set from outside
+PLACE = re.compile(r"^(\S.*\.\w+:\d+:\d+: |\S.*: |setting |cannot read )")
+
+#: every key of the format is used once
+INNER: dict[str, Any] = {
+    "components": {"g": {"python": "blocks.py:Gain", "period": 1}, "h": {"python": "blocks.py:Gain"}},
+    "connections": [{"from": "g.y", "to": "h.u", "delay": 1}],
+    "algorithm": {"kind": "staged", "stages": [["g"], ["h"]]},
+    "ports": {"inputs": {"x": ["g.u"]}, "outputs": {"y": "h.y"}, "parameters": {"factor": "g.k"}},
+}
+SCENARIO: dict[str, Any] = {
+    "name": "good",
+    "description": "Everything at once.",
+    "start_time": 0,
+    "stop_time": 4.0,
+    "step_size": "1/2",
+    "components": {
+        "a": {"python": "blocks.py:Gain", "parameters": {"k": 3.0}, "period": 1},
+        "b": {"python": "blocks.py:Plant", "arguments": {"vehicle": "ship"}},
+        "c": {"python": "blocks.py:Controller", "parameters": {"gain": [1.0, 2.0]}},
+        "t": {"python": "blocks.py:Typed", "parameters": {"number": 3, "flag": True, "text": "x"}},
+        "inner": {"system": "inner.json", "parameters": {"factor": 2.0}},
+        "f": {"fmu": "probe.fmu", "parameters": {"y_start": 1.0}, "isolation": None},
+    },
+    "connections": [
+        {"from": "a.y", "to": "inner.x"},
+        {"from": "b.ship", "to": "c.vehicle", "delay": 1},
+        {"from": "c.motor", "to": "b.ship.motor"},
+        {"from": "inner.y", "to": "f.u"},
+    ],
+    "algorithm": {"kind": "staged", "stages": [["a", "inner"], ["b", "c", "t"], ["f"]], "parallel": "auto"},
+    "record": {"signals": ["*.y", "b.*"], "interval": 1},
+    "events": [{"time": 1, "set": {"a.k": 2.0}}],
+    "inputs": [{"file": "profile.csv", "to": {"x": ["a.u"]}, "interpolation": "linear"}],
+    "kpis": [{"name": "end", "python": "kpis.py:last", "arguments": {"signal": "a.y"}}],
+    "checks": [{"kpi": "end.value", "max": 10, "min": -10}],
+    "figures": [{"name": "picture", "python": "kpis.py:last", "arguments": {"signal": "a.y"}}],
+    "reference": {"file": "profile.csv", "tolerances": {"a.*": {"absolute": 0.1, "time": 0.1}}},
+    "deadlines": {"load": 10.0, "step": 5.0},
+    "non_finite": "error",
+}
+del SCENARIO["components"]["f"]["isolation"]
+
+SHIPPED = sorted(path.stem for path in (resources.root() / "scenarios").glob("*.json"))
+
+
+def counted(examples: int) -> settings:
+    """Always the same examples."""
+    off = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example]
+    phases = [Phase.generate, Phase.shrink]
+    return settings(
+        max_examples=examples, derandomize=True, database=None, deadline=None, suppress_health_check=off, phases=phases
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, probes: dict[int, Path]) -> Path:
+    folder = tmp_path_factory.mktemp("mutants")
+    shutil.copy(BLOCKS, folder)
+    shutil.copy(probes[3], folder / "probe.fmu")
+    (folder / "kpis.py").write_text(KPIS)
+    (folder / "profile.csv").write_text("time,x\n0,1\n4,2\n")
+    return folder
+
+
+def judge(file: Path, text: str) -> bool:
+    """Whether a scenario is accepted."""
+    file.write_text(text, encoding="utf-8")
+    begin = time.process_time()
+    try:
+        cosim.load(file).free()
+        accepted = True
+    except cosim.InputError as error:
+        accepted = False
+        assert error.problems
+        for problem in error.problems:
+            assert problem.where or PLACE.match(str(problem)), problem
+            assert "\n" not in str(problem), problem
+            str(problem).encode()
+    assert time.process_time() - begin < 2
+    return accepted
+
+
+def write(folder: Path, scenario: Any, inner: Any) -> bool:
+    (folder / "inner.json").write_text(json.dumps(inner), encoding="utf-8")
+    return judge(folder / "scenario.json", json.dumps(scenario, indent=1))
+
+
+def test_the_scenario_is_good_before_it_is_changed(folder):
+    assert write(folder, SCENARIO, INNER)
+
+
+@pytest.mark.parametrize("count", [counted(600), pytest.param(counted(100_000), marks=pytest.mark.fuzz)])
+def test_mutated_scenarios(folder, count):
+    results = set()
+
+    @count
+    @given(mutants(SCENARIO))
+    def change(scenario):
+        results.add(write(folder, scenario, INNER))
+
+    change()
+    assert results == {True, False}
+
+
+@pytest.mark.parametrize("count", [counted(150), pytest.param(counted(20_000), marks=pytest.mark.fuzz)])
+def test_mutated_nested_systems(folder, count):
+    results = set()
+
+    @count
+    @given(mutants(INNER))
+    def change(inner):
+        results.add(write(folder, SCENARIO, inner))
+
+    change()
+    assert results == {True, False}
+
+
+@pytest.mark.parametrize("count", [counted(250), pytest.param(counted(20_000), marks=pytest.mark.fuzz)])
+def test_mutated_texts(folder, count):
+    """Characters changed, so that most of them are no JSON any more."""
+    text = json.dumps(SCENARIO)
+    words = st.sampled_from(
+        [*'{}[]",:\\ \n\0', "NaN", "-", "1e999", "9" * 5000, "\ufeff", "é", "//", "null", "[" * 500, '{"a":' * 500]
+    )
+
+    @count
+    @given(st.integers(0, len(text)), st.sampled_from([0, 0, 1, 2, 30, 3000]), words)
+    def change(place, length, word):
+        judge(folder / "scenario.json", text[:place] + word + text[place + length :])
+
+    change()
+
+
+@pytest.mark.parametrize("count", [counted(25), pytest.param(counted(5_000), marks=pytest.mark.fuzz)])
+def test_mutated_shipped_scenarios(tmp_path_factory, count):
+    """All that is shipped stands beside the mutant, so that its paths are right."""
+    root = tmp_path_factory.mktemp("shipped")
+    for name in ("fmus", "plant_src", "controllers"):
+        (root / name).symlink_to(resources.root() / name)
+    shutil.copytree(resources.root() / "scenarios", root / "scenarios")
+    documents = {name: read_document(root / "scenarios" / f"{name}.json").value for name in SHIPPED}
+
+    @count
+    @given(st.sampled_from(SHIPPED).flatmap(lambda name: mutants(documents[name])))
+    def change(scenario):
+        judge(root / "scenarios" / "mutant.json", json.dumps(scenario))
+
+    change()
