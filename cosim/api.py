@@ -42,7 +42,7 @@ def load(
     JSON pointer ("/components/plant/arguments/environment/seed"), anything in the file. `real_time` is the number of simulated
     seconds per second on the wall (None: as fast as possible); with `late="fail"` a run that falls more than one step behind ends
     with a LateError. With `isolation="fmu"` every FMU runs in a process of its own; with `sandbox` also, and such processes read
-    and write only what is theirs and have no TCP. Raises InputError with all problems.
+    and write only what is theirs and have no network. Raises InputError with all problems.
     """
     times = {"/stop_time": stop_time, "/step_size": step_size}
     settings = {**{key: value for key, value in times.items() if value is not None}, **(parameters or {})}

@@ -27,6 +27,7 @@ class Problem:
     """One refused thing: what is wrong, and where it stands (file, line, JSON path) as far as that is known.
 
     `subject` names the setting that is wrong ("components", "usv", "period"); who knows where settings stand replaces `where`.
+    As text it is one line: what cannot be printed is escaped.
     """
 
     message: str
@@ -34,7 +35,8 @@ class Problem:
     subject: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        return f"{self.where}: {self.message}" if self.where else self.message
+        text = f"{self.where}: {self.message}" if self.where else self.message
+        return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
 
 
 class InputError(CosimError):

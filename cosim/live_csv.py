@@ -19,7 +19,7 @@ from .journal import ROWS, Journal
 from .unfinished import ROWS_FILE, Header, read_header
 
 #: short runs are left alone for this long, long ones get new lines this often, and no longer than this at a time (s)
-FIRST, EVERY, AT_MOST = 0.5, 0.3, 0.2
+FIRST, EVERY, AT_MOST = 0.2, 0.3, 0.2
 
 _ROWS_AT_A_TIME = 500
 

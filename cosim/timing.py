@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from fractions import Fraction
 from math import lcm
@@ -11,13 +12,21 @@ import numpy as np
 #: integers up to this one are exact as floats
 _EXACT = 2**53
 
+#: a number of seconds in text, or a fraction of two; few digits, because Fraction would write 1e999999999 in full
+_SECONDS = re.compile(r"[-+]?(\d{1,400}/\d{1,400}|(\d{1,400}\.?\d{0,400}|\.\d{1,400})([eE][-+]?\d{1,3})?)", re.ASCII)
+
 
 def exact(value: float | int | str | Fraction) -> Fraction:
     """The number a person wrote: 0.01 is 1/100, "1/60" is a sixtieth.
 
-    Raises ValueError for what is no finite number.
+    Raises ValueError for what is no finite number or no time in seconds that anybody could mean, ZeroDivisionError for "1/0".
     """
-    return Fraction(repr(value)) if isinstance(value, float) else Fraction(value)
+    if isinstance(value, str) and not _SECONDS.fullmatch(value.strip()):
+        raise ValueError(f'expected a number or a fraction, found "{value:.40}"')
+    number = Fraction(repr(value)) if isinstance(value, float) else Fraction(value)
+    if abs(number) > _EXACT:
+        raise ValueError(f"expected at most {_EXACT}")
+    return number
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +48,8 @@ class Grid:
         if stop < start:
             raise ValueError(f"the stop time {float(stop)!r} lies before the start time {float(start)!r}")
         count = (stop - start) / step
+        if count > _EXACT:
+            raise ValueError(f"{float(stop - start)!r} s are more than {_EXACT} steps of {float(step)!r} s")
         if count.denominator != 1:
             raise ValueError(f"{float(stop - start)!r} s is no multiple of the step size {float(step)!r} s")
         denominator = lcm(start.denominator, step.denominator)

@@ -81,6 +81,99 @@ def _slide(result: Result, vehicle: str, deck: str, row: int) -> float:
     return float(np.abs(place[row:] - place[row])[contact[row:]].max())
 
 
+@units(
+    forward_error="m",
+    left_error="m",
+    normal_speed="m/s",
+    tangential_speed="m/s",
+    kinetic_energy="J",
+    tilt="rad",
+    deck_roll="rad",
+    deck_pitch="rad",
+    deck_heave="m",
+    peak_force="N",
+)
+def touchdown(result: Result, vehicle: str, deck: str, mass: float) -> dict[str, Number]:
+    """How `vehicle` of `mass` (kg) meets the landing deck of a vessel ("plant.usv.deck"), seen from the deck.
+
+    Touchdown is that of `landing`. Speeds are those one row earlier, relative to the point of the deck below the vehicle.
+
+    forward_error, left_error  m    place of the vehicle's centre of mass from the deck centre, along the deck's axes
+    normal_speed               m/s  speed towards the deck along its normal, > 0 approaching
+    tangential_speed           m/s  speed in the plane of the deck
+    kinetic_energy             J    mass / 2 times the square of the relative speed
+    tilt                       rad  angle between the up axes of vehicle and deck
+    deck_roll, deck_pitch      rad  attitude of the vessel
+    deck_heave                 m    height of the deck centre above its mean over all rows
+    peak_force                 N    largest contact force from touchdown on, mean over a step
+    """
+    row = touchdown_row(result, vehicle)
+    if row is None:
+        return dict.fromkeys(touchdown.units, math.nan)  # type: ignore[attr-defined]
+    vessel = deck.removesuffix(".deck")
+    axes = _axes(result, vessel, row)
+    forward, left, _ = axes.T @ _offset(result, vehicle, deck, row)
+    tangential, normal = _approach_speeds(result, vehicle, deck, row - 1)
+    height = result[f"{deck}.position.z"]
+    return {
+        "forward_error": float(forward),
+        "left_error": float(left),
+        "normal_speed": normal,
+        "tangential_speed": tangential,
+        "kinetic_energy": mass / 2 * (normal**2 + tangential**2),
+        "tilt": math.acos(min(float(axes[:, 2] @ _axes(result, vehicle, row)[:, 2]), 1.0)),
+        "deck_roll": float(result[f"{vessel}.attitude.roll"][row]),
+        "deck_pitch": float(result[f"{vessel}.attitude.pitch"][row]),
+        "deck_heave": float(height[row] - height.mean()),
+        "peak_force": float(result[f"{vehicle}.contact.force"][row:].max()),
+    }
+
+
+def _approach_speeds(result: Result, vehicle: str, deck: str, row: int) -> tuple[float, float]:
+    """Speed in the plane of the deck and towards it (m/s), relative to the point of the deck where the vehicle is."""
+    vessel = deck.removesuffix(".deck")
+    axes = _axes(result, vessel, row)
+    rates = axes @ [result[f"{vessel}.rates.{axis}"][row] for axis in "pqr"]
+    point = _vector(result, f"{deck}.velocity", row) + np.cross(rates, _offset(result, vehicle, deck, row))
+    u, v, w = axes.T @ (_vector(result, f"{vehicle}.velocity", row) - point)
+    return math.hypot(u, v), float(-w)
+
+
+def _vector(result: Result, name: str, row: int) -> np.ndarray:
+    return np.array([result[f"{name}.{axis}"][row] for axis in "xyz"])
+
+
+def _offset(result: Result, vehicle: str, deck: str, row: int) -> np.ndarray:
+    """From the deck centre to the vehicle's centre of mass, in the world's axes (m)."""
+    return _vector(result, f"{vehicle}.position", row) - _vector(result, f"{deck}.position", row)
+
+
+def _axes(result: Result, vehicle: str, row: int) -> np.ndarray:
+    """The forward, left and up axis of a vehicle in the world's axes, as columns: Rz(yaw) Ry(pitch) Rx(roll)."""
+    roll, pitch, yaw = (float(result[f"{vehicle}.attitude.{angle}"][row]) for angle in ("roll", "pitch", "yaw"))
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(angle), math.sin(angle)) for angle in (roll, pitch, yaw))
+    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+    return about_z @ about_y @ about_x
+
+
+@units(time_to_land="s")
+def descent(result: Result, vehicle: str, mode: str, descending: float) -> dict[str, Number]:
+    """How the way down went, told by the signal `mode`: `descending` is its value for that, lower ones come before it.
+
+    time_to_land  s  from the first row in that mode to the touchdown of `landing`, aborted descents included
+    aborts        1  how often a lower mode followed upon it
+    """
+    modes = result[mode]
+    rows, row = np.flatnonzero(modes == descending), touchdown_row(result, vehicle)
+    landed = row is not None and rows.size > 0
+    return {
+        "time_to_land": float(result.time[row] - result.time[rows[0]]) if landed else math.nan,
+        "aborts": int(np.count_nonzero((modes[:-1] == descending) & (modes[1:] < descending))),
+    }
+
+
 @units(time="s")
 def waypoints(result: Result, vehicle: str, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
     """Whether `vehicle` came within `radius` (m) of the waypoints (`x`, `y`) (m, world), one after the other.
@@ -103,6 +196,39 @@ def waypoints(result: Result, vehicle: str, x: Sequence[float], y: Sequence[floa
         "all_reached": reached == len(times),
         **{f"time[{i}]": time for i, time in enumerate(times, start=1)},
     }
+
+
+@units(rms="m", max="m", leg="m")
+def cross_track(result: Result, vehicle: str, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
+    """How far `vehicle` was from the straight legs between its place in the first row and the waypoints (see `waypoints`).
+
+    A leg begins when the waypoint before it is reached, and ends when its own is, or with the last row; the distance is that
+    from the endless line through both ends of the leg, horizontally.
+
+    rms         m  over all rows of all legs
+    max         m  largest distance
+    leg[1] ...  m  largest distance on each leg, NaN for those that were not begun
+    """
+    times = [value for key, value in waypoints(result, vehicle, x, y, radius).items() if key.startswith("time")]
+    place = result[f"{vehicle}.position.x"] + 1j * result[f"{vehicle}.position.y"]
+    corners = [place[0], *(east + 1j * north for east, north in zip(x, y, strict=True))]
+    begin, legs = float(result.time[0]), []
+    for start, end, reached in zip(corners, corners[1:], times, strict=False):
+        rows = (result.time >= begin) & ~(result.time > reached)  # NaN: not reached, until the last row
+        legs.append(_distance_from_line(place[rows], start, end))
+        begin = reached  # NaN: the legs that follow have no rows
+    all_legs = np.concatenate(legs)
+    return {
+        "rms": float(np.sqrt(np.mean(all_legs**2))),
+        "max": float(all_legs.max()),
+        **{f"leg[{i}]": float(leg.max()) if leg.size else math.nan for i, leg in enumerate(legs, start=1)},
+    }
+
+
+def _distance_from_line(place: np.ndarray, start: complex, end: complex) -> np.ndarray:
+    """Distance (m) of places x + iy from the line through two points, or from the point when they are one."""
+    way = end - start
+    return np.abs(((place - start) * np.conj(way)).imag) / abs(way) if way else np.abs(place - start)
 
 
 @units(rms="m", max="m")

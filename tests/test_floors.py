@@ -24,9 +24,10 @@ FLOORS = [
     {"scenario"},
     {"results"},
     {"kpi", "compare"},
+    {"kpis"},
     {"api", "report"},
     {"cli"},
-    {"__main__"},
+    {"__main__", "pytest_plugin"},
 ]
 #: export stands aside: only the assembly of `modelica` sources and `cosim build` look into it
 ALLOWED = {("scenario", "export"), ("cli", "export")}

@@ -49,7 +49,7 @@ def command(scenarios: tuple[Path, ...], update: bool, junit: Path | None, outpu
         write_junit("cosim regress", [_case(outcome) for outcome in outcomes], junit)
     failed = sum(outcome.code != 0 for outcome in outcomes)
     click.echo(f"{len(outcomes)} scenarios, {failed} failed" if failed else f"{len(outcomes)} scenarios, all well")
-    return next(code for code in _SEVERITY if code in {0, *(outcome.code for outcome in outcomes)})
+    return min((outcome.code for outcome in outcomes), key=_SEVERITY.index)
 
 
 def _default() -> Path:

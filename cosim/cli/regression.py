@@ -47,6 +47,8 @@ class Regression:
     def _outcome(self) -> Outcome:
         command = [sys.executable, "-m", "cosim", "run", str(self.file), "--no-report", "--output-dir", str(self.directory)]
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)  # noqa: S603
+        if done.returncode < 0:
+            return Outcome(self.file.stem, 1, "did not run to its end", (f"cosim run: ended by signal {-done.returncode}",))
         if done.returncode not in (0, 3):
             return Outcome(self.file.stem, done.returncode, "did not run to its end", tuple(done.stderr.splitlines()))
         try:
@@ -57,7 +59,7 @@ class Regression:
 
     def _compared(self, run: _Run) -> Outcome:
         failed, summary = run.failed_checks(), f"{len(run.checks)} checks"
-        if run.tolerances:
+        if run.scenario.get("reference"):
             comparison = run.compared()
             summary += f", {len(comparison.verdicts)} signals"
             if not comparison.passed:
@@ -106,11 +108,9 @@ class _Run:
 
     @cached_property
     def tolerances(self) -> dict[str, Tolerance]:
-        """By pattern; none when there is no reference."""
         from ..compare import Tolerance
 
-        reference = self.scenario.get("reference") or {"tolerances": {}}
-        return {pattern: Tolerance(**tolerance) for pattern, tolerance in reference["tolerances"].items()}
+        return {pattern: Tolerance(**tolerance) for pattern, tolerance in self.scenario["reference"]["tolerances"].items()}
 
     @cached_property
     def reference(self) -> Result:

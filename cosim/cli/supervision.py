@@ -26,7 +26,7 @@ _isolation = click.option(
 _sandbox = click.option(
     "--sandbox",
     is_flag=True,
-    help="Every FMU in a process of its own that reads only its own files, writes only to its temporary folder, has no TCP.",
+    help="Every FMU in a process of its own that reads only its own files, writes only to a temporary folder, has no network.",
 )
 
 

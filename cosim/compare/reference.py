@@ -15,7 +15,7 @@ from ..results.files import write_json
 from .comparison import Comparer, compare, matched
 from .tube import Tolerance
 
-#: at least every so many rows one is kept, and more where the run itself would not stay within SHARE of its tolerances around them
+#: of so many rows at least one is kept, and more where the run itself would leave SHARE of its tolerances around them
 STRIDE = 64
 SHARE = 0.25
 

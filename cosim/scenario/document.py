@@ -22,6 +22,10 @@ from ..errors import InputError, Problem
 Path_ = tuple["str | int", ...]
 _SPACE = re.compile(r"[ \t\r\n]*")
 _LITERAL = re.compile(r"-?Infinity|NaN|true|false|null|-?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][-+]?\d+)?")
+#: neither file names nor UTF-8 can hold these
+_UNUSABLE = re.compile("[\0\ud800-\udfff]")
+#: characters
+_LONGEST_NUMBER = 1000
 _NAME = re.compile(r"[A-Za-z_]\w*")
 
 
@@ -146,18 +150,22 @@ class _Reader:
 
     def string(self, offset: int) -> tuple[str, int]:
         try:
-            return scanstring(self.text, offset + 1, True)
+            text, end = scanstring(self.text, offset + 1, True)
         except json.JSONDecodeError as error:
             raise self.error(error.pos, error.msg) from None
+        if found := _UNUSABLE.search(text):
+            message = f"the character U+{ord(found.group()):04X} is not allowed"
+            self.document.problems.append(Problem(message, self.document.position(offset)))
+        return _UNUSABLE.sub("\N{REPLACEMENT CHARACTER}", text), end
 
     def literal(self, offset: int, path: Path_) -> tuple[Any, int]:
         match = _LITERAL.match(self.text, offset)
         if match is None:
             raise self.error(offset, "expected a JSON value")
         word = match.group()
-        value = json.loads(word)
+        value = json.loads(word) if len(word) <= _LONGEST_NUMBER else math.inf
         if isinstance(value, float) and not math.isfinite(value):
-            self.problem(path, f"{word} is not allowed, expected a finite number")
+            self.problem(path, f"{word:.40} is not allowed, expected a finite number")
             value = 0.0
         return value, match.end()
 

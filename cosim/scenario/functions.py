@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Collection
+from collections.abc import Callable, Collection
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from ..errors import did_you_mean
+from ..python_component import load_object
 from .schema import FunctionSpec
 
 
 def function_problem(spec: FunctionSpec, folder: Path) -> str:
-    """Why `file.py:function` cannot be called with its arguments later; "" when it can. The file is read, not run."""
+    """Why `file.py:function` or `package.module:function` cannot be called with its arguments later; "" when it can.
+
+    The file is read, not run.
+    """
     file, _, name = spec.python.rpartition(":")
-    path = folder / file
-    if not file.endswith(".py") or not name.isidentifier():
-        return f'expected "file.py:function", found "{spec.python}"'
-    if not path.is_file():
-        return f'file "{file}" does not exist'
+    if not name.isidentifier() or not (file.endswith(".py") or all(part.isidentifier() for part in file.split("."))):
+        return f'expected "file.py:function" or "package.module:function", found "{spec.python}"'
+    path = folder / file if file.endswith(".py") else _module_file(file)
+    if path is None or not path.is_file():
+        return f'{"file" if file.endswith(".py") else "module"} "{file}" does not exist'
     try:
         tree = ast.parse(path.read_bytes())
     except SyntaxError as error:
@@ -26,6 +33,23 @@ def function_problem(spec: FunctionSpec, folder: Path) -> str:
     if name not in functions:
         return f'"{file}" defines no function "{name}"{did_you_mean(name, functions)}'
     return _argument_problem(name, functions[name], spec.arguments)
+
+
+def _module_file(module: str) -> Path | None:
+    """Where an installed module lies; the packages around it are imported."""
+    try:
+        spec = find_spec(module)
+    except ImportError:
+        return None
+    return Path(spec.origin) if spec and spec.origin else None
+
+
+def load_function(reference: str, folder: Path) -> Callable[..., Any]:
+    """What `file.py:function`, relative to `folder`, or `package.module:function` is; raises InputError as `load_object`."""
+    module, _, name = reference.rpartition(":")
+    if module.endswith(".py"):
+        return load_object(reference, folder)
+    return getattr(import_module(module), name)
 
 
 def _argument_problem(name: str, declared: ast.arguments, given: Collection[str]) -> str:

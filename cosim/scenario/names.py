@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-import math
 import re
+import sys
 from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -147,4 +147,4 @@ def _accepts(kind: str, value: Any) -> bool:
         return kind == "Boolean" and isinstance(value, bool)
     if kind in ("String", "Binary"):
         return isinstance(value, str)
-    return isinstance(value, int | float) and math.isfinite(value) if kind in _REALS else isinstance(value, int)
+    return isinstance(value, int | float) and abs(value) <= sys.float_info.max if kind in _REALS else isinstance(value, int)

@@ -169,7 +169,7 @@ class FunctionSpec(Spec):
     """A Python function of the result: a KPI (returns numbers) or a figure (returns a matplotlib Figure)."""
 
     name: Name
-    python: str = Field(description='"file.py:function"')
+    python: str = Field(description='"file.py:function" or "package.module:function"')
     arguments: dict[str, Any] = {}
 
 

@@ -68,6 +68,19 @@ def test_the_picture_shows_the_tube_and_what_is_outside(tmp_path):
         assert np.abs(pixels - colour).max(axis=1).min() < 2
 
 
+def test_a_picture_is_drawn_of_what_is_not_finite_or_missing_too(tmp_path):
+    text = csv(tmp_path / "a.csv").read_text().replace("\n1,", "\n1,NaN #", 1)
+    broken = tmp_path / "broken.csv"
+    broken.write_text("\n".join(line.split(" #")[0] for line in text.splitlines()))
+    for result, reference in ((broken, tmp_path / "a.csv"), (tmp_path / "a.csv", broken)):
+        picture = tmp_path / f"{result.stem}.png"
+        done = cosim("compare", result, reference, "--absolute", "1", "--plot", picture)
+        assert (done.returncode, "plant.x is nan at t = 1 s" in done.stderr, picture.exists()) == (3, True, True)
+    (tmp_path / "other.csv").write_text("time,y\n0,1\n6,1\n")
+    assert cosim("compare", tmp_path / "other.csv", tmp_path / "a.csv", "--plot", tmp_path / "none.svg").returncode == 3
+    assert (tmp_path / "none.svg").exists()
+
+
 def test_what_cannot_be_read_is_refused(tmp_path):
     missing = cosim("compare", tmp_path / "none.csv", csv(tmp_path / "b.csv"))
     assert (missing.returncode, "none.csv" in missing.stderr) == (2, True)

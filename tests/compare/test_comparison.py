@@ -81,6 +81,12 @@ def test_what_is_not_finite_before_the_reference_begins_does_not_matter():
     assert compare(recorded(longer, a__y=np.where(longer < 0, np.nan, longer)), REFERENCE, {"a.y": Tolerance(1e-9)}).passed
 
 
+def test_what_is_not_finite_is_found_between_rows_too():
+    """The reference begins between a row that is NaN and one that is not."""
+    result = recorded([-0.05, 0.05, 10], a__y=[np.nan, 0.05, 10])
+    assert failures(result, {"a.y": Tolerance(9, 9, 9)}) == ["a.y is nan at t = 0 s in the result"]
+
+
 def test_the_last_pattern_counts():
     result = changed(a__x=np.sin(TIME) + 0.1, a__y=TIME + 0.1)
     general_first = {"*": Tolerance(), "a.*": Tolerance(0.2), "*.y": Tolerance(0.05)}
@@ -125,6 +131,8 @@ def test_nothing_to_compare_does_not_pass():
     assert failures(empty) == ["the result has no rows"]
     assert failures(REFERENCE, EXACT, empty) == ["the reference has no rows"]
     assert not compare(REFERENCE, recorded(), EXACT).passed
+    assert str(compare(REFERENCE, REFERENCE, {})) == "nothing was compared"
+    assert not compare(REFERENCE, REFERENCE, {}).passed
 
 
 def test_the_worst_signal_is_the_one_farthest_out_of_its_own_tube():

@@ -7,6 +7,7 @@ import pytest
 
 from cosim.compare import Tolerance, compare
 from cosim.compare.comparison import Comparer
+from cosim.compare.tube import even_spacing
 from cosim.recording import Recording
 from cosim.results import Result
 
@@ -76,6 +77,25 @@ def test_windows_find_what_a_search_finds(seed):
     found = bounds(moments, time, values, 0, 0, reach)
     assert found[0] == pytest.approx(lower, abs=1e-9)
     assert found[1] == pytest.approx(upper, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_even_rows_are_searched_faster_and_as_well(seed):
+    rng = np.random.default_rng(seed)
+    time = rng.uniform(-5, 5) + np.arange(rng.integers(2, 90)) * 0.01
+    values = rng.normal(size=len(time))
+    reach = rng.choice([0, 0.01, 0.015, 0.03, 0.1234, 5])
+    lower, upper = searched(time, time, values, reach)
+    comparer = Comparer(recorded(time, x=values), recorded(time, x=values))
+    tube = comparer.tube("x", Tolerance(0, 0, reach))
+    assert even_spacing(time) == pytest.approx(0.01)
+    assert tube.lower == pytest.approx(lower, abs=1e-9)
+    assert tube.upper == pytest.approx(upper, abs=1e-9)
+
+
+def test_uneven_rows_are_not_taken_for_even_ones():
+    assert even_spacing(np.array([0, 0.01, 0.02, 0.031])) == 0
+    assert even_spacing(np.array([0.0, 0.0])) == even_spacing(np.array([1.0])) == 0
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -18,7 +18,10 @@ import cosim
 from cosim import api
 from cosim.errors import InputError
 from cosim.fmi.isolated.remote import RemoteFmu
+from cosim.sandbox import available, landlock
 from cosim.scenario import assemble
+
+FMUS = Path(__file__).parents[2] / "fmus"
 
 
 def test_demo_1_is_the_same_bit_for_bit():
@@ -32,6 +35,14 @@ def scenario(folder: Path, components: dict[str, object], **more: object) -> Pat
     path = folder / "apart.json"
     path.write_text(json.dumps(content))
     return path
+
+
+@pytest.mark.skipif(available().landlock < landlock.NETWORK_VERSION, reason="this kernel has no sandbox (Linux 6.7)")
+@pytest.mark.parametrize("name", ["python/vtol.fmu", "c/speed_keeper.fmu", "strider.fmu", "fmi3/ar_drone.fmu"])
+def test_shipped_fmus_in_a_sandbox_are_the_same_bit_for_bit(name, tmp_path):
+    file = scenario(tmp_path, {"a": {"fmu": str(FMUS / name)}})
+    here, apart = (cosim.run(file, sandbox=sandbox) for sandbox in (False, True))
+    assert {name: here[name].tobytes() for name in here} == {name: apart[name].tobytes() for name in apart} != {}
 
 
 def apart(assembly: api.Assembly) -> list[str]:

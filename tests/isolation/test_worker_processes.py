@@ -109,6 +109,16 @@ def test_what_a_process_prints_is_passed_on_up_to_a_limit(worker, capfd):
     assert capfd.readouterr().err.count("x") == 1 << 16
 
 
+def test_python_code_prints_as_c_code_does(worker, capfd, monkeypatch, tmp_path):
+    """Whatever the importer's own streams are."""
+    with (tmp_path / "stream").open("w") as stream:
+        monkeypatch.setattr("sys.stdout", stream)
+        process = worker(lambda line: print("hello") or line)
+        assert process.request(TURN, 5.0) == DONE
+    process.end()
+    assert capfd.readouterr().err == "hello\n"
+
+
 def test_an_interrupt_reaches_the_importer_while_it_waits(worker):
     process = worker(lambda line: time.sleep(60))
     before = signal.signal(signal.SIGALRM, signal.default_int_handler)
@@ -186,7 +196,8 @@ simulate(system({"a": fmu}), Settings(exact(0), exact(1), exact("1/100")), [kill
 """
 
 
-def test_a_worker_ends_with_its_importer(probes):
+def test_a_worker_ends_with_its_importer(probes, tmp_path, monkeypatch):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))  # where an importer that is killed leaves its files
     words = [sys.executable, "-c", IMPORTER, Path(__file__).parents[1], probes[2]]
     done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
     (worker,) = done.stdout.split()

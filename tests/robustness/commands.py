@@ -46,8 +46,8 @@ class Workplace:
     def start(self, *arguments: object, environment: dict[str, str] | None = None, **more: Any) -> subprocess.Popen[str]:
         command = [sys.executable, "-m", "cosim", *map(str, arguments)]
         variables = {**os.environ, "TMPDIR": str(self.tmp), "WORKPLACE": str(self.folder), **(environment or {})}
-        output = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        return subprocess.Popen(command, cwd=self.folder, env=variables, **{**output, **more})
+        usual = {"cwd": self.folder, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        return subprocess.Popen(command, env=variables, **{**usual, **more})
 
     def run(self, *arguments: object, **more: Any) -> subprocess.CompletedProcess[str]:
         process = self.start(*arguments, **more)

@@ -11,77 +11,26 @@ from hypothesis import strategies as st
 Path_ = tuple[Any, ...]
 
 #: what stands in scenarios by mistake or malice; text of a file is written from them by `json.dumps`, so NaN too
-TELLING = st.sampled_from(
-    [
-        *(
-            None,
-            True,
-            False,
-            "",
-            0,
-            -1,
-            1.5,
-            -0.0,
-            [],
-            {},
-            [[]],
-            [None],
-            {"": None},
-            "NaN",
-            "1/0",
-            "1/60",
-            "-1/3",
-            "1e400",
-            "0x10",
-        ),
-        *(float("nan"), float("inf"), 1e308, 5e-324, 10**18, 10**400, 2**63, -(2**63) - 1, "1e999999999", "9" * 5000, "1_0"),
-        *(
-            "a",
-            "a.y",
-            "inner.x",
-            "b.u",
-            "*",
-            "**",
-            ".",
-            "..",
-            "a.",
-            ".y",
-            "a.y.z",
-            "a[1]",
-            "a[",
-            "$",
-            "x" * 300,
-            "\0",
-            "\ud800",
-            "é",
-            "\n",
-        ),
-        *(
-            "/",
-            "/dev/null",
-            "/dev/zero",
-            "/proc/self/mem",
-            ".",
-            "scenario.json",
-            "inner.json",
-            "blocks.py",
-            "blocks.py:",
-            ":Gain",
-        ),
-        *(
-            "blocks.py:Gain",
-            "blocks.py:Missing",
-            "blocks.py:__name__",
-            "../blocks.py:Gain",
-            "probe.fmu",
-            "kpis.py:last",
-            "profile.csv",
-        ),
-    ]
+ODD = (None, True, False, "", 0, -1, 1.5, -0.0, [], {}, [[]], [None], {"": None})
+NUMBERS = ("NaN", "1/0", "1/60", "-1/3", "1e400", "0x10", "1e999999999", "9" * 5000, "1_0", float("nan"), float("inf"))
+LARGE = (1e308, 5e-324, 10**18, 10**400, 2**63, -(2**63) - 1)
+NAMES = ("a", "a.y", "inner.x", "b.u", "*", "**", ".", "..", "a.", ".y", "a.y.z", "a[1]", "a[", "$", "x" * 300)
+CHARACTERS = ("\0", "\ud800", "é", "\n", "\u202e")
+FILES = ("/", "/dev/null", "/dev/zero", "/proc/self/mem", "scenario.json", "inner.json", "blocks.py", "probe.fmu", "profile.csv")
+FUNCTIONS = (
+    "blocks.py:",
+    ":Gain",
+    "blocks.py:Gain",
+    "blocks.py:Missing",
+    "blocks.py:__name__",
+    "../blocks.py:Gain",
+    "kpis.py:last",
 )
+TELLING = st.sampled_from((*ODD, *NUMBERS, *LARGE, *NAMES, *CHARACTERS, *FILES, *FUNCTIONS))
 SCALARS = st.one_of(st.integers(), st.floats(), st.text(max_size=8), st.booleans(), TELLING)
 VALUES = st.one_of(
-    TELLING, st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=4), inner))
+    TELLING,
+    st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=4), inner, max_size=3)),
 )
 
 

@@ -40,8 +40,9 @@ def rows(workplace: Workplace) -> int:
     return len(cosim.Result.from_csv(file).time) if file.exists() else 0
 
 
-@pytest.mark.parametrize(("place", "kept"), [("load", 0), ("initialization", 0), ("step", 20)])
-@pytest.mark.parametrize("isolation", ["run", "none"])
+@pytest.mark.parametrize(
+    ("isolation", "place", "kept"), [("run", "load", 0), ("run", "initialization", 0), ("run", "step", 20), ("none", "step", 20)]
+)
 def test_while_a_component_is_at_work(workplace, isolation, place, kept):
     interrupted(workplace, place, "--isolation", isolation, arguments={"slow": place})
     assert rows(workplace) == kept

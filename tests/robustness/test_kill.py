@@ -37,7 +37,7 @@ class Killed:
 
     def begin(self) -> float:
         assert self.place.reached("started"), self.process.communicate()
-        self.started = float((self.place.folder / "started").read_text() or "nan")
+        self.started = float((self.place.folder / "started").read_text())
         return self.started + self.delay
 
     def kill(self) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from good_scenario import INNER, SCENARIO, furnish
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from mutations import mutants
@@ -18,50 +19,8 @@ import cosim
 from cosim import resources
 from cosim.scenario.document import read_document
 
-BLOCKS = Path(__file__).parents[1] / "scenario" / "blocks.py"
-KPIS = "def last(result, signal):\n    return {'value': float(result[signal][-1])}\n"
 #: what a problem may begin with: file, line and column, or what was set from outside
 PLACE = re.compile(r"^(\S.*\.\w+:\d+:\d+: |\S.*: |setting |cannot read )")
-
-#: every key of the format is used once
-INNER: dict[str, Any] = {
-    "components": {"g": {"python": "blocks.py:Gain", "period": 1}, "h": {"python": "blocks.py:Gain"}},
-    "connections": [{"from": "g.y", "to": "h.u", "delay": 1}],
-    "algorithm": {"kind": "staged", "stages": [["g"], ["h"]]},
-    "ports": {"inputs": {"x": ["g.u"]}, "outputs": {"y": "h.y"}, "parameters": {"factor": "g.k"}},
-}
-SCENARIO: dict[str, Any] = {
-    "name": "good",
-    "description": "Everything at once.",
-    "start_time": 0,
-    "stop_time": 4.0,
-    "step_size": "1/2",
-    "components": {
-        "a": {"python": "blocks.py:Gain", "parameters": {"k": 3.0}, "period": 1},
-        "b": {"python": "blocks.py:Plant", "arguments": {"vehicle": "ship"}},
-        "c": {"python": "blocks.py:Controller", "parameters": {"gain": [1.0, 2.0]}},
-        "t": {"python": "blocks.py:Typed", "parameters": {"number": 3, "flag": True, "text": "x"}},
-        "inner": {"system": "inner.json", "parameters": {"factor": 2.0}},
-        "f": {"fmu": "probe.fmu", "parameters": {"y_start": 1.0}, "isolation": None},
-    },
-    "connections": [
-        {"from": "a.y", "to": "inner.x"},
-        {"from": "b.ship", "to": "c.vehicle", "delay": 1},
-        {"from": "c.motor", "to": "b.ship.motor"},
-        {"from": "inner.y", "to": "f.u"},
-    ],
-    "algorithm": {"kind": "staged", "stages": [["a", "inner"], ["b", "c", "t"], ["f"]], "parallel": "auto"},
-    "record": {"signals": ["*.y", "b.*"], "interval": 1},
-    "events": [{"time": 1, "set": {"a.k": 2.0}}],
-    "inputs": [{"file": "profile.csv", "to": {"x": ["a.u"]}, "interpolation": "linear"}],
-    "kpis": [{"name": "end", "python": "kpis.py:last", "arguments": {"signal": "a.y"}}],
-    "checks": [{"kpi": "end.value", "max": 10, "min": -10}],
-    "figures": [{"name": "picture", "python": "kpis.py:last", "arguments": {"signal": "a.y"}}],
-    "reference": {"file": "profile.csv", "tolerances": {"a.*": {"absolute": 0.1, "time": 0.1}}},
-    "deadlines": {"load": 10.0, "step": 5.0},
-    "non_finite": "error",
-}
-del SCENARIO["components"]["f"]["isolation"]
 
 SHIPPED = sorted(path.stem for path in (resources.root() / "scenarios").glob("*.json"))
 
@@ -77,12 +36,7 @@ def counted(examples: int) -> settings:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory, probes: dict[int, Path]) -> Path:
-    folder = tmp_path_factory.mktemp("mutants")
-    shutil.copy(BLOCKS, folder)
-    shutil.copy(probes[3], folder / "probe.fmu")
-    (folder / "kpis.py").write_text(KPIS)
-    (folder / "profile.csv").write_text("time,x\n0,1\n4,2\n")
-    return folder
+    return furnish(tmp_path_factory.mktemp("mutants"), probes[3])
 
 
 def judge(file: Path, text: str) -> bool:
@@ -142,9 +96,8 @@ def test_mutated_nested_systems(folder, count):
 def test_mutated_texts(folder, count):
     """Characters changed, so that most of them are no JSON any more."""
     text = json.dumps(SCENARIO)
-    words = st.sampled_from(
-        [*'{}[]",:\\ \n\0', "NaN", "-", "1e999", "9" * 5000, "\ufeff", "é", "//", "null", "[" * 500, '{"a":' * 500]
-    )
+    telling = ("NaN", "-", "1e999", "9" * 5000, "\ufeff", "é", "//", "null", "[" * 500, '{"a":' * 500)
+    words = st.sampled_from([*'{}[]",:\\ \n\0', *telling])
 
     @count
     @given(st.integers(0, len(text)), st.sampled_from([0, 0, 1, 2, 30, 3000]), words)

@@ -31,7 +31,8 @@ class Ticker(Fmi2Slave):
         if self.slow == "initialization":
             dawdle("initialization")
         self.clock = time.monotonic()
-        Path("started").write_text(repr(self.clock))
+        Path("starting").write_text(repr(self.clock))
+        Path("starting").rename("started")
 
     def do_step(self, current_time, step_size):
         time.sleep(self.pause)

@@ -29,6 +29,8 @@ class Block:
     def __init__(self, inputs: Ports, outputs: Ports):
         self.memory = mmap.mmap(-1, _VALUES + _size(inputs) + _size(outputs))
         self.journal = Journal(self.memory)
+        #: the integers of the journal, which the worker writes in every step
+        self.marker = memoryview(self.memory)[:64].cast("q")
         self.clock = ctypes.c_double.from_buffer(self.memory, _CLOCK)
         self.inputs = self._mirror(inputs, _VALUES)
         self.outputs = self._mirror(outputs, _VALUES + _size(inputs))

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import ctypes
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from ...journal import Deadlines
 
+_CLONE_NEWUSER, _CLONE_NEWNET = 0x10000000, 0x40000000
+
 
 @dataclass(frozen=True)
 class Isolation:
     """How long calls into the FMU may take; with `sandbox` it reads only its own files and libraries, writes only to its
-    temporary folder, and has no TCP."""
+    temporary folder, and has no network (where user namespaces are forbidden: no TCP)."""
 
     deadlines: Deadlines = field(default_factory=Deadlines)
     sandbox: bool = False
@@ -24,4 +28,16 @@ class Isolation:
         readable = (fmu, *interpreter_folders()) if self.sandbox else ()
         confine = "required" if self.sandbox else "never"
         settings = Settings(readable=readable, writable=(temporary,), confine=confine, parent=importer)  # type: ignore[arg-type]
-        return lambda: enter(settings)
+
+        def entrance() -> None:
+            if self.sandbox:
+                _leave_network()
+            enter(settings)
+
+        return entrance
+
+
+def _leave_network() -> None:
+    """From now on this process has a network of its own, without any device; where that is forbidden, nothing changes."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).unshare(_CLONE_NEWUSER | _CLONE_NEWNET)

@@ -33,12 +33,12 @@ def _restored(value: dict[str, Any]) -> Any:
 def read_line(reader: int) -> bytes:
     """The next command; empty when there is nobody any more who could send one."""
     line = os.read(reader, PIECE)
-    while line and not line.endswith(b"\n"):
+    while line[-1:] != b"\n" and line:
         line += os.read(reader, PIECE)
     return line
 
 
 def write(writer: int, line: bytes) -> None:
     """Write the whole line."""
-    while line:
-        line = line[os.write(writer, line) :]
+    while (written := os.write(writer, line)) < len(line):
+        line = line[written:]

@@ -60,12 +60,12 @@ class Process:
     def request(self, line: bytes, deadline: float) -> bytes:
         """Send a command and wait for its answer, for at most `deadline` s. Raises Lost, also when the worker has died."""
         try:
-            os.write(self._writer, line) if len(line) <= PIECE else write(self._writer, line)
+            write(self._writer, line)
             if self._poll.poll(_USUAL_WAIT) == self._usual:
-                self._rest = os.read(self._reader, PIECE)
-                if self._rest == DONE:
-                    self._rest = b""
+                data = os.read(self._reader, PIECE)
+                if data == DONE and not self._rest:
                     return DONE
+                self._rest += data
             with waiting():
                 return self._answer(deadline)
         except BrokenPipeError:
@@ -162,11 +162,13 @@ class Process:
 
 def _be_the_worker(serve: Callable[[int, int], None], commands: int, answers: int, printed: int) -> NoReturn:
     code = 70
+    _streams = sys.stdout, sys.stderr  # they live on, so that what the importer has not flushed is not written here, too
     try:
         os.dup2(printed, 1)
         os.dup2(printed, 2)
         commands, answers = _out_of_reach(commands), _out_of_reach(answers)
         _close_all_but({0, 1, 2, commands, answers})
+        sys.stdout, sys.stderr = (os.fdopen(n, "w", buffering=1, errors="replace", closefd=False) for n in (1, 2))
         serve(commands, answers)
         code = 0
     finally:

@@ -153,11 +153,11 @@ class RemoteFmu(Component):
             target[:] = source
         self._command = "turn"
         answer = self._request(TURN)
-        if answer == DONE:
-            for target, source in self._out:
-                target[:] = source
-            return OK
-        return self._ended_early(self._value(answer))
+        if answer != DONE:
+            return self._ended_early(self._value(answer))
+        for target, source in self._out:
+            target[:] = source
+        return OK
 
     def _turn_with_texts(self, clock: ctypes.c_double) -> int:
         self._clock.value = clock.value

@@ -16,7 +16,7 @@ from typing import Any
 
 from ... import journal as journals
 from ... import log
-from ...component import Call, StepResult
+from ...component import Call, DoStep, StepResult
 from ...errors import ComponentError, InputError
 from ...journal import CALL, Phase
 from ..instance import WARNING, FmuInstance
@@ -34,7 +34,7 @@ class Worker:
     def __init__(self, instance: FmuInstance, block: Block, enter: Callable[[], None]):
         self._instance, self._block, self._enter = instance, block, enter
         self._in, self._out = texts(block.inputs), texts(block.outputs)
-        self._calls: Sequence[tuple[int, Callable[..., int], tuple[Any, ...], Call]] = ()
+        self._calls: Sequence[tuple[int, Callable[..., int], tuple[Any, ...], bool, Call]] = ()
         self._states: dict[int, Any] = {}
         self._numbers = count()
         self._commands: dict[str, Callable[..., Any]] = {
@@ -107,20 +107,20 @@ class Worker:
     def _prepare(self, step_size: float) -> list[str]:
         """Names of the calls of a turn, by the number that stands in the journal."""
         calls = self._instance.turn(self._block.clock, step_size)
-        self._calls = [(number, call.function, call.arguments, call) for number, call in enumerate(calls)]
+        self._calls = [(n, call.function, call.arguments, isinstance(call.native, DoStep), call) for n, call in enumerate(calls)]
         self._block.journal.enter(Phase.STEPPING)
         return [call.name for call in calls]
 
     def _turn(self) -> StepResult | None:
-        journal, warning, traps = self._block.journal, WARNING, _traps
+        marker, warning, traps = self._block.marker, WARNING, _traps
         # equal in the default rounding mode only, and the least denormal is no zero only if it is not flushed
         one, little, least = 1.0, 2.0**-54, 5e-324
-        for number, function, arguments, call in self._calls:
-            journal[CALL] = number
+        for number, function, arguments, steps, call in self._calls:
+            marker[CALL] = number
             status = function(*arguments)
             if status > warning:
                 return self._instance.failed(call.name, status)
-            if one + little != one - little or not least + least or traps():
+            if one + little != one - little or not least + least or (steps and traps()):
                 raise ComponentError(self._instance.name, call.name, FLOAT_STATE, self._block.clock.value)
         return None
 

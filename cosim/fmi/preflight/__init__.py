@@ -9,6 +9,7 @@ from io import BufferedReader
 from itertools import islice
 from pathlib import Path
 
+from ...errors import InputError
 from . import rules_model, rules_structure, rules_values, rules_variables
 from .archive import Archive, open_file
 from .binary import check_binary
@@ -59,6 +60,8 @@ def examine(path: Path, limits: Limits = LIMITS) -> Examination:
             _examine(Archive(file, limits), limits, result)
         except Flaw as flaw:
             result.findings.append(flaw.finding)
+        except OSError as error:
+            raise InputError(f'FMU "{path}" cannot be read: {error.strerror}') from None
     return result
 
 

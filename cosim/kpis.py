@@ -1,0 +1,219 @@
+"""KPIs of any signal, for every scenario:
+
+    {"name": "altitude_error", "python": "cosim.kpis:rms", "arguments": {"signal": "plant.uav.position.z", "target": 2.0}}
+
+Each function looks at the rows with start <= time <= stop (s) and returns its number as `value`, NaN where there is none. Between
+rows signals are straight lines; integrals go by the trapezoidal rule. `target` is a number or the name of another signal; errors
+are signal - target. A number whose unit is not mentioned has that of the signal.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .kpi import units
+from .results import Result
+
+Target = float | str
+FOREVER = math.inf
+
+
+def rms(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+    """Root of the mean squared error over time."""
+    time, error = _error(result, signal, target, start, stop)
+    return {"value": math.sqrt(_mean(time, error**2))}
+
+
+def mean(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+    """Mean error over time."""
+    return {"value": _mean(*_error(result, signal, target, start, stop))}
+
+
+def maximum(
+    result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER
+) -> dict[str, float]:
+    """Largest error, with its sign: the largest value of the signal where there is no target."""
+    _, error = _error(result, signal, target, start, stop)
+    return {"value": float(error.max()) if error.size else math.nan}
+
+
+def minimum(
+    result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER
+) -> dict[str, float]:
+    """Smallest error, with its sign."""
+    _, error = _error(result, signal, target, start, stop)
+    return {"value": float(error.min()) if error.size else math.nan}
+
+
+def peak(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+    """Largest error without its sign."""
+    _, error = _error(result, signal, target, start, stop)
+    return {"value": float(np.abs(error).max()) if error.size else math.nan}
+
+
+def final(result: Result, signal: str, target: Target = 0.0, stop: float = FOREVER) -> dict[str, float]:
+    """Error in the last row."""
+    _, error = _error(result, signal, target, -FOREVER, stop)
+    return {"value": float(error[-1]) if error.size else math.nan}
+
+
+def iae(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+    """Integral of the absolute error, in the signal's unit times s."""
+    time, error = _error(result, signal, target, start, stop)
+    return {"value": _integral(time, np.abs(error))}
+
+
+def ise(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+    """Integral of the squared error, in the signal's unit squared times s."""
+    time, error = _error(result, signal, target, start, stop)
+    return {"value": _integral(time, error**2)}
+
+
+def itae(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+    """Integral of the absolute error times the time since the first row, in the signal's unit times s2."""
+    time, error = _error(result, signal, target, start, stop)
+    return {"value": _integral(time, (time - time[:1]) * np.abs(error))}
+
+
+@units(value="J")
+def energy(result: Result, effort: str, flow: Target = 1.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+    """Integral of effort times flow (J): of force (N) and speed (m/s), torque (N.m) and rate (rad/s), or of a power (W) alone."""
+    rows = _rows(result, start, stop)
+    power = result[effort] * (result[flow] if isinstance(flow, str) else flow)
+    return {"value": _integral(result.time[rows], power[rows])}
+
+
+def saturation_share(
+    result: Result,
+    signal: str,
+    lower: float = -FOREVER,
+    upper: float = FOREVER,
+    start: float = -FOREVER,
+    stop: float = FOREVER,
+) -> dict[str, float]:
+    """Share of the time (1) with the signal at `lower` or below or at `upper` or above; each row's value holds until the next."""
+    rows = _rows(result, start, stop)
+    time, values = result.time[rows], result[signal][rows]
+    if len(time) < 2 or time[-1] == time[0]:
+        return {"value": math.nan}
+    saturated = (values <= lower) | (values >= upper)
+    return {"value": float(np.diff(time) @ saturated[:-1] / (time[-1] - time[0]))}
+
+
+@units(value="s")
+def time_to_reach(result: Result, signal: str, level: float, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+    """Time (s) from the first row until the signal first is at `level` or has crossed it, whichever side it came from."""
+    rows = _rows(result, start, stop)
+    time, values = result.time[rows], result[signal][rows].astype(np.float64)
+    side = -1.0 if values.size and values[0] > level else 1.0
+    return {"value": _first_time(time, side * values, side * level) - (time[0] if time.size else 0.0)}
+
+
+@units(value="s")
+def rise_time(
+    result: Result,
+    signal: str,
+    start: float = -FOREVER,
+    stop: float = FOREVER,
+    initial: float | None = None,
+    target: float | None = None,
+    low: float = 0.1,
+    high: float = 0.9,
+) -> dict[str, float]:
+    """Time (s) that a step response takes from the share `low` (1) of its way to the share `high`, each reached the first time.
+
+    The way goes from `initial`, without one the value of the first row, to `target`, without one the value of the last row.
+    """
+    step = _step(result, signal, start, stop, initial, target)
+    return {"value": _first_time(step.time, step.share, high) - _first_time(step.time, step.share, low)}
+
+
+def overshoot(
+    result: Result,
+    signal: str,
+    start: float = -FOREVER,
+    stop: float = FOREVER,
+    initial: float | None = None,
+    target: float | None = None,
+) -> dict[str, float]:
+    """How far a step response goes beyond its target at most, as a share of its way (1; see `rise_time`); 0 when it does not."""
+    share = _step(result, signal, start, stop, initial, target).share
+    return {"value": max(float(share.max()) - 1, 0.0) if share.size else math.nan}
+
+
+@units(value="s")
+def settling_time(
+    result: Result,
+    signal: str,
+    start: float = -FOREVER,
+    stop: float = FOREVER,
+    initial: float | None = None,
+    target: float | None = None,
+    band: float = 0.02,
+) -> dict[str, float]:
+    """Time (s) from the first row until a step response stays within `band` times its way (see `rise_time`) of its target.
+
+    NaN when the last row is outside.
+    """
+    time, share = _step(result, signal, start, stop, initial, target)
+    away = np.abs(share - 1)
+    outside = np.flatnonzero(away > band)
+    if not share.size or away[-1] > band:
+        return {"value": math.nan}
+    if not outside.size:
+        return {"value": 0.0}
+    last = outside[-1]
+    return {"value": _first_time(time[last:], -away[last:], -band) - float(time[0])}
+
+
+class _Step(NamedTuple):
+    """A response as the share of its way from initial value (0) to target (1)."""
+
+    time: np.ndarray
+    share: np.ndarray
+
+
+def _step(result: Result, signal: str, start: float, stop: float, initial: float | None, target: float | None) -> _Step:
+    """Without any rows when there are none or no way to go."""
+    rows = _rows(result, start, stop)
+    time, values = result.time[rows], result[signal][rows].astype(np.float64)
+    if not values.size:
+        return _Step(time, values)
+    begin = float(values[0]) if initial is None else initial
+    end = float(values[-1]) if target is None else target
+    return _Step(time, (values - begin) / (end - begin)) if end != begin else _Step(time[:0], values[:0])
+
+
+def _rows(result: Result, start: float, stop: float) -> slice:
+    return slice(int(np.searchsorted(result.time, start, "left")), int(np.searchsorted(result.time, stop, "right")))
+
+
+def _error(result: Result, signal: str, target: Target, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
+    rows = _rows(result, start, stop)
+    wanted = result[target] if isinstance(target, str) else target
+    return result.time[rows], (result[signal].astype(np.float64) - wanted)[rows]
+
+
+def _integral(time: np.ndarray, values: np.ndarray) -> float:
+    return float(np.trapezoid(values, time)) if time.size else math.nan
+
+
+def _mean(time: np.ndarray, values: np.ndarray) -> float:
+    if not time.size:
+        return math.nan
+    return _integral(time, values) / float(time[-1] - time[0]) if time[-1] > time[0] else float(values.mean())
+
+
+def _first_time(time: np.ndarray, values: np.ndarray, level: float) -> float:
+    """When a line through the rows first is at `level` or above, NaN when it never is."""
+    above = np.flatnonzero(values >= level)
+    if not above.size:
+        return math.nan
+    row = above[0]
+    if row == 0:
+        return float(time[0])
+    share = (level - values[row - 1]) / (values[row] - values[row - 1])
+    return float(time[row - 1] + share * (time[row] - time[row - 1]))

@@ -1,0 +1,134 @@
+"""`cosim regress` on small scenarios: a cooling body, held against its reference and its checks."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+from lxml import etree
+
+COOLING = """
+import os
+import signal
+
+from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
+
+
+class Body(Fmi2Slave):
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        self.rate, self.temperature = 0.5, 80.0
+        self.register_variable(Real("rate", causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
+        self.register_variable(Real("temperature", causality=Fmi2Causality.output))
+
+    def do_step(self, current_time, step_size):
+        if self.rate > 1000:
+            os.kill(os.getppid(), signal.SIGKILL)
+        if self.rate > 90:
+            raise ValueError("no body cools that fast")
+        self.temperature -= self.rate * step_size * self.temperature
+        return True
+
+
+def last(result, signal):
+    return {"value": float(result[signal][-1])}
+"""
+REFERENCE = {"file": "references/cooling.csv", "tolerances": {"body.*": {"absolute": 0.1}}}
+CHECK = {
+    "kpis": [{"name": "end", "python": "cooling.py:last", "arguments": {"signal": "body.temperature"}}],
+    "checks": [{"kpi": "end.value", "max": 10}],
+}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "scenarios").mkdir()
+    (tmp_path / "scenarios/cooling.py").write_text(COOLING)
+    return tmp_path
+
+
+def scenario(folder, name="cooling", rate=0.5, **more):
+    body = {"python": "cooling.py:Body", "parameters": {"rate": rate}}
+    content = {"name": name, "stop_time": 5, "step_size": 0.01, "components": {"body": body}, **more}
+    (folder / f"scenarios/{name}.json").write_text(json.dumps(content))
+
+
+def regress(folder, *arguments):
+    command = [sys.executable, "-m", "cosim", "regress", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
+
+
+def test_a_reference_is_written_and_met(folder):
+    scenario(folder, reference=REFERENCE)
+    updated = regress(folder, "--update")
+    assert updated.returncode == 0, updated.stdout + updated.stderr
+    assert "1 signals, " in updated.stdout
+    assert json.loads((folder / "scenarios/references/cooling.json").read_text())["versions"]["numpy"]
+    again = regress(folder)
+    assert (again.returncode, again.stdout.splitlines()[-1]) == (0, "1 scenarios, all well")
+
+
+def test_a_changed_run_fails_and_says_what_and_since_when(folder):
+    scenario(folder, reference=REFERENCE)
+    assert regress(folder, "--update").returncode == 0
+    scenario(folder, rate=0.55, reference=REFERENCE)
+    done = regress(folder, "--junit", "out/junit.xml")
+    assert done.returncode == 3
+    assert "body.temperature leaves its tube at t = 0.0" in done.stdout
+    assert "changed since the reference was made: cooling.json\n" in done.stdout
+    assert (folder / "runs/cooling/tubes.png").stat().st_size > 10_000
+    suite = etree.parse(folder / "out/junit.xml").getroot().find("testsuite")
+    assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("1", "1", "0")
+    assert "leaves its tube" in suite.find("testcase[@name='cooling']/failure").text
+
+
+def test_every_scenario_of_a_folder_has_its_outcome(folder):
+    scenario(folder, name="aimless")
+    scenario(folder, name="crashing", rate=99, **CHECK)
+    scenario(folder, name="good", rate=0.9, **CHECK)
+    scenario(folder, name="warm", rate=0.1, **CHECK)
+    done = regress(folder, "scenarios", "--junit", "junit.xml")
+    assert done.returncode == 1
+    assert [line.split()[:2] for line in done.stdout.splitlines() if line[0] != " "] == [
+        ["FAILED", "crashing"],
+        ["passed", "good"],
+        ["FAILED", "warm"],
+        ["3", "scenarios,"],
+    ]
+    assert "body: do_step failed at t = 0 s: ValueError: no body cools that fast" in done.stdout
+    assert "end.value is 48.5" in done.stdout
+    cases = etree.parse(folder / "junit.xml").getroot().findall("testsuite/testcase")
+    assert {case.get("name"): [part.tag for part in case] for case in cases} == {
+        "crashing": ["error"],
+        "good": [],
+        "warm": ["failure"],
+    }
+
+
+def test_a_run_that_is_killed_is_no_success(folder):
+    scenario(folder, name="good", rate=0.9, **CHECK)
+    scenario(folder, name="killed", rate=1001, **CHECK)
+    done = regress(folder)
+    assert (done.returncode, "cosim run: ended by signal 9" in done.stdout) == (1, True)
+
+
+def test_a_failed_run_becomes_no_reference(folder):
+    scenario(folder, rate=0.1, reference=REFERENCE, **CHECK)
+    done = regress(folder, "--update")
+    assert (done.returncode, "a failed run becomes no reference" in done.stdout) == (3, True)
+    assert not (folder / "scenarios/references").exists()
+
+
+def test_a_missing_reference_is_refused_with_the_remedy(folder):
+    scenario(folder, reference=REFERENCE)
+    done = regress(folder, "scenarios/cooling.json")
+    assert done.returncode == 2
+    assert 'cooling.csv" does not exist: `cosim regress --update` writes it' in done.stdout
+
+
+def test_nothing_to_do_and_what_cannot_be_found_are_refused(folder):
+    scenario(folder, name="aimless")
+    assert regress(folder).returncode == 2
+    assert 'no shipped scenario "colling"' in regress(folder, "colling").stderr
+    (folder / "scenarios/aimless.json").write_text("{]")
+    assert "aimless.json:1:2:" in regress(folder).stdout
