@@ -19,6 +19,7 @@ from pythonfmu.variables import Boolean, Integer, Real, ScalarVariable, String
 from . import log
 from .component import Component, Ports, Variable
 from .errors import ComponentError, InputError, Problem, did_you_mean
+from .resources import is_file
 from .units import parse
 
 _TYPES = {Real: "Float64", Integer: "Int32", Boolean: "Boolean", String: "String"}
@@ -175,7 +176,7 @@ def load_object(reference: str, folder: Path) -> Any:
     if not separator or not file.endswith(".py") or not name.isidentifier():
         raise InputError(f'expected "file.py:name", found "{reference}"')
     path = (folder / file).resolve()
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f'file "{file}" does not exist')
     module = _import(path)
     if not hasattr(module, name):

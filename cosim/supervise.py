@@ -64,7 +64,7 @@ class Outcome:
 
 
 def possible() -> bool:
-    """Whether this process can fork, and prints to files that a child can share (a test's or a notebook's own streams are none)."""
+    """Whether this process can fork, and prints to files that a child can share (those of a test or a notebook are none)."""
     try:
         return hasattr(os, "fork") and sys.stdout.fileno() >= 0 and sys.stderr.fileno() >= 0
     except (OSError, AttributeError):

@@ -11,6 +11,7 @@ from typing import Any
 
 from ..errors import did_you_mean
 from ..python_component import load_object
+from ..resources import is_file
 from .schema import FunctionSpec
 
 
@@ -23,7 +24,7 @@ def function_problem(spec: FunctionSpec, folder: Path) -> str:
     if not name.isidentifier() or not (file.endswith(".py") or all(part.isidentifier() for part in file.split("."))):
         return f'expected "file.py:function" or "package.module:function", found "{spec.python}"'
     path = folder / file if file.endswith(".py") else _module_file(file)
-    if path is None or not path.is_file():
+    if path is None or not is_file(path):
         return f'{"file" if file.endswith(".py") else "module"} "{file}" does not exist'
     try:
         tree = ast.parse(path.read_bytes())

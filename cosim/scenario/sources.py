@@ -8,6 +8,7 @@ from pathlib import Path
 from ..component import Component
 from ..errors import InputError
 from ..fmi import FmuFile, Isolation, instantiate
+from ..resources import is_file
 from .schema import ComponentSpec
 from .tree import Node
 
@@ -44,7 +45,7 @@ class Workshop:
         file, _, model = spec.modelica.rpartition(":")
         if not file.endswith(".mo"):
             raise InputError(f'expected "file.mo:Model", found "{spec.modelica}"')
-        if not (folder / file).is_file():
+        if not is_file(folder / file):
             raise InputError(f'file "{file}" does not exist')
         self.modelica.append(folder / file)
         return self._instance(cached_fmu(folder / file, model), spec, name)

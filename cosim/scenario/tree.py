@@ -75,7 +75,7 @@ def find(scenario: str | Path) -> Path:
     """A path as it is, or the file of a shipped scenario given by its name."""
     path = Path(scenario)
     shipped = resources.root() / "scenarios"
-    if path.suffix == ".json" or path.is_file():
+    if path.suffix == ".json" or resources.is_file(path):
         return path
     names = sorted(file.stem for file in shipped.glob("*.json"))
     if str(scenario) not in names:

@@ -18,8 +18,6 @@ import cosim
 
 NOTHING = {"/record": {"signals": []}, "/kpis": [], "/checks": [], "/figures": []}
 
-WARM_UP = 20
-
 
 def inventory() -> dict[str, int]:
     gc.collect()
@@ -39,10 +37,10 @@ def entries(folder: str) -> int:
 
 def over_runs(scenario: str, count: int) -> list[dict[str, int]]:
     """After the first runs, in which caches and memory pools fill, and after as many as asked for."""
-    looks = []
-    for n in range(1, WARM_UP + count + 1):
+    looks, first = [], max(20, min(50, count // 2))
+    for n in range(1, first + count + 1):
         cosim.run(scenario, NOTHING | {"/record": {"signals": ["*"]}}, stop_time=0.05)
-        if n in (WARM_UP, WARM_UP + count):
+        if n in (first, first + count):
             looks.append(inventory())
     return looks
 

@@ -66,7 +66,7 @@ def test_the_scenario_is_good_before_it_is_changed(folder):
     assert write(folder, SCENARIO, INNER)
 
 
-@pytest.mark.parametrize("count", [counted(600), pytest.param(counted(100_000), marks=pytest.mark.fuzz)])
+@pytest.mark.parametrize("count", [counted(500), pytest.param(counted(100_000), marks=pytest.mark.fuzz)])
 def test_mutated_scenarios(folder, count):
     results = set()
 

@@ -1,6 +1,6 @@
 """A scenario of 1000 FMUs and 10 000 connections, from its JSON to the first step.
 
-Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_large_systems.py
+Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_large_wiring.py
 """
 
 from __future__ import annotations
