@@ -25,6 +25,7 @@ from . import journal as journals
 from .errors import ComponentError
 from .journal import CALL, CHANGES, CODE, ROWS, STEPS, Journal, Phase
 from .live_csv import LiveCsv
+from .sandbox.process import detach, lower
 from .temporary import run_folder
 from .unfinished import read_header
 
@@ -44,7 +45,7 @@ MEMORY = 4 << 30
 _GENERATIONS = 10
 
 _POLITE = (signal.SIGTERM, signal.SIGHUP)
-_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
+_PR_SET_CHILD_SUBREAPER = 36
 
 
 @dataclass(frozen=True)
@@ -79,10 +80,11 @@ def supervised(entry: Callable[[], int]) -> Outcome:
         sys.stdout.flush()
         sys.stderr.flush()
         reader, writer = os.pipe()
+        supervisor = os.getpid()
         child = os.fork()
         if child == 0:
             os.close(reader)
-            _be_the_child(entry, journal, writer, folder)
+            _be_the_child(entry, journal, writer, folder, supervisor)
         os.close(writer)
         return _Supervisor(child, journal, reader).watch()
 
@@ -110,10 +112,10 @@ def _adopt_orphans() -> None:
 # -- in the child ------------------------------------------------------------------------------------------------------------
 
 
-def _be_the_child(entry: Callable[[], int], journal: Journal, foreign_output: int, temporary: str) -> None:
+def _be_the_child(entry: Callable[[], int], journal: Journal, foreign_output: int, temporary: str, supervisor: int) -> None:
     code = 70
     try:
-        _detach(foreign_output)
+        _detach(foreign_output, supervisor)
         tempfile.tempdir = os.environ["TMPDIR"] = temporary
         journals.keep(journal)
         code = entry()
@@ -125,28 +127,18 @@ def _be_the_child(entry: Callable[[], int], journal: Journal, foreign_output: in
         os._exit(code)  # foreign code has no say in the end of the process
 
 
-def _detach(foreign_output: int) -> None:
+def _detach(foreign_output: int, supervisor: int) -> None:
     """A session of its own that ends with the supervisor, nothing to read, and a pipe for what foreign code prints.
 
     Memory is limited, so that a component that never has enough ends alone, and core files are not written.
     """
-    os.setsid()
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    _limit(resource.RLIMIT_DATA, MEMORY)
-    _limit(resource.RLIMIT_CORE, 0)
+    detach(supervisor)
+    lower(resource.RLIMIT_DATA, MEMORY)
+    lower(resource.RLIMIT_CORE, 0)
     sys.stdout, sys.stderr = _kept(sys.stdout), _kept(sys.stderr)
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
     os.dup2(foreign_output, 1)
     os.dup2(foreign_output, 2)
-    os.close(nothing)
     os.close(foreign_output)
-
-
-def _limit(kind: int, value: int) -> None:
-    _, hard = resource.getrlimit(kind)
-    resource.setrlimit(kind, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
 
 
 def _kept(stream):  # type: ignore[no-untyped-def]

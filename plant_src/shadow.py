@@ -184,7 +184,7 @@ class PlanarChain(Shadow):
         return Enclosure((-radius, -radius, low), (radius, radius, high))
 
     def _create(self, body: Body) -> int:
-        number = self._create_chain(body)
+        number = planar_chain(self._client, body)
         for joint in self._JOINTS:
             options = {"physicsClientId": self._client}
             pybullet.setJointMotorControl2(number, joint, pybullet.VELOCITY_CONTROL, force=0, **options)
@@ -194,27 +194,6 @@ class PlanarChain(Shadow):
         set_dynamics(self._client, number, self._JOINTS[2], body)
         self._effort = self._pieces["effort"].data
         return number
-
-    def _create_chain(self, body: Body) -> int:
-        origin, upright = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]
-        return pybullet.createMultiBody(
-            0,
-            -1,
-            -1,
-            [0.0, 0.0, body.height],
-            upright,
-            linkMasses=[0, 0, body.mass],
-            linkCollisionShapeIndices=[-1, -1, compound(body.boxes, self._client)],
-            linkVisualShapeIndices=[-1] * 3,
-            linkPositions=[origin] * 3,
-            linkOrientations=[upright] * 3,
-            linkInertialFramePositions=[origin] * 3,
-            linkInertialFrameOrientations=[upright] * 3,
-            linkParentIndices=[0, 1, 2],
-            linkJointTypes=[pybullet.JOINT_PRISMATIC, pybullet.JOINT_PRISMATIC, pybullet.JOINT_REVOLUTE],
-            linkJointAxis=[[1, 0, 0], [0, 1, 0], [0, 0, 1]],
-            physicsClientId=self._client,
-        )
 
     def _place(self, pose: Sequence[float]) -> None:
         for joint in self._JOINTS:
@@ -228,6 +207,29 @@ class PlanarChain(Shadow):
     def measure(self) -> None:
         x, y, yaw = pybullet.getJointStates(self.body, self._JOINTS, self._client)
         _write_rates(self._motion, 0, x[1], y[1], yaw[1])
+
+
+def planar_chain(client: int, body: Body, link_mass: float = 0.0) -> int:
+    """A body at its height on joints for x, y and yaw, whose first two links have `link_mass` (kg)."""
+    origin, upright = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]
+    return pybullet.createMultiBody(
+        0,
+        -1,
+        -1,
+        [0.0, 0.0, body.height],
+        upright,
+        linkMasses=[link_mass, link_mass, body.mass],
+        linkCollisionShapeIndices=[-1, -1, compound(body.boxes, client)],
+        linkVisualShapeIndices=[-1] * 3,
+        linkPositions=[origin] * 3,
+        linkOrientations=[upright] * 3,
+        linkInertialFramePositions=[origin] * 3,
+        linkInertialFrameOrientations=[upright] * 3,
+        linkParentIndices=[0, 1, 2],
+        linkJointTypes=[pybullet.JOINT_PRISMATIC, pybullet.JOINT_PRISMATIC, pybullet.JOINT_REVOLUTE],
+        linkJointAxis=[[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+        physicsClientId=client,
+    )
 
 
 def compound(boxes: Sequence[Box], client: int) -> int:

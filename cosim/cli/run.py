@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -14,6 +13,7 @@ import click
 from ..errors import CosimError
 from ..journal import STEPS
 from . import report, supervision
+from .progress import progress_bar
 
 if TYPE_CHECKING:
     from ..api import Execution
@@ -174,14 +174,5 @@ def _pace(pace: Mapping[str, Any]) -> str:
 
 @contextmanager
 def _progress(assembly: Assembly) -> Iterator[list[Observer]]:
-    """A progress bar on a terminal, nothing elsewhere."""
-    if not sys.stderr.isatty():
-        yield []
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task(assembly.spec.name)
-        yield [lambda finished, total: progress.update(task, completed=finished, total=total)]
+    with progress_bar(assembly.spec.name) as observer:
+        yield [observer] if observer else []

@@ -31,15 +31,15 @@ def detach(parent: int | None) -> None:
 
 def limit(memory: int, open_files: int, file_size: int, cpu_seconds: int | None) -> None:
     """Lower the limits of this process; `memory` in bytes beyond what is mapped already. No core file is written."""
-    _lower(resource.RLIMIT_AS, mapped() + memory)
-    _lower(resource.RLIMIT_NOFILE, open_files)
-    _lower(resource.RLIMIT_FSIZE, file_size)
-    _lower(resource.RLIMIT_CORE, 0)
+    lower(resource.RLIMIT_AS, mapped() + memory)
+    lower(resource.RLIMIT_NOFILE, open_files)
+    lower(resource.RLIMIT_FSIZE, file_size)
+    lower(resource.RLIMIT_CORE, 0)
     if cpu_seconds is not None:
-        _lower(resource.RLIMIT_CPU, cpu_seconds)
+        lower(resource.RLIMIT_CPU, cpu_seconds)
 
 
-def _lower(kind: int, value: int) -> None:
+def lower(kind: int, value: int) -> None:
     """Soft and hard limit; a hard limit that is lower already stays."""
     _, hard = resource.getrlimit(kind)
     value = value if hard == resource.RLIM_INFINITY else min(value, hard)

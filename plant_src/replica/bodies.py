@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arguments import Numbers
 from ..bullet import pybullet
-from ..shadow import compound, set_dynamics
+from ..shadow import compound, planar_chain, set_dynamics
 from ..vehicles.ar_drone import geometry as ar_drone
 from ..vehicles.ar_drone.parameters import CENTRE_OF_MASS, ROTOR_SENSES, ROTORS, principal_axes
 from ..vehicles.shapes import quaternion
@@ -81,7 +81,7 @@ class Vessel:
 
     def __init__(self, client: int, initial: Numbers):
         """`initial`: x, y, yaw, surge and sway velocity, yaw rate."""
-        self._client, self.body = client, _chain(client)
+        self._client, self.body = client, planar_chain(client, strider.BODY, LINK_MASS)
         velocity = (_about_z(initial[2])[:2, :2] @ np.array(initial[3:5])).tolist()
         for joint, rate in zip(self._JOINTS, (*velocity, initial[5]), strict=True):
             pybullet.setJointMotorControl2(self.body, joint, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client)
@@ -122,25 +122,3 @@ def attitude(to_world: np.ndarray) -> np.ndarray:
 def _about_z(angle: float) -> np.ndarray:
     cos, sin = math.cos(angle), math.sin(angle)
     return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-
-
-def _chain(client: int) -> int:
-    origin, upright = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]
-    return pybullet.createMultiBody(
-        0,
-        -1,
-        -1,
-        [0.0, 0.0, strider.BODY.height],
-        upright,
-        linkMasses=[LINK_MASS, LINK_MASS, strider.BODY.mass],
-        linkCollisionShapeIndices=[-1, -1, compound(strider.BODY.boxes, client)],
-        linkVisualShapeIndices=[-1] * 3,
-        linkPositions=[origin] * 3,
-        linkOrientations=[upright] * 3,
-        linkInertialFramePositions=[origin] * 3,
-        linkInertialFrameOrientations=[upright] * 3,
-        linkParentIndices=[0, 1, 2],
-        linkJointTypes=[pybullet.JOINT_PRISMATIC, pybullet.JOINT_PRISMATIC, pybullet.JOINT_REVOLUTE],
-        linkJointAxis=[[1, 0, 0], [0, 1, 0], [0, 0, 1]],
-        physicsClientId=client,
-    )
