@@ -393,7 +393,7 @@ static UsualTurn packed(const Operation *op, uint32_t **pool) {
 
 static int all_measured(const Program *p) {
     for (const Operation *op = p->operations; op < p->operations + p->count; op++)
-        if ((op->kind == STEP2 || op->kind == STEP3) && op->step.memory->trials) return 0;
+        if (is_usual(p, op) && op[2].step.memory->trials) return 0;
     return 1;
 }
 

@@ -36,6 +36,7 @@ class NativeExecutor(Executor):
 
     def _prepare(self) -> None:
         self._program = _native.Program(ctypes.addressof(self._clock), self.marker.ctypes.data, self._on_status)
+        self._prepared = self.finished
         for gather, line in self._delays.items():
             if not gather.source.dtype.hasobject:
                 line.rewind(self.finished)
@@ -113,9 +114,9 @@ class NativeExecutor(Executor):
             finally:
                 self.recorder.advance(int(self.marker[ROWS]))
 
-    @staticmethod
-    def _batch(first: int) -> int:
-        return BATCH if first >= TRIALS else TRIALS
+    def _batch(self, first: int) -> int:
+        """The first call of a program is short: it measures steps, and the next one packs the turns."""
+        return BATCH if first >= self._prepared + TRIALS else TRIALS
 
     def _steps_with_room(self) -> int:
         """Macro steps until the present chunk of rows is full; a new chunk when it is full now."""

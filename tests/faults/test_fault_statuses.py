@@ -8,6 +8,7 @@ import pytest
 from fault_fmu import COUNT, function_name, lag_output, scenario
 
 T5 = " failed at t = 0.05 s: "
+T8 = " failed at t = 0.08 s: "
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,26 @@ def test_a_bad_return_stops_the_run_with_one_line_and_keeps_the_rows(fmus, runne
     assert case.words.format(f=function_name(version, case.order.split()[0])) in done.err
     assert "Traceback" not in done.err
     assert (done.temporaries, done.processes, done.changes) == ([], [], [])
+
+
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [
+        ("SetReal @0.075 error", T8 + "status 3 (error)"),
+        ("DoStep @0.08 error", T8 + "status 3 (error)"),
+        ("GetReal @0.085 error", T8 + "status 3 (error)"),
+        ("DoStep @0.08 round_up", T8 + "changed the floating-point mode"),
+    ],
+)
+def test_nothing_is_overlooked_in_the_usual_turn_of_set_step_and_get(fmus, runner, tmp_path, version, order, words):
+    """Which the native executor takes without looking at each operation, once steps have been measured: long before 0.08 s."""
+    components = {"lag": {"fmu": str(fmus(version, order))}, "next": {"fmu": str(fmus(version, name="next"))}}
+    ring = [{"from": "lag.y", "to": "next.u"}, {"from": "next.y", "to": "lag.u"}]
+    stages = {"stages": [["lag", "next"]]}
+    file = scenario(tmp_path, fmus.folder, components=components, connections=ring, algorithm=stages)
+    done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report")
+    assert (done.code, len(done.rows)) == (1, 9), done.err
+    assert f"lag: {function_name(version, order.split()[0])}{words}" in done.err
 
 
 def test_the_rows_of_a_failed_run_are_those_of_a_good_one(fmus, runner, tmp_path, version):
