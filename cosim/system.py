@@ -45,12 +45,25 @@ Parallel = Literal["auto", True, False]
 
 
 @dataclass(frozen=True, slots=True)
+class Iteration:
+    """Stages are repeated from the same state until no connected output among them changes any more.
+
+    A number y has stopped changing when it differs from its last value by at most tolerance * (1 + |y|). It is an error when
+    that takes more than `limit` rounds.
+    """
+
+    tolerance: float
+    limit: int
+
+
+@dataclass(frozen=True, slots=True)
 class Group:
     """Components that step in stages of their own inside one place of an outer stage (a nested system)."""
 
     name: str
     stages: tuple[Stage, ...]
     parallel: Parallel = "auto"
+    iteration: Iteration | None = None
 
 
 Stage = tuple["str | Group", ...]
@@ -64,6 +77,14 @@ def members(stages: Iterable[Stage]) -> Iterator[str]:
                 yield from members(member.stages)
             else:
                 yield member
+
+
+def groups(stages: Iterable[Stage]) -> Iterator[Group]:
+    """All groups in the stages, also those inside groups."""
+    for member in (member for stage in stages for member in stage):
+        if isinstance(member, Group):
+            yield member
+            yield from groups(member.stages)
 
 
 class Place(NamedTuple):
@@ -114,9 +135,21 @@ class System:
             elif name in seen:
                 yield Problem(f'component "{name}" stands in the stages twice', subject=subject)
             seen.add(name)
+        for group in groups(self.stages):
+            if group.iteration:
+                yield from self._iteration_problems(group)
         for name in self.components:
             if name not in seen:
                 yield Problem(f'component "{name}" is in no stage, so it would never step', subject=subject)
+
+    def _iteration_problems(self, group: Group) -> Iterator[Problem]:
+        repeated = f"the stages of {group.name} are iterated"
+        for name in members(group.stages):
+            if name in self.components and not self.components[name].has_state:
+                text = f'{repeated}, but "{name}" cannot return to a state (FMI: canGetAndSetFMUState)'
+                yield Problem(text, subject=("components", name))
+            if name in self.periods:
+                yield Problem(f'{repeated}, so "{name}" cannot have a period of its own', subject=("components", name, "period"))
 
     def _connection_problems(self) -> Iterator[Problem]:
         fed: dict[Endpoint, Connection] = {}

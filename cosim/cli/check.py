@@ -62,7 +62,7 @@ def _list_stages(stages: tuple[Stage, ...] | object, indent: str) -> None:
 
 
 def _connections(assembly: Assembly) -> None:
-    from ..engine.plan import conversion
+    from ..engine.gathering import conversion
 
     system = assembly.system
     click.echo(f"\nconnections ({len(system.connections)})")

@@ -12,17 +12,17 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 
-from ..component import Call, Component, Ports, StepResult
+from ..component import Call, StepResult
 from ..errors import ComponentError
 from ..journal import calling
-from .moves import DelayLine, copy
+from .gathering import Gather
+from .initialization import propagate, take_start_values
+from .iteration import Round, Rounds
+from .moves import DelayLine, Move, copy
 from .parallel import TRIALS, Crew, SideBySide, may_overlap, processors
-from .plan import Plan, Step
+from .plan import Loop, Phase, Plan, Step
 from .recorder import Recorder
-from .turns import Ending, Turn, take
-
-#: components named in messages about several
-SHOWN = 8
+from .turns import SHOWN, WARNING, Ending, Turn, float_state_changed, take
 
 #: places in the marker: number of the present call, macro steps finished, rows recorded
 CALL, STEPS, ROWS, MARKER_SIZE = 0, 1, 2, 3
@@ -53,7 +53,7 @@ class Executor(ABC):
         self.marker = np.zeros(MARKER_SIZE, np.int64) if marker is None else marker
         self._finite = finite
         self._clock = ctypes.c_double()
-        self._delays = {g: DelayLine(g) for phase in plan.phases for g in phase.gathers if g.delay}
+        self._delays = {g: DelayLine(g) for phase in plan.all_phases for g in phase.gathers if g.delay}
         self._turns: list[Turn] = []
         #: the turns of each phase
         self._stages: list[list[Turn]] = []
@@ -90,8 +90,8 @@ class Executor(ABC):
             with calling(name, "enter_initialization_mode", "initialization", start):
                 component.enter_initialization_mode(start, stop)
                 component.get_outputs()
-                _take_start_values(component, plan.inputs.ports[name])
-        self._propagate(start)
+                take_start_values(component, plan.inputs.ports[name])
+        propagate(plan, start)
         for name, component in plan.system.components.items():
             with calling(name, "exit_initialization_mode", "initialization", start):
                 component.exit_initialization_mode()
@@ -104,36 +104,46 @@ class Executor(ABC):
         self.recorder.record(0)
         self.marker[ROWS] = self.recorder.rows
 
-    def _propagate(self, time: float) -> None:
-        moves = [copy(gather) for phase in self.plan.phases for gather in phase.gathers]
-        components, inputs, outputs = self.plan.system.components, self.plan.inputs.ports, self.plan.signals.ports
-        given: dict[str, object] = dict.fromkeys(components)
-        found = {name: _contents(outputs[name]) for name in components}
-        for _ in range(len(components) + 1):
-            for move in moves:
-                move()
-            fed = {name: now for name in components if (now := _contents(inputs[name])) != given[name]}
-            for name in fed:
-                with calling(name, "set_inputs and get_outputs", "initialization", time):
-                    components[name].set_inputs()
-                    components[name].get_outputs()
-            changed = {name: now for name in fed if (now := _contents(outputs[name])) != found[name]}
-            if not changed:
-                return
-            given |= fed
-            found |= changed
-        reason = f"the outputs still change after {len(components)} rounds: an algebraic loop"
-        raise ComponentError(" -> ".join(changed), "initialization", reason, time)
-
     # -- turns ---------------------------------------------------------------------------------------------------------
 
     def _number(self) -> None:
-        self._stages = [[self._turn(self._calls_of(step), step) for step in phase.steps] for phase in self.plan.phases]
+        self._stages = [self._turns_of(phase) for phase in self.plan.phases]
         for place, (phase, turns) in enumerate(zip(self.plan.phases, self._stages, strict=True)):
             overlapping = [turn for turn in turns if may_overlap(turn)]
             together = SideBySide(overlapping, phase.parallel)
             if phase.parallel and len(together.groups()) > 1:
                 self._joint[place] = self._join(together)
+
+    def _turns_of(self, phase: Phase) -> list[Turn]:
+        turns = [self._turn(self._calls_of(step), step) for step in phase.steps]
+        return [*turns, self._repeated(phase.loop)] if phase.loop else turns
+
+    def _repeated(self, loop: Loop) -> Turn:
+        """A turn that stands for all rounds of a loop."""
+        rounds = Rounds(loop, self.plan.signals, [self._round(phase) for phase in loop.phases], self._take)
+        step = Step(loop.name, next(iter(loop.components.values())), 1, 0.0)
+        return self._turn([Call(self._iterate, (rounds,), "a step in rounds")], step)
+
+    def _round(self, phase: Phase) -> Round:
+        again = [copy(gather) for gather in phase.gathers if not gather.delay]
+        return again, [self._delays[gather].move for gather in phase.gathers if gather.delay], self._turns_of(phase)
+
+    def _iterate(self, rounds: Rounds) -> int:
+        return _TERMINATION if rounds.step(self._clock.value) else 0
+
+    def _take(self, turn: Turn) -> bool:
+        """Take a turn from Python; returns whether the simulation is to end."""
+        for number, call in enumerate(turn.calls, start=turn.first):
+            self.marker[CALL] = number
+            if (status := call.function(*call.arguments)) > WARNING:
+                self._bad_status(turn, call, status)
+                break
+        if float_state_changed():
+            self._float_state_changed(turn, turn.calls[-1])
+        return self.termination is not None
+
+    def _move(self, gather: Gather) -> Move:
+        return self._delays[gather].move if gather.delay else copy(gather)
 
     def _calls_of(self, step: Step) -> Sequence[Call]:
         return step.component.turn(self._clock, step.step_size) or [Call(self._python_turn, (step,), "do_step")]
@@ -254,17 +264,3 @@ class Executor(ABC):
         """Let threads end; nothing is run any more."""
         if self._crew:
             self._crew.close()
-
-
-def _contents(ports: Ports) -> list[object]:
-    """What stands in the arrays, bit for bit."""
-    return [array.tolist() if array.dtype.hasobject else array.tobytes() for array in ports.arrays.values()]
-
-
-def _take_start_values(component: Component, ports: Ports) -> None:
-    """Fill the bound inputs with the component's own values, which those keep that no connection feeds."""
-    filled = dict.fromkeys(ports.arrays, 0)
-    for variable in ports.variables:
-        begin = filled[variable.dtype]
-        filled[variable.dtype] += len(variable.slots)
-        ports.arrays[variable.dtype][begin : filled[variable.dtype]] = component.get(variable.name)

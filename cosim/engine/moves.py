@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .plan import Gather
+from .gathering import Gather
 
 Move = Callable[[], object]
 

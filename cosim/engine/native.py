@@ -9,9 +9,8 @@ import numpy as np
 
 from ..component import Access, Call, DoStep, Flags
 from .executor import ROWS, Executor
-from .moves import copy
+from .gathering import Gather
 from .parallel import TRIALS
-from .plan import Gather
 from .turns import Turn
 
 try:
@@ -37,9 +36,9 @@ class NativeExecutor(Executor):
     def _prepare(self) -> None:
         self._program = _native.Program(ctypes.addressof(self._clock), self.marker.ctypes.data, self._on_status)
         self._prepared = self.finished
-        for gather, line in self._delays.items():
-            if not gather.source.dtype.hasobject:
-                line.rewind(self.finished)
+        for gather in (gather for phase in self.plan.phases for gather in phase.gathers):
+            if gather.delay and not gather.source.dtype.hasobject:
+                self._delays[gather].rewind(self.finished)
         for phase, turns in zip(self.plan.phases, self._stages, strict=True):
             for gather in phase.gathers:
                 self._add_move(gather)
@@ -53,7 +52,7 @@ class NativeExecutor(Executor):
 
     def _add_move(self, gather: Gather) -> None:
         if gather.source.dtype.hasobject:
-            self._add_object_move(self._delays[gather].move if gather.delay else copy(gather))
+            self._add_object_move(self._move(gather))
             return
         first, count = int(gather.target_indices[0]), len(gather.target_indices)
         together = np.array_equal(gather.target_indices, np.arange(first, first + count))

@@ -10,28 +10,13 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any
-
-import numpy as np
+from typing import NamedTuple
 
 from ..component import Component, Variable
-from ..system import Connection, Endpoint, Group, Parallel, Stage, System, members
+from ..system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System, members
 from ..timing import Grid
-from .layout import Layout, Slot, lay_out
-
-
-@dataclass(frozen=True, eq=False)
-class Gather:
-    """Values of one dtype that move together: target = factor * source + offset, `delay` macro steps late."""
-
-    source: np.ndarray
-    source_indices: np.ndarray
-    target: np.ndarray
-    target_indices: np.ndarray
-    delay: int = 0
-    factor: np.ndarray | None = None
-    offset: np.ndarray | None = None
+from .gathering import Gather, Gathering
+from .layout import Layout, lay_out
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +31,27 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Phase:
-    """Gathers, then steps."""
+    """Gathers, then steps, then a loop."""
 
     gathers: tuple[Gather, ...]
     steps: tuple[Step, ...]
     parallel: Parallel = "auto"
+    loop: Loop | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """Phases that are repeated within a macro step until what their components tell each other stands still."""
+
+    name: str
+    iteration: Iteration
+    phases: tuple[Phase, ...]
+    connections: Sequence[Connection]
+
+    @property
+    def components(self) -> dict[str, Component]:
+        """The components that step in it, by name."""
+        return {step.name: step.component for phase in _opened(self.phases) for step in phase.steps}
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,23 +64,37 @@ class Plan:
     signals: Layout
     phases: Sequence[Phase]
 
+    @property
+    def all_phases(self) -> Iterator[Phase]:
+        """The phases, each followed by those of its loop."""
+        return _opened(self.phases)
+
 
 def compile_plan(system: System, grid: Grid, recorded: Iterable[Endpoint] = ()) -> Plan:
     """Lay out the arrays and order the work. The system must have no problems, its periods must fit the grid."""
     phases = list(_phases(system))
-    inputs = _inputs(system, [connection for connections, _, _ in phases for connection in connections])
+    inputs = _inputs(system, [connection for phase in phases for connection in _read(phase)])
     signals = _signals(system, recorded)
-    gathering = _Gathering(system, inputs, signals)
-    return Plan(
-        system,
-        grid,
-        inputs,
-        signals,
-        [
-            Phase(tuple(gathering.gathers(connections)), tuple(_step(system, grid, name) for name in names), parallel)
-            for connections, names, parallel in phases
-        ],
-    )
+    gathering = Gathering(system, inputs, signals)
+
+    def phase_of(raw: _RawPhase) -> Phase:
+        steps = tuple(_step(system, grid, name) for name in raw.names)
+        return Phase(tuple(gathering.gathers(raw.connections)), steps, raw.parallel, loop_of(raw.group, raw.inner))
+
+    def loop_of(group: Group | None, inner: Sequence[_RawPhase]) -> Loop | None:
+        if not group or not group.iteration:
+            return None
+        connections = [connection for phase in inner for connection in _read(phase)]
+        return Loop(group.name, group.iteration, tuple(map(phase_of, inner)), connections)
+
+    return Plan(system, grid, inputs, signals, list(map(phase_of, phases)))
+
+
+def _opened(phases: Iterable[Phase]) -> Iterator[Phase]:
+    for phase in phases:
+        yield phase
+        if phase.loop:
+            yield from _opened(phase.loop.phases)
 
 
 def _step(system: System, grid: Grid, name: str) -> Step:
@@ -87,11 +102,24 @@ def _step(system: System, grid: Grid, name: str) -> Step:
     return Step(name, system.components[name], divisor, float(grid.step * divisor))
 
 
-_RawPhase = tuple[list[Connection], list[str], Parallel]
+class _RawPhase(NamedTuple):
+    """Connections to read, components to step and whether at the same time; then the inner phases of an iterated group."""
+
+    connections: list[Connection]
+    names: list[str]
+    parallel: Parallel = "auto"
+    group: Group | None = None
+    inner: Sequence[_RawPhase] = ()
+
+
+def _read(phase: _RawPhase) -> Iterator[Connection]:
+    yield from phase.connections
+    for inner in phase.inner:
+        yield from _read(inner)
 
 
 def _phases(system: System) -> Iterator[_RawPhase]:
-    """(connections to read, components to step, whether at the same time) of every phase, in order."""
+    """Every phase, in order."""
     incoming: dict[str, list[Connection]] = defaultdict(list)
     for connection in system.connections:
         incoming[connection.target.component].append(connection)
@@ -106,7 +134,7 @@ def _run(
         groups = [member for member in stage if isinstance(member, Group)]
         own_group = {name: frozenset(members(group.stages)) for group in groups for name in members(group.stages)}
         readers = [connection for name in members([stage]) for connection in incoming.get(name, ())]
-        yield (
+        yield _RawPhase(
             [
                 c
                 for c in readers
@@ -116,7 +144,11 @@ def _run(
             parallel,
         )
         for group in groups:
-            yield from _run(group.stages, group.parallel, frozenset(members(group.stages)), incoming)
+            inner = _run(group.stages, group.parallel, frozenset(members(group.stages)), incoming)
+            if group.iteration:
+                yield _RawPhase([], [], group=group, inner=list(inner))
+            else:
+                yield from inner
 
 
 def _inputs(system: System, connections: Iterable[Connection]) -> Layout:
@@ -146,75 +178,3 @@ def _signals(system: System, recorded: Iterable[Endpoint]) -> Layout:
             for name, names in read.items()
         }
     )
-
-
-def conversion(source: Variable, target: Variable) -> tuple[float, float]:
-    """(factor, offset) from the source's unit to the target's; (1.0, 0.0) where one of them has no unit."""
-    if source.unit is None or target.unit is None:
-        return 1.0, 0.0
-    return source.unit.conversion(target.unit)
-
-
-class _Gathering:
-    """Makes gathers out of connections, as few and as long as possible."""
-
-    def __init__(self, system: System, inputs: Layout, signals: Layout):
-        self._system, self._inputs, self._signals = system, inputs, signals
-        #: (dtype of source, place of target) -> offset of source, for all connections that just copy
-        self._copies: dict[tuple[Any, Slot], int] = {}
-        for connection in system.connections:
-            if not connection.delay and self._conversion(connection) == (1.0, 0.0):
-                source, target = self._ends(connection)
-                self._copies[source.dtype, target] = source.offset
-
-    def _ends(self, connection: Connection) -> tuple[Slot, Slot]:
-        return self._signals.places[connection.source], self._inputs.places[connection.target]
-
-    def _conversion(self, connection: Connection) -> tuple[float, float]:
-        return conversion(self._system.place(connection.source).variable, self._system.place(connection.target).variable)
-
-    def gathers(self, connections: Iterable[Connection]) -> Iterator[Gather]:
-        """The gathers of one phase, by dtypes, delay, and with or without conversion."""
-        kinds: dict[tuple[Any, ...], list[Connection]] = defaultdict(list)
-        for connection in connections:
-            source, target = self._ends(connection)
-            converted = self._conversion(connection) != (1.0, 0.0)
-            kinds[source.dtype, target.dtype, connection.delay, converted].append(connection)
-        for (_, _, delay, converted), alike in kinds.items():
-            if delay or converted:
-                yield self._special(alike, delay, converted)
-            else:
-                yield from self._runs(alike)
-
-    def _special(self, connections: list[Connection], delay: int, converted: bool) -> Gather:
-        sources, targets = zip(*map(self._ends, connections), strict=True)
-        factors, offsets = np.array([self._conversion(connection) for connection in connections]).T
-        return self._gather(sources, targets, delay, *((factors, offsets) if converted else ()))
-
-    def _runs(self, connections: list[Connection]) -> Iterator[Gather]:
-        """Copies, joined to runs of neighbouring targets.
-
-        A gap is filled with the copies that belong there although they are read again later, in the phase they belong to: one
-        long gather costs less than two short ones.
-        """
-        source_dtype, target_dtype = (slot.dtype for slot in self._ends(connections[0]))
-        offsets = sorted(self._ends(connection)[1].offset for connection in connections)
-        runs = [[offsets[0]]]
-        for before, after in pairwise(offsets):
-            gap = range(before + 1, after)
-            if all((source_dtype, Slot(target_dtype, offset)) in self._copies for offset in gap):
-                runs[-1] += [*gap, after]
-            else:
-                runs.append([after])
-        for run in runs:
-            targets = [Slot(target_dtype, offset) for offset in run]
-            yield self._gather([Slot(source_dtype, self._copies[source_dtype, target]) for target in targets], targets)
-
-    def _gather(self, sources: Sequence[Slot], targets: Sequence[Slot], *more: Any) -> Gather:
-        return Gather(
-            self._signals.arrays[sources[0].dtype],
-            np.array([slot.offset for slot in sources], np.intp),
-            self._inputs.arrays[targets[0].dtype],
-            np.array([slot.offset for slot in targets], np.intp),
-            *more,
-        )

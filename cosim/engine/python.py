@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from math import inf
 from time import perf_counter
 from typing import Any
@@ -11,10 +12,11 @@ import numpy as np
 
 from ..component import Call, DoStep
 from .executor import CALL, ROWS, STEPS, Executor
-from .moves import Move, copy
 from .parallel import TRIALS
-from .plan import Gather
 from .turns import WARNING, Turn
+
+#: up to so many are faster added one by one than by numpy
+FEW_FLOATS = 16
 
 
 class PythonExecutor(Executor):
@@ -29,10 +31,7 @@ class PythonExecutor(Executor):
             ([self._move(gather) for gather in phase.gathers], [self._numbered(turn) for turn in turns])
             for phase, turns in zip(self.plan.phases, self._stages, strict=True)
         ]
-        self._watched = [(floats, np.zeros_like(floats)) for floats in self.watched]
-
-    def _move(self, gather: Gather) -> Move:
-        return self._delays[gather].move if gather.delay else copy(gather)
+        self._spoiled = [_spoiled(floats) for floats in self.watched]
 
     def _numbered(self, turn: Turn) -> tuple[int, list[tuple[Any, Any, int]], Turn]:
         measure = self._joint and self.finished < TRIALS
@@ -53,13 +52,13 @@ class PythonExecutor(Executor):
         return self._shortest
 
     def _run(self, end: int) -> None:
-        seconds, phases, record, clock = self.plan.grid.seconds, self._phases, self.recorder.record, self._clock
-        marker, recorder, warning = self.marker.data, self.recorder, WARNING
-        watched = self._watched
+        grid, phases, record, clock = self.plan.grid, self._phases, self.recorder.record, self._clock
+        origin, stride, denominator = grid.integers.values()
+        marker, recorder, checks = self.marker.data, self.recorder, self._spoiled
         # equal in the default rounding mode only, and the least denormal is no zero only if it is not flushed
         one, little, least = 1.0, 2.0**-54, 5e-324
         for n in range(self.finished, end):
-            clock.value = seconds(n)
+            clock.value = (origin + n * stride) / denominator
             for moves, turns in phases:
                 for move in moves:
                     move()
@@ -68,16 +67,24 @@ class PythonExecutor(Executor):
                         continue
                     for function, arguments, number in calls:
                         marker[CALL] = number
-                        status = function(*arguments)
-                        if status > warning:
+                        if (status := function(*arguments)) and status > WARNING:
                             self._bad_status(turn, turn.calls[number - turn.first], status)
                             break
                     if one + little != one - little or not least + least:
                         self._float_state_changed(turn, turn.calls[-1])
-            for floats, zeros in watched:
-                if floats.dot(zeros):  # NaN unless all are finite
+            for spoiled in checks:
+                if spoiled():
                     self._check_finite()
             record(n + 1)
             marker[ROWS], marker[STEPS] = recorder.rows, n + 1
             if self.termination:
                 return
+
+
+def _spoiled(floats: np.ndarray) -> Callable[[], float]:
+    """Zero when all are finite, otherwise NaN; it may be NaN too when their sum is not finite."""
+    if len(floats) <= FEW_FLOATS:
+        view = floats.data
+        return lambda: sum(view) * 0.0
+    zeros: Any = np.zeros_like(floats)
+    return partial(floats.dot, zeros)  # type: ignore[return-value]

@@ -8,6 +8,9 @@ from typing import NamedTuple
 from ..component import Call
 from .plan import Step
 
+#: components or outputs shown in messages about several
+SHOWN = 8
+
 #: the highest FMI status that lets a simulation go on
 WARNING = 1
 
@@ -39,11 +42,11 @@ def _take(turn: Turn) -> Iterator[Ending]:
         if status > WARNING:
             yield Ending(turn, call, status)
             break
-    if _float_state_changed():
+    if float_state_changed():
         yield Ending(turn, turn.calls[-1], None)
 
 
-def _float_state_changed() -> bool:
+def float_state_changed() -> bool:
     """Equal in the default rounding mode only, and the least denormal is no zero only if it is not flushed."""
     one, little, least = 1.0, 2.0**-54, 5e-324
     return one + little != one - little or not least + least

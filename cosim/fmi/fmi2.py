@@ -42,9 +42,9 @@ class Fmi2Instance(FmuInstance):
         self.call("setupExperiment", None, start_time, stop_time)
         self.call("enterInitializationMode")
 
-    def _step_calls(self, step_size: ctypes.c_double) -> list[Call]:
+    def _step_calls(self, step_size: Any, seconds: float) -> list[Call]:
         arguments = (POINTER(self._handle), self._clock, step_size, ctypes.c_int.from_param(1))
-        native = DoStep(2, address(self._do_step), self._handle, step_size.value)
+        native = DoStep(2, address(self._do_step), self._handle, seconds)
         return [Call(self._do_step, arguments, "fmi2DoStep", native)]
 
     def failed(self, name: str, status: int) -> StepResult:

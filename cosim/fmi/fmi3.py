@@ -35,12 +35,12 @@ class Fmi3Instance(FmuInstance):
         self._clock.value = start_time
         self.call("enterInitializationMode", None, start_time, stop_time)
 
-    def _step_calls(self, step_size: ctypes.c_double) -> list[Call]:
+    def _step_calls(self, step_size: Any, seconds: float) -> list[Call]:
         self._flags, self._reached = (ctypes.c_bool * 3)(), ctypes.c_double()
         flags, reached = ctypes.addressof(self._flags), ctypes.addressof(self._reached)
         results = [POINTER(flags + i * ctypes.sizeof(ctypes.c_bool)) for i in range(3)]
         arguments = (POINTER(self._handle), self._clock, step_size, ctypes.c_bool.from_param(True), *results, POINTER(reached))
-        native = DoStep(3, address(self._do_step), self._handle, step_size.value, flags, reached)
+        native = DoStep(3, address(self._do_step), self._handle, seconds, flags, reached)
         kept = (self._flags, self._reached)
         return [Call(self._do_step, arguments, "fmi3DoStep", native, kept), Call(self._ended, (), _ENDED, Flags(flags), kept)]
 

@@ -66,7 +66,7 @@ class FmuInstance(Component):
     #: the C function that makes an instance
     _instantiation: str
 
-    def _step_calls(self, step_size: ctypes.c_double) -> list[Call]:
+    def _step_calls(self, step_size: Any, seconds: float) -> list[Call]:
         """doStep from the time in `self._clock`."""
         raise NotImplementedError
 
@@ -87,7 +87,7 @@ class FmuInstance(Component):
         self._do_step = ctypes.CDLL(None, handle=self._fmu.dll._handle)[f"{self.prefix}DoStep"]
         self._do_step.restype = ctypes.c_int
         self._clock, self._step_size = ctypes.c_double(), ctypes.c_double()
-        self._steps = self._step_calls(self._step_size)
+        self._steps = self._step_calls(self._step_size, 0.0)
 
     def _load(self, folder: Path) -> Any:
         """FMPy's object for this instance: a copy of one that is made once for all instances, which takes milliseconds."""
@@ -215,7 +215,7 @@ class FmuInstance(Component):
 
     def turn(self, clock: ctypes.c_double, step_size: float) -> Sequence[Call]:
         self._clock = clock
-        return [*self._sets, *self._step_calls(ctypes.c_double(step_size)), *self._gets]
+        return [*self._sets, *self._step_calls(ctypes.c_double.from_param(step_size), step_size), *self._gets]
 
     def set_inputs(self) -> None:
         self._make(self._sets)

@@ -6,14 +6,15 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 from ..component import Component, Variable
 from ..errors import InputError, Problem, did_you_mean
-from ..fmi import Isolation
+from ..fmi import FmuFile, Isolation
 from ..journal import Deadlines
 from ..simulate import Event, Settings, problems
-from ..system import Connection, Endpoint, Group, Parallel, Stage, System
+from ..system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System
 from ..table import read_table
 from .functions import function_problem
 from .names import Slots, Target, Unknown, assign, resolve
@@ -30,11 +31,11 @@ PROFILES = "inputs"
 class Assembler:
     """The steps of assembling, each adding to `problems`."""
 
-    def __init__(self, scenario: Scenario, apart: bool, sandbox: bool):
+    def __init__(self, scenario: Scenario, apart: bool, sandbox: bool, prepared: Mapping[Path, FmuFile]):
         self.root, self.spec, self.outside = scenario.root, scenario.spec, scenario.assignments
         self.problems: list[Problem] = list(scenario.problems)
         deadlines = Deadlines(**self.spec.deadlines.model_dump())
-        self.workshop = Workshop(Isolation(deadlines, sandbox), apart or sandbox)
+        self.workshop = Workshop(Isolation(deadlines, sandbox), apart or sandbox, prepared)
         self.components: dict[str, Component] = {}
         self._by_name: dict[str, Mapping[str, Variable]] = {}
         self.start_values: dict[str, dict[str, Any]] = defaultdict(dict)
@@ -47,7 +48,7 @@ class Assembler:
         self.system = System(
             self.components,
             connections,
-            (*self._stages(self.root), *([tuple(self.profiles)] if self.profiles else [])),
+            (*self._outermost(), *([tuple(self.profiles)] if self.profiles else [])),
             dict(self._periods(self.root)),
             self.start_values,
             aliases,
@@ -140,10 +141,15 @@ class Assembler:
         listed = node.spec.algorithm.stages if node.spec.algorithm else [[name] for name in node.spec.components]
         return tuple(tuple(self._member(node, name) for name in stage if name not in node.broken) for stage in listed if stage)
 
+    def _outermost(self) -> tuple[Stage, ...]:
+        """The root's stages; when they are iterated, as a group without the profiles."""
+        stages, iteration = self._stages(self.root), _iteration(self.spec)
+        return ((Group(self.spec.name, stages, _parallel(self.spec), iteration),),) if iteration else stages
+
     def _member(self, node: Node, name: str) -> str | Group:
         if name in node.children:
             child = node.children[name]
-            return Group(node.full_name(name), self._stages(child), _parallel(child.spec))
+            return Group(node.full_name(name), self._stages(child), _parallel(child.spec), _iteration(child.spec))
         return node.full_name(name)
 
     def _periods(self, node: Node, inherited: Fraction | None = None) -> Iterator[tuple[str, Fraction]]:
@@ -237,3 +243,8 @@ class Assembler:
 
 def _parallel(spec: SystemSpec) -> Parallel:
     return spec.algorithm.parallel if spec.algorithm else "auto"
+
+
+def _iteration(spec: SystemSpec) -> Iteration | None:
+    found = spec.algorithm.iteration if spec.algorithm else None
+    return Iteration(found.tolerance, found.limit) if found else None

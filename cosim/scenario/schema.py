@@ -131,6 +131,13 @@ class ConnectionSpec(Spec):
     delay: int = Field(0, ge=0, description="macro steps; until then the initial output arrives")
 
 
+class IterationSpec(Spec):
+    """Repeating every macro step from the same state until the connected outputs stand still."""
+
+    tolerance: float = Field(1e-9, gt=0, description="y stands still when it changes by at most tolerance * (1 + |y|)")
+    limit: int = Field(50, ge=2, description="rounds in a macro step; more are an error")
+
+
 class AlgorithmSpec(Spec):
     """Stages step one after the other, the components of a stage side by side."""
 
@@ -140,6 +147,9 @@ class AlgorithmSpec(Spec):
         "auto",
         description="whether the FMUs of a stage step at the same time, on threads, with the same result: where their measured "
         "steps are long enough (instances of one file never at once), always, or never",
+    )
+    iteration: IterationSpec | None = Field(
+        None, description="repeat the stages in every macro step until they agree; all components must have states to return to"
     )
 
 

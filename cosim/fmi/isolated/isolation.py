@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ...journal import Deadlines
@@ -23,21 +23,20 @@ class Isolation:
 
     def entrance(self, fmu: Path, temporary: Path, importer: int) -> Callable[[], None]:
         """What a worker of the process `importer` does before it loads foreign code; raises InputError where it cannot."""
-        from ...sandbox import Settings, enter, interpreter_folders
+        from ...sandbox import Settings, enter, interpreter_folders, landlock
 
         readable = (fmu, *interpreter_folders()) if self.sandbox else ()
         confine = "required" if self.sandbox else "never"
         settings = Settings(readable=readable, writable=(temporary,), confine=confine, parent=importer)  # type: ignore[arg-type]
 
         def entrance() -> None:
-            if self.sandbox:
-                _leave_network()
-            enter(settings)
+            left = self.sandbox and _leave_network()
+            # no kernel is refused for rules about a network that is not there
+            enter(replace(settings, network=left and landlock.version() < landlock.NETWORK_VERSION))
 
         return entrance
 
 
-def _leave_network() -> None:
+def _leave_network() -> bool:
     """From now on this process has a network of its own, without any device; where that is forbidden, nothing changes."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).unshare(_CLONE_NEWUSER | _CLONE_NEWNET)
+    return sys.platform == "linux" and ctypes.CDLL(None).unshare(_CLONE_NEWUSER | _CLONE_NEWNET) == 0

@@ -1,0 +1,85 @@
+"""Macro steps that are repeated until the components agree (fixed-point iteration with rollback).
+
+In every round all components of a loop step from the same state; what they read is what the round before gave them, or this
+round where a stage before theirs gave it. The last round's inputs therefore belong to the end of the step, not to its start.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+
+from ..component import Component
+from ..errors import ComponentError
+from .layout import Dtype, Layout
+from .moves import Move
+from .plan import Loop
+from .turns import SHOWN, Turn
+
+#: the moves of a phase, those that are made in the first round only, and its turns
+Round = tuple[Sequence[Move], Sequence[Move], Sequence[Turn]]
+
+
+class Rounds:
+    """The rounds of a loop's macro step; `take` takes a turn and says whether the simulation is to end."""
+
+    def __init__(self, loop: Loop, signals: Layout, phases: Sequence[Round], take: Callable[[Turn], bool]):
+        self._loop, self._phases, self._take = loop, phases, take
+        outputs: dict[Dtype, dict[int, str]] = defaultdict(dict)
+        for connection in loop.connections:
+            slot = signals.places[connection.source]
+            outputs[slot.dtype][slot.offset] = str(connection.source)
+        self._watched = [(signals.arrays[dtype], list(found)) for dtype, found in outputs.items()]
+        self._names = [list(found.values()) for found in outputs.values()]
+
+    def step(self, time: float) -> bool:
+        """The macro step from `time`; returns whether the simulation is to end.
+
+        Raises ComponentError when the outputs still change after the last round that is allowed.
+        """
+        with ExitStack() as stack:
+            states = [(component, self._state(component, stack)) for component in self._loop.components.values()]
+            for number in range(self._loop.iteration.limit):
+                if number:
+                    for component, state in states:
+                        component.set_state(state)
+                before = self._values()
+                if self._round(first=number == 0):
+                    return True
+                moved = [self._moved(old, new) for old, new in zip(before, self._values(), strict=True)]
+                if not any(flags.any() for flags in moved):
+                    return False
+        raise ComponentError(self._loop.name, "iteration", self._complaint(moved), time)
+
+    def _state(self, component: Component, stack: ExitStack) -> Any:
+        state = component.get_state()
+        stack.callback(component.free_state, state)
+        return state
+
+    def _round(self, first: bool) -> bool:
+        for moves, once, turns in self._phases:
+            for move in (*moves, *once) if first else moves:
+                move()
+            for turn in turns:
+                if self._take(turn):
+                    return True
+        return False
+
+    def _values(self) -> list[np.ndarray]:
+        return [array[places] for array, places in self._watched]
+
+    def _moved(self, old: np.ndarray, new: np.ndarray) -> np.ndarray:
+        if old.dtype.kind != "f":
+            return old != new
+        with np.errstate(invalid="ignore"):  # what is not finite never stands still
+            return ~(np.abs(new - old) <= self._loop.iteration.tolerance * (1 + np.abs(new)))
+
+    def _complaint(self, moved: Sequence[np.ndarray]) -> str:
+        changing = [name for names, flags in zip(self._names, moved, strict=True) for name in np.array(names)[flags]]
+        some = ", ".join(changing[:SHOWN]) + (f", ... ({len(changing)} in all)" if len(changing) > SHOWN else "")
+        iteration = self._loop.iteration
+        return f"after {iteration.limit} rounds these outputs still change by more than {iteration.tolerance:g}: {some}"
