@@ -14,10 +14,11 @@ from typing import Any, Literal
 
 from . import __version__
 from .errors import ComponentError, CosimError
-from .kpi import CheckOutcome, evaluate_checks, evaluate_kpis
+from .kpi import CheckOutcome, evaluate_checks, evaluate_kpis, kpi_senses, kpi_units
 from .pacer import Late
 from .results import Result
 from .scenario import Assembly, assemble
+from .scenario.overview import overview
 from .simulate import Observer, Run, simulation
 from .unfinished import write_metadata
 
@@ -127,12 +128,15 @@ def _with_kpis(result: Result, assembly: Assembly) -> Execution:
     """The result with all KPIs; when some fail, the others are there all the same."""
     kpis: dict[str, Any] = {}
     failures: list[BaseException] = []
-    for kpi in assembly.kpis():
+    functions = assembly.kpis()
+    for kpi in functions:
         try:
             kpis |= evaluate_kpis(result, [kpi])
         except (CosimError, KeyboardInterrupt) as error:
             failures.append(error)
-    return Execution(replace(result, kpis=kpis), failures[0] if failures else None)
+    about = {"kpi_units": kpi_units(functions, kpis, result.units), "kpi_senses": kpi_senses(functions, kpis)}
+    evaluated = replace(result, kpis=kpis, metadata={**result.metadata, **about})
+    return Execution(evaluated, failures[0] if failures else None)
 
 
 def checks(assembly: Assembly, result: Result) -> list[CheckOutcome]:
@@ -146,6 +150,7 @@ def _metadata(assembly: Assembly) -> dict[str, Any]:
         "name": assembly.spec.name,
         "scenario": assembly.document.value,
         "scenario_file": str(assembly.document.file.resolve()),
+        "system": overview(assembly),
         "versions": {"cosim": __version__, "python": platform.python_version(), **_versions()},
         "machine": {"system": platform.system(), "machine": platform.machine()},
         "sha256": {name: sha256(file.read_bytes()).hexdigest() for name, file in assembly.files().items()},

@@ -9,19 +9,27 @@ A KPI is a plain function `function(result, **arguments)` that returns its numbe
 from __future__ import annotations
 
 import inspect
+import math
 import operator
+import re
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, NamedTuple, TypeVar
+from types import MappingProxyType
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
 from .errors import ComponentError, InputError, Problem, did_you_mean
 from .results import Result
+from .units import product
 
 Number = float | int | bool
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 LIMITS: Mapping[str, Callable[[Any, Any], bool]] = {"min": operator.ge, "max": operator.le, "equals": operator.eq}
+
+
+#: a factor of a declared unit: a unit, or the argument whose signal has it, and a power
+_FACTOR = re.compile(r"(\{(\w+)\}|[A-Za-z%]+)(-?\d*)")
 
 
 class Evaluation(NamedTuple):
@@ -59,10 +67,23 @@ class Evaluation(NamedTuple):
 
 
 def units(**unit_of: str) -> Callable[[Function], Function]:
-    """Decorator: the units of a KPI's numbers in Modelica syntax; what is not named is a count or a Boolean."""
+    """Decorator: the units of a KPI's numbers in Modelica syntax; what is not named is a count or a Boolean.
+
+    "{signal}" stands for the unit of the signal that the argument `signal` names: an integral of its square has "{signal}2.s".
+    """
 
     def declare(function: Function) -> Function:
         function.units = unit_of  # type: ignore[attr-defined]
+        return function
+
+    return declare
+
+
+def better(**sense: Literal["lower", "higher"]) -> Callable[[Function], Function]:
+    """Decorator: which of a KPI's numbers are better the lower or the higher they are; what is not named is neither."""
+
+    def declare(function: Function) -> Function:
+        function.better = sense  # type: ignore[attr-defined]
         return function
 
     return declare
@@ -89,10 +110,49 @@ def _number(evaluation: Evaluation, key: str, value: Any) -> Number:
     return number
 
 
-def kpi_units(kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]], names: Iterable[str]) -> dict[str, str]:
-    """The unit that a KPI's function declares (see `units`) for each of `names`, "" for none; "time[3]" is declared as "time"."""
-    declared = {f"{name}.{key}": unit for name, function, _ in kpis for key, unit in getattr(function, "units", {}).items()}
+def first_time(time: np.ndarray, values: np.ndarray, level: float) -> float:
+    """When a line through the rows (`time`, `values`), shape (rows,), first is at `level` or above; NaN when it never is."""
+    above = np.flatnonzero(values >= level)
+    if not above.size:
+        return math.nan
+    row = above[0]
+    if row == 0:
+        return float(time[0])
+    share = (level - values[row - 1]) / (values[row] - values[row - 1])
+    return float(time[row - 1] + share * (time[row] - time[row - 1]))
+
+
+def kpi_units(
+    kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]],
+    names: Iterable[str],
+    signal_units: Mapping[str, str] = MappingProxyType({}),
+) -> dict[str, str]:
+    """The unit that a KPI's function declares (see `units`) for each of `names`, "" for none; "time[3]" is declared as "time".
+
+    `signal_units` are those of the result; a unit that depends on a signal's is "" where that is unknown.
+    """
+    declared = {
+        f"{name}.{key}": _unit(unit, arguments, signal_units)
+        for name, function, arguments in kpis
+        for key, unit in getattr(function, "units", {}).items()
+    }
     return {name: declared.get(name.partition("[")[0], "") for name in names}
+
+
+def _unit(declared: str, arguments: Mapping[str, Any], signal_units: Mapping[str, str]) -> str:
+    """A declared unit with the units of signals in their places."""
+    if "{" not in declared:
+        return declared
+    factors = [(part, signal, int(power or 1)) for part, signal, power in _FACTOR.findall(declared)]
+    known = [(signal_units.get(str(arguments.get(signal)), "") if signal else part, power) for part, signal, power in factors]
+    return product(known) if all(unit for unit, _ in known) else ""
+
+
+def kpi_senses(kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]], names: Iterable[str]) -> dict[str, str]:
+    """ "lower" or "higher" for each of `names` whose KPI's function says what is better (see `better`)."""
+    declared = {f"{name}.{key}": sense for name, function, _ in kpis for key, sense in getattr(function, "better", {}).items()}
+    found = {name: declared.get(name.partition("[")[0]) for name in names}
+    return {name: sense for name, sense in found.items() if sense}
 
 
 class CheckOutcome(NamedTuple):

@@ -14,24 +14,28 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .kpi import units
+from .kpi import better, first_time, units
 from .results import Result
 
 Target = float | str
 FOREVER = math.inf
 
 
+@better(value="lower")
+@units(value="{signal}")
 def rms(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
     """Root of the mean squared error over time."""
     time, error = _error(result, signal, target, start, stop)
     return {"value": math.sqrt(_mean(time, error**2))}
 
 
+@units(value="{signal}")
 def mean(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
     """Mean error over time."""
     return {"value": _mean(*_error(result, signal, target, start, stop))}
 
 
+@units(value="{signal}")
 def maximum(
     result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
@@ -40,6 +44,7 @@ def maximum(
     return {"value": float(error.max()) if error.size else math.nan}
 
 
+@units(value="{signal}")
 def minimum(
     result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
@@ -48,36 +53,46 @@ def minimum(
     return {"value": float(error.min()) if error.size else math.nan}
 
 
+@better(value="lower")
+@units(value="{signal}")
 def peak(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
     """Largest error without its sign."""
     _, error = _error(result, signal, target, start, stop)
     return {"value": float(np.abs(error).max()) if error.size else math.nan}
 
 
+@units(value="{signal}")
 def final(result: Result, signal: str, target: Target = 0.0, stop: float = FOREVER) -> dict[str, float]:
     """Error in the last row."""
     _, error = _error(result, signal, target, -FOREVER, stop)
     return {"value": float(error[-1]) if error.size else math.nan}
 
 
+@better(value="lower")
+@units(value="{signal}.s")
 def iae(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
     """Integral of the absolute error, in the signal's unit times s."""
     time, error = _error(result, signal, target, start, stop)
     return {"value": _integral(time, np.abs(error))}
 
 
+@better(value="lower")
+@units(value="{signal}2.s")
 def ise(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
     """Integral of the squared error, in the signal's unit squared times s."""
     time, error = _error(result, signal, target, start, stop)
     return {"value": _integral(time, error**2)}
 
 
+@better(value="lower")
+@units(value="{signal}.s2")
 def itae(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
     """Integral of the absolute error times the time since the first row, in the signal's unit times s2."""
     time, error = _error(result, signal, target, start, stop)
     return {"value": _integral(time, (time - time[:1]) * np.abs(error))}
 
 
+@better(value="lower")
 @units(value="J")
 def energy(result: Result, effort: str, flow: Target = 1.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
     """Integral of effort times flow (J): of force (N) and speed (m/s), torque (N.m) and rate (rad/s), or of a power (W) alone."""
@@ -86,6 +101,7 @@ def energy(result: Result, effort: str, flow: Target = 1.0, start: float = -FORE
     return {"value": _integral(result.time[rows], power[rows])}
 
 
+@better(value="lower")
 def saturation_share(
     result: Result,
     signal: str,
@@ -103,15 +119,17 @@ def saturation_share(
     return {"value": float(np.diff(time) @ saturated[:-1] / (time[-1] - time[0]))}
 
 
+@better(value="lower")
 @units(value="s")
 def time_to_reach(result: Result, signal: str, level: float, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
     """Time (s) from the first row until the signal first is at `level` or has crossed it, whichever side it came from."""
     rows = _rows(result, start, stop)
     time, values = result.time[rows], result[signal][rows].astype(np.float64)
     side = -1.0 if values.size and values[0] > level else 1.0
-    return {"value": _first_time(time, side * values, side * level) - (time[0] if time.size else 0.0)}
+    return {"value": first_time(time, side * values, side * level) - (time[0] if time.size else 0.0)}
 
 
+@better(value="lower")
 @units(value="s")
 def rise_time(
     result: Result,
@@ -128,9 +146,10 @@ def rise_time(
     The way goes from `initial`, without one the value of the first row, to `target`, without one the value of the last row.
     """
     step = _step(result, signal, start, stop, initial, target)
-    return {"value": _first_time(step.time, step.share, high) - _first_time(step.time, step.share, low)}
+    return {"value": first_time(step.time, step.share, high) - first_time(step.time, step.share, low)}
 
 
+@better(value="lower")
 def overshoot(
     result: Result,
     signal: str,
@@ -144,6 +163,7 @@ def overshoot(
     return {"value": max(float(share.max()) - 1, 0.0) if share.size else math.nan}
 
 
+@better(value="lower")
 @units(value="s")
 def settling_time(
     result: Result,
@@ -166,7 +186,7 @@ def settling_time(
     if not outside.size:
         return {"value": 0.0}
     last = outside[-1]
-    return {"value": _first_time(time[last:], -away[last:], -band) - float(time[0])}
+    return {"value": first_time(time[last:], -away[last:], -band) - float(time[0])}
 
 
 class _Step(NamedTuple):
@@ -205,15 +225,3 @@ def _mean(time: np.ndarray, values: np.ndarray) -> float:
     if not time.size:
         return math.nan
     return _integral(time, values) / float(time[-1] - time[0]) if time[-1] > time[0] else float(values.mean())
-
-
-def _first_time(time: np.ndarray, values: np.ndarray, level: float) -> float:
-    """When a line through the rows first is at `level` or above, NaN when it never is."""
-    above = np.flatnonzero(values >= level)
-    if not above.size:
-        return math.nan
-    row = above[0]
-    if row == 0:
-        return float(time[0])
-    share = (level - values[row - 1]) / (values[row] - values[row - 1])
-    return float(time[row - 1] + share * (time[row] - time[row - 1]))

@@ -16,7 +16,7 @@ from shutil import copyfileobj
 from typing import IO
 
 from .journal import ROWS, Journal
-from .unfinished import ROWS_FILE, Header, read_header
+from .unfinished import ROWS_FILE, Header, TextReader, read_header
 
 #: short runs are left alone for this long, long ones get new lines this often, and no longer than this at a time (s)
 FIRST, EVERY, AT_MOST = 0.2, 0.3, 0.2
@@ -60,7 +60,8 @@ class LiveCsv:
         header = read_header(folder)
         if folder is None or target is None or header is None:
             return False
-        self._target, self._rows_file, self._lines = target, folder / ROWS_FILE, Lines(header)
+        self._target, self._rows_file = target, folder / ROWS_FILE
+        self._lines = Lines(header, TextReader(folder, header))
         self._shown, self._hidden = (_Copy(folder / f"live-{name}.csv") for name in "ab")
         self._shown.path.write_bytes(self._lines.first())
         self._shown.size = len(self._lines.first())
@@ -109,8 +110,8 @@ class LiveCsv:
 class Lines:
     """The rows of a run as lines of CSV, in the format of `results.csv_files`."""
 
-    def __init__(self, header: Header):
-        self._header = header
+    def __init__(self, header: Header, texts: TextReader):
+        self._header, self._texts = header, texts
         places = sorted({column.offset for column in header.columns})
         order = [places.index(column.offset) for column in header.columns]
         self._ordered = itemgetter(*order) if len(order) > 1 else lambda values: tuple(values[i] for i in order)
@@ -120,8 +121,7 @@ class Lines:
 
     def first(self) -> bytes:
         """The line of names."""
-        names = ("time", *(column.name.replace('"', '""') for column in self._header.columns))
-        return (",".join(f'"{name}"' for name in names) + "\n").encode()
+        return ",".join(map(_quoted, ("time", *self._header.names))).encode() + b"\n"
 
     def next(self, source: IO[bytes], rows: int) -> bytes:
         """Lines of some of the rows that follow, of `rows` that there are in the file."""
@@ -132,8 +132,21 @@ class Lines:
         source.seek(first * header.row_size)
         values = self._unpack(source.read(count * header.row_size)) if header.row_size else [()] * count
         table = [(header.seconds(n * header.every), *self._ordered(row)) for n, row in enumerate(values, start=first)]
+        lines = to_json(table, inf_nan_mode="constants")[2:-2].replace(b"],[", b"\n") + b"\n"
         self.written += len(table)
-        return to_json(table, inf_nan_mode="constants")[2:-2].replace(b"],[", b"\n") + b"\n"
+        return self._with_texts(lines, first) if header.texts else lines
+
+    def _with_texts(self, lines: bytes, first: int) -> bytes:
+        """The lines of numbers, the first of them with this number, with texts between them."""
+        whole = []
+        for row, line in enumerate(lines.decode().splitlines(), start=first):
+            time, *numbers = line.split(",")
+            whole.append(",".join([time, *self._header.complete(numbers, map(_quoted, self._texts.row(row)))]) + "\n")
+        return "".join(whole).encode()
+
+
+def _quoted(text: str) -> str:
+    return '"' + str(text).replace('"', '""') + '"'
 
 
 def _format(header: Header) -> str:

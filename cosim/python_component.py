@@ -154,7 +154,12 @@ def load_component(reference: str, folder: Path, instance_name: str, arguments: 
     kind = load_object(reference, folder)
     if inspect.isclass(kind) and issubclass(kind, Fmi2Slave):
         return PythonSlave(_construct(kind, reference, instance_name=instance_name, **arguments), instance_name)
-    return _construct(kind, reference, instance_name, **arguments)
+    made = _construct(kind, reference, instance_name, **arguments)
+    expected = (name for name in {**Component.__annotations__, **vars(Component)} if not name.startswith("_"))
+    if missing := [name for name in expected if not hasattr(made, name)]:
+        text = f"{reference} makes a {type(made).__name__} without {', '.join(missing)}"
+        raise InputError(f"{text}; expected a component or an Fmi2Slave class")
+    return made
 
 
 def _construct(kind: Callable[..., Any], reference: str, *positional: Any, **named: Any) -> Any:

@@ -23,8 +23,9 @@ from .process_state import contained
 from .recording import Recording
 from .stopwatch import Stopwatch
 from .system import Endpoint, System
+from .text_rows import SavingRecorder
 from .timing import Grid
-from .unfinished import ROWS_FILE, write_header
+from .unfinished import write_header
 
 #: called with (finished macro steps, all macro steps); observers only look
 Observer = Callable[[int, int], None]
@@ -134,8 +135,11 @@ def _executor(system: System, settings: Settings) -> Executor:
     grid = Grid.of(settings.start_time, settings.stop_time, settings.step_size)
     plan = compile_plan(system, grid, settings.columns.values())
     journal = current()
-    rows_file = settings.rows_file or (journal.folder / ROWS_FILE if journal and journal.folder else None)
-    recorder = Recorder(plan, settings.columns, int((settings.record_interval or grid.step) / grid.step), rows_file)
+    every = int((settings.record_interval or grid.step) / grid.step)
+    if journal and journal.folder and not settings.rows_file:
+        recorder: Recorder = SavingRecorder(plan, settings.columns, every, journal.folder)
+    else:
+        recorder = Recorder(plan, settings.columns, every, settings.rows_file)
     marker = None if journal is None else np.frombuffer(journal.memory, np.int64, MARKER_SIZE)
     return executor_kind(settings.executor)(plan, recorder, marker, settings.finite)
 

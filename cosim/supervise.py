@@ -76,7 +76,7 @@ def supervised(entry: Callable[[], int]) -> Outcome:
     """Run `entry` in a child process that keeps a journal (see `journal.current`); it returns an exit code and never raises."""
     journal = Journal(mmap.mmap(-1, journals.SIZE))
     _adopt_orphans()
-    with run_folder() as folder, _polite_ends():
+    with run_folder() as folder, polite_ends():
         sys.stdout.flush()
         sys.stderr.flush()
         reader, writer = os.pipe()
@@ -90,7 +90,7 @@ def supervised(entry: Callable[[], int]) -> Outcome:
 
 
 @contextmanager
-def _polite_ends() -> Iterator[None]:
+def polite_ends() -> Iterator[None]:
     """Within the block a closed terminal, or a service manager that ends the run, counts as an interrupt by the user."""
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -1,4 +1,4 @@
-"""A folder for temporary files that goes with its process: at its end, or, when it was killed, at the start of the next one."""
+"""Folders for temporary files that go with their process: at its end, or, when it was killed, at the start of the next one."""
 
 from __future__ import annotations
 
@@ -7,53 +7,69 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from shutil import rmtree
 
-PREFIX = "cosim-run-"
+#: what a folder is for: a run, an extracted FMU, what an FMU in a process of its own writes
+RUN, FMU, WORKER = "cosim-run-", "cosim-fmu-", "cosim-worker-"
 
 
-@contextmanager
-def run_folder() -> Iterator[str]:
-    """A temporary folder until the block ends; folders of processes that were killed before they could end are removed now.
+class LockedFolder:
+    """A new temporary folder until `cleanup`; folders of processes that were killed before they could end are removed first.
 
     The process holds a lock on its folder, which the operating system takes back however the process ends. The lock is what
     makes a folder taken: process ids may be reused, or belong to another container with the same /tmp.
     """
-    if sys.platform == "win32":
-        with tempfile.TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True) as folder:
-            yield folder
-        return
-    for stale in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
-        _remove_abandoned(stale)
-    folder, lock = _locked_folder()
+
+    def __init__(self, prefix: str):
+        _remove_abandoned_in(tempfile.gettempdir())
+        self.name, self._lock = _locked_folder(prefix)
+
+    def cleanup(self) -> None:
+        """Remove the folder. What cannot be removed stays, and the next process finds it."""
+        rmtree(self.name, ignore_errors=True)
+        with suppress(OSError):  # foreign code has closed all descriptors
+            os.close(self._lock)
+
+
+@contextmanager
+def run_folder() -> Iterator[str]:
+    """A locked folder until the block ends."""
+    folder = LockedFolder(RUN)
     try:
-        yield folder
+        yield folder.name
     finally:
-        rmtree(folder, ignore_errors=True)
-        os.close(lock)
+        folder.cleanup()
 
 
-def _locked_folder() -> tuple[str, int]:
+def _locked_folder(prefix: str) -> tuple[str, int]:
     """A new folder and the descriptor that holds its lock; another process may have removed it before it was locked."""
     while True:
-        folder = tempfile.mkdtemp(prefix=PREFIX)
+        folder = tempfile.mkdtemp(prefix=prefix)
         lock = _lock(folder, wait=True)
-        if lock is not None and Path(folder).is_dir():
+        if lock is None:
+            return folder, -1  # no locks here: such folders are never taken for abandoned ones
+        if Path(folder).is_dir():
             return folder, lock
-        if lock is not None:
-            os.close(lock)
-
-
-def _remove_abandoned(folder: Path) -> None:
-    lock = _lock(folder, wait=False)
-    if lock is not None:
-        rmtree(folder, ignore_errors=True)
         os.close(lock)
+
+
+@cache
+def _remove_abandoned_in(directory: str) -> None:
+    """Once in a process: 1000 runs need not look 1000 times."""
+    for prefix in (RUN, FMU, WORKER):
+        for folder in Path(directory).glob(f"{prefix}*"):
+            lock = _lock(folder, wait=False)
+            if lock is not None:
+                rmtree(folder, ignore_errors=True)
+                os.close(lock)
 
 
 def _lock(folder: str | Path, wait: bool) -> int | None:
     """A descriptor that holds the lock of a folder of this user; None when it cannot be had."""
+    if sys.platform == "win32":
+        return None
     import fcntl
 
     with suppress(OSError):

@@ -1,18 +1,20 @@
 """A run's folder while it is going on: rows as they are recorded, and what is needed to read them.
 
-`header.json` says what a row is and which calls are made, `rows` holds the rows (see `engine.rows`). After a crash another
-process makes a recording of it.
+`header.json` says what a row is and which calls are made, `rows` holds the rows (see `engine.rows`), `texts` what is no number
+in them (see `text_rows`). After a crash another process makes a recording of it.
 """
 
 from __future__ import annotations
 
+import io
 import json
+import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from .journal import current
 
@@ -20,7 +22,9 @@ if TYPE_CHECKING:
     from .engine import Executor
     from .recording import Recording
 
-ROWS_FILE, HEADER_FILE, METADATA_FILE = "rows", "header.json", "metadata.json"
+T = TypeVar("T")
+
+ROWS_FILE, TEXTS_FILE, HEADER_FILE, METADATA_FILE = "rows", "texts", "header.json", "metadata.json"
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,8 @@ class Header:
     """What the rows of an unfinished run mean.
 
     Row k holds the values of communication point n = k * `every`, at (`origin` + n * `stride`) / `denominator` s. `calls` names
-    (component, function) by the number in the marker, `texts` the recorded signals that are no numbers and so not in the rows.
+    (component, function) by the number in the marker, `texts` the recorded signals that are no numbers and so not in the rows,
+    each with its place among all columns.
     """
 
     origin: int
@@ -49,7 +54,19 @@ class Header:
     row_size: int
     columns: Sequence[Column]
     calls: Sequence[tuple[str, str]]
-    texts: Sequence[str]
+    texts: Sequence[tuple[int, str]]
+
+    @property
+    def names(self) -> list[str]:
+        """All columns in the order in which they were asked for."""
+        return self.complete([column.name for column in self.columns], [name for _, name in self.texts])
+
+    def complete(self, numbers: Iterable[T], texts: Iterable[T]) -> list[T]:
+        """What belongs to the columns of numbers and to those of texts, in the order of all columns."""
+        whole = list(numbers)
+        for (place, _), text in zip(self.texts, texts, strict=True):
+            whole.insert(place, text)
+        return whole
 
     def seconds(self, n: int) -> float:
         """Time of communication point n."""
@@ -76,7 +93,7 @@ def write_header(folder: Path, executor: Executor) -> None:
         "row_size": dtype.itemsize,
         "columns": columns,
         "calls": executor.calls,
-        "texts": [name for name in recorder.variables if name not in (dtype.names or ())],
+        "texts": [(i, name) for i, name in enumerate(recorder.variables) if name not in (dtype.names or ())],
     }
     (folder / HEADER_FILE).write_text(json.dumps(header), encoding="utf-8")
 
@@ -90,7 +107,42 @@ def read_header(folder: Path | None) -> Header | None:
     except (OSError, ValueError):
         return None
     columns = [Column(**column) for column in data.pop("columns")]
-    return Header(**data | {"columns": columns, "calls": [(component, name) for component, name in data["calls"]]})
+    pairs = {key: [tuple(pair) for pair in data[key]] for key in ("calls", "texts")}
+    return Header(**data | {"columns": columns} | pairs)
+
+
+class TextReader:
+    """Follows the texts of an unfinished run row by row, as far as they are written."""
+
+    def __init__(self, folder: Path, header: Header):
+        self._file = (folder / TEXTS_FILE).open("rb") if header.texts else io.BytesIO()
+        self._names = [name for _, name in header.texts]
+        self._rewind()
+
+    def _rewind(self) -> None:
+        self._file.seek(0)
+        self._row, self._change = -1, (-1, dict[str, Any]())
+        self._texts: dict[str, Any] = dict.fromkeys(self._names, "")
+
+    def row(self, number: int) -> list[Any]:
+        """The texts in a row; rows are best asked for one after the other."""
+        if number < self._row:
+            self._rewind()
+        self._row = number
+        while self._change[0] <= number:
+            self._texts |= self._change[1]
+            line = self._file.readline()
+            if not line.endswith(b"\n"):
+                self._file.seek(-len(line), os.SEEK_CUR)
+                self._change = (-1, {})
+                break
+            first, texts = json.loads(line, object_hook=_restored)
+            self._change = (first, texts)
+        return list(self._texts.values())
+
+
+def _restored(value: dict[str, Any]) -> Any:
+    return bytes.fromhex(value["bytes"]) if value.keys() == {"bytes"} else value
 
 
 def write_metadata(metadata: dict[str, Any]) -> None:
@@ -130,7 +182,7 @@ def saved() -> None:
 
 
 def recover(folder: Path | None, rows: int) -> Recording:
-    """The first `rows` rows of an unfinished run as a recording; texts are lost."""
+    """The first `rows` rows of an unfinished run as a recording."""
     import numpy as np
 
     from .engine import read_rows
@@ -150,5 +202,11 @@ def recover(folder: Path | None, rows: int) -> Recording:
     )
     data = read_rows(folder / ROWS_FILE, dtype, rows)
     time = np.array([header.seconds(row * header.every) for row in range(rows)], np.float64)
-    values = {column.name: data[column.name].astype(bool) if column.boolean else data[column.name] for column in columns}
-    return Recording(time, values, {column.name: column.unit for column in columns})
+    numbers = [data[column.name].astype(bool) if column.boolean else data[column.name] for column in columns]
+    reader = TextReader(folder, header)
+    texts = np.empty((rows, len(header.texts)), object)
+    for row in range(rows if header.texts else 0):
+        texts[row] = reader.row(row)
+    units = header.complete([column.unit for column in columns], [""] * len(header.texts))
+    values = header.complete(numbers, texts.T)
+    return Recording(time, dict(zip(header.names, values, strict=True)), dict(zip(header.names, units, strict=True)))

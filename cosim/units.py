@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
@@ -76,16 +77,37 @@ def parse(text: str) -> Unit:
     """
     if text in KNOWN:
         return KNOWN[text]
-    above, slash, below = text.partition("/")
-    if slash and below.startswith("(") and below.endswith(")"):
-        below = below[1:-1]
-    factors = [(_factor(part, text), 1) for part in above.split(".")]
-    factors += [(_factor(part, text), -1) for part in below.split(".")] if slash else []
     exponents, scale = [0] * len(BASE), 1.0
-    for (unit, power), sign in factors:
+    for (unit, power), sign in ((_factor(part, text), sign) for part, sign in _factors(text)):
         scale *= unit.factor ** (sign * power)
         exponents = [e + sign * power * k for e, k in zip(exponents, unit.exponents, strict=True)]
     return Unit(text, tuple(exponents), scale)
+
+
+def _factors(text: str) -> list[tuple[str, int]]:
+    """The factors of a unit as they are written, and whether each stands above (1) or below the line (-1)."""
+    above, slash, below = text.partition("/")
+    if slash and below.startswith("(") and below.endswith(")"):
+        below = below[1:-1]
+    return [(part, 1) for part in above.split(".")] + [(part, -1) for part in below.split(".") if slash]
+
+
+def product(units: Iterable[tuple[str, int]]) -> str:
+    """The product of units and their powers, in Modelica syntax: [("m/s", 2), ("s", 1)] is "m2/s", what cancels out "1".
+
+    Raises ValueError for a unit whose syntax cannot be read.
+    """
+    powers: dict[str, int] = {}
+    for text, power in units:
+        for part, sign in _factors(text):
+            match = _FACTOR.fullmatch(part)
+            if match is None:
+                raise ValueError(f'cannot read the unit "{text}" at "{part}"')
+            powers[match.group(1)] = powers.get(match.group(1), 0) + sign * power * int(match.group(2) or 1)
+    powers.pop("1", None)
+    above, below = ([f"{unit}{abs(n) if abs(n) > 1 else ''}" for unit, n in powers.items() if sign * n > 0] for sign in (1, -1))
+    divisor = f"({'.'.join(below)})" if len(below) > 1 else "".join(below)
+    return (".".join(above) or "1") + (f"/{divisor}" if below else "")
 
 
 def _factor(text: str, whole: str) -> tuple[Unit, int]:

@@ -2,27 +2,35 @@
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from cosim.errors import InputError, Problem, did_you_mean
+import numpy as np
 
-from .catalogue import MODELS, Model
+from cosim.component import Variable
+from cosim.errors import InputError, did_you_mean
 
-Keys = tuple[str, ...]
-Numbers = tuple[float, ...]
+from .catalogue import VEHICLES, Model
+from .environment import CALM, Sea, realise, settings
+from .environment.settings import Environment
+from .reading import Keys, Numbers, Reader
+
+#: prefix of the parameters that hold the waves, and of those that say where a vehicle starts
+WAVE, INITIAL = "wave.", "initial."
 
 
 @dataclass(frozen=True)
 class Spawn:
-    """A vehicle to place: `initial` holds the values of its model's parameters `initial.*`."""
+    """A vehicle to place: `parameters` holds the values of its model's parameters, in order."""
 
     name: str
     model: Model
-    initial: Numbers
+    parameters: Numbers
+
+    def parameter(self, name: str) -> float:
+        """The value of a scalar parameter."""
+        return self.parameters[self.model.slots("parameter").index(name)]
 
 
 @dataclass(frozen=True)
@@ -40,6 +48,8 @@ class Arguments:
 
     vehicles: Sequence[Spawn]
     platforms: Sequence[Platform]
+    environment: Environment
+    sea: Sea
 
 
 def read(vehicles: Any, platforms: Any, environment: Any) -> Arguments:
@@ -47,47 +57,70 @@ def read(vehicles: Any, platforms: Any, environment: Any) -> Arguments:
     reader = _Reader()
     spawns = [reader.vehicle(name, spec) for name, spec in reader.named(vehicles, ("vehicles",)).items()]
     boxes = [reader.platform(name, spec) for name, spec in reader.named(platforms, ("platforms",)).items()]
-    reader.environment(environment)
+    surrounding = settings.read(reader, environment)
     if vehicles == {}:
         reader.complain(("vehicles",), "found no vehicle, expected at least one")
     if reader.problems:
         raise InputError(reader.problems)
-    return Arguments([spawn for spawn in spawns if spawn], boxes)
+    sea = realise(surrounding.waves, surrounding.seed) if surrounding.waves else CALM
+    return Arguments([_in(sea, spawn) for spawn in spawns if spawn], boxes, surrounding, sea)
 
 
-class _Reader:
-    """Collects problems while it reads; faulty values are replaced, so that reading goes on."""
-
-    def __init__(self) -> None:
-        self.problems: list[Problem] = []
-
-    def complain(self, path: Keys, text: str) -> None:
-        where = ".".join(path)
-        self.problems.append(Problem(text, where, ("arguments", *path)))
-
+class _Reader(Reader):
     def vehicle(self, name: str, spec: Any) -> Spawn | None:
         path = ("vehicles", name)
-        spec = self.keys(spec, path, ("model", "position"), ("yaw", "velocity_body", "rates"))
-        model = self.model(spec.get("model"), (*path, "model"))
+        spec = self.keys(spec, path, ("model", "position"), ("motion", "yaw", "velocity_body", "rates", "parameters"))
+        model = self.model(spec, path)
         if model is None:
             return None
-        axes = [slot.rpartition(".")[2] for slot in model.slots("parameter") if slot.startswith("initial.position.")]
+        axes = [slot.rpartition(".")[2] for slot in model.slots("parameter") if slot.startswith(f"{INITIAL}position.")]
         values = {"yaw": self.number(spec.get("yaw", 0.0), (*path, "yaw"))}
         for key, letters in (("position", axes), ("velocity_body", "uvw"), ("rates", "pqr")):
             vector = self.vector(spec.get(key, [0.0] * len(letters)), (*path, key), letters)
             values |= {f"{key}.{letter}": value for letter, value in zip(letters, vector, strict=True)}
-        initial = [values.pop(slot.removeprefix("initial.")) for slot in model.slots("parameter")]
-        for key, value in values.items():
-            if value:
+        initial = {f"{INITIAL}{key}": value for key, value in values.items()}
+        for slot, value in initial.items():
+            if value and slot not in model.slots("parameter"):
+                key = slot.removeprefix(INITIAL)
                 self.complain((*path, key.partition(".")[0]), f"found {key} = {value}; a {model.name} does not move that way")
-        return Spawn(name, model, tuple(initial))
+        given = self.parameters(model, initial, spec.get("parameters", {}), (*path, "parameters"))
+        starts = zip(model.slots("parameter"), model.starts("parameter"), strict=True)
+        return Spawn(name, model, tuple((initial | given).get(slot, start) for slot, start in starts))
 
-    def model(self, name: Any, path: Keys) -> Model | None:
-        if isinstance(name, str) and name not in MODELS:
-            self.complain(path, f'unknown vehicle model "{name}"{did_you_mean(name, MODELS)}')
+    def model(self, spec: Mapping[str, Any], path: Keys) -> Model | None:
+        name, path = spec.get("model"), (*path, "model")
+        if isinstance(name, str) and name not in VEHICLES:
+            self.complain(path, f'unknown vehicle model "{name}"{did_you_mean(name, VEHICLES)}')
         elif name is not None and not isinstance(name, str):
-            self.complain(path, f"found {name!r}, expected the name of a vehicle model: {', '.join(MODELS)}")
-        return MODELS.get(name) if isinstance(name, str) else None
+            self.complain(path, f"found {name!r}, expected the name of a vehicle model: {', '.join(VEHICLES)}")
+        motions = VEHICLES.get(name) if isinstance(name, str) else None
+        if not motions:
+            return None
+        return motions[self.choice(spec.get("motion", next(iter(motions))), (*path[:-1], "motion"), tuple(motions))]
+
+    def parameters(self, model: Model, placed: Mapping[str, float], spec: Any, path: Keys) -> dict[str, float]:
+        """Values of the given parameters by slots; not those that the other keys or the environment set."""
+        free = {v.name: v for v in model.reals("parameter") if v.name not in placed and not v.name.startswith(WAVE)}
+        values: dict[str, float] = {}
+        for name, value in self.mapping(spec, path).items():
+            if name in free:
+                values |= zip(free[name].slots, self.values(free[name], value, (*path, name)), strict=True)
+            else:
+                hint = did_you_mean(name, free) if free else "; it has none"
+                self.complain((*path, name), f'{model.name} has no parameter "{name}" to set{hint}')
+        return values
+
+    def values(self, variable: Variable, value: Any, path: Keys) -> Numbers:
+        """A number, or a list of numbers for an array, in the range of the variable."""
+        count = len(variable.slots)
+        if not variable.shape:
+            value = [value]
+        elif not isinstance(value, list | tuple) or len(value) != count:
+            self.complain(path, f"found {value!r}, expected a list of {count} numbers")
+            value = [1.0] * count
+        low = -np.inf if variable.minimum is None else variable.minimum
+        high = np.inf if variable.maximum is None else variable.maximum
+        return tuple(self.number(number, path, low, high) for number in value)
 
     def platform(self, name: str, spec: Any) -> Platform:
         path = ("platforms", name)
@@ -97,44 +130,13 @@ class _Reader:
             self.complain((*path, "size"), f"found {list(size)}, expected edges greater than 0")
         return Platform(name, size, self.vector(spec.get("position", [0.0] * 3), (*path, "position"), "xyz"))
 
-    def environment(self, spec: Any) -> None:
-        seed = self.keys(spec, ("environment",), (), ("seed",)).get("seed", 0)
-        if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
-            self.complain(("environment", "seed"), f"found {seed!r}, expected an integer of at least 0")
 
-    def named(self, value: Any, path: Keys) -> Mapping[str, Any]:
-        """An object whose keys name things that variables are named after."""
-        for name in (found := self.mapping(value, path)):
-            if not re.fullmatch(r"[A-Za-z_]\w*", name):
-                self.complain((*path, name), f'found the name "{name}", expected letters, digits and underscores')
-        return found
-
-    def keys(self, value: Any, path: Keys, required: Sequence[str], optional: Sequence[str]) -> Mapping[str, Any]:
-        """An object with these keys and no others."""
-        found = self.mapping(value, path)
-        for key in found:
-            if key not in (*required, *optional):
-                self.complain((*path, key), f'unknown key "{key}"{did_you_mean(key, (*required, *optional))}')
-        if isinstance(value, Mapping):
-            for key in required:
-                if key not in found:
-                    self.complain(path, f'"{key}" is missing')
-        return found
-
-    def mapping(self, value: Any, path: Keys) -> Mapping[str, Any]:
-        if isinstance(value, Mapping):
-            return value
-        self.complain(path, f"found {value!r}, expected an object {{...}}")
-        return {}
-
-    def vector(self, value: Any, path: Keys, axes: Sequence[str]) -> Numbers:
-        if not isinstance(value, list | tuple) or len(value) != len(axes):
-            self.complain(path, f"found {value!r}, expected a list of {len(axes)} numbers [{', '.join(axes)}]")
-            return (1.0,) * len(axes)
-        return tuple(self.number(number, path) for number in value)
-
-    def number(self, value: Any, path: Keys) -> float:
-        if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
-            return float(value)
-        self.complain(path, f"found {value!r}, expected a finite number")
-        return 1.0
+def _in(sea: Sea, spawn: Spawn) -> Spawn:
+    """The vehicle with the waves in its parameters, if it has such."""
+    parameters = dict(zip(spawn.model.slots("parameter"), spawn.parameters, strict=True))
+    if f"{WAVE}count" not in parameters:
+        return spawn
+    parameters[f"{WAVE}count"] = float(len(sea.amplitude))
+    for name in ("amplitude", "frequency", "direction", "phase"):
+        parameters |= {f"{WAVE}{name}[{k}]": value for k, value in enumerate(getattr(sea, name).tolist(), start=1)}
+    return Spawn(spawn.name, spawn.model, tuple(parameters.values()))

@@ -12,13 +12,24 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cosim.kpi import Number, units
+from cosim.kpi import Number, better, units
 from cosim.results import Result
+
+from . import deck_frame
 
 #: A vehicle without any contact for this long (s) flies; a start some millimetres above its support or a bounce does not.
 FLIGHT_TIME = 0.1
 
 
+@better(
+    lateral_error="lower",
+    touchdown_speed="lower",
+    tangential_speed="lower",
+    slide="lower",
+    bounces="lower",
+    landed_at_end="higher",
+    final_lateral_error="lower",
+)
 @units(time="s", lateral_error="m", touchdown_speed="m/s", tangential_speed="m/s", slide="m", final_lateral_error="m")
 def landing(result: Result, vehicle: str, deck: str) -> dict[str, Number]:
     """The landing of `vehicle` on a vessel whose landing deck is `deck` ("plant.usv.deck").
@@ -29,7 +40,7 @@ def landing(result: Result, vehicle: str, deck: str) -> dict[str, Number]:
     lateral_error        m    horizontal distance of the vehicle's centre of mass from the deck centre at touchdown
     touchdown_speed      m/s  speed of the vehicle towards the deck (relative, vertical, > 0 approaching), one row earlier
     tangential_speed     m/s  horizontal speed relative to the deck centre, one row earlier
-    slide                m    largest horizontal distance from the touchdown point, as seen from the deck, while in contact
+    slide                m    largest distance from the touchdown point in the plane of the deck, while in contact
     bounces              1    how often contact with the vessel was lost and regained after touchdown
     landed_at_end             whether there was a touchdown and the last row is in contact with a vessel
     final_lateral_error  m    as lateral_error, at the last row; NaN unless landed_at_end
@@ -74,16 +85,24 @@ def horizontal_distance(result: Result, first: str, second: str) -> np.ndarray:
 
 
 def _slide(result: Result, vehicle: str, deck: str, row: int) -> float:
-    """Largest distance from the place of row `row`, in the axes of the vessel that carries the deck, over rows in contact."""
-    x, y = (result[f"{vehicle}.position.{axis}"] - result[f"{deck}.position.{axis}"] for axis in "xy")
-    place = (x + 1j * y) * np.exp(-1j * result[f"{deck.removesuffix('.deck')}.attitude.yaw"])
-    contact = result[f"{vehicle}.contact.vessel"].astype(bool)
-    return float(np.abs(place[row:] - place[row])[contact[row:]].max())
+    """Largest distance from the place of row `row` in the plane of the deck, over rows in contact."""
+    place = deck_frame.place(result, vehicle, deck)[row:, :2]
+    contact = result[f"{vehicle}.contact.vessel"].astype(bool)[row:]
+    return float(np.linalg.norm(place - place[0], axis=1)[contact].max())
 
 
+@better(
+    lateral_error="lower",
+    normal_speed="lower",
+    tangential_speed="lower",
+    kinetic_energy="lower",
+    tilt="lower",
+    peak_force="lower",
+)
 @units(
     forward_error="m",
     left_error="m",
+    lateral_error="m",
     normal_speed="m/s",
     tangential_speed="m/s",
     kinetic_energy="J",
@@ -99,6 +118,7 @@ def touchdown(result: Result, vehicle: str, deck: str, mass: float) -> dict[str,
     Touchdown is that of `landing`. Speeds are those one row earlier, relative to the point of the deck below the vehicle.
 
     forward_error, left_error  m    place of the vehicle's centre of mass from the deck centre, along the deck's axes
+    lateral_error              m    distance of the two from each other in the plane of the deck
     normal_speed               m/s  speed towards the deck along its normal, > 0 approaching
     tangential_speed           m/s  speed in the plane of the deck
     kinetic_energy             J    mass / 2 times the square of the relative speed
@@ -111,17 +131,17 @@ def touchdown(result: Result, vehicle: str, deck: str, mass: float) -> dict[str,
     if row is None:
         return dict.fromkeys(touchdown.units, math.nan)  # type: ignore[attr-defined]
     vessel = deck.removesuffix(".deck")
-    axes = _axes(result, vessel, row)
-    forward, left, _ = axes.T @ _offset(result, vehicle, deck, row)
-    tangential, normal = _approach_speeds(result, vehicle, deck, row - 1)
+    forward, left, _ = deck_frame.place(result, vehicle, deck)[row].tolist()
+    u, v, w = deck_frame.velocity(result, vehicle, deck)[row - 1].tolist()
     height = result[f"{deck}.position.z"]
     return {
-        "forward_error": float(forward),
-        "left_error": float(left),
-        "normal_speed": normal,
-        "tangential_speed": tangential,
-        "kinetic_energy": mass / 2 * (normal**2 + tangential**2),
-        "tilt": math.acos(min(float(axes[:, 2] @ _axes(result, vehicle, row)[:, 2]), 1.0)),
+        "forward_error": forward,
+        "left_error": left,
+        "lateral_error": math.hypot(forward, left),
+        "normal_speed": -w,
+        "tangential_speed": math.hypot(u, v),
+        "kinetic_energy": mass / 2 * (u**2 + v**2 + w**2),
+        "tilt": float(deck_frame.tilt(result, vehicle, deck)[row]),
         "deck_roll": float(result[f"{vessel}.attitude.roll"][row]),
         "deck_pitch": float(result[f"{vessel}.attitude.pitch"][row]),
         "deck_heave": float(height[row] - height.mean()),
@@ -129,35 +149,7 @@ def touchdown(result: Result, vehicle: str, deck: str, mass: float) -> dict[str,
     }
 
 
-def _approach_speeds(result: Result, vehicle: str, deck: str, row: int) -> tuple[float, float]:
-    """Speed in the plane of the deck and towards it (m/s), relative to the point of the deck where the vehicle is."""
-    vessel = deck.removesuffix(".deck")
-    axes = _axes(result, vessel, row)
-    rates = axes @ [result[f"{vessel}.rates.{axis}"][row] for axis in "pqr"]
-    point = _vector(result, f"{deck}.velocity", row) + np.cross(rates, _offset(result, vehicle, deck, row))
-    u, v, w = axes.T @ (_vector(result, f"{vehicle}.velocity", row) - point)
-    return math.hypot(u, v), float(-w)
-
-
-def _vector(result: Result, name: str, row: int) -> np.ndarray:
-    return np.array([result[f"{name}.{axis}"][row] for axis in "xyz"])
-
-
-def _offset(result: Result, vehicle: str, deck: str, row: int) -> np.ndarray:
-    """From the deck centre to the vehicle's centre of mass, in the world's axes (m)."""
-    return _vector(result, f"{vehicle}.position", row) - _vector(result, f"{deck}.position", row)
-
-
-def _axes(result: Result, vehicle: str, row: int) -> np.ndarray:
-    """The forward, left and up axis of a vehicle in the world's axes, as columns: Rz(yaw) Ry(pitch) Rx(roll)."""
-    roll, pitch, yaw = (float(result[f"{vehicle}.attitude.{angle}"][row]) for angle in ("roll", "pitch", "yaw"))
-    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(angle), math.sin(angle)) for angle in (roll, pitch, yaw))
-    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    return about_z @ about_y @ about_x
-
-
+@better(time_to_land="lower", aborts="lower")
 @units(time_to_land="s")
 def descent(result: Result, vehicle: str, mode: str, descending: float) -> dict[str, Number]:
     """How the way down went, told by the signal `mode`: `descending` is its value for that, lower ones come before it.
@@ -174,6 +166,7 @@ def descent(result: Result, vehicle: str, mode: str, descending: float) -> dict[
     }
 
 
+@better(reached="higher", all_reached="higher", time="lower")
 @units(time="s")
 def waypoints(result: Result, vehicle: str, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
     """Whether `vehicle` came within `radius` (m) of the waypoints (`x`, `y`) (m, world), one after the other.
@@ -198,6 +191,7 @@ def waypoints(result: Result, vehicle: str, x: Sequence[float], y: Sequence[floa
     }
 
 
+@better(rms="lower", max="lower", leg="lower")
 @units(rms="m", max="m", leg="m")
 def cross_track(result: Result, vehicle: str, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
     """How far `vehicle` was from the straight legs between its place in the first row and the waypoints (see `waypoints`).
@@ -231,6 +225,7 @@ def _distance_from_line(place: np.ndarray, start: complex, end: complex) -> np.n
     return np.abs(((place - start) * np.conj(way)).imag) / abs(way) if way else np.abs(place - start)
 
 
+@better(rms="lower", max="lower")
 @units(rms="m", max="m")
 def tracking(result: Result, vehicle: str, target: str, start: float, stop: float = math.inf) -> dict[str, Number]:
     """How well `vehicle` stayed above `target` ("plant.usv" or "plant.usv.deck") over start <= time <= stop (s).
@@ -244,6 +239,7 @@ def tracking(result: Result, vehicle: str, target: str, start: float, stop: floa
     return {"rms": float(np.sqrt(np.mean(distance**2))), "max": float(distance.max())}
 
 
+@better(stopped_at_end="higher")
 @units(stop_time="s", final_speed="rad/s", max_speed="rad/s")
 def motors(result: Result, rotor_speed: str, threshold: float = 1.0) -> dict[str, Number]:
     """Whether the motors were switched off: the commands `rotor_speed`[1], [2], ... ("uav.mixer.rotor_speed"), in rad/s.
@@ -266,6 +262,7 @@ def motors(result: Result, rotor_speed: str, threshold: float = 1.0) -> dict[str
     }
 
 
+@units(value="{signal}")
 def final(result: Result, signal: str) -> dict[str, float]:
     """`value`: the last value of one signal, in its own unit."""
     return {"value": result[signal][-1].item()}

@@ -55,27 +55,32 @@ class Shadow(ABC):
     """One vehicle: its body in Bullet and its compiled equations (`vehicles/shadow_maps.py`).
 
     `pieces` are its numbers by name, as many as `sizes` says, and "step" (s), which all vehicles share. `inputs` and `outputs`
-    hold the real variables of the model in order; the outputs after the published motion are left to others. `predict`
+    hold the real variables of the model in order; the outputs after the published motion are left to others, and the piece
+    "surroundings" is the environment's. `predict`
     foresees the "motion" that Bullet would measure, and `measure` replaces it by what Bullet made of it.
     """
 
     PIECES: ClassVar[Mapping[str, int]]  # name -> size
-    SPAWN: ClassVar[Sequence[str]] = ("predicted", "twist", "motion", "pose")  # results
+    SPAWN: ClassVar[Sequence[str]] = ("constants", "predicted", "twist", "motion", "pose")  # results
     BEFORE: ClassVar[Names]
     AFTER: ClassVar[Names]
     #: pose in Bullet of a body at rest in the origin
     AT_ORIGIN: ClassVar[Sequence[float]]
 
     def __init__(self, client: int, spawn: Spawn, pieces: Mapping[str, np.ndarray]):
-        self.name, self.model, self._client, self._pieces = spawn.name, spawn.model, client, pieces
+        self.name, self.model, self._client = spawn.name, spawn.model, client
+        constants = spawn.model.constants if spawn.model.constants is not None else len(spawn.parameters)
+        self._pieces = pieces = {**pieces, "constants": np.zeros(constants)}
+        pieces["surroundings"][:] = [variable.start for variable in spawn.model.surroundings]
         self.inputs, self.outputs = pieces["inputs"], pieces["outputs"]
+        self.surroundings = pieces["surroundings"]
         self._motion, self._twist = pieces["motion"].data, pieces["twist"].data
         library = load(spawn.model.name)
         #: where a free step leads
         self.predict = self._bound(library.shadow_before, self.BEFORE)
         #: take over what became of the step, and publish it
         self.correct = self._bound(library.shadow_after, self.AFTER)
-        bound(library.shadow_spawn, [np.array(spawn.initial)], [pieces[name] for name in self.SPAWN])()
+        bound(library.shadow_spawn, [np.array(spawn.parameters)], [pieces[name] for name in self.SPAWN])()
         self.correct()
         self.body = self._create(spawn.model.body)
         self._place(pieces["pose"].tolist())
@@ -84,7 +89,9 @@ class Shadow(ABC):
     def sizes(cls, model: Model) -> dict[str, int]:
         """How many numbers a vehicle has in which pieces."""
         slots = {"inputs": len(model.slots("input")), "outputs": len(model.slots("output"))}
-        return {**cls.PIECES, **slots, "path": 6, "anchor": 3, "leash": 3, "alarm": 1, "impulse": 1}
+        slots["surroundings"] = len(model.surroundings)
+        states = dict.fromkeys(("state", "start", "predicted"), len(model.states))
+        return {**states, **cls.PIECES, **slots, "path": 6, "anchor": 3, "leash": 3, "alarm": 1, "impulse": 1}
 
     def _bound(self, function: Callable[..., None], names: Names) -> Callable[[], None]:
         arguments, results = ([self._pieces[name] for name in side] for side in names)
@@ -118,7 +125,8 @@ class Shadow(ABC):
 
     def fault(self) -> str:
         """What keeps the vehicle from going on: an input that is not finite, or where the free step leads."""
-        for name, value in zip(self.model.slots("input"), self.inputs, strict=True):
+        names = [*self.model.slots("input"), *(variable.name for variable in self.model.surroundings)]
+        for name, value in zip(names, np.concatenate([self.inputs, self._pieces["surroundings"]]), strict=True):
             if not math.isfinite(value):
                 return f"{self.name}.{name} is {value}, expected a finite number"
         predicted = self._pieces["predicted"]
@@ -129,12 +137,12 @@ class Shadow(ABC):
 class FreeBody(Shadow):
     """A vehicle that moves freely in space; its frame in Bullet has the principal axes of inertia."""
 
-    PIECES = {"state": 13, "start": 13, "predicted": 13, "twist": 6, "motion": 6, "torque": 3, "pose": 7}
+    PIECES = {"twist": 6, "motion": 6, "torque": 3, "pose": 7}
     BEFORE = (
-        ("state", "inputs", "step", "anchor", "leash"),
+        ("state", "inputs", "surroundings", "constants", "step", "anchor", "leash"),
         ("start", "predicted", "twist", "motion", "torque", "pose", "path", "alarm"),
     )
-    AFTER = (("start", "predicted", "twist", "motion", "step"), ("state", "impulse", "outputs"))
+    AFTER = (("start", "predicted", "twist", "motion", "constants", "step"), ("state", "impulse", "outputs"))
     AT_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
     @staticmethod
@@ -161,18 +169,29 @@ class FreeBody(Shadow):
         _write_twist(self._motion, 0, *linear, *angular)
 
 
+class FloatingBody(FreeBody):
+    """A vessel that moves freely in space; the contact impulse of a step is carried over to the next one."""
+
+    PIECES = {**FreeBody.PIECES, "carried": 6, "previous": 6}
+    BEFORE = (
+        (*FreeBody.BEFORE[0], "carried"),
+        ("start", "predicted", "twist", "motion", "torque", "pose", "previous", "path", "alarm"),
+    )
+    AFTER = ((*FreeBody.AFTER[0], "previous"), (*FreeBody.AFTER[1], "carried"))
+
+
 class PlanarChain(Shadow):
     """A vessel in the horizontal plane: a chain of joints x, y and yaw with massless links, so that only the hull has inertia.
 
     The joints carry heave, roll and pitch; loads in these directions have no effect.
     """
 
-    PIECES = {"state": 6, "start": 6, "predicted": 6, "twist": 3, "motion": 3, "effort": 3, "pose": 6, "rates": 3}
+    PIECES = {"twist": 3, "motion": 3, "effort": 3, "pose": 6, "rates": 3}
     BEFORE = (
-        ("state", "inputs", "step", "anchor", "leash", "rates"),
+        ("state", "inputs", "surroundings", "constants", "step", "anchor", "leash", "rates"),
         ("start", "predicted", "twist", "motion", "effort", "pose", "path", "alarm"),
     )
-    AFTER = (("start", "predicted", "twist", "motion", "step"), ("state", "impulse", "outputs", "rates"))
+    AFTER = (("start", "predicted", "twist", "motion", "constants", "step"), ("state", "impulse", "outputs", "rates"))
     AT_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     _JOINTS = (0, 1, 2)
 

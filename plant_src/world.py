@@ -6,17 +6,20 @@ import ctypes
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from cosim import log
 from cosim.component import DTYPES, Call, Component, Ports, Variable
 from cosim.errors import ComponentError, InputError, Problem, did_you_mean
 
 from . import arguments
 from .arguments import Arguments, Platform
 from .bullet import pybullet
+from .environment.surroundings import Surroundings
 from .fleet import Fleet, Snapshot
+from .scene import replay
 from .shadow import UnsoundError, compound, set_dynamics
 from .vehicles.shapes import Box
 
@@ -30,15 +33,24 @@ _FLOAT, _FLAG = DTYPES["Float64"], DTYPES["Boolean"]
 _BODY_A, _BODY_B, _DISTANCE = 1, 2, 8  # fields of Bullet's contact points
 
 
+class State(NamedTuple):
+    """The state of a world: that of its vehicles, and what the environment was told and publishes."""
+
+    fleet: Snapshot
+    surroundings: np.ndarray
+
+
 class World(Component):
-    """Vehicles and fixed platforms in one PyBullet client.
+    """Vehicles and fixed platforms in one PyBullet client, with wind, waves and current around them.
 
-    `vehicles`: name -> {"model": "ar_drone" or "strider", "position": [x, y, z] or [x, y] (m, centre of mass), "yaw": rad,
-    "velocity_body": [u, v, w] (m/s), "rates": [p, q, r] (rad/s)}; all but model and position are zero if not given.
+    `vehicles`: name -> {"model": one of `catalogue.VEHICLES`, "motion": "planar" or "6dof", "position": [x, y, z] or for vessels
+    [x, y] (m, centre of mass), "yaw": rad, "velocity_body": [u, v, w] (m/s), "rates": [p, q, r] (rad/s), "parameters": name ->
+    value}; all but model and position may be left out.
     `platforms`: name -> {"size": [x, y, z] (m, edges), "position": [x, y, z] (m, centre)}.
-    `environment`: {"seed": integer}; nothing in the world is random so far.
+    `environment`: as `environment/settings.py` has it; waves and gusts begin with the run.
 
-    The variables of vehicle V are those of its model with the prefix "V.". Raises InputError with all problems.
+    The variables of vehicle V are those of its model with the prefix "V.", those of the environment have "environment.". Raises
+    InputError with all problems.
     """
 
     binds_everything = True
@@ -53,7 +65,7 @@ class World(Component):
     ):
         read = arguments.read(vehicles, {} if platforms is None else platforms, {} if environment is None else environment)
         self._name = instance_name
-        self._step, self._step_size, self._step_count = np.zeros(1), math.nan, 1
+        self._step, self._step_size, self._step_count, self._start_time = np.zeros(1), math.nan, 1, 0.0
         self._flags = np.zeros((len(read.vehicles), 2), _FLAG)
         self._flags_data = self._flags.reshape(-1).data
         self._bound_inputs: dict[str, np.ndarray] = {}
@@ -66,11 +78,20 @@ class World(Component):
         self._places = {variable.name: (variable, values) for variable, values in self._lay_out()}
         self.variables = [variable for variable, _ in self._places.values()]
 
+    @staticmethod
+    def scene(name: str, scenario: Mapping[str, Any]) -> dict[str, Any]:
+        """What the 3-D replay draws of a world, see `scene.replay`."""
+        return replay.world(name, scenario)
+
     def _populate(self, read: Arguments) -> None:
         names = {self._add_platform(platform): f"platforms.{platform.name}" for platform in read.platforms}
         self._fleet = Fleet(self._client, read, self._step, self._flags)
         names |= {shadow.body: f"vehicles.{shadow.name}" for shadow in self._fleet.shadows}
         self._refuse_overlaps(names)
+        self._surroundings = Surroundings(read, self._fleet.shadows)
+        self._acting = bool(self._surroundings.updates)  # a calm world pays nothing
+        for name in self._surroundings.unmoved:
+            log.message(self._name, log.WARNING, f"the planar vessel {name} does not move with the waves")
 
     def _add_platform(self, platform: Platform) -> int:
         x, y, z = platform.size
@@ -101,6 +122,9 @@ class World(Component):
             prefixed = [replace(variable, name=f"{shadow.name}.{variable.name}") for variable in shadow.model.variables]
             yield from _views([v for v in prefixed if v.causality == "input"], {_FLOAT: shadow.inputs})
             yield from _views([v for v in prefixed if v.causality == "output"], {_FLOAT: shadow.outputs, _FLAG: flags})
+        around = self._surroundings
+        yield from _views(around.input_variables, {_FLOAT: around.inputs})
+        yield from _views(around.output_variables, {_FLOAT: around.outputs})
 
     def set(self, name: str, value: Any) -> None:
         variable, values = self._variable(name, "set")
@@ -121,17 +145,24 @@ class World(Component):
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         self._bound_inputs = {variable.name: values for variable, values in _views(inputs.variables, inputs.arrays)}
+        given, wanted = inputs.arrays[_FLOAT].data, outputs.arrays[_FLOAT].data
         # memoryviews: numpy takes longer for so few numbers
-        self._incoming = self._fleet.inputs.data, inputs.arrays[_FLOAT].data
-        self._outgoing = outputs.arrays[_FLOAT].data, self._fleet.outputs.data
-        self._outgoing_flags = outputs.arrays[_FLAG].data, self._flags.reshape(-1).data
+        own_inputs, own_outputs = self._fleet.inputs.data, self._fleet.outputs.data
+        self._incoming = [(own_inputs, given[: len(own_inputs)])]
+        self._outgoing = [
+            (wanted[: len(own_outputs)], own_outputs),
+            (outputs.arrays[_FLAG].data, self._flags.reshape(-1).data),
+        ]
+        if self._acting:
+            self._incoming.append((self._surroundings.inputs.data, given[len(own_inputs) :]))
+            self._outgoing.append((wanted[len(own_outputs) :], self._surroundings.outputs.data))
 
     def set_inputs(self) -> None:
-        own, given = self._incoming
-        own[:] = given
+        for own, given in self._incoming:
+            own[:] = given
 
     def get_outputs(self) -> None:
-        for wanted, own in (self._outgoing, self._outgoing_flags):
+        for wanted, own in self._outgoing:
             wanted[:] = own
 
     def turn(self, clock: ctypes.c_double, step_size: float) -> Sequence[Call]:
@@ -145,9 +176,12 @@ class World(Component):
 
     # -- life cycle ----------------------------------------------------------------------------------------------------
 
-    def enter_initialization_mode(self, start_time: float, stop_time: float) -> None: ...
+    def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
+        self._start_time = start_time
 
-    def exit_initialization_mode(self) -> None: ...
+    def exit_initialization_mode(self) -> None:
+        self._surroundings.update(0.0)
+        self._surroundings.publish(0.0)
 
     def do_step(self, time: float, step_size: float) -> None:
         if step_size != self._step_size:
@@ -155,10 +189,20 @@ class World(Component):
         if self._fleet.contacts.any:
             self._fleet.contacts.clear()
         try:
-            for _ in range(self._step_count):
-                self._fleet.advance(1 / self._step_count)
+            if self._acting:
+                self._advance_in_surroundings(time - self._start_time)
+            else:
+                for _ in range(self._step_count):
+                    self._fleet.advance(1 / self._step_count)
         except UnsoundError as error:
             raise ComponentError(self._name, "do_step", str(error), time) from None
+
+    def _advance_in_surroundings(self, time: float) -> None:
+        """The steps of Bullet in a world that is not calm, from a time since the start (s)."""
+        for k in range(self._step_count):
+            self._surroundings.update(time + k * self._step[0])
+            self._fleet.advance(1 / self._step_count)
+        self._surroundings.publish(time + self._step_size)
 
     def _set_step_size(self, time: float, step_size: float) -> None:
         """Split the component's step into equal steps of Bullet."""
@@ -178,14 +222,15 @@ class World(Component):
 
     # -- state ---------------------------------------------------------------------------------------------------------
 
-    def get_state(self) -> Snapshot:
-        return self._fleet.get_state()
+    def get_state(self) -> State:
+        return State(self._fleet.get_state(), self._surroundings.block.copy())
 
-    def set_state(self, state: Snapshot) -> None:
-        self._fleet.set_state(state)
+    def set_state(self, state: State) -> None:
+        self._fleet.set_state(state.fleet)
+        self._surroundings.block[:] = state.surroundings
 
-    def free_state(self, state: Snapshot) -> None:
-        self._fleet.free_state(state)
+    def free_state(self, state: State) -> None:
+        self._fleet.free_state(state.fleet)
 
 
 def _views(variables: Sequence[Variable], arrays: Mapping[np.dtype[Any], np.ndarray]) -> Iterator[tuple[Variable, np.ndarray]]:

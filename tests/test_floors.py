@@ -17,7 +17,7 @@ FLOORS = [
     {"system", "recording"},
     {"engine"},
     {"unfinished"},
-    {"live_csv"},
+    {"live_csv", "text_rows"},
     {"simulate", "supervise"},
     {"fmi", "python_component", "table"},
     {"export"},
@@ -25,7 +25,7 @@ FLOORS = [
     {"results"},
     {"kpi", "compare"},
     {"kpis"},
-    {"api", "report"},
+    {"api", "bench", "report"},
     {"cli"},
     {"__main__", "pytest_plugin"},
 ]

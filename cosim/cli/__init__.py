@@ -20,10 +20,16 @@ COMMANDS = {
     "simulate": ("simulate", "Simulate one FMU alone."),
     "compare": ("compare", "Compare a result with a reference, signal by signal."),
     "regress": ("regress", "Run all scenarios that have checks or references, and hold them against these."),
+    "bench-controller": ("bench_controller", "Put a controller in a shipped one's place, in every scenario that has it."),
+    "sweep": ("sweep", "Run a scenario at many points: parameter studies and Monte Carlo, here or on a cluster."),
+    "tune": ("tune", "Find the parameters that make a KPI small."),
     "plot": ("plot", "Draw the figures of finished runs again."),
+    "report": ("report_page", "Make the page about a finished run again."),
+    "replay": ("replay", "Make a page with the 3-D replay of one run, or of two to compare."),
     "info": ("info", "Print what an FMU says about itself."),
     "validate": ("validate", "Examine FMUs against the FMI standard without running them."),
     "build": ("build", "Export controllers and plants to fmus/."),
+    "init": ("init", "Begin a project of your own: controller, scenario, reference, tests, CI."),
     "new": ("new", "Begin a controller of your own that runs at once."),
     "schema": ("schema", "Print the JSON Schema of scenarios."),
     "doctor": ("doctor", "Print what is installed and active here."),
@@ -60,7 +66,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _code(arguments: list[str]) -> int:
-    return guarded(lambda: _outcome(cli.main(arguments, prog_name="cosim", standalone_mode=False)))
+    return guarded(lambda: _outcome(cli.main(arguments, prog_name="cosim", standalone_mode=False, obj=tuple(arguments))))
 
 
 def guarded(command: Callable[[], int]) -> int:

@@ -156,9 +156,9 @@ def _sandbox() -> Iterator[Finding]:
     else:
         yield Finding("sandbox", "Landlock", "not in this kernel (Linux 5.13 or newer)", "missing")
     if offered.bubblewrap:
-        yield Finding("sandbox", "bubblewrap", f"{offered.bubblewrap} works")
+        yield Finding("sandbox", "bubblewrap", f"{offered.bubblewrap} works: --sandbox strict can be used")
     else:
-        yield Finding("sandbox", "bubblewrap", "no program bwrap that works here", "missing")
+        yield Finding("sandbox", "bubblewrap", "no program bwrap that works here, so no --sandbox strict", "missing")
     yield from (Finding("this process", name.replace("_", " "), _words(value)) for name, value in asdict(active()).items())
 
 

@@ -5,11 +5,27 @@ from __future__ import annotations
 import logging
 import sys
 
+#: warnings that are kept for the report
+MOST_KEPT = 200
 
-def show(level: int = logging.INFO) -> None:
-    """Print messages of components from now on."""
-    handler = logging.StreamHandler(sys.stderr)
+
+class _Keeper(logging.Handler):
+    """Keeps the texts of warnings and errors."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.texts: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if len(self.texts) < MOST_KEPT:
+            self.texts.append(f"{record.levelname} {record.getMessage()}")
+
+
+def show(level: int = logging.INFO) -> list[str]:
+    """Print messages of components from now on; the list returned grows by the text of each warning and error among them."""
+    handler, keeper = logging.StreamHandler(sys.stderr), _Keeper()
     handler.setFormatter(logging.Formatter("%(levelname)s %(message)s"))
     logger = logging.getLogger("cosim")
-    logger.handlers[:] = [handler]
+    logger.handlers[:] = [handler, keeper]
     logger.setLevel(level)
+    return keeper.texts

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
@@ -18,8 +18,10 @@ from .regression import Outcome, Regression
 if TYPE_CHECKING:
     from ..report.junit import Case
 
+T = TypeVar("T")
+
 #: of several exit codes the first one counts
-_SEVERITY = (130, 70, 2, 1, 3, 0)
+SEVERITY = (130, 70, 2, 1, 3, 0)
 
 
 @click.command()
@@ -36,11 +38,11 @@ def command(scenarios: tuple[Path, ...], update: bool, junit: Path | None, outpu
     few rows as describe them, and beside them what made them; a run that fails its checks becomes no reference. Ends with 3 when
     a check or comparison was not met, 1 when a component failed, 2 when a scenario was refused.
     """
-    files = list(_with_any(("reference",) if update else ("checks", "reference"), _found(scenarios or [_default()])))
+    files = list(_with_any(("reference",) if update else ("checks", "reference"), found(scenarios or [default_folder()])))
     _refuse_same_names(files)
     work = [Regression(file, output_dir / file.stem, update) for file in files]
     outcomes = []
-    for outcome in _all(work, jobs or _processors()):
+    for outcome in in_parallel([each.outcome for each in work], jobs or processors()):
         _print(outcome)
         outcomes.append(outcome)
     if junit:
@@ -49,16 +51,17 @@ def command(scenarios: tuple[Path, ...], update: bool, junit: Path | None, outpu
         write_junit("cosim regress", [_case(outcome) for outcome in outcomes], junit)
     failed = sum(outcome.code != 0 for outcome in outcomes)
     click.echo(f"{len(outcomes)} scenarios, {failed} failed" if failed else f"{len(outcomes)} scenarios, all well")
-    return min((outcome.code for outcome in outcomes), key=_SEVERITY.index)
+    return min((outcome.code for outcome in outcomes), key=SEVERITY.index)
 
 
-def _default() -> Path:
+def default_folder() -> Path:
     """The folder scenarios/ here, else that of the shipped ones."""
     own = Path("scenarios")
     return own if own.is_dir() else resources.root() / own
 
 
-def _found(paths: Iterable[Path]) -> Iterator[Path]:
+def found(paths: Iterable[Path]) -> Iterator[Path]:
+    """The scenario files that are meant by files, names of shipped scenarios and folders. Raises InputError."""
     from ..scenario.tree import find
 
     for path in paths:
@@ -92,16 +95,17 @@ def _refuse_same_names(files: Iterable[Path]) -> None:
         )
 
 
-def _processors() -> int:
+def processors() -> int:
+    """How many this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _all(work: Sequence[Regression], jobs: int) -> Iterator[Outcome]:
-    """All outcomes in order; each thread waits for a child process."""
+def in_parallel(work: Sequence[Callable[[], T]], jobs: int) -> Iterator[T]:
+    """What all functions return, in order; each is called on a thread that mostly waits for a child process."""
     from concurrent.futures import ThreadPoolExecutor
 
     with ThreadPoolExecutor(jobs) as pool:
-        yield from pool.map(Regression.outcome, work)
+        yield from pool.map(lambda function: function(), work)
 
 
 def _print(outcome: Outcome) -> None:

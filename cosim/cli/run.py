@@ -12,11 +12,12 @@ import click
 
 from ..errors import CosimError
 from ..journal import STEPS
-from . import report, supervision
+from . import report, strict, supervision
 from .progress import progress_bar
 
 if TYPE_CHECKING:
     from ..api import Execution
+    from ..kpi import CheckOutcome
     from ..results import Result
     from ..scenario import Assembly
     from ..simulate import Observer
@@ -27,10 +28,10 @@ _LATENESS = {"max": "max_lateness", "mean": "mean_lateness", "99 %": "lateness_9
 #: folder of a run that is going on, inside its output directory
 UNFINISHED = ".unfinished"
 
-RESULTS = ("result.csv", "result.parquet", "kpis.json", "run.json")
+RESULTS = ("result.csv", "result.parquet", "kpis.json", "run.json", "report.html")
 
 
-@click.command()
+@click.command(cls=strict.Command)
 @click.argument("scenario")
 @click.option("--output-dir", type=click.Path(path_type=Path), help="Where results go; default: runs/NAME.")
 @click.option("--stop-time", help="Stop time in s instead of the scenario's.")
@@ -52,16 +53,27 @@ RESULTS = ("result.csv", "result.parquet", "kpis.json", "run.json")
     help="What happens when a real-time run falls more than one step behind.",
 )
 @click.option("--parquet", is_flag=True, help="Write result.parquet too (extra `parquet`).")
-@click.option("--no-report", is_flag=True, help="Write no figures.")
+@click.option("--no-report", is_flag=True, help="Write no figures and no report.html.")
 @supervision.option
-def command(isolation: str, sandbox: bool, **options: Any) -> int:
+def command(isolation: str, sandbox: str | None, **options: Any) -> int:
     """Run SCENARIO, a JSON file or the name of a shipped scenario.
 
-    Writes result.csv, kpis.json, run.json and figures to the output directory. Exit code 0: all is well; 1: a component
-    failed, the results until then are kept; 2: the scenario was refused; 3: a check was not met.
+    Writes result.csv, kpis.json, run.json, figures and report.html to the output directory. Exit code 0: all is well;
+    1: a component failed, the results until then are kept; 2: the scenario was refused; 3: a check was not met.
     """
-    apart: dict[str, Any] = {"isolation": "fmu" if isolation == "fmu" else "none", "sandbox": sandbox}
+    if strict.wanted(sandbox):
+        return strict.again(*_needed(**options))
+    apart: dict[str, Any] = {"isolation": "fmu" if isolation == "fmu" else "none", "sandbox": bool(sandbox)}
     return supervision.protected(lambda: _run(**options, **apart), isolation, _salvage)
+
+
+def _needed(scenario: str, output_dir: Path | None, settings: Sequence[str], **_: Any) -> tuple[list[Path], Path | None]:
+    """Files that the command reads, and the folder it writes to (None when it will refuse the scenario)."""
+    from ..scenario import load
+    from ..scenario.tree import parse_settings
+
+    loaded = load(scenario, parse_settings(settings))
+    return loaded.files(), None if loaded.problems else (output_dir or Path("runs") / loaded.spec.name).absolute()
 
 
 def _run(
@@ -80,7 +92,7 @@ def _run(
     from ..unfinished import unfinished
     from . import messages
 
-    messages.show()
+    warnings = messages.show()
     if parquet:
         require_parquet()
     began = time.perf_counter()
@@ -98,6 +110,7 @@ def _run(
         _progress(assembly) as observers,
         executed(assembly, observers) as execution,
     ):
+        execution.result.metadata["warnings"] = warnings
         code = _finish(execution, assembly, directory, shown, no_report, began)
         if parquet:
             execution.result.to_parquet(directory / "result.parquet")
@@ -108,7 +121,6 @@ def _finish(execution: Execution, assembly: Assembly, directory: Path, shown: Pa
     """Write, print and draw what came of the run; returns the exit code."""
     from ..api import checks
     from ..kpi import kpi_units
-    from ..report.figures import draw_figures
     from ..report.tables import print_kpis
     from ..results.result import write_run
     from ..unfinished import saved
@@ -121,10 +133,24 @@ def _finish(execution: Execution, assembly: Assembly, directory: Path, shown: Pa
     write_run(result, directory)
     saved()
     outcomes = checks(assembly, result)
-    print_kpis(result.kpis, outcomes, kpi_units(assembly.kpis(), result.kpis))
-    figures = [] if no_report else draw_figures(result, assembly.figures(), directory)
-    _summary(result, shown, figures, began)
+    print_kpis(result.kpis, outcomes, kpi_units(assembly.kpis(), result.kpis, result.units))
+    files = [] if no_report else _draw(result, assembly, outcomes, directory)
+    _summary(result, shown, files, began)
     return 0 if all(outcome.passed for outcome in outcomes) else 3
+
+
+def _draw(result: Result, assembly: Assembly, outcomes: Sequence[CheckOutcome], directory: Path) -> list[str]:
+    """Draw the figures and write the report; returns the names of the files."""
+    from ..report.figures import draw, save, svg
+    from ..report.html import write_report
+
+    pictures = {}
+    for name, function, arguments in assembly.figures():
+        figure = draw(result, name, function, arguments)
+        save(figure, directory / f"{name}.png")
+        pictures[name] = svg(figure)
+    write_report(result, outcomes, pictures, directory / "report.html")
+    return [*(f"{name}.png" for name in pictures), "report.html"]
 
 
 def _salvage(outcome: Outcome) -> None:
@@ -156,9 +182,9 @@ def _keep(partial: Result, directory: Path, shown: Path) -> None:
         click.echo(f"{len(partial.time)} rows until t = {partial.time[-1]:g} s kept in {shown}", err=True)
 
 
-def _summary(result: Result, directory: Path, figures: list[Path], began: float) -> None:
+def _summary(result: Result, directory: Path, drawn: list[str], began: float) -> None:
     loop, simulated = result.timing["loop_seconds"], float(result.time[-1] - result.time[0])
-    files = ", ".join(["result.csv", "kpis.json", "run.json", *(path.name for path in figures)])
+    files = ", ".join(["result.csv", "kpis.json", "run.json", *drawn])
     click.echo(f"\n{simulated:g} s simulated in {loop:.2f} s: {simulated / loop:.0f} times real time")
     click.echo(f"{files} in {directory} ({time.perf_counter() - began:.1f} s in all)")
     if pace := result.metadata["real_time"]:

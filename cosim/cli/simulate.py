@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..temporary import run_folder
-from . import report, supervision
+from . import report, strict, supervision
 
 if TYPE_CHECKING:
     from ..component import Component
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 NAME, PROFILE = "fmu", "profile"
 
 
-@click.command()
+@click.command(cls=strict.Command)
 @click.argument("fmu", type=click.Path(path_type=Path))
 @click.option("--output-file", type=click.Path(path_type=Path), help="CSV file for the outputs; default: print final values.")
 @click.option("--stop-time", help="Stop time in s; default: the FMU's, else 1.")
@@ -29,13 +29,15 @@ NAME, PROFILE = "fmu", "profile"
 @click.option("--start-value", "start_values", multiple=True, metavar="name=value", help="Set a parameter or start value.")
 @click.option("--input-file", type=click.Path(path_type=Path), help='CSV file with "time" and columns named as inputs.')
 @supervision.option
-def command(isolation: str, sandbox: bool, output_file: Path | None, **options: Any) -> int:
+def command(isolation: str, sandbox: str | None, output_file: Path | None, **options: Any) -> int:
     """Simulate FMU (FMI 2.0 or 3.0 Co-Simulation) from its default start time."""
     output = output_file.absolute() if output_file else None
+    if strict.wanted(sandbox):
+        return strict.again([path for path in (options["fmu"], options["input_file"]) if path], output and output.parent)
     with run_folder() as folder:
         unfinished = output.with_name(f".{output.name}.unfinished") if output else Path(folder) / "run"
         return supervision.protected(
-            lambda: _simulate(unfinished, output, output_file, _apart(isolation, sandbox), **options),
+            lambda: _simulate(unfinished, output, output_file, _apart(isolation, bool(sandbox)), **options),
             isolation,
             lambda outcome: _save(supervision.recovered(outcome), output, output_file),
         )

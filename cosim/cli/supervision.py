@@ -11,6 +11,7 @@ import click
 
 from ..errors import CosimError
 from . import guarded
+from .strict import KINDS
 
 if TYPE_CHECKING:
     from ..recording import Recording
@@ -25,8 +26,10 @@ _isolation = click.option(
 )
 _sandbox = click.option(
     "--sandbox",
-    is_flag=True,
-    help="Every FMU in a process of its own that reads only its own files, writes only to a temporary folder, has no network.",
+    type=click.Choice(KINDS),
+    metavar="[strict]",
+    help="Every FMU in a process of its own that reads only its own files, writes only to a temporary folder, has no network; "
+    "with `strict` the whole command sees only the files it needs and writes only its results (needs bubblewrap).",
 )
 
 

@@ -19,7 +19,7 @@ import casadi as ca
 
 from ..component import Variable
 from .block import Block, BlockVariable
-from .equations_c import c_function
+from .equations_c import Callee, c_function, callees
 from .equations_glue import INCLUDES, glue
 
 _SIGNATURE = "void {}(const double *const in[], double *const out[])"
@@ -48,6 +48,15 @@ class ContinuousModel:
     step_size: float = 0.01
     max_sub_step: float = 0.005
     resources: Mapping[str, Path] = field(default_factory=dict)
+    #: parameters -> what the other callables are given in their place, computed once when the model is initialized
+    constants: Callable[[ca.SX], ca.SX] | None = None
+    #: how functions that the expressions call are written in C, where it is not their own text
+    callees: Sequence[Callee] = ()
+
+    def constant_symbols(self) -> ca.SX:
+        """Symbols for what the callables are given as parameters."""
+        parameters = ca.SX.sym("parameters", len(self.slots("parameter")))
+        return ca.SX.sym("constants", self.constants(parameters).numel()) if self.constants else parameters
 
     def advance(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1) -> ca.SX:
         """The state after `step` (s) with held inputs, in `sub_steps` equal Runge-Kutta steps."""
@@ -131,6 +140,7 @@ def _header(model: ContinuousModel) -> str:
     flags = model.flags()
     sizes = {
         "parameter": len(model.slots("parameter")),
+        "constant": model.constant_symbols().numel() if model.constants else 0,
         "input": len(model.slots("input")),
         "state": len(model.states),
         "output": len(flags) - sum(flags),
@@ -144,25 +154,30 @@ def _header(model: ContinuousModel) -> str:
 
 def _source(model: ContinuousModel, exported: Sequence[ca.Function]) -> str:
     """The text of model.c."""
-    functions = [f"static {_SIGNATURE.format(f.name())}\n{c_function(f)}" for f in _functions(model)]
+    own = _functions(model)
+    called = callees([*own, *exported], model.callees)
+    functions = [f"static {_SIGNATURE.format(name)}\n{body}" for name, body in called.items()]
+    functions += [f"static {_SIGNATURE.format(f.name())}\n{c_function(f)}" for f in own]
     functions += [f"MODEL_EXPORT {_SIGNATURE.format(f.name())}\n{c_function(f)}" for f in exported]
     return "\n".join([INCLUDES, *functions, glue(model)])
 
 
 def _functions(model: ContinuousModel) -> list[ca.Function]:
-    parameters = ca.SX.sym("parameters", len(model.slots("parameter")))
+    parameters, constants = ca.SX.sym("parameters", len(model.slots("parameter"))), model.constant_symbols()
     inputs = ca.SX.sym("inputs", len(model.slots("input")))
     state = ca.SX.sym("state", len(model.states))
     step = ca.SX.sym("step")
-    outputs = ca.vertsplit(model.outputs(state, inputs, parameters))
+    outputs = ca.vertsplit(model.outputs(state, inputs, constants))
     flags = model.flags()
     numbers = ca.vertcat(*(y for y, flag in zip(outputs, flags, strict=True) if not flag))
     truths = ca.vertcat(*(y for y, flag in zip(outputs, flags, strict=True) if flag))
-    observe = ca.Function("observe", [state, inputs, parameters], [numbers, truths])
+    observe = ca.Function("observe", [state, inputs, constants], [numbers, truths])
     if not model.states:
         return [observe]
+    prepare = [ca.Function("prepare", [parameters], [model.constants(parameters)])] if model.constants else []
     return [
-        ca.Function("initial_state", [parameters], [model.initial_state(parameters)]),
-        ca.Function("sub_step", [state, inputs, parameters, step], [model.advance(state, inputs, parameters, step)]),
+        *prepare,
+        ca.Function("initial_state", [constants], [model.initial_state(constants)]),
+        ca.Function("sub_step", [state, inputs, constants, step], [model.advance(state, inputs, constants, step)]),
         observe,
     ]

@@ -7,7 +7,11 @@ readable, compiles without warnings and depends on nothing but the C mathematica
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -56,33 +60,158 @@ _OPERATIONS = {
 }
 
 
+@dataclass(frozen=True)
+class Callee:
+    """A function that expressions call, with its body in C.
+
+    `function` says what it computes; it has the option `never_inline`. `body` reads `in[i][j]`, writes `out[i][j]` and may
+    call the functions that it `needs`.
+    """
+
+    function: ca.Function
+    body: str
+    needs: Sequence[ca.Function] = ()
+
+
+class _Places(NamedTuple):
+    """Where element j of argument i and of result i lie in C."""
+
+    argument: Callable[[int, int], str]
+    result: Callable[[int, int], str]
+
+
+_POINTERS = _Places(lambda i, j: f"in[{i}][{j}]", lambda i, j: f"out[{i}][{j}]")
+
+
+def sum_over_rows(name: str, term: ca.Function, rows: int) -> Callee:
+    """The sum of `term` over the rows of a table, in C a loop.
+
+    `term` maps (common, row) to a vector. The function of the result maps (common, count, table), with a table (rows, columns)
+    of which only the first `count` rows are used, to the sum of the terms. `rows` is a multiple of 8: so many terms are computed
+    side by side, which compilers make use of if the term is plain arithmetic, and added one after the other.
+    """
+    common, table = ca.SX.sym("common", term.size1_in(0)), ca.SX.sym("table", rows, term.size1_in(1))
+    count = ca.SX.sym("count")
+    terms = [ca.if_else(count > k, term(common, table[k, :].T), 0) for k in range(rows)]
+    total = ca.Function(name, [common, count, table], [sum(terms)], {"never_inline": True})
+    places = _Places(lambda i, j: f"row[{rows * j} + k]" if i else f"common[{j}]", lambda i, j: f"value[{j}][k]")
+    statements = "".join(f"            {statement};\n" for statement in _Statements(_dense(term), places))
+    sizes = {"size": term.size1_out(0), "rows": rows, "common": term.size1_in(0)}
+    return Callee(total, _SUM % {**sizes, "statements": statements})
+
+
+_SUM = """{
+    double common[%(common)d], *const sum = out[0];
+    for (int i = 0; i < %(common)d; ++i) common[i] = in[0][i];
+    for (int i = 0; i < %(size)d; ++i) sum[i] = 0;
+    for (int first = 0; first < %(rows)d && first < in[1][0]; first += 8) {
+        const double *const row = in[2] + first;
+        double value[%(size)d][8];
+        for (int k = 0; k < 8; ++k) {
+%(statements)s        }
+        for (int k = 0; k < 8 && first + k < in[1][0]; ++k)
+            for (int i = 0; i < %(size)d; ++i) sum[i] += value[i][k];
+    }
+}
+"""
+
+
+def callees(functions: Iterable[ca.Function], known: Sequence[Callee] = ()) -> dict[str, str]:
+    """Name -> body of the functions that these call, each after those that it calls itself."""
+    given = {callee.function.name(): callee for callee in known}
+    found: dict[str, str] = {}
+    for function in functions:
+        for called in function.find_functions(0):
+            callee = given.get(called.name())
+            found |= callees([called] if callee is None else [], known)
+            for needed in callee.needs if callee else ():
+                found |= callees([needed], known) | {needed.name(): c_function(needed)}
+            found[called.name()] = callee.body if callee else c_function(called)
+    return found
+
+
 def c_function(function: ca.Function) -> str:
     """The body of the function: reads `in[i][j]` and writes `out[i][j]`, element j of argument and result i.
 
+    Functions with the option `never_inline` are called (`callees` has their bodies).
     Raises ValueError for an operation that has no counterpart in C.
     """
+    return "{\n" + "".join(f"    {statement};\n" for statement in _Statements(_dense(function))) + "}\n"
+
+
+def _dense(function: ca.Function) -> ca.Function:
+    """The function without structural zeros and common subexpressions."""
     arguments = [ca.SX.sym(f"a{i}", function.size_in(i)) for i in range(function.n_in())]
-    results = ca.cse([ca.densify(result) for result in function.call(arguments)])
-    dense = ca.Function(function.name(), arguments, results)
-    return "{\n" + "".join(f"    {statement};\n" for statement in _statements(dense)) + "}\n"
+    results = ca.cse([ca.densify(result) for result in function.call(arguments, True, False)])
+    return ca.Function(function.name(), arguments, results)
 
 
-def _statements(function: ca.Function) -> Iterator[str]:
-    names: dict[int, str] = {}  # place in CasADi's work vector -> the variable that holds its present value
-    for k in range(function.n_instructions()):
-        operation = function.instruction_id(k)
-        targets, operands = function.instruction_output(k), function.instruction_input(k)
+class _Statements:
+    """The statements of a function, each an assignment or a call.
+
+    `_values` maps places in CasADi's work vector to the C expression that holds their present value.
+    """
+
+    def __init__(self, function: ca.Function, places: _Places = _POINTERS):
+        self._function, self._places = function, places
+        self._values: dict[int, str] = {}
+        self._called = {called.name(): called for called in function.find_functions(0)}
+        text = function.str(True).partition("Algorithm:\n")[2].splitlines() if self._called else []
+        self._names = [line.partition(" = ")[2].partition("(")[0] for line in text]
+
+    def __iter__(self) -> Iterator[str]:
+        for k in range(self._function.n_instructions()):
+            operation = self._function.instruction_id(k)
+            if operation == ca.OP_CALL:
+                yield from self._call(k)
+            elif operation == ca.OP_INPUT:
+                self._read(k)
+            else:
+                yield self._assign(k, operation)
+
+    def _read(self, k: int) -> None:
+        argument, element = self._function.instruction_input(k)
+        self._values[self._function.instruction_output(k)[0]] = self._places.argument(argument, element)
+
+    def _assign(self, k: int, operation: int) -> str:
+        targets, operands = self._function.instruction_output(k), self._function.instruction_input(k)
         if operation == ca.OP_OUTPUT:
-            yield f"out[{targets[0]}][{targets[1]}] = {names[operands[0]]}"
-            continue
-        if operation == ca.OP_INPUT:
-            value = f"in[{operands[0]}][{operands[1]}]"
-        elif operation == ca.OP_CONST:
-            value = _literal(function.instruction_constant(k))
+            return f"{self._places.result(*targets)} = {self._values[operands[0]]}"
+        if operation == ca.OP_CONST:
+            value = _literal(self._function.instruction_constant(k))
         else:
-            value = _operation(function, operation).format(*(names[place] for place in operands))
-        names[targets[0]] = f"v{k}"
-        yield f"const double v{k} = {value}"
+            value = _operation(self._function, operation).format(*(self._values[place] for place in operands))
+        self._values[targets[0]] = f"v{k}"
+        return f"const double v{k} = {value}"
+
+    def _call(self, k: int) -> Iterator[str]:
+        """A call; arguments that lie side by side among those of this function are not copied."""
+        callee = self._called[self._names[k]]
+        places, arguments = iter(self._function.instruction_input(k)), []
+        for i in range(callee.n_in()):
+            values = [self._values[place] for place in islice(places, callee.nnz_in(i))]
+            arguments.append(pointer := _pointer(values) or f"c{k}_{i}")
+            if pointer == f"c{k}_{i}":
+                yield f"const double {pointer}[] = {{{', '.join(values)}}}"
+        sizes = [callee.nnz_out(i) for i in range(callee.n_out())]
+        for i, size in enumerate(sizes):
+            yield f"double r{k}_{i}[{size}]"
+        results = [f"r{k}_{i}" for i in range(len(sizes))]
+        yield (
+            f"{callee.name()}((const double *const[]){{{', '.join(arguments)}}}, (double *const[]){{{', '.join(results)}}})"
+        )
+        elements = [f"r{k}_{i}[{j}]" for i, size in enumerate(sizes) for j in range(size)]
+        self._values |= dict(zip(self._function.instruction_output(k), elements, strict=True))
+
+
+def _pointer(values: Sequence[str]) -> str | None:
+    """The address of consecutive elements of an argument, if these are such."""
+    match = re.fullmatch(r"in\[(\d+)\]\[(\d+)\]", values[0])
+    if match is None:
+        return None
+    argument, first = match[1], int(match[2])
+    side_by_side = [f"in[{argument}][{first + k}]" for k in range(len(values))]
+    return f"in[{argument}] + {first}" if list(values) == side_by_side else None
 
 
 def _operation(function: ca.Function, operation: int) -> str:

@@ -22,7 +22,8 @@ def glue(model: ContinuousModel) -> str:
         "messages": messages,
         "states": len(model.states),
         "state": "m->state" if model.states else "NULL",
-        "parameter": member["parameter"],
+        "constant": "m->constant" if model.constants else member["parameter"],
+        "prepare": _PREPARE if model.constants else "",
         "input": member["input"],
         "output": numbers,
         "flag_slots": max(flags, 1),
@@ -58,7 +59,7 @@ INCLUDES = """#include <math.h>
 _PUBLISH = """static void publish(Model *m)
 {
     double flags[%(flag_slots)d];
-    const double *in[] = {%(state)s, %(input)s, %(parameter)s};
+    const double *in[] = {%(state)s, %(input)s, %(constant)s};
     double *out[] = {%(output)s, flags};
     observe(in, out);
 %(take_flags)s}
@@ -92,12 +93,19 @@ _FAILURE = """static const char *failure(const Model *m)
 
 """
 
+_PREPARE = """    {
+        const double *parameters[] = {m->parameter};
+        double *constants[] = {m->constant};
+        prepare(parameters, constants);
+    }
+"""
+
 _ADVANCE = """const char *model_initialize(Model *m, double time)
 {
-    const double *in[] = {%(parameter)s};
+    const double *in[] = {%(constant)s};
     double *out[] = {m->state};
     (void)time;
-    initial_state(in, out);
+%(prepare)s    initial_state(in, out);
     publish(m);
     return failure(m);
 }
@@ -107,7 +115,7 @@ const char *model_step(Model *m, double time, double step_size)
     const long count = (long)fmax(1.0, ceil(step_size / %(max_sub_step)s - 1e-9));
     const double sub_step_size = step_size / (double)count;
     double next[%(states)d];
-    const double *in[] = {m->state, %(input)s, %(parameter)s, &sub_step_size};
+    const double *in[] = {m->state, %(input)s, %(constant)s, &sub_step_size};
     double *out[] = {next};
     (void)time;
     for (long k = 0; k < count; ++k) {

@@ -32,8 +32,9 @@ _PACKAGE = "__path__, __package__ = [__import__('os').path.dirname(__file__)], _
 def write_python_fmu(source: Path, target: Path) -> Path:
     """Write the FMI 2.0 FMU of the one `Fmi2Slave` class in `source` to `target`.
 
-    It contains the source, the files of its folder that it imports relatively (`from .pid import Pid`), PythonFMU itself and
-    its binaries for linux64 and win64; the host needs Python, and what the source imports else. A variable with an attribute
+    It contains the source, the files of its folder that it imports relatively (`from .pid import Pid`), the JSON file of the
+    same name beside it if there is one, PythonFMU itself and its binaries for linux64 and win64; the host needs Python, and what
+    the source imports else. A variable with an attribute
     `unit` writes it itself (`to_xml`); the definitions of units are added. Raises InputError when the class cannot be exported
     or its variables make no valid description.
     """
@@ -44,6 +45,12 @@ def write_python_fmu(source: Path, target: Path) -> Path:
     files[DESCRIPTION] = to_bytes(root)
     validate(files[DESCRIPTION], source)
     return write_archive(files, target)
+
+
+def source_files(source: Path) -> list[Path]:
+    """The files that go into the FMU."""
+    data = source.resolve().with_suffix(".json")
+    return [*with_relative_imports(source), *([data] if data.is_file() else [])]
 
 
 def _build(source: Path) -> dict[str, bytes]:
@@ -62,10 +69,10 @@ def _build(source: Path) -> dict[str, bytes]:
 
 
 def _modules(source: Path) -> dict[Path, bytes]:
-    """The source and what it imports relatively, by their paths from the folder of the source."""
+    """The files of a source, by their paths from its folder."""
     folder = source.resolve().parent
     try:
-        files = sorted(file.resolve() for file in with_relative_imports(source))
+        files = sorted(file.resolve() for file in source_files(source))
     except SyntaxError as error:
         raise InputError(Problem(f"cannot be exported: {error}", str(source))) from None
     outside = [file for file in files if not file.is_relative_to(folder)]

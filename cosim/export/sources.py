@@ -15,7 +15,7 @@ from .c_sources import write_c_fmu
 from .compiler import compiler_version, find_compiler
 from .imports import with_relative_imports
 from .package import write_fmu
-from .python_class import write_python_fmu
+from .python_class import source_files, write_python_fmu
 from .validation import DESCRIPTION
 
 
@@ -74,13 +74,14 @@ def _load_equations(path: Path, model: str | None) -> Block:
 
 def _write_python(path: Path, target: Path) -> list[Path]:
     write_python_fmu(path, target)
-    return with_relative_imports(path)
+    return source_files(path)
 
 
 KINDS = (
     Kind("Modelica model", "controllers/modelica/*.mo", "rumoca", _load_modelica),
     Kind("PythonFMU class", "controllers/python/*.py", "pythonfmu", None, "python", _write_python, compiled=False),
     Kind("equations", "plant_src/**/equations.py", "casadi", _load_equations),
+    Kind("PythonFMU class", "plant_src/*_fmu.py", "pythonfmu", None, "python", _write_python, compiled=False),
     Kind("C controller", f"controllers/c/*/{DESCRIPTION}", "fmpy", None, "c", write_c_fmu),
 )
 
@@ -105,7 +106,7 @@ def source_of(path: Path, model: str | None = None) -> Source:
     if path.suffix == ".py":
         return Source(path, KINDS[1], snake_case(path.stem))
     if path.name == DESCRIPTION:
-        return Source(path, KINDS[3], path.resolve().parent.name)
+        return Source(path, KINDS[-1], path.resolve().parent.name)
     raise InputError(Problem(f"cannot be exported; expected a .mo or .py file, or a C controller's {DESCRIPTION}", str(path)))
 
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from hashlib import file_digest
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..errors import InputError
+from ..temporary import FMU, LockedFolder
 from .description import Description, describe
 from .preflight import LIMITS, Examination, Limits, examine, extract, open_file, refuse
 
@@ -33,7 +33,7 @@ class FmuFile:
 
     def __init__(self, path: Path, limits: Limits = LIMITS):
         self.path, self.limits = path, limits
-        self._folder: TemporaryDirectory[str] | _LentFolder | None = None
+        self._folder: LockedFolder | _LentFolder | None = None
         self._users = 0
         #: FMPy's object with the loaded library, which all instances share
         self.library: Any = None
@@ -61,7 +61,7 @@ class FmuFile:
         """The folder with the extracted FMU, until it is released. Raises InputError when it cannot be extracted."""
         if self._folder is None:
             self.check_platform()
-            folder = TemporaryDirectory(prefix="cosim-fmu-")
+            folder = LockedFolder(FMU)
             try:
                 extract(self.path, self.examination, Path(folder.name), self.limits)
             except OSError as error:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,6 +81,16 @@ def save(figure: Figure, path: Path) -> None:
             FigureCanvasAgg(figure).print_png(temporary, metadata={"Software": None})
         else:
             FigureCanvasSVG(figure).print_svg(temporary, metadata={"Date": None, "Creator": None})
+
+
+def svg(figure: Figure) -> str:
+    """A figure as the text of an SVG file, without dates and versions."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    text = StringIO()
+    with _style():
+        FigureCanvasSVG(figure).print_svg(text, metadata={"Date": None, "Creator": None})
+    return text.getvalue()
 
 
 def draw_figures(

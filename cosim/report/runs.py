@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -18,13 +19,15 @@ Function = tuple[str, Callable[..., Any], Mapping[str, Any]]
 def read_run(directory: str | Path) -> Result:
     """The result in a folder that `cosim run` wrote, with its KPIs, timing and metadata.
 
-    Booleans return as 0 and 1 and units are unknown, see `Result.from_csv`. Raises InputError when a file cannot be read.
+    Booleans return as 0 and 1, see `Result.from_csv`. Raises InputError when a file cannot be read.
     """
     directory = Path(directory)
     about = _read_json(directory / "run.json")
-    timing = about.pop("timing", {})
+    timing, units = about.pop("timing", {}), about.pop("units", {})
     kpis = _read_json(directory / "kpis.json") if (directory / "kpis.json").exists() else {}
-    return replace(Result.from_csv(directory / "result.csv"), kpis=kpis, timing=timing, metadata=about)
+    numbers = {name: math.nan if value is None else value for name, value in kpis.items()}
+    recording = Result.from_csv(directory / "result.csv").recording
+    return Result(replace(recording, units={**recording.units, **units}), numbers, timing, about)
 
 
 def _read_json(path: Path) -> dict[str, Any]:

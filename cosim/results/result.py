@@ -83,8 +83,8 @@ class Result:
 
 
 def write_run(result: Result, directory: str | Path) -> None:
-    """Write `result.csv`, `kpis.json` and `run.json` (metadata and timing) to `directory`, each of them atomically."""
+    """Write `result.csv`, `kpis.json` and `run.json` (metadata, timing, units) to `directory`, each of them atomically."""
     directory = Path(directory)
     result.to_csv(directory / "result.csv")
     write_json(result.kpis, directory / "kpis.json")
-    write_json({**result.metadata, "timing": result.timing}, directory / "run.json")
+    write_json({**result.metadata, "timing": result.timing, "units": result.units}, directory / "run.json")

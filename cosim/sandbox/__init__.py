@@ -7,9 +7,10 @@ end of the parent is its own end; standard input is empty; no privileges can be 
 programs started, only below `readable`; files are written only below `writable`; TCP needs `network` (Landlock, Linux 5.13, its
 TCP rules 6.7).
 
-What remains: Landlock blocks neither UDP and raw sockets nor looking at names, sizes and modes of files, nor changing the modes
-of one's own. `command` (bubblewrap, strict mode) shows no other files and no network at all. A worker can use up its limits,
-leave children behind in sessions of their own, which the parent has to end, and lie in its outputs.
+What remains: Landlock blocks neither UDP, raw sockets and Unix sockets that have a path, nor looking at names, sizes and modes
+of files, nor changing the modes of one's own. `command` (bubblewrap, strict mode) shows no other files and processes and no
+network at all. A worker can use up its limits, leave children behind in sessions of their own, which the parent has to end, and
+lie in its outputs.
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
-"""Strict mode: bubblewrap starts the worker with its own processes, users, network and files."""
+"""Strict mode: bubblewrap starts a command with its own processes, users, network and files."""
 
 from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ..errors import InputError
 
-_CLOSED = ("--unshare-all", "--die-with-parent", "--new-session")
+_CLOSED = ("--unshare-all", "--die-with-parent", "--new-session", "--as-pid-1")
 _OWN = ("--proc", "/proc", "--dev", "/dev", "--tmpfs", "/tmp")  # noqa: S108
 
 
@@ -26,18 +26,26 @@ def bubblewrap() -> str:
     return program
 
 
-def command(arguments: Sequence[str], readable: Sequence[Path], writable: Sequence[Path] = ()) -> list[str]:
-    """The command that runs `arguments` seeing nothing but the listed folders, under their own paths.
+def command(
+    arguments: Sequence[str], readable: Iterable[Path], writable: Iterable[Path] = (), *, status: int | None = None
+) -> list[str]:
+    """The command that runs `arguments` in this folder seeing nothing but the listed ones, under their own paths.
 
-    No network at all, no process of outside, an empty /tmp; everything ends with the caller. Raises InputError where
-    bubblewrap is missing or not permitted.
+    No network at all, no process of outside, an empty /tmp; everything ends with the caller. Where folders lie in each other,
+    the inner one counts; `writable` counts more than `readable`. To the descriptor `status` bubblewrap writes lines of JSON
+    with "child-pid", and "exit-code" at the end of a command that was started. Raises InputError where bubblewrap is missing
+    or not permitted.
     """
     program = bubblewrap()
     if not program:
-        raise InputError("strict isolation needs bubblewrap (program bwrap) and user namespaces; found none that works")
+        raise InputError(
+            "the strict sandbox needs bubblewrap (program bwrap, package bubblewrap) and user namespaces; found none that works"
+        )
     words = [program, *_CLOSED, *_OWN]
-    for path in readable:
-        words += ["--ro-bind", str(path), str(path)]
-    for path in writable:
-        words += ["--bind", str(path), str(path)]
-    return [*words, "--", *arguments]
+    bound = {**dict.fromkeys(readable, "--ro-bind"), **dict.fromkeys(writable, "--bind")}
+    for path in sorted(bound):
+        words += [bound[path], str(path), str(path)]
+    if status is not None:
+        words += ["--json-status-fd", str(status)]
+    here = str(Path.cwd())
+    return [*words, "--dir", here, "--chdir", here, "--", *arguments]

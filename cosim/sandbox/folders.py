@@ -19,7 +19,11 @@ _SYSTEM = (
 
 
 def interpreter_folders() -> tuple[Path, ...]:
-    """Existing folders and files that this interpreter, its packages and shared libraries are read from."""
-    own = str(Path(__file__).parents[1])
-    places = [Path(text) for text in (*_SYSTEM, sys.prefix, sys.base_prefix, *sys.path, own) if text]
+    """Existing folders and files that this interpreter, its packages and shared libraries are read from.
+
+    Not the current folder, which Python searches, too, when it is started as `python -m cosim`.
+    """
+    own = Path(__file__).parents[1]
+    searched = [path for path in map(Path, sys.path) if path.absolute() != Path.cwd()]
+    places = [*map(Path, (*_SYSTEM, sys.prefix, sys.base_prefix)), *searched, own]
     return tuple(dict.fromkeys(path.absolute() for path in places if path.exists()))

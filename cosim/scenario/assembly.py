@@ -6,9 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os.path import relpath
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from ..errors import InputError
+from ..fmi import FmuFile
 from ..python_component import package_files
 from ..simulate import Settings
 from ..stopwatch import Stopwatch
@@ -18,7 +20,7 @@ from .document import Document
 from .functions import load_function
 from .schema import FunctionSpec, ScenarioSpec
 from .sources import Workshop
-from .tree import Node, load
+from .tree import Node, Scenario, load
 
 Function = tuple[str, Callable[..., Any], Mapping[str, Any]]
 
@@ -80,23 +82,28 @@ class Assembly:
 
 
 def assemble(
-    scenario: str | Path, settings: Mapping[str, Any] | None = None, *, apart: bool = False, sandbox: bool = False
+    scenario: str | Path,
+    settings: Mapping[str, Any] | None = None,
+    *,
+    apart: bool = False,
+    sandbox: bool = False,
+    prepared: Mapping[Path, FmuFile] = MappingProxyType({}),
 ) -> Assembly:
     """Read, wire and check a scenario; `settings` are changes from outside (see `tree.load`).
 
-    With `apart` every FMU runs in a process of its own; with `sandbox` also, and those that do are confined.
+    With `apart` every FMU runs in a process of its own; with `sandbox` also, and those that do are confined. `prepared` are
+    FMU files by resolved path that were read before.
 
     Raises InputError with every problem found, each with file, line and JSON path.
     """
     watch = Stopwatch()
     with watch.measure("load_seconds"):
-        return _assemble(scenario, settings, watch, apart, sandbox)
+        with watch.measure("parse_seconds"):
+            loaded = load(scenario, settings)
+        return _assembled(loaded, Assembler(loaded, apart, sandbox, prepared), watch)
 
 
-def _assemble(scenario: str | Path, settings: Mapping[str, Any] | None, watch: Stopwatch, apart: bool, sandbox: bool) -> Assembly:
-    with watch.measure("parse_seconds"):
-        loaded = load(scenario, settings)
-    assembler = Assembler(loaded, apart, sandbox)
+def _assembled(loaded: Scenario, assembler: Assembler, watch: Stopwatch) -> Assembly:
     try:
         with watch.measure("instantiate_seconds"):
             assembler.make_components()

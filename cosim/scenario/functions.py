@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Collection
+from functools import lru_cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -27,13 +28,18 @@ def function_problem(spec: FunctionSpec, folder: Path) -> str:
     if path is None or not is_file(path):
         return f'{"file" if file.endswith(".py") else "module"} "{file}" does not exist'
     try:
-        tree = ast.parse(path.read_bytes())
+        functions = _functions(path.read_bytes())
     except SyntaxError as error:
         return f'"{file}" is no Python: {error.msg} (line {error.lineno})'
-    functions = {node.name: node.args for node in tree.body if isinstance(node, ast.FunctionDef)}
     if name not in functions:
         return f'"{file}" defines no function "{name}"{did_you_mean(name, functions)}'
     return _argument_problem(name, functions[name], spec.arguments)
+
+
+@lru_cache(16)  # several functions of one file are the rule, and sweeps load a scenario again and again
+def _functions(source: bytes) -> dict[str, ast.arguments]:
+    """The functions that a file defines."""
+    return {node.name: node.args for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)}
 
 
 def _module_file(module: str) -> Path | None:

@@ -17,11 +17,11 @@ class Workshop:
     """Makes components; every FMU file is read once, however many components use it.
 
     `isolation` is how FMUs run that run in processes of their own: those that ask for it, with `apart` all of them, and the
-    further instances of an FMU that allows one per process.
+    further instances of an FMU that allows one per process. `prepared` are FMU files by resolved path that were read before.
     """
 
-    def __init__(self, isolation: Isolation, apart: bool) -> None:
-        self._isolation, self._apart = isolation, apart
+    def __init__(self, isolation: Isolation, apart: bool, prepared: Mapping[Path, FmuFile]) -> None:
+        self._isolation, self._apart, self._prepared = isolation, apart, prepared
         self.fmus: dict[Path, FmuFile] = {}
         #: source files of components
         self.python: list[Path] = []
@@ -61,7 +61,8 @@ class Workshop:
         file = self.fmus.get(path.resolve())
         alone = file is not None and file.description.only_once_per_process
         if file is None or alone:  # a library that was loaded before would be the same one in a worker
-            file = self.fmus[path.resolve()] = FmuFile(path)
+            file = self._prepared.get(path.resolve()) if file is None else None
+            file = self.fmus[path.resolve()] = file or FmuFile(path)
         apart = self._apart or spec.isolation is not None or alone
         return instantiate(file, name, isolation=self._isolation if apart else None)
 

@@ -11,8 +11,9 @@ from typing import Any
 
 from .. import resources
 from ..errors import InputError, Problem, did_you_mean
+from ..python_component import package_files
 from .document import Document, read_document
-from .schema import NestedSpec, ScenarioSpec, SystemSpec
+from .schema import NestedSpec, ScenarioSpec, SystemSpec, kept
 from .validate import validate
 
 
@@ -69,6 +70,20 @@ class Scenario:
     def spec(self) -> ScenarioSpec:
         assert isinstance(self.root.spec, ScenarioSpec)
         return self.root.spec
+
+    def files(self) -> list[Path]:
+        """All files that are named, there or not: nested systems, sources with their packages, profiles, KPIs and figures."""
+        files = [node.document.file for node in self.root.walk()]
+        files += [self.root.folder / spec.file for _, spec in kept(self.spec.inputs)]
+        functions = [spec for _, spec in (*kept(self.spec.kpis), *kept(self.spec.figures))]
+        python = [self.root.folder / spec.python.rpartition(":")[0] for spec in functions if ".py:" in spec.python]
+        for node, name in self.root.leaves():
+            spec = node.spec.components[name]
+            if spec.python:
+                python.append(node.folder / spec.python.rpartition(":")[0])
+            else:
+                files.append(node.folder / (spec.fmu or (spec.modelica or "").rpartition(":")[0]))
+        return [*files, *(member for file in python for member in package_files(file))]
 
 
 def find(scenario: str | Path) -> Path:

@@ -42,16 +42,26 @@ def validate(document: Document, kind: type[S]) -> Validated[S]:
         try:
             return Validated(kind.model_validate(value), problems, refused)
         except ValidationError as error:
+            if first:  # later ones are consequences of cutting
+                problems += refusals(kind, document, error)
             for detail in error.errors(include_url=False):
-                path = tuple(key for key in detail["loc"] if key != "[key]")
-                if first:  # later ones are consequences of cutting
-                    problems.append(Problem(_message(kind, path, detail), document.where(path)))
+                path = _path(detail)
                 refused |= {str(key) for key in path[:1] if len(path) == 1}
                 if detail["type"] == "extra_forbidden":
                     _remove(value, path)
                 else:
                     _cut(kind, value, path[:-1] if detail["type"] == "missing" and len(path) > 1 else path)
             first = False
+
+
+def refusals(kind: type[BaseModel], document: Document, error: ValidationError) -> list[Problem]:
+    """What a schema has found wrong in a document, each with its place there."""
+    details = [(_path(detail), detail) for detail in error.errors(include_url=False)]
+    return [Problem(_message(kind, path, detail), document.where(path)) for path, detail in details]
+
+
+def _path(detail: Any) -> tuple[str | int, ...]:
+    return tuple(key for key in detail["loc"] if key != "[key]")
 
 
 def _message(kind: type[BaseModel], path: Sequence[str | int], detail: Any) -> str:

@@ -11,7 +11,7 @@ from ..arguments import Numbers
 from ..bullet import pybullet
 from ..shadow import compound, planar_chain, set_dynamics
 from ..vehicles.ar_drone import geometry as ar_drone
-from ..vehicles.ar_drone.parameters import CENTRE_OF_MASS, ROTOR_SENSES, ROTORS, principal_axes
+from ..vehicles.ar_drone.parameters import AIRFRAME, CENTRE_OF_MASS, ROTOR_SENSES, ROTORS
 from ..vehicles.shapes import quaternion
 from ..vehicles.strider import geometry as strider
 from ..vehicles.strider.parameters import RUDDER_ARM
@@ -36,7 +36,7 @@ class Quadcopter:
 
     def __init__(self, client: int, initial: Numbers):
         """`initial`: position (3) of the model's origin, yaw, velocity (3) and rates (3) in forward-left-up body axes."""
-        self._client, self._axes = client, principal_axes()[1]
+        self._client, self._axes = client, AIRFRAME.principal_axes()[1]
         turn = _about_z(initial[3])
         centre = np.array(initial[0:3]) + turn @ CENTRE_OF_MASS
         yaw = pybullet.getQuaternionFromEuler([0.0, 0.0, initial[3]])

@@ -77,8 +77,8 @@ class World(Component):
         pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)
         for platform in platforms:
             _add_platform(self._client, platform)
-        self._quadcopter = Quadcopter(self._client, spawns["uav"].initial)
-        self._vessel = Vessel(self._client, spawns["usv"].initial)
+        self._quadcopter = Quadcopter(self._client, spawns["uav"].parameters)
+        self._vessel = Vessel(self._client, spawns["usv"].parameters)
         self._refuse_overlaps()
         self._moved = np.zeros(3)
         self._publish(math.inf)

@@ -29,13 +29,14 @@ LEAVES = ((0.22, 0.42, 0.17), (0.28, 0.48, 0.19), (0.18, 0.36, 0.18), (0.36, 0.5
 
 class Part(NamedTuple):
     """A coloured solid in the frame of what it belongs to (m): a box by its edges, a cylinder by radius and length along z,
-    a sphere by its radius."""
+    a sphere by its radius. Only the 3-D replay draws what can be seen through (`opacity` below 1)."""
 
     shape: Literal["box", "cylinder", "sphere"]
     size: tuple[float, ...]
     position: Vector
     colour: Vector
     orientation: Quaternion = UPRIGHT
+    opacity: float = 1.0
 
     def reach(self) -> float:
         """Largest distance of its points from its centre (m)."""
@@ -66,8 +67,8 @@ def _rotor(x: float, y: float, z: float, colour: Vector) -> list[Part]:
     leg, share = -FEET_HEIGHT, EDGE / math.sqrt(2) / ROTORS[0, 0]  # the feet stand a little inside the motors
     return [
         Part("cylinder", (0.012, leg), (share * x, share * y, -leg / 2), GREY),
-        Part("cylinder", (0.103, 0.004), (x, y, z + 0.012), BLACK),
-        Part("cylinder", (0.095, 0.006), (x, y, z + 0.012), colour),
+        Part("cylinder", (0.103, 0.004), (x, y, z + 0.012), BLACK, opacity=0.5),
+        Part("cylinder", (0.095, 0.006), (x, y, z + 0.012), colour, opacity=0.6),
         Part("cylinder", (0.014, 0.02), (x, y, z + 0.01), BLACK),
     ]
 
@@ -158,6 +159,3 @@ def lake(platforms: Mapping[str, Mapping[str, Sequence[float]]]) -> list[Part]:
     """Everything that keeps still, but for land, water and sky (see `land` and `light`)."""
     decks = [part for one in platforms.values() for part in platform(one["size"], one["position"])]
     return [*trees(), *decks]
-
-
-VEHICLES = {"ar_drone": ar_drone, "strider": strider}

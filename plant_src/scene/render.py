@@ -12,8 +12,9 @@ from cosim.errors import InputError, did_you_mean
 from .cameras import CAMERAS, View
 from .land import add_land
 from .light import HAZE, HILLS_FAR, Rays, horizon_row, rays, sky, surface, water_distance
+from .looks import looks
 from .mission import Mission
-from .models import VEHICLES, lake
+from .models import lake
 from .stage import Picture, Stage
 
 
@@ -102,7 +103,7 @@ class Scene:
     def __init__(self, mission: Mission):
         self.mission = mission
         self.still = Stage(lake(mission.platforms))
-        self.moving = Stage(*(VEHICLES[model]() for model in mission.vehicles.values()))
+        self.moving = Stage(*(looks(model) for model in mission.vehicles.values()))
         self._last: Backdrop | None = None
 
     def __enter__(self) -> Self:

@@ -41,6 +41,13 @@ def about_z(angle: ca.SX) -> ca.SX:
     return ca.vertcat(ca.cos(angle / 2), 0, 0, ca.sin(angle / 2))
 
 
+def of_euler_angles(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
+    """The quaternion of the sequence yaw, pitch, roll (ZYX), rad."""
+    about_x = ca.vertcat(ca.cos(roll / 2), ca.sin(roll / 2), 0, 0)
+    about_y = ca.vertcat(ca.cos(pitch / 2), 0, ca.sin(pitch / 2), 0)
+    return product(about_z(yaw), product(about_y, about_x))
+
+
 def euler_angles(q: ca.SX) -> ca.SX:
     """Roll, pitch and yaw of the sequence yaw, pitch, roll (ZYX), rad."""
     r = matrix(q)

@@ -2,8 +2,10 @@
 
 Each vehicle exports three functions beside its FMU:
 
-    shadow_spawn   initial parameters -> state at the start, as if a free step had led to it, and pose in Bullet's terms
-    shadow_before  state, inputs, step, the box in which the vehicle comes near nothing
+    shadow_spawn   parameters -> constants (`ContinuousModel.constants`, or the parameters), state at the start, as if a free
+                   step had led to it, and pose in Bullet's terms
+    shadow_before  state, inputs, surroundings (the last inputs of the model), constants, step, the box in which the vehicle
+                   comes near nothing
                    -> state after a free step, the constant motion that leads there and what Bullet needs to make it,
                       path of the centre of mass, alarm
     shadow_after   these, and the motion that Bullet made of it
@@ -27,10 +29,14 @@ from cosim.export.equations import ContinuousModel
 
 from . import kinematics
 from .alarms import ADRIFT, LARGEST_STATE, UNSOUND
+from .interface import SURROUNDINGS
 from .shapes import quaternion
 
 #: at most 5 ms long, since the world makes steps of at most 10 ms
 SUB_STEPS = 2
+
+#: how many numbers a force and a torque are
+LINEAR_ANGULAR = 6
 
 #: below this contact impulse (N s) a step was free; rounding leaves less than 1e-14
 FREE_IMPULSE = 1e-12
@@ -38,7 +44,7 @@ FREE_IMPULSE = 1e-12
 
 @dataclass(frozen=True)
 class FreeBody:
-    """A free rigid body with the state (position, orientation, world velocity, body rates).
+    """A free rigid body with the state (position, orientation, world velocity, body rates), and more that contact leaves alone.
 
     `mass` in kg; `inertia` (3, 3) in kg m2 about the centre of mass; `principal_axes` (3, 3) turns Bullet's body frame into the
     vehicle's; `observe` gives the published variables of a state. A pose in Bullet's terms is (position, quaternion x y z w), a
@@ -56,33 +62,33 @@ class FreeBody:
         return [self._spawn(), self._before(), self._after()]
 
     def _spawn(self) -> ca.Function:
-        (parameters,) = _symbols(parameters=len(self.model.slots("parameter")))
-        state = self.model.initial_state(parameters)
+        parameters, constants = constants_of(self.model)
+        state = self.model.initial_state(constants)
         motion = ca.vertcat(state[7:10], kinematics.matrix(state[3:7]) @ state[10:13])
-        return ca.Function("shadow_spawn", [parameters], [state, motion, motion, self._pose(state)])
+        return ca.Function("shadow_spawn", [parameters], [constants, state, motion, motion, self._pose(state)])
 
     def _before(self) -> ca.Function:
-        state, inputs, step, anchor, leash = arguments = _symbols_before(self.model, 13)
-        end = self.model.advance(state, inputs, ca.SX(), step, SUB_STEPS)
+        arguments = symbols_before(self.model)
+        state, end, step = arguments[0], foreseen(self.model, *arguments[:5]), arguments[4]
         linear = (end[0:3] - state[0:3]) / step
         angular = kinematics.rotation_vector(kinematics.product(end[3:7], kinematics.conjugate(state[3:7]))) / step
         # Bullet adds the gyroscopic torque of its body by itself: this one cancels it
         torque = ca.cross(angular, self._inertia_in_world(state) @ angular)
         twist, path = ca.vertcat(linear, angular), ca.vertcat(state[0:3], end[0:3])
-        results = [state, end, twist, twist, torque, self._pose(state), path, _alarm(end, inputs, path, anchor, leash)]
+        results = [state, end, twist, twist, torque, self._pose(state), path, alarm(end, path, arguments)]
         return ca.Function("shadow_before", arguments, results)
 
     def _after(self) -> ca.Function:
-        start, predicted, twist, motion, step = arguments = _symbols(start=13, predicted=13, twist=6, motion=6, step=1)
+        start, predicted, twist, motion, _, step = arguments = symbols_after(self.model, 6)
         linear, angular = ca.vertsplit(motion - twist, 3)
         to_body = kinematics.matrix(predicted[3:7]).T
         turned = ca.inv(ca.SX(self.inertia)) @ (to_body @ (self._inertia_in_world(start) @ angular))
-        velocity = predicted[7:13] + ca.vertcat(linear, turned)
-        impulse = _contact(self.mass * ca.norm_2(linear))
+        velocity, others = predicted[7:13] + ca.vertcat(linear, turned), predicted[13:]
+        impulse = contact(self.mass * ca.norm_2(linear))
         orientation = kinematics.product(kinematics.turned_by(motion[3:6] * step), start[3:7])
         pose = ca.vertcat(start[0:3] + motion[0:3] * step, kinematics.normalised(orientation))
-        seen = ca.vertcat(pose, motion[0:3], kinematics.matrix(orientation).T @ motion[3:6])
-        return _outcome(arguments, impulse, predicted, ca.vertcat(pose, velocity), self.observe, seen)
+        seen = ca.vertcat(pose, motion[0:3], kinematics.matrix(orientation).T @ motion[3:6], others)
+        return _outcome(arguments, impulse, predicted, ca.vertcat(pose, velocity, others), self.observe, seen)
 
     def _pose(self, state: ca.SX) -> ca.SX:
         x, y, z, w = quaternion(self.principal_axes)
@@ -113,27 +119,27 @@ class PlanarChain:
         return [self._spawn(), self._before(), self._after()]
 
     def _spawn(self) -> ca.Function:
-        (parameters,) = _symbols(parameters=len(self.model.slots("parameter")))
-        state = self.model.initial_state(parameters)
+        parameters, constants = constants_of(self.model)
+        state = self.model.initial_state(constants)
         rates = ca.vertcat(_turn(state[2]) @ state[3:5], state[5])
-        return ca.Function("shadow_spawn", [parameters], [state, rates, rates, ca.vertcat(state[0:3], rates)])
+        return ca.Function("shadow_spawn", [parameters], [constants, state, rates, rates, ca.vertcat(state[0:3], rates)])
 
     def _before(self) -> ca.Function:
-        state, inputs, step, anchor, leash = arguments = _symbols_before(self.model, 6)
-        (rates,) = _symbols(rates=3)
-        end = self.model.advance(state, inputs, ca.SX(), step, SUB_STEPS)
+        arguments = symbols_before(self.model)
+        state, end, step = arguments[0], foreseen(self.model, *arguments[:5]), arguments[4]
+        (rates,) = symbols(rates=3)
         twist = (end[0:3] - state[0:3]) / step
         effort = self._inertia() * (twist - rates) / step
         path = ca.vertcat(self.observe(state)[0:3], self.observe(end)[0:3])
         pose = ca.vertcat(state[0:3], rates)
-        results = [state, end, twist, twist, effort, pose, path, _alarm(end, inputs, path, anchor, leash)]
+        results = [state, end, twist, twist, effort, pose, path, alarm(end, path, arguments)]
         return ca.Function("shadow_before", [*arguments, rates], results)
 
     def _after(self) -> ca.Function:
-        start, predicted, twist, motion, step = arguments = _symbols(start=6, predicted=6, twist=3, motion=3, step=1)
+        start, predicted, twist, motion, _, step = arguments = symbols_after(self.model, 3)
         change = motion - twist
         velocity = predicted[3:6] + ca.vertcat(_turn(predicted[2]).T @ change[0:2], change[2])
-        impulse = _contact(ca.norm_2(self._inertia() * change))
+        impulse = contact(ca.norm_2(self._inertia() * change))
         pose = start[0:3] + motion * step
         seen = ca.vertcat(pose, _turn(pose[2]).T @ motion[0:2], motion[2])
         return _outcome(arguments, impulse, predicted, ca.vertcat(pose, velocity), self.observe, seen, motion)
@@ -142,9 +148,31 @@ class PlanarChain:
         return ca.SX([self.mass, self.mass, self.moment])
 
 
-def _symbols_before(model: ContinuousModel, state: int) -> list[ca.SX]:
-    """State, inputs, step, and middle and half edges (world frame, m) of the box in which the vehicle comes near nothing."""
-    return _symbols(state=state, inputs=len(model.slots("input")), step=1, anchor=3, leash=3)
+def constants_of(model: ContinuousModel) -> tuple[ca.SX, ca.SX]:
+    """Symbols of the parameters, and the constants that follow from them."""
+    (parameters,) = symbols(parameters=len(model.slots("parameter")))
+    return parameters, model.constants(parameters) if model.constants else parameters
+
+
+def symbols_before(model: ContinuousModel) -> list[ca.SX]:
+    """State, inputs, surroundings, constants, step, and middle and half edges (world frame, m) of the box in which the vehicle
+    comes near nothing."""
+    surroundings = sum(variable.name in SURROUNDINGS for variable in model.slots("input"))
+    inputs = len(model.slots("input")) - surroundings
+    state, given, around = symbols(state=len(model.states), inputs=inputs, surroundings=surroundings)
+    return [state, given, around, model.constant_symbols(), *symbols(step=1, anchor=3, leash=3)]
+
+
+def symbols_after(model: ContinuousModel, motion: int) -> list[ca.SX]:
+    """State at the start and foreseen at the end of a step, foreseen and real mean motion, constants and step."""
+    count = len(model.states)
+    states = symbols(start=count, predicted=count, twist=motion, motion=motion)
+    return [*states, model.constant_symbols(), *symbols(step=1)]
+
+
+def foreseen(model: ContinuousModel, state: ca.SX, inputs: ca.SX, surroundings: ca.SX, constants: ca.SX, step: ca.SX) -> ca.SX:
+    """The state after a free step."""
+    return model.advance(state, ca.vertcat(inputs, surroundings), constants, step, SUB_STEPS)
 
 
 def _outcome(
@@ -161,18 +189,23 @@ def _outcome(
     return ca.Function("shadow_after", arguments, [state, impulse, observe(published), *more])
 
 
-def _symbols(**sizes: int) -> list[ca.SX]:
+def symbols(**sizes: int) -> list[ca.SX]:
     return [ca.SX.sym(name, size) for name, size in sizes.items()]
 
 
-def _alarm(state: ca.SX, inputs: ca.SX, path: ca.SX, anchor: ca.SX, leash: ca.SX) -> ca.SX:
-    """Zero when all is well, ADRIFT when the path leaves the box, UNSOUND when inputs or state are unusable."""
-    sound = ca.logic_and(ca.sum1(ca.fabs(inputs)) < ca.inf, ca.norm_2(state) < LARGEST_STATE)
+def alarm(end: ca.SX, path: ca.SX, arguments: list[ca.SX]) -> ca.SX:
+    """Zero when all is well, ADRIFT when the path leaves the box, UNSOUND when inputs or the state at the end are unusable.
+
+    `arguments` are those of `shadow_before`.
+    """
+    _, inputs, surroundings, _, _, anchor, leash = arguments
+    given = ca.fabs(ca.vertcat(inputs, surroundings))
+    sound = ca.logic_and(ca.sum1(given) < ca.inf, ca.norm_2(end) < LARGEST_STATE)
     excess = ca.fabs(path - ca.vertcat(anchor, anchor)) - ca.vertcat(leash, leash)
     return ca.if_else(sound, ca.if_else(ca.mmax(excess) > 0, ADRIFT, 0), UNSOUND)
 
 
-def _contact(impulse: ca.SX) -> ca.SX:
+def contact(impulse: ca.SX) -> ca.SX:
     """The impulse (N s), zero where there is only rounding; not a number stays so."""
     return ca.if_else(impulse <= FREE_IMPULSE, 0, impulse)
 

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from cosim.units import parse
+from cosim.units import BASE, parse, product
 
 
 @pytest.mark.parametrize(
@@ -41,3 +41,21 @@ def test_the_same_unit_needs_no_conversion():
 def test_what_cannot_be_read_is_refused(text):
     with pytest.raises(ValueError, match="unit"):
         parse(text)
+
+
+@pytest.mark.parametrize(
+    ("factors", "expected"),
+    [
+        ([("m", 1)], "m"),
+        ([("m/s", 2), ("s", 1)], "m2/s"),
+        ([("kg.m2/s3", 1), ("s", 1)], "kg.m2/s2"),
+        ([("m.s-1", 1)], "m/s"),
+        ([("W/(m2.K)", 2)], "W2/(m4.K2)"),
+        ([("rad", 1), ("rad", -1)], "1"),
+        ([("1", 1), ("s", -1)], "1/s"),
+    ],
+)
+def test_products_of_units(factors, expected):
+    assert product(factors) == expected
+    exponents = [sum(power * parse(text).exponents[i] for text, power in factors) for i in range(len(BASE))]
+    assert list(parse(expected).exponents) == exponents

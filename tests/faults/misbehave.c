@@ -167,6 +167,7 @@ static int connect_(int kind) {
 }
 static int tcp(Lag *m) { return connect_(SOCK_STREAM); }
 static int udp(Lag *m) { return connect_(SOCK_DGRAM); }
+static int processes(Lag *m) { record("process %d child of %d", getpid(), getppid()); return OK; }
 
 /* -- values and statuses -- */
 static int put(Lag *m, double y) { if (m) m->x[Y] = y; return OK; }
@@ -191,7 +192,7 @@ static const struct { const char *name; int (*act)(Lag *); } FAULTS[] = {
     {"change_folder", change_folder}, {"change_locale", change_locale}, {"change_umask", change_umask},
     {"change_environment", change_environment}, {"ignore_interrupts", ignore_interrupts}, {"close_output", close_output},
     {"close_all", close_all}, {"fork", fork_}, {"daemon", daemon_}, {"thread", thread}, {"write_here", write_here},
-    {"write_temporary", write_temporary}, {"tcp", tcp}, {"udp", udp},
+    {"write_temporary", write_temporary}, {"tcp", tcp}, {"udp", udp}, {"processes", processes},
 };
 
 static int misbehave(Fault *fault, Lag *m, const char *function, double time) {

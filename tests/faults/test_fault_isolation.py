@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from cosim.sandbox import available, landlock
 needs_landlock = pytest.mark.skipif(
     available().landlock < landlock.NETWORK_VERSION, reason="this kernel cannot confine files and network (Linux 6.7)"
 )
+needs_bubblewrap = pytest.mark.skipif(not available().bubblewrap, reason="no bubblewrap that works")
 
 
 def run(runner: Runner, folder: Path, components: dict[str, Any], *words: str, **more: Any) -> Outcome:
@@ -188,6 +190,30 @@ class TestSandbox:
         done = confined("DoStep 6 tcp", *words)
         assert f"connect -1 {answer}" in done.err
         assert done.code == 0
+
+    @needs_bubblewrap
+    @pytest.mark.parametrize(
+        ("order", "words"),
+        [
+            ("DoStep 6 write_here", "file fault_was_here 0"),
+            ("DoStep 6 write_temporary", "fault_was_here 1"),
+            ("DoStep 6 tcp", "connect -1 Permission denied"),
+            ("DoStep 6 udp", "connect -1 Network is unreachable"),
+            ("DoStep 6 daemon", "child "),
+            ("DoStep 6 processes", "process [1-9] child of [1-9]\n"),
+        ],
+    )
+    def test_strictly_it_has_neither_files_nor_network_nor_other_processes(self, confined, tmp_path, order, words):
+        done = confined(order, "--sandbox", "strict", "--isolation", "run")
+        assert re.search(words, done.err)
+        assert (done.code, len(done.rows), done.processes, done.temporaries) == (0, ALL, [], [])
+        assert not (tmp_path / "fault_was_here").exists()
+
+    @needs_bubblewrap
+    def test_strictly_a_crash_is_named_and_the_rows_are_kept(self, confined, version):
+        done = confined("DoStep 6 segv", "--sandbox", "strict", "--isolation", "run")
+        assert f"lag: fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.err
+        assert (done.code, len(done.rows), done.processes, done.temporaries) == (1, 6, [], [])
 
     @pytest.mark.skipif(not may_leave_network(), reason="user namespaces are forbidden here")
     @pytest.mark.parametrize(("words", "answer"), [((), "0 Success"), (("--sandbox",), "-1 Network is unreachable")])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mission_recording import SINK, TOUCHDOWN, mission, replaced
 
-from plant_src.kpis import cross_track, descent, touchdown, waypoints
+from plant_src.kpis import cross_track, descent, landing, touchdown, waypoints
 
 DECK = {"vehicle": "plant.uav", "deck": "plant.usv.deck"}
 MASS = 0.42
@@ -20,6 +20,7 @@ def test_a_level_touchdown():
         {
             "forward_error": 0.03,
             "left_error": 0.04,
+            "lateral_error": 0.05,
             "normal_speed": SINK,
             "tangential_speed": 0.1,
             "kinetic_energy": MASS / 2 * (SINK**2 + 0.1**2),
@@ -66,6 +67,29 @@ def test_a_pitching_deck_comes_up():
     """Positive pitch rate is nose down: 0.5 m ahead of the centre the deck sinks at 0.1 m/s."""
     pitching = mission(offset=(0.5, 0.0), plant__usv__rates__q=ZERO + 0.2, plant__uav__velocity__x=ZERO + 1.0)
     assert touchdown(pitching, **DECK, mass=MASS)["normal_speed"] == pytest.approx(SINK - 0.1, rel=0.01)
+
+
+def test_errors_lie_in_the_plane_of_a_rolled_deck():
+    """Left side up by 0.2 rad: a place 0.3 m to the left and as high as the deck rises there is that far up the slope."""
+    rolled = mission(
+        offset=(0.0, 0.3),
+        plant__usv__attitude__roll=ZERO + 0.2,
+        plant__uav__position__z=ZERO + 0.27 + 0.3 * math.tan(0.2),
+    )
+    kpis = touchdown(rolled, **DECK, mass=MASS)
+    assert (kpis["left_error"], kpis["lateral_error"]) == pytest.approx((0.3 / math.cos(0.2), 0.3 / math.cos(0.2)))
+
+
+def test_a_vehicle_that_rolls_along_with_the_deck_does_not_slide():
+    """0.5 m left of the centre and 0.05 m above the deck, carried along by a deck that heels after touchdown."""
+    roll = 0.3 * np.clip(TIME - TOUCHDOWN, 0, 1)
+    carried = mission(
+        offset=(0.0, 0.0),
+        plant__usv__attitude__roll=roll,
+        plant__uav__position__y=0.5 * np.cos(roll) - 0.05 * np.sin(roll),
+        plant__uav__position__z=0.27 + 0.5 * np.sin(roll) + 0.05 * np.cos(roll),
+    )
+    assert landing(carried, **DECK)["slide"] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_heave_is_the_height_above_the_mean():

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from cosim.component import Ports, Variable
+from cosim.engine.initialization import take_start_values
 from plant_src.world import World
 
 DECK_TOP = 0.2689  # m above the water
@@ -19,11 +20,17 @@ PLATFORM_TOP = 0.5
 class Trial:
     """A world with its bound arrays: step it and look at it."""
 
-    def __init__(self, vehicles: Mapping[str, Any], platforms: Mapping[str, Any] | None = None):
-        self.world = World("plant", vehicles, platforms)
+    def __init__(
+        self,
+        vehicles: Mapping[str, Any],
+        platforms: Mapping[str, Any] | None = None,
+        environment: Mapping[str, Any] | None = None,
+    ):
+        self.world = World("plant", vehicles, platforms, environment)
         self.inputs, self.outputs = _ports(self.world, "input"), _ports(self.world, "output")
         self.world.bind(self.inputs, self.outputs)
         self.world.enter_initialization_mode(0.0, 1e3)
+        take_start_values(self.world, self.inputs)
         self.world.exit_initialization_mode()
         self.world.get_outputs()
         self.steps = 0

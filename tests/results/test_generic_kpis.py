@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cosim import kpis
-from cosim.kpi import kpi_units
+from cosim.kpi import kpi_senses, kpi_units
 from cosim.recording import Recording
 from cosim.results import Result
 
@@ -195,6 +195,21 @@ def test_what_is_not_there_is_refused_before_the_run(tmp_path, python, arguments
     assert "$.kpis[0]" in done.stderr
 
 
-def test_units_are_declared():
-    named = [("rise", kpis.rise_time, {}), ("work", kpis.energy, {}), ("rms", kpis.rms, {})]
-    assert kpi_units(named, ["rise.value", "work.value", "rms.value"]) == {"rise.value": "s", "work.value": "J", "rms.value": ""}
+def test_units_are_those_of_the_signals():
+    named = [
+        ("rise", kpis.rise_time, {"signal": "speed"}),
+        ("work", kpis.energy, {"effort": "force"}),
+        ("rms", kpis.rms, {"signal": "speed"}),
+        ("iae", kpis.iae, {"signal": "speed"}),
+        ("ise", kpis.ise, {"signal": "speed"}),
+        ("itae", kpis.itae, {"signal": "angle"}),
+        ("unknown", kpis.ise, {"signal": "other"}),
+        ("overshoot", kpis.overshoot, {"signal": "speed"}),
+    ]
+    units = kpi_units(named, [f"{name}.value" for name, _, _ in named], {"speed": "m/s", "angle": "rad", "other": ""})
+    assert list(units.values()) == ["s", "J", "m/s", "m", "m2/s", "rad.s2", "", ""]
+
+
+def test_better_is_declared():
+    named = [("rms", kpis.rms, {}), ("mean", kpis.mean, {})]
+    assert kpi_senses(named, ["rms.value", "mean.value"]) == {"rms.value": "lower"}

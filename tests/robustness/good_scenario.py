@@ -12,6 +12,10 @@ def last(result, signal):
     return {"value": float(result[signal][-1])}
 
 
+def nothing(result):
+    return {}
+
+
 def picture(result):
     from matplotlib.figure import Figure
 

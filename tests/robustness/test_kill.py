@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import pytest
 from commands import Workplace, children, until
+from ticker import tens
 
 import cosim
 
@@ -61,6 +62,7 @@ class Killed:
         result = cosim.Result.from_csv(file)
         rows = len(result.time)
         assert result["ticker.count"].tolist() == list(range(rows))
+        assert result["ticker.tens"].tolist() == [tens(n) for n in range(rows)]
         assert result.time.tolist() == [n / 100 for n in range(rows)]
         assert self.moment - result["ticker.clock"][-1] <= (0.1 if self.whom == "child" else PROMISE)
 

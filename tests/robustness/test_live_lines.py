@@ -14,10 +14,14 @@ from cosim.journal import ROWS, SIZE, Journal, Phase
 from cosim.live_csv import Lines, LiveCsv
 from cosim.recording import Recording
 from cosim.results.csv_files import write_csv
-from cosim.unfinished import HEADER_FILE, ROWS_FILE, Column, Header
+from cosim.unfinished import HEADER_FILE, ROWS_FILE, TEXTS_FILE, Column, Header, TextReader
 
 ROWS_COUNT = 1234
 KINDS = {"a.x": "<f8", 'quoted "b"': "<f4", "flag": "|b1", "small": "|i1", "natural": "<u8", "whole": "<i8"}
+
+
+#: from these rows on the two texts are others
+TEXTS = {0: {"first": "a"}, 7: {"last": 'quoted, "x"'}, 600: {"first": "", "last": "\N{SNOWMAN}\n"}, 1200: {"last": "end"}}
 
 
 @pytest.fixture
@@ -36,14 +40,28 @@ def header(table: np.ndarray) -> Header:
     fields = {name: table.dtype.fields[name] for name in table.dtype.names}
     columns = [Column(name, kind.str, offset, kind.kind == "b", "") for name, (kind, offset) in fields.items()]
     twin = Column("twin", "<i8", fields["whole"][1], False, "")
-    return Header(5, 1, 100, 2, table.dtype.itemsize, [twin, *columns], [], [])
+    return Header(5, 1, 100, 2, table.dtype.itemsize, [twin, *columns], [], [(0, "first"), (len(columns) + 2, "last")])
+
+
+def texts(rows: int) -> dict[str, np.ndarray]:
+    columns = {name: np.full(rows, "", object) for name in ("first", "last")}
+    for row, changes in TEXTS.items():
+        for name, text in changes.items():
+            columns[name][row:] = text
+    return columns
 
 
 def expected(table: np.ndarray, folder: Path, rows: int) -> bytes:
     time = np.array([(5 + 2 * n) / 100 for n in range(rows)])
-    columns = {"twin": table["whole"][:rows], **{name: table[name][:rows] for name in table.dtype.names}}
+    numbers = {"twin": table["whole"][:rows], **{name: table[name][:rows] for name in table.dtype.names}}
+    first, last = texts(rows).values()
+    columns = {"first": first, **numbers, "last": last}
     write_csv(Recording(time, columns, {}), folder / "expected.csv")
     return (folder / "expected.csv").read_bytes()
+
+
+def write_texts(run: Path) -> None:
+    (run / TEXTS_FILE).write_text("".join(json.dumps(change) + "\n" for change in TEXTS.items()))
 
 
 def running(table: np.ndarray, folder: Path) -> Journal:
@@ -52,6 +70,7 @@ def running(table: np.ndarray, folder: Path) -> Journal:
     run.mkdir()
     (run / HEADER_FILE).write_text(json.dumps(asdict(header(table))))
     (run / ROWS_FILE).write_bytes(table.tobytes())
+    write_texts(run)
     journal = Journal(bytearray(SIZE))
     journal.put_files(run, folder / "result.csv")
     journal.enter(Phase.STEPPING)
@@ -59,7 +78,9 @@ def running(table: np.ndarray, folder: Path) -> Journal:
 
 
 def test_lines_have_the_format_of_results(table, tmp_path):
-    lines, file = Lines(header(table)), io.BytesIO(table.tobytes())
+    write_texts(tmp_path)
+    described = header(table)
+    lines, file = Lines(described, TextReader(tmp_path, described)), io.BytesIO(table.tobytes())
     text = lines.first()
     while lines.written < ROWS_COUNT:
         text += lines.next(file, ROWS_COUNT)
@@ -85,6 +106,20 @@ def test_the_file_is_whole_at_every_moment_even_when_an_update_is_interrupted(ta
 
 def interrupt() -> bytes:
     raise KeyboardInterrupt
+
+
+def test_texts_are_followed_as_they_are_written(table, tmp_path):
+    """The last line is not whole yet; later it is, and an earlier row is asked for again."""
+    write_texts(tmp_path)
+    file = tmp_path / TEXTS_FILE
+    whole = file.read_bytes()
+    file.write_bytes(whole[:-3])
+    reader = TextReader(tmp_path, header(table))
+    assert reader.row(599) == ["a", 'quoted, "x"']
+    assert reader.row(1233) == ["", "\N{SNOWMAN}\n"]
+    file.write_bytes(whole)
+    assert reader.row(1233) == ["", "end"]
+    assert reader.row(3) == ["a", ""]
 
 
 def test_the_final_file_is_not_replaced(table, tmp_path):

@@ -4,7 +4,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real, String
 
 
 def dawdle(where):
@@ -13,8 +13,17 @@ def dawdle(where):
     time.sleep(60)
 
 
+def tens(count):
+    """Not easy for a CSV file.
+
+    >>> tens(25)
+    '"2" tens, é'
+    """
+    return f'"{count // 10:.0f}" tens, é'
+
+
 class Ticker(Fmi2Slave):
-    """Each step lasts `pause` s; `count` counts the steps and `clock` is the wall clock (s) at their ends.
+    """Each step lasts `pause` s; `count` counts the steps, `tens` says in words how many tens, `clock` is the wall clock (s).
 
     `slow` names the place where it stays: load, initialization, step, stubborn (a step that no interrupt ends), or nowhere.
     """
@@ -22,8 +31,10 @@ class Ticker(Fmi2Slave):
     def __init__(self, pause=0.002, slow="", **arguments):
         super().__init__(**arguments)
         self.pause, self.slow, self.count, self.clock = pause, slow, 0.0, 0.0
+        self.tens = tens(0)
         for name in ("count", "clock"):
             self.register_variable(Real(name, causality=Fmi2Causality.output))
+        self.register_variable(String("tens", causality=Fmi2Causality.output))
         if slow == "load":
             dawdle("load")
 
@@ -37,6 +48,7 @@ class Ticker(Fmi2Slave):
     def do_step(self, current_time, step_size):
         time.sleep(self.pause)
         self.count, self.clock = self.count + 1, time.monotonic()
+        self.tens = tens(self.count)
         if self.count == 20:
             self.twentieth_step()
         return True

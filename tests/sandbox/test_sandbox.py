@@ -257,5 +257,5 @@ class TestStrict:
 
 def test_strict_mode_without_bubblewrap_is_refused(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(InputError, match="strict isolation needs bubblewrap"):
+    with pytest.raises(InputError, match="the strict sandbox needs bubblewrap"):
         command(["true"], [])

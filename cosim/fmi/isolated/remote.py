@@ -8,13 +8,13 @@ import os
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, NoReturn
 
 from ... import log
 from ...component import Call, Component, Ports, StepResult
 from ...errors import ComponentError, InputError
 from ...journal import CALL, Phase
+from ...temporary import WORKER, LockedFolder
 from ..file import FmuFile
 from ..instance import DISCARD, OK, FmuInstance
 from .block import Block, pairs, texts
@@ -42,7 +42,7 @@ class RemoteFmu(Component):
         self.variables, self.has_state = self.description.variables, self.description.has_state
         self._logging_on = logging_on
         self._process: Process | None = None
-        self._temporary: TemporaryDirectory[str] | None = None
+        self._temporary: LockedFolder | None = None
         #: the deadline that holds now
         self._deadline = isolation.deadlines.load
         #: the command that is being carried out, and the names of the calls of a turn
@@ -53,7 +53,7 @@ class RemoteFmu(Component):
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         folder = self._file.acquire()
-        self._temporary = TemporaryDirectory(prefix="cosim-worker-", ignore_cleanup_errors=True)
+        self._temporary = LockedFolder(WORKER)
         self._block = Block(inputs, outputs)
         self._clock = self._block.clock
         self._in, self._out = pairs(self._block.inputs, inputs), pairs(outputs, self._block.outputs)

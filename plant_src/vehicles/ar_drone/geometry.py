@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..shapes import Body, Box, quaternion
-from .parameters import CENTRE_OF_MASS, MASS, principal_axes
+from .parameters import AIRFRAME, CENTRE_OF_MASS
 
 #: bottom of the motor cylinders, on which the vehicle stands, and top of the hull, from the origin of the model's frame (m)
 FEET_HEIGHT, TOP_HEIGHT = -0.0566, 0.03
@@ -18,7 +18,7 @@ EDGE = 0.228
 
 def _box() -> Box:
     """One box: its corners are the feet at the ends of the arms, so it stands at a diagonal to the body axes."""
-    to_body = principal_axes()[1]
+    to_body = AIRFRAME.principal_axes()[1]
     centre = to_body.T @ (np.array([0.0, 0.0, (TOP_HEIGHT + FEET_HEIGHT) / 2]) - CENTRE_OF_MASS)
     half = math.sqrt(0.5)
     diagonal = np.array([[half, half, 0.0], [-half, half, 0.0], [0.0, 0.0, 1.0]])
@@ -27,4 +27,4 @@ def _box() -> Box:
 
 
 #: one box: four spheres or a hull of the same size creep more, and their contact cannot be restored bit for bit
-BODY = Body(MASS, tuple(principal_axes()[0].tolist()), (_box(),))
+BODY = Body(AIRFRAME.mass, tuple(AIRFRAME.principal_axes()[0].tolist()), (_box(),))

@@ -3,12 +3,14 @@
 Sources: [model] the simulation model published with the paper "An Open Simulation Strategy for Rapid Control Design in Aerial
 and Maritime Drone Teams" (github.com/OmarVelascoAnrar/UAV_USV_Simulator, commit 1eee757), converted from its body frame
 x forward, y right, z down: y and z of vectors and the products of inertia Ixy, Ixz change their sign. "Forward" is the arm
-of rotor 1; the hull lies along the diagonal between two arms, hence the large Ixy.
+of rotor 1; the hull lies along the diagonal between two arms, hence the large Ixy. [maker] Parrot's data of the AR.Drone 2.0.
 """
 
 from __future__ import annotations
 
 import numpy as np
+
+from ..airframe import Airframe, Rotor
 
 #: body and four propellers [model]: 0.4038924 kg + 4 * 0.010 kg, as summed there (kg)
 MASS = 0.443892
@@ -47,14 +49,24 @@ TORQUE_COEFFICIENT = 2.38e-7
 #: 5000 revolutions per minute, rounded as in the model [model, paper] (rad/s)
 MAX_ROTOR_SPEED = 5000 * 0.10471976
 
+#: of the 8 inch propellers [maker]; matters to the ground effect only (m)
+ROTOR_RADIUS = 0.1016
+
 #: [model] (m/s2)
 GRAVITY = 9.81
 
 
-def principal_axes() -> tuple[np.ndarray, np.ndarray]:
-    """Principal moments of inertia (3,), ascending, and the rotation (3, 3) from the principal-axis frame to the body frame."""
-    moments, axes = np.linalg.eigh(INERTIA)
-    axes = axes * np.sign(np.diag(axes))
-    if np.linalg.det(axes) < 0:
-        axes[:, 0] = -axes[:, 0]
-    return moments, axes
+AIRFRAME = Airframe(
+    name="ar_drone",
+    mass=MASS,
+    inertia=INERTIA,
+    rotors=tuple(
+        Rotor(place, tuple(position), sense)
+        for place, position, sense in zip(("front", "left", "rear", "right"), ROTORS.tolist(), ROTOR_SENSES, strict=True)
+    ),
+    thrust_coefficient=THRUST_COEFFICIENT,
+    torque_coefficient=TORQUE_COEFFICIENT,
+    max_rotor_speed=MAX_ROTOR_SPEED,
+    rotor_radius=ROTOR_RADIUS,
+    gravity=GRAVITY,
+)

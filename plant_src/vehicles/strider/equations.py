@@ -23,9 +23,11 @@ def rate(state: ca.SX, inputs: ca.SX) -> ca.SX:
     """Time derivative of (x, y, yaw, surge, sway, yaw rate)."""
     yaw, u, v, r = ca.vertsplit(state[2:6])
     thrust, rudder_angle = inputs[0], inputs[1]
-    external_force, external_torque = inputs[2:5], inputs[5:8]
+    external_force, external_torque, wind, current = inputs[2:5], inputs[5:8], inputs[8:11], inputs[11:13]
     cos, sin = ca.cos(yaw), ca.sin(yaw)
-    loads = hull_loads(v, r) + air_drag(u, v) + rudder_loads(u, v, r, rudder_angle)
+    u_water, v_water = u - (cos * current[0] + sin * current[1]), v - (cos * current[1] - sin * current[0])
+    u_air, v_air = u - (cos * wind[0] + sin * wind[1]), v - (cos * wind[1] - sin * wind[0])
+    loads = hull_loads(v_water, r) + air_drag(u_air, v_air) + rudder_loads(u_water, v_water, r, rudder_angle)
     surge_force = loads[0] + thrust + cos * external_force[0] + sin * external_force[1]
     side_force = loads[1] - sin * external_force[0] + cos * external_force[1]
     moment = loads[2] + external_torque[2]
@@ -35,12 +37,12 @@ def rate(state: ca.SX, inputs: ca.SX) -> ca.SX:
 
 
 def hull_loads(v: ca.SX, r: ca.SX) -> ca.SX:
-    """X, Y (N) and N (N m) of the water on the hulls."""
+    """X, Y (N) and N (N m) of the water on the hulls, which move through it at v and r."""
     return p.HULLS * ca.vertcat(0, p.Y_V * v + p.Y_R * r, p.N_V * v + p.N_R * r)
 
 
 def air_drag(u: ca.SX, v: ca.SX) -> ca.SX:
-    """X, Y (N) and N (N m) of still air."""
+    """X, Y (N) and N (N m) of the air, through which the vessel moves at u and v."""
     return -p.AIR_DRAG * ca.vertcat(ca.fabs(u) * u, ca.fabs(v) * v, 0)
 
 

@@ -1,0 +1,3 @@
+block AccelerationController "Horizontal pursuit: from position and velocity references to accelerations"
+  extends Fleet.AccelerationController;
+end AccelerationController;

@@ -1,0 +1,144 @@
+"""`cosim bench-controller`: does a controller fit, does it fly, and is it better than the shipped one?"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from shutil import rmtree
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..errors import InputError, Problem
+from . import supervision
+from .bench_trial import Flight, Trial, flights
+from .regress import SEVERITY, default_folder, found, processors
+
+if TYPE_CHECKING:
+    from ..bench.score import Row
+
+#: what the child process that looks at the candidate hands over to its parent
+_PREPARED = "bench.json"
+
+
+@click.command()
+@click.argument("controller")
+@click.option(
+    "--role", required=True, help="Which place it takes: usv_autopilot, uav_position, ...; or the path of a role's JSON."
+)
+@click.option(
+    "--scenarios",
+    multiple=True,
+    metavar="DIR|SCENARIO",
+    type=click.Path(path_type=Path),
+    help="Where it is tried; default: the folder scenarios/ here, else the shipped one.",
+)
+@click.option(
+    "--output-dir", type=click.Path(path_type=Path), default=Path("runs/bench"), show_default=True, help="Where results go."
+)
+@click.option("--jobs", type=click.IntRange(min=1), help="How many scenarios run at a time; default: one per processor.")
+@click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
+def command(controller: str, role: str, scenarios: tuple[Path, ...], output_dir: Path, jobs: int | None, as_json: bool) -> int:
+    """Put CONTROLLER in the place of the shipped one in every scenario that has such a place, and fly them all.
+
+    CONTROLLER is an FMU, my.py:Class, my.mo:Model or a nested system's JSON. Its variables are examined first. The table shows
+    its KPIs beside those of the shipped controller and of its last run here. Ends with 3 when a check was not met, 1 when a
+    component failed, 2 when the controller does not fit.
+    """
+    from ..bench.candidate import source
+
+    candidate = source(controller)
+    files = list(found(scenarios or [default_folder()]))
+    own = output_dir / Path(role).stem / candidate.name
+    code = supervision.protected(lambda: _prepare(controller, role, files, own), "run", lambda outcome: None)
+    if code:
+        return code
+    trials, notes = _trials(own, output_dir / "shipped")
+    flown = []
+    for flight in flights(trials, jobs or processors()):
+        flown.append(flight)
+        if not as_json:
+            _print(flight, candidate.name)
+    if as_json:
+        _print_json(candidate.name, role, flown, notes)
+    else:
+        _summary(flown, notes)
+    return min((flight.outcome.code for flight in flown), key=SEVERITY.index)
+
+
+def _prepare(controller: str, role_name: str, files: Sequence[Path], own: Path) -> int:
+    """Examine the candidate and write the scenarios with it; in a child process, since its code is run."""
+    from ..bench.candidate import interface, problems, source
+    from ..bench.role import read_role
+    from ..bench.transplant import Transplant
+    from ..results.files import write_json
+
+    role, candidate = read_role(role_name), source(controller)
+    variables = interface(candidate)
+    if misfits := problems(role, variables):
+        raise InputError([Problem(problem.message, controller) for problem in misfits])
+    rmtree(own / "scenarios", ignore_errors=True)
+    written, notes = [], []
+    for file in files:
+        transplant = Transplant(role, candidate, variables, (own / "scenarios").absolute())
+        if path := transplant.scenario(file):
+            written.append({"file": path, "original": file})
+            notes += [f"{file.stem}: {note}" for note in dict.fromkeys(transplant.notes)]
+    if not written:
+        raise InputError(f'no scenario has a place for the role "{role.name}": {role.description}')
+    write_json({"scenarios": written, "notes": notes}, own / _PREPARED)
+    return 0
+
+
+def _trials(own: Path, shipped: Path) -> tuple[list[Trial], list[str]]:
+    """The scenarios that were written, and the notes on what was left out of them."""
+    prepared = json.loads((own / _PREPARED).read_text(encoding="utf-8"))
+    trials = [
+        Trial(Path(each["file"]), Path(each["original"]), own / Path(each["file"]).stem, shipped / Path(each["file"]).stem)
+        for each in prepared["scenarios"]
+    ]
+    return trials, prepared["notes"]
+
+
+def _print(flight: Flight, candidate: str) -> None:
+    from .bench_table import print_comparison
+
+    word = click.style("passed", fg="green") if flight.outcome.code == 0 else click.style("FAILED", fg="red", bold=True)
+    click.echo(f"\n{word}  {flight.name}  {flight.outcome.seconds:.1f} s")
+    for line in flight.outcome.details:
+        click.echo(f"        {line}")
+    print_comparison(flight.rows(), candidate)
+
+
+def _summary(flown: Sequence[Flight], notes: Sequence[str]) -> None:
+    for note in notes:
+        click.echo(f"note: {note}")
+    better, worse = (sum(row.against_shipped == word for each in flown for row in each.rows()) for word in ("better", "worse"))
+    failed = sum(flight.outcome.code != 0 for flight in flown)
+    click.echo(
+        f"\n{len(flown)} scenarios, {failed} failed; {better} KPIs better and {worse} worse than with the shipped controller"
+    )
+
+
+def _print_json(candidate: str, role: str, flown: Sequence[Flight], notes: Sequence[str]) -> None:
+    from ..results.files import plain
+
+    scenarios = [
+        {
+            "name": flight.name,
+            "code": flight.outcome.code,
+            "seconds": flight.outcome.seconds,
+            "problems": flight.outcome.details,
+            "kpis": [_row(row) for row in flight.rows()],
+        }
+        for flight in flown
+    ]
+    content = {"candidate": candidate, "role": role, "scenarios": scenarios, "notes": notes}
+    click.echo(json.dumps(plain(content), indent=2))
+
+
+def _row(row: Row) -> dict[str, Any]:
+    checks = [{**outcome.check, "passed": outcome.passed} for outcome in row.checks]
+    return {**asdict(row), "checks": checks}

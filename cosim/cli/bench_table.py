@@ -1,0 +1,60 @@
+"""The table that shows a candidate's KPIs beside those of others."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from ..report.tables import LONGEST_LINE, number_text
+
+if TYPE_CHECKING:
+    from ..bench.score import Row
+    from ..kpi import Number
+
+_COLOURS = {"better": "[green]better[/]", "worse": "[red]worse[/]", "": ""}
+
+
+def print_comparison(rows: Sequence[Row], candidate: str) -> None:
+    """One line for each KPI: numbers of the candidate, the shipped controller and the last run, which are better, and checks.
+
+    Prints nothing when there are no KPIs; colours as `cosim.report.tables.print_kpis`.
+    """
+    from rich import box
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    if not rows:
+        return
+    with_last, with_checks = any(row.last is not None for row in rows), any(row.checks for row in rows)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    table.add_column("KPI", overflow="fold")
+    for header in (
+        "unit",
+        candidate,
+        "shipped",
+        "",
+        *(("last run", "") if with_last else ()),
+        *(("check",) if with_checks else ()),
+    ):
+        table.add_column(
+            escape(header), justify="right" if header in (candidate, "shipped", "last run") else "left", no_wrap=True
+        )
+    for row in rows:
+        cells = [row.name, row.unit, _text(row.candidate), _text(row.shipped)]
+        last = [_text(row.last), _COLOURS[row.against_last]] if with_last else []
+        table.add_row(*map(escape, cells), _COLOURS[row.against_shipped], *last, *([_checks(row)] if with_checks else []))
+    console = Console(file=sys.stdout, highlight=False)
+    if not console.is_terminal:
+        console.width = LONGEST_LINE
+    console.print(table)
+
+
+def _text(value: Number | None) -> str:
+    return "" if value is None else number_text(value)
+
+
+def _checks(row: Row) -> str:
+    words = ("[green]{} met[/]" if outcome.passed else "[bold red]{} not met[/]" for outcome in row.checks)
+    return ", ".join(word.format(outcome.limits) for word, outcome in zip(words, row.checks, strict=True))

@@ -1,0 +1,91 @@
+"""`cosim sweep`: a scenario, run at every point of a design."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..errors import CosimError, InputError
+from . import studies
+
+if TYPE_CHECKING:
+    from ..sweep.aggregate import Group
+    from ..sweep.ledger import Ledger
+    from ..sweep.outcome import Summary
+    from ..sweep.sweep import Sweep
+
+#: so many groups and causes are printed; the files hold all of them
+_SHOWN = 20
+
+
+@click.command()
+@click.argument("sweep")
+@click.option("--output-dir", type=click.Path(path_type=Path), help="Where results go; default: runs/NAME.")
+@click.option("--parquet", is_flag=True, help="Write table.parquet too (extra `parquet`).")
+@studies.options
+def command(sweep: str, output_dir: Path | None, parquet: bool, **where: Any) -> int:
+    """Run SWEEP, a JSON file or the name of a shipped sweep.
+
+    Every run has a child process of its own. Writes table.csv (one row per run), aggregates.csv, success.csv, failures.csv and
+    sweep.json to the output directory. A sweep that was interrupted or killed goes on where it was when it is called again. Exit
+    code 0: all runs were made; 1: some failed; 2: the sweep was refused; 130: interrupted, what was finished is written.
+    """
+    from ..results.files import prepare
+    from ..results.parquet_files import require_parquet
+    from ..sweep.ledger import Ledger
+    from ..sweep.sweep import Sweep
+
+    if parquet:
+        require_parquet()
+    read = Sweep.of(sweep)
+    folder = output_dir or Path("runs") / read.read.spec.name
+    prepare(folder)
+    with Ledger(folder, where.pop("retry_failed")) as ledger:
+        return _run(read, ledger, folder, parquet, **where)
+
+
+def _run(sweep: Sweep, ledger: Ledger, folder: Path, parquet: bool, workers: int | None, scheduler: str | None) -> int:
+    from ..sweep.outcome import write
+
+    began, interrupted = time.monotonic(), False
+    done = sum(1 for job in sweep.jobs() if job.key in ledger)
+    if done < len(sweep):
+        try:
+            with studies.progress(len(sweep)) as progress, studies.engine(sweep.study, workers, scheduler) as engine:
+                progress.begin(done)
+                sweep.run(ledger, engine, progress)
+        except KeyboardInterrupt:
+            interrupted = True
+        except CosimError as error:
+            if error.exit_code != InputError.exit_code:
+                write(sweep, ledger, folder, parquet)
+            raise
+    summary = write(sweep, ledger, folder, parquet)
+    _print(sweep, summary)
+    made = f"{summary.finished - done} made now in {studies.duration(time.monotonic() - began)}"
+    click.echo(f"{summary.finished} of {len(sweep)} runs, {made}, {summary.failed} failed; table.csv and others in {folder}")
+    if interrupted:
+        raise KeyboardInterrupt
+    return 1 if summary.failed else 0
+
+
+def _print(sweep: Sweep, summary: Summary) -> None:
+    if not summary.groups:
+        return
+    numbers = summary.groups[0].statistics()
+    kpis = [[name, *(f"{found[key]:.4g}" for key in ("mean", "std", "min", "median", "max"))] for name, found in numbers]
+    if kpis:
+        studies.print_table(["KPI", "mean", "std", "min", "median", "max"], kpis)
+    if sweep.criteria or summary.failed:
+        studies.print_table(["runs", "n", "success", "95 % interval"], [_success(group) for group in summary.groups[:_SHOWN]])
+    for cause, count, first in summary.causes[:_SHOWN]:
+        click.echo(f"{count} failed, the first is run {first}: {cause}", err=True)
+
+
+def _success(group: Group) -> list[str]:
+    label = ", ".join(f"{name} = {value}" for name, value in group.labels.items()) or "all"
+    low, high = group.interval
+    return [label, str(group.runs), f"{100 * group.rate:.1f} %", f"{100 * low:.1f} ... {100 * high:.1f} %"]

@@ -1,0 +1,74 @@
+"""`cosim tune`: the parameters that make a KPI small."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..errors import CosimError, InputError
+from . import studies
+
+if TYPE_CHECKING:
+    from ..sweep.ledger import Ledger
+    from ..sweep.tune import Trial, Tuning
+
+
+@click.command()
+@click.argument("tuning", metavar="TUNE")
+@click.option("--output-dir", type=click.Path(path_type=Path), help="Where results go; default: runs/NAME.")
+@studies.options
+def command(tuning: str, output_dir: Path | None, **where: Any) -> int:
+    """Search as TUNE says, a JSON file or the name of a shipped one.
+
+    Writes trials.csv (every point that was tried) and best.json to the output directory. A tuning that was interrupted or killed
+    goes on where it was when it is called again. Exit code 0: a point was found; 1: every run failed; 2: refused; 3: no point
+    keeps the constraints; 130: interrupted.
+    """
+    from ..results.files import prepare
+    from ..sweep.ledger import Ledger
+    from ..sweep.tune import Tuning
+
+    read = Tuning.of(tuning)
+    folder = output_dir or Path("runs") / read.spec.name
+    prepare(folder)
+    with Ledger(folder, where.pop("retry_failed")) as ledger:
+        return _run(read, ledger, folder, **where)
+
+
+def _run(tuning: Tuning, ledger: Ledger, folder: Path, workers: int | None, scheduler: str | None) -> int:
+    from ..sweep.trials import write
+
+    try:
+        with studies.progress(_most(tuning)) as progress, studies.engine(tuning.study, workers, scheduler) as engine:
+            tuning.run(ledger, engine, progress)
+    except (CosimError, KeyboardInterrupt) as error:
+        if not isinstance(error, InputError):
+            write(tuning, folder)
+        raise
+    best = write(tuning, folder)
+    _print(tuning, best, folder)
+    return 0 if best.feasible else 1 if best.failure else 3
+
+
+def _most(tuning: Tuning) -> int:
+    """Runs at most."""
+    method = tuning.spec.method
+    whole = method.population * (method.generations + 1) if method.kind == "differential_evolution" else method.evaluations
+    return whole * len(tuning.spec.cases)
+
+
+def _print(tuning: Tuning, best: Trial, folder: Path) -> None:
+    from ..sweep.outcome import run_command
+
+    first = tuning.trials[0]
+    rows = [[name, f"{first.parameters[name]:.6g}", f"{value:.6g}"] for name, value in best.parameters.items()]
+    rows.append([tuning.objective.text, f"{first.value:.6g}", f"{best.value:.6g}"])
+    studies.print_table(["", "start", "best"], rows)
+    if not best.feasible:
+        reason = best.failure or f"the best violates them by {best.violation:.3g}"
+        click.echo(f"no point keeps the constraints: {reason}", err=True)
+    settings = {**tuning.spec.settings, **tuning.spec.cases[0], **tuning.settings(best.parameters)}
+    click.echo(f"{len(tuning.trials)} points tried; trials.csv and best.json in {folder}")
+    click.echo(run_command(tuning.read.scenario, settings))

@@ -1,0 +1,185 @@
+"""The system as a diagram: components in the order of their stages from left to right, and what flows between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN, LANE = 152.0, 52.0, 62.0, 34.0, 24.0, 14.0  # px
+FRAME_GAP = 12.0  # px between a frame and what it holds
+FRAME = 0.2  # rows above and below a nested system, for its frame
+LONGEST_TITLE, LONGEST_ORIGIN = 20, 25  # characters
+LONGEST_LIST = 40  # lines of a tool tip
+
+
+@dataclass(frozen=True)
+class Box:
+    """A component: its place (px, of the upper left corner), and what is written on it."""
+
+    name: str
+    x: float
+    y: float
+    title: str
+    origin: str
+    about: str
+
+
+class Frame(NamedTuple):
+    """A nested system around its components."""
+
+    name: str
+    x: float
+    y: float
+    width: float
+    height: float
+
+
+class Wire(NamedTuple):
+    """All connections from one component to another: a path, where their number is written, and what they are."""
+
+    path: str
+    x: float
+    y: float
+    count: int
+    about: str
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """What the template draws (px)."""
+
+    width: float
+    height: float
+    boxes: Sequence[Box]
+    frames: Sequence[Frame]
+    wires: Sequence[Wire]
+
+
+def diagram(system: Mapping[str, Any]) -> Diagram:
+    """The diagram of a system as `cosim.scenario.overview` describes it."""
+    known = {component["name"]: component for component in system["components"]}
+    block = _sequence(system["stages"])
+    boxes = {name: _box(known[name], *place) for name, place in block.places.items()}
+    flows = _flows(system["connections"], boxes)
+    lanes = sum(boxes[target].x <= boxes[source].x for source, target in flows)
+    bottom = MARGIN + block.rows * (HEIGHT + GAP_Y)
+    width = 2 * MARGIN + block.columns * (WIDTH + GAP_X) - GAP_X
+    wires = list(_wires(flows, boxes, bottom))
+    return Diagram(width, bottom + LANE * lanes + MARGIN / 2, list(boxes.values()), list(_frames(boxes.values())), wires)
+
+
+class _Block(NamedTuple):
+    """Components by name at (column, row), and how many columns and rows they take."""
+
+    places: dict[str, tuple[float, float]]
+    columns: int
+    rows: float
+
+
+def _sequence(stages: Sequence[Sequence[Any]]) -> _Block:
+    """Stages one beside the other, each centred."""
+    blocks = [_stack([_member(member) for member in stage]) for stage in stages]
+    rows = max((block.rows for block in blocks), default=0)
+    places, columns = {}, 0
+    for block in blocks:
+        places |= _moved(block, columns, (rows - block.rows) / 2)
+        columns += block.columns
+    return _Block(places, columns, rows)
+
+
+def _stack(blocks: Sequence[_Block]) -> _Block:
+    """What steps side by side, one below the other."""
+    places, rows = {}, 0.0
+    for block in blocks:
+        places |= _moved(block, 0, rows)
+        rows += block.rows
+    return _Block(places, max((block.columns for block in blocks), default=0), rows)
+
+
+def _member(member: Any) -> _Block:
+    """A component, or a nested system with room for its frame."""
+    if isinstance(member, str):
+        return _Block({member: (0, 0)}, 1, 1)
+    block = _sequence(member["stages"])
+    return _Block(_moved(block, 0, FRAME), block.columns, block.rows + 2 * FRAME)
+
+
+def _moved(block: _Block, columns: float, rows: float) -> dict[str, tuple[float, float]]:
+    return {name: (x + columns, y + rows) for name, (x, y) in block.places.items()}
+
+
+def _box(component: Mapping[str, Any], column: float, row: float) -> Box:
+    place = (MARGIN + column * (WIDTH + GAP_X), MARGIN + row * (HEIGHT + GAP_Y))
+    name, origin = component["name"], component["origin"]
+    every = f", every {component['period']:g} s" if component["period"] else ""
+    about = f"{name}\n{origin}\n{component['inputs']} inputs, {component['outputs']} outputs{every}"
+    return Box(name, *place, _cut(name, LONGEST_TITLE), _cut(origin.rpartition("/")[2], LONGEST_ORIGIN), about)
+
+
+def _cut(text: str, length: int) -> str:
+    return text if len(text) <= length else f"{text[: length - 1]}…"
+
+
+def _flows(connections: Sequence[Sequence[str]], boxes: Mapping[str, Box]) -> dict[tuple[str, str], list[str]]:
+    """(from component, to component) -> a line for each connection."""
+    flows: dict[tuple[str, str], list[str]] = {}
+    for source, target, unit, note in connections:
+        ends = _component(source, boxes), _component(target, boxes)
+        text = f"{source} → {target}" + (f"  [{unit}]" if unit else "") + (f"  ({note})" if note else "")
+        if ends[0] and ends[1]:
+            flows.setdefault(ends, []).append(text)
+    return flows
+
+
+def _component(name: str, boxes: Mapping[str, Box]) -> str:
+    """The component that a variable belongs to."""
+    return max((box for box in boxes if name.startswith(f"{box}.")), key=len, default="")
+
+
+def _wires(flows: Mapping[tuple[str, str], list[str]], boxes: Mapping[str, Box], bottom: float) -> Iterator[Wire]:
+    lane = bottom - GAP_Y / 2
+    for (source, target), lines in flows.items():
+        start, end = boxes[source], boxes[target]
+        more = [f"and {len(lines) - LONGEST_LIST} more"] if len(lines) > LONGEST_LIST else []
+        about = "\n".join([*lines[:LONGEST_LIST], *more])
+        if end.x > start.x:
+            path, x, y = _forward(start, end)
+        else:
+            lane += LANE
+            path, x, y = _back(start, end, lane)
+        yield Wire(path, x, y, len(lines), about)
+
+
+def _forward(start: Box, end: Box) -> tuple[str, float, float]:
+    """A curve from the right side of a box to the left side of one further right; it bows around what lies between."""
+    x1, y1, x2, y2 = start.x + WIDTH, start.y + HEIGHT / 2, end.x, end.y + HEIGHT / 2
+    bend = (x2 - x1) / 2
+    far = x2 - x1 > GAP_X + 1 and abs(y1 - y2) < HEIGHT
+    lift = -(HEIGHT + GAP_Y) * 0.8 if far else 0.0
+    path = f"M{x1:g} {y1:g}C{x1 + bend:g} {y1 + lift:g} {x2 - bend:g} {y2 + lift:g} {x2:g} {y2:g}"
+    return path, (x1 + x2) / 2, (y1 + y2) / 2 + 0.75 * lift
+
+
+def _back(start: Box, end: Box, lane: float) -> tuple[str, float, float]:
+    """From the lower side of a box, along a lane below everything, up to the lower side of an earlier one."""
+    x1, y1, x2, y2 = start.x + 0.62 * WIDTH, start.y + HEIGHT, end.x + 0.38 * WIDTH, end.y + HEIGHT
+    corner = 12.0
+    path = (
+        f"M{x1:g} {y1:g}V{lane - corner:g}Q{x1:g} {lane:g} {x1 - corner:g} {lane:g}"
+        f"H{x2 + corner:g}Q{x2:g} {lane:g} {x2:g} {lane - corner:g}V{y2:g}"
+    )
+    return path, (x1 + x2) / 2, lane
+
+
+def _frames(boxes: Iterable[Box]) -> Iterator[Frame]:
+    """A frame for each outermost nested system."""
+    groups: dict[str, list[Box]] = {}
+    for box in boxes:
+        outer, dot, _ = box.name.partition(".")
+        if dot:
+            groups.setdefault(outer, []).append(box)
+    for name, members in groups.items():
+        x, y = min(box.x for box in members) - FRAME_GAP, min(box.y for box in members) - FRAME_GAP
+        right, low = max(box.x for box in members) + WIDTH + FRAME_GAP, max(box.y for box in members) + HEIGHT + FRAME_GAP
+        yield Frame(name, x, y, right - x, low - y)

@@ -1,0 +1,123 @@
+"""`report.html`: everything about a run on one page, in one file that needs no network."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..kpi import CheckOutcome, Number
+from ..results import Result
+from ..results.files import plain, replacing
+from .diagram import diagram
+from .pages import embedded, markup, render
+from .replay import replay_data
+from .tables import number_text
+
+#: what timings measure, in the order in which things happen
+TIMINGS = {
+    "load_seconds": "load",
+    "initialize_seconds": "initialise",
+    "loop_seconds": "stepping loop",
+    "simulate_seconds": "simulate, in all",
+}
+
+#: files whose hashes are shown
+MOST_HASHES = 300
+
+
+class Row(NamedTuple):
+    """A KPI as it is shown; with `limits` where it has a check."""
+
+    name: str
+    value: str
+    unit: str
+    limits: str = ""
+    passed: bool = True
+
+
+def write_report(result: Result, outcomes: Sequence[CheckOutcome], pictures: Mapping[str, str], path: Path) -> None:
+    """Write the page about `result` to `path`: KPIs with their checks, the figures (`pictures`: name -> SVG), the system with
+    its connections and units, scenario, versions, timings and warnings, and the replay.
+
+    Raises InputError for a result without rows, and when the file cannot be written.
+    """
+    about, units = _about(result), result.metadata.get("kpi_units", {})
+    text = render(
+        "report.html",
+        about=about,
+        checks=len(outcomes),
+        failed=sum(not outcome.passed for outcome in outcomes),
+        facts=list(_facts(result)),
+        cards=[_card(outcome, units) for outcome in outcomes],
+        kpis=_grouped(result.kpis, units),
+        warnings=result.metadata.get("warnings", []),
+        figures=[{"name": name, "svg": markup(_bare(svg))} for name, svg in pictures.items()],
+        d=diagram(about["system"]) if about["system"] else None,
+        scenario=json.dumps(about["scenario"], indent=1, ensure_ascii=False),
+        timings=list(_timings(result)),
+        versions=[*about["versions"].items(), *about["machine"].items()],
+        data=embedded(replay_data([result])),
+    )
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _about(result: Result) -> dict[str, Any]:
+    """What run.json says, with everything that the template names."""
+    missing: dict[str, Any] = {
+        "name": "run",
+        "failure": None,
+        "scenario": {},
+        "scenario_file": "",
+        "system": None,
+        "versions": {"cosim": ""},
+        "machine": {},
+        "sha256": {},
+    }
+    about = plain({**missing, **result.metadata})
+    return {**about, "sha256": dict(islice(about["sha256"].items(), MOST_HASHES))}
+
+
+def _facts(result: Result) -> Iterator[tuple[str, str]]:
+    simulated = float(result.time[-1] - result.time[0])
+    yield "simulated", f"{simulated:g} s"
+    if loop := result.timing.get("loop_seconds"):
+        yield "speed", f"{simulated / loop:.0f} × real time"
+    yield "signals", str(len(result))
+    yield "rows", str(len(result.time))
+    if by := result.metadata.get("terminated_by"):
+        yield "ended by", f"{by['component']} at {by['time']:g} s"
+
+
+def _row(name: str, value: Number, units: Mapping[str, str]) -> Row:
+    return Row(name, number_text(value), units.get(name, ""))
+
+
+def _card(outcome: CheckOutcome, units: Mapping[str, str]) -> Row:
+    row = _row(outcome.check["kpi"], outcome.value, units)
+    return row._replace(limits=outcome.limits, passed=outcome.passed)
+
+
+def _grouped(kpis: Mapping[str, Number], units: Mapping[str, str]) -> dict[str, list[Row]]:
+    """The numbers of each KPI function, without its name before theirs."""
+    groups: dict[str, list[Row]] = {}
+    for name, value in kpis.items():
+        group, _, own = name.partition(".")
+        groups.setdefault(group, []).append(_row(name, value, units)._replace(name=own))
+    return groups
+
+
+def _timings(result: Result) -> Iterator[tuple[str, str]]:
+    for key, label in TIMINGS.items():
+        if key in result.timing:
+            yield label, f"{1e3 * result.timing[key]:.0f} ms"
+    if pace := result.metadata.get("real_time"):
+        yield "real time", f"{pace['late_steps']} of {pace['steps']} steps late"
+
+
+def _bare(svg: str) -> str:
+    """An SVG file as an element of a page: without the declarations before it."""
+    return svg[svg.index("<svg") :]

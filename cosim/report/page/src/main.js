@@ -1,0 +1,62 @@
+// The replay page. Its data stands in the element #replay-data, as `cosim/report/replay.py` writes it.
+import "uplot/dist/uPlot.min.css";
+import "./style.css";
+import { build, connectSignals, connectTime, connectView, showSpans } from "./controls.js";
+import { Player } from "./player.js";
+import { Plots } from "./plots.js";
+import { Run } from "./run.js";
+import { onThemeChange, themeButtons } from "./theme.js";
+import { View } from "./view.js";
+
+async function start(root, data) {
+  const runs = await Promise.all(data.runs.map(Run.decoded));
+  const player = new Player(runs[0].first, Math.max(...runs.map((run) => run.last)));
+  const page = build(root);
+  connectTime(page, player);
+  const view = sceneView(page, data.scene, runs);
+  if (view) {
+    player.onChange(() => view.update(player.time));
+    connectView(page, view, data.scene);
+    showSpans(page, runs[0], data.scene.spans);
+  }
+  const plots = new Plots(page.plots, runs, player);
+  for (const patterns of data.scene.plots) plots.add(patterns);
+  connectSignals(page, runs[0], plots);
+  onThemeChange(() => (view?.recolour(), plots.recolour()));
+  player.tell();
+  animate(player, view);
+  return { player, view, plots, runs };
+}
+
+function sceneView(page, scene, runs) {
+  if (scene.bodies.some((body) => runs[0].knows(body))) {
+    try {
+      return new View(page.canvas, scene, runs);
+    } catch (error) {
+      console.warn(`no 3-D view: ${error.message}`);
+    }
+  }
+  page.stage.remove();
+  page.layers.remove();
+  return null;
+}
+
+function animate(player, view) {
+  let former;
+  const frame = (now) => {
+    player.advance(former === undefined ? 0 : (now - former) / 1000);
+    view?.draw(player.playing ? now - former : 0);
+    former = now;
+    requestAnimationFrame(frame);
+  };
+  requestAnimationFrame(frame);
+}
+
+themeButtons(document);
+const root = document.getElementById("replay");
+if (root) {
+  start(root, JSON.parse(document.getElementById("replay-data").textContent)).then((replay) => {
+    window.cosimReplay = replay;
+    root.dataset.ready = "true";
+  });
+}

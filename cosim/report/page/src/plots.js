@@ -1,0 +1,127 @@
+// Signals over time, with a cursor that is the moment of the replay: press or drag in a plot to go there.
+import uPlot from "uplot";
+import { theme } from "./theme.js";
+
+const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+const HEIGHT = 148;
+
+/** Four significant digits without an exponent where that is short. */
+export const shown = (value) => (Number.isFinite(value) ? String(Number(value.toPrecision(4))) : "–");
+
+function axis(unit) {
+  const { ink, rule } = theme();
+  const style = { stroke: ink, grid: { stroke: rule, width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif" };
+  return unit === undefined ? { ...style, size: 26, space: 70 } : { ...style, size: 54, space: 28 };
+}
+
+class Plot {
+  constructor(parent, signals, runs, player, remove) {
+    Object.assign(this, { signals, runs, player });
+    this.element = parent.appendChild(document.createElement("figure"));
+    this.element.className = "plot";
+    this.legend = this.element.appendChild(document.createElement("figcaption"));
+    this.values = signals.map((name, i) => this.#entry(name, COLOURS[i % COLOURS.length]));
+    const close = this.legend.appendChild(document.createElement("button"));
+    Object.assign(close, { type: "button", className: "close", textContent: "×", title: "Remove this plot", onclick: () => remove(this) });
+    this.#draw();
+  }
+
+  #entry(name, colour) {
+    const entry = this.legend.appendChild(document.createElement("span"));
+    const key = entry.appendChild(document.createElement("i"));
+    key.style.background = colour;
+    entry.append(name);
+    const value = entry.appendChild(document.createElement("b"));
+    return { name, value };
+  }
+
+  #series() {
+    return this.signals.flatMap((name, i) =>
+      this.runs.filter((run) => run.has(name)).map((run) => ({
+        run, name,
+        label: name, stroke: COLOURS[i % COLOURS.length], width: run === this.runs[0] ? 1.6 : 1.3,
+        dash: run === this.runs[0] ? undefined : [5, 4], points: { show: false },
+      })));
+  }
+
+  #draw() {
+    const series = this.#series();
+    const tables = this.runs.map((run) => [run.time, ...series.filter((s) => s.run === run).map((s) => run.values(s.name))]);
+    const data = tables.length === 1 ? tables[0] : uPlot.join(tables.filter((table) => table.length > 1));
+    const sorted = this.runs.flatMap((run) => series.filter((s) => s.run === run)).map((s) => ({ ...s, spanGaps: true }));
+    const unit = this.runs[0].units[this.signals[0]] ?? "";
+    const options = {
+      width: Math.max(this.element.clientWidth, 120), height: HEIGHT, legend: { show: false }, padding: [8, 10, 0, 0],
+      scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high) } },
+      axes: [axis(), axis(unit)], series: [{}, ...sorted],
+      cursor: { drag: { x: false, y: false, setScale: false }, points: { show: false }, y: false, x: false },
+    };
+    this.chart?.destroy();
+    this.chart = new uPlot(options, data, this.element);
+    this.element.dataset.unit = unit;
+    this.line = this.chart.over.appendChild(document.createElement("div"));
+    this.line.className = "now";
+    this.#scrub(this.chart.over);
+    this.update();
+  }
+
+  #scrub(over) {
+    const seek = (event) => this.player.seek(this.chart.posToVal(event.clientX - over.getBoundingClientRect().left, "x"));
+    over.addEventListener("pointerdown", (event) => {
+      over.setPointerCapture(event.pointerId);
+      seek(event);
+    });
+    over.addEventListener("pointermove", (event) => event.buttons & 1 && seek(event));
+  }
+
+  update() {
+    this.line.style.transform = `translateX(${this.chart.valToPos(this.player.time, "x")}px)`;
+    const unit = this.element.dataset.unit;
+    for (const { name, value } of this.values) {
+      const texts = this.runs.filter((run) => run.has(name)).map((run) => shown(run.value(name, this.player.time)));
+      value.textContent = `${texts.join(" | ")} ${this.runs[0].units[name] ?? unit}`;
+    }
+  }
+
+  resize() {
+    this.chart.setSize({ width: Math.max(this.element.clientWidth, 120), height: HEIGHT });
+    this.update();
+  }
+
+  recolour() {
+    this.#draw();
+  }
+}
+
+function padded(low, high) {
+  if (low == null || high == null) return [0, 1];
+  const room = high > low ? 0.07 * (high - low) : Math.max(1e-3, 0.1 * Math.abs(high));
+  return [low - room, high + room];
+}
+
+export class Plots {
+  constructor(parent, runs, player) {
+    Object.assign(this, { parent, runs, player, list: [] });
+    new ResizeObserver(() => this.list.forEach((plot) => plot.resize())).observe(parent);
+    player.onChange(() => this.list.forEach((plot) => plot.update()));
+  }
+
+  /** A plot of the signals that match any of the patterns; "*" stands for any text. False when nothing matches. */
+  add(patterns) {
+    const tests = patterns.map((pattern) => new RegExp(`^${pattern.split("*").map((s) => s.replace(/[.[\]()+?^$|{}\\]/g, "\\$&")).join(".*")}$`));
+    const signals = this.runs[0].signals.filter((name) => tests.some((test) => test.test(name)));
+    if (!signals.length) return false;
+    this.list.push(new Plot(this.parent, signals.slice(0, 12), this.runs, this.player, (plot) => this.#remove(plot)));
+    return true;
+  }
+
+  #remove(plot) {
+    plot.chart.destroy();
+    plot.element.remove();
+    this.list.splice(this.list.indexOf(plot), 1);
+  }
+
+  recolour() {
+    this.list.forEach((plot) => plot.recolour());
+  }
+}

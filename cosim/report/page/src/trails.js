@@ -1,0 +1,64 @@
+// What a body leaves behind: its path, brighter where it has been, and ghosts of where it was.
+import { BufferGeometry, InstancedMesh, Line, LineBasicMaterial, Matrix4, MeshLambertMaterial, Vector3 } from "three";
+import { Line2 } from "three/addons/lines/Line2.js";
+import { LineGeometry } from "three/addons/lines/LineGeometry.js";
+import { LineMaterial } from "three/addons/lines/LineMaterial.js";
+import { geometryOf } from "./bodies.js";
+
+const MOST_POINTS = 500;
+const MOST_GHOSTS = 24;
+const ONE = new Vector3(1, 1, 1);
+
+/** Rows of a run, at most `count` and evenly spaced, the last among them. */
+function spread(run, count) {
+  const last = run.time.length - 1;
+  const stride = Math.max(1, Math.ceil(last / count));
+  const rows = Array.from({ length: Math.floor(last / stride) + 1 }, (_, i) => i * stride);
+  return rows[rows.length - 1] === last ? rows : [...rows, last];
+}
+
+export class Trail {
+  constructor(run, body, colour, isOther) {
+    this.rows = spread(run, MOST_POINTS);
+    const points = this.rows.map((row) => run.position(body, row));
+    const thin = new LineBasicMaterial({ color: colour, transparent: true, opacity: 0.4, depthWrite: false });
+    this.whole = new Line(new BufferGeometry().setFromPoints(points), thin);
+    const dashes = isOther ? { dashed: true, dashSize: 0.12, gapSize: 0.1 } : {};
+    const thick = new LineMaterial({ color: colour, linewidth: isOther ? 1.8 : 2.6, transparent: true, depthWrite: false, ...dashes });
+    this.past = new Line2(new LineGeometry().setPositions(points.flatMap((point) => point.toArray())), thick);
+    this.past.computeLineDistances();
+    this.lines = [this.whole, this.past];
+    for (const line of this.lines) line.frustumCulled = false;
+  }
+
+  /** Draw as past what lies before a row. */
+  update(row) {
+    let count = 0;
+    while (count < this.rows.length - 1 && this.rows[count + 1] <= row) count++;
+    this.past.geometry.instanceCount = count;
+    this.past.visible = this.whole.visible && count > 0;
+  }
+}
+
+export class Ghosts {
+  constructor(run, body) {
+    const duration = run.last - run.first;
+    this.interval = [0.5, 1, 2, 5, 10, 20, 60, 300, 1800].find((step) => duration / step <= MOST_GHOSTS) ?? duration / MOST_GHOSTS;
+    this.first = run.first;
+    const moments = Array.from({ length: Math.floor(duration / this.interval + 1e-6) + 1 }, (_, i) => run.first + i * this.interval);
+    const material = new MeshLambertMaterial({ vertexColors: true, transparent: true, opacity: 0.26, depthWrite: false });
+    const geometry = geometryOf(body.parts.filter((part) => part.opacity === 1));
+    this.mesh = new InstancedMesh(geometry, material, moments.length);
+    moments.forEach((moment, i) => {
+      const { position, orientation } = run.pose(body, moment);
+      this.mesh.setMatrixAt(i, new Matrix4().compose(position, orientation, ONE));
+    });
+    this.mesh.frustumCulled = false;
+    this.mesh.visible = false;
+  }
+
+  /** Show those of the past. */
+  update(time) {
+    this.mesh.count = Math.floor((time - this.first) / this.interval + 1e-6) + 1;
+  }
+}

@@ -1,0 +1,67 @@
+"""What to draw in the 3-D replay, asked from the components of a scenario: the importer itself knows no vehicle.
+
+A Python component may say what it looks like by a static method `scene(name, scenario) -> dict`; a scenario of other components
+names a function `(scenario, **arguments) -> dict` under its key "scene". `name` is the component's, `scenario` the scenario as
+JSON. The answer is JSON as well, with any of these keys (m, rad, world frame z up; colours as CSS has them):
+
+- `bodies`: {"name", "title", "colour", "position": [x, y, z], "orientation": [w, x, y, z] or "attitude": [roll, pitch, yaw],
+  "parts"}; position and orientation are names of signals, or numbers
+- `parts` of a body, and `fixed`: {"shape", "size", "position", "orientation": [x, y, z, w], "colour": [r, g, b] in 0 ... 1,
+  "opacity"}; a "box" has its edges as size, a "cylinder" (along z) radius and length, a "cone" lower and upper radius and length,
+  a "sphere" its radius, a "ring" radius and thickness
+- `water`: {"waves": [{"amplitude", "frequency", "number", "direction", "phase"}], "gain": signal or number}; it lies at z = 0
+- `markers`: {"position", "radius", "label"}; `views`: {"name", "on": a body, "eye", "target"} in axes that turn with its yaw
+- `spans`: {"signal", "label", "colour"}, a Boolean; `plots`: lists of patterns of signals
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from ..errors import ComponentError, InputError
+from ..python_component import load_object
+from ..results.files import plain
+from ..scenario.functions import load_function
+
+LISTS = ("bodies", "fixed", "markers", "views", "spans", "plots")
+
+
+def scene_of(metadata: Mapping[str, Any]) -> dict[str, Any]:
+    """The scene of a run, given what its run.json says; nothing to draw when no component says what it looks like.
+
+    Raises InputError when something that the scenario names is not there, ComponentError when asking fails.
+    """
+    scene: dict[str, Any] = {**{key: [] for key in LISTS}, "water": None}
+    if "scenario_file" not in metadata:
+        return scene
+    for part in _parts(metadata["scenario"], Path(metadata["scenario_file"]).parent):
+        for key in LISTS:
+            scene[key] += part.get(key, [])
+        scene["water"] = scene["water"] or part.get("water")
+    return scene
+
+
+def _parts(scenario: Mapping[str, Any], folder: Path) -> Iterator[dict[str, Any]]:
+    for name, component in scenario.get("components", {}).items():
+        if isinstance(reference := component.get("python"), str):
+            ask = getattr(load_object(reference, folder), "scene", None)
+            if callable(ask):
+                yield _answer(f'component "{name}"', ask, name, scenario)
+    if spec := scenario.get("scene"):
+        yield _answer("the scenario's scene", load_function(spec["python"], folder), scenario, **spec.get("arguments", {}))
+
+
+def _answer(who: str, ask: Callable[..., Any], *values: Any, **named: Any) -> dict[str, Any]:
+    try:
+        answer = ask(*values, **named)
+        json.dumps(plain(answer))
+    except InputError:
+        raise
+    except Exception as error:
+        raise ComponentError(who, "scene", f"{type(error).__name__}: {error}") from error
+    if not isinstance(answer, dict):
+        raise ComponentError(who, "scene", f"returned {type(answer).__name__}, expected a dict")
+    return answer

@@ -1,0 +1,1 @@
+"""Many runs of one scenario: parameter studies, Monte Carlo and tuning, on this machine or a cluster."""

@@ -1,0 +1,180 @@
+"""From factors to points: which levels are run together.
+
+Sampled designs are drawn by `scipy.stats.qmc` in the unit cube; every factor turns a number of [0, 1) into one of its levels by
+its inverse distribution function.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .schema import DesignSpec, DistributionSpec, FactorSpec, RangeSpec, SweepSpec
+
+#: largest double below 1
+_BELOW_ONE = float(np.nextafter(1.0, 0.0))
+
+
+class Level(NamedTuple):
+    """What a factor is called in the table, and the settings that it makes."""
+
+    label: Any
+    settings: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Factor:
+    """A factor with its levels; those of a continuous one are made from `quantile` (number of [0, 1) -> value)."""
+
+    name: str
+    paths: Sequence[str] = ()
+    listed: Sequence[Level] = ()
+    quantile: Callable[[float], Any] | None = None
+    #: levels in a full factorial design
+    grid: Sequence[Level] = ()
+
+    def at(self, place: float) -> Level:
+        """The level at a place of [0, 1)."""
+        if self.quantile is None:
+            return self.listed[int(place * len(self.listed))]
+        return level(self.paths, self.quantile(place))
+
+
+def level(paths: Sequence[str], value: Any) -> Level:
+    """All paths set to one value."""
+    return Level(value, dict.fromkeys(paths, value))
+
+
+def factor(spec: FactorSpec) -> Factor:
+    """A factor as its file describes it."""
+    if spec.levels is not None:
+        return _listed(spec.name, [Level(label, settings) for label, settings in spec.levels.items()])
+    paths = spec.set or []
+    if spec.values is not None:
+        return _listed(spec.name, [level(paths, value) for value in spec.values])
+    part = spec.range or spec.distribution
+    assert part is not None
+    quantile = _rounded(_range(spec.range) if spec.range else _distribution(part), spec.integer)  # type: ignore[arg-type]
+    grid = [level(paths, quantile(place)) for place in _places(part)]
+    return Factor(spec.name, paths, quantile=quantile, grid=grid)
+
+
+def _listed(name: str, levels: Sequence[Level]) -> Factor:
+    return Factor(name, listed=levels, grid=levels)
+
+
+def _places(part: RangeSpec | DistributionSpec) -> list[float]:
+    """Where the levels of a full factorial design lie: a range's ends belong to it, a distribution's are improbable."""
+    count = part.count or 0
+    if isinstance(part, RangeSpec):
+        return [i / (count - 1) for i in range(count)]
+    return [(i + 0.5) / count for i in range(count)]
+
+
+def _rounded(quantile: Callable[[float], float], integer: bool) -> Callable[[float], float]:
+    return (lambda place: round(quantile(place))) if integer else quantile
+
+
+def _range(spec: RangeSpec) -> Callable[[float], float]:
+    return lambda place: between(place, spec.min, spec.max, spec.scale == "log")
+
+
+def between(place: float, low: float, high: float, logarithmic: bool) -> float:
+    """The number at a place of [0, 1] between two bounds, which are met exactly."""
+    found = low * math.exp(place * math.log(high / low)) if logarithmic else low + place * (high - low)
+    return low if place == 0 else high if place == 1 else min(max(found, low), high)
+
+
+def _distribution(spec: DistributionSpec) -> Callable[[float], float]:
+    from scipy import stats
+
+    distribution = _DISTRIBUTIONS[spec.kind](stats, **spec.arguments)
+    return lambda place: float(distribution.ppf(min(max(place, 1 - _BELOW_ONE), _BELOW_ONE)))
+
+
+def _truncated(stats: Any, mean: float, std: float, min: float = -math.inf, max: float = math.inf) -> Any:
+    return stats.truncnorm((min - mean) / std, (max - mean) / std, mean, std)
+
+
+_DISTRIBUTIONS: Mapping[str, Callable[..., Any]] = {
+    "uniform": lambda stats, min, max: stats.uniform(min, max - min),
+    "normal": lambda stats, mean, std: stats.norm(mean, std),
+    "truncated_normal": _truncated,
+    "lognormal": lambda stats, median, sigma: stats.lognorm(sigma, scale=median),
+    "triangular": lambda stats, min, mode, max: stats.triang((mode - min) / (max - min), min, max - min),
+    "exponential": lambda stats, mean: stats.expon(scale=mean),
+    "weibull": lambda stats, shape, scale: stats.weibull_min(shape, scale=scale),
+}
+
+
+@dataclass(frozen=True)
+class Point:
+    """One run: the labels of its levels by column of the table, and all its settings."""
+
+    labels: Mapping[str, Any]
+    settings: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Design:
+    """All points of a sweep, made one by one; seeds vary fastest, then the last factor."""
+
+    factors: Sequence[Factor]
+    seeds: Sequence[Level] = ()
+    #: places in the unit cube, shape (points, factors); None: all combinations
+    samples: np.ndarray | None = field(default=None, repr=False)
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of the factors, then the seed's."""
+        return [*(factor.name for factor in self.factors), *(["seed"] if self.seeds else [])]
+
+    def __len__(self) -> int:
+        points = math.prod(len(factor.grid) for factor in self.factors) if self.samples is None else len(self.samples)
+        return points * max(1, len(self.seeds))
+
+    def __iter__(self) -> Iterator[Point]:
+        return map(self.__getitem__, range(len(self)))
+
+    def __getitem__(self, run: int) -> Point:
+        if not 0 <= run < len(self):
+            raise IndexError(run)
+        index, seed = divmod(run, max(1, len(self.seeds)))
+        levels = [*self._levels(index), *(self.seeds[seed : seed + 1])]
+        labels = {name: level.label for name, level in zip(self.columns, levels, strict=True)}
+        return Point(labels, {path: value for level in levels for path, value in level.settings.items()})
+
+    def _levels(self, index: int) -> list[Level]:
+        if self.samples is not None:
+            return [factor.at(place) for factor, place in zip(self.factors, self.samples[index].tolist(), strict=True)]
+        found = []
+        for factor in reversed(self.factors):
+            index, place = divmod(index, len(factor.grid))
+            found.append(factor.grid[place])
+        return found[::-1]
+
+    def variants(self) -> Iterator[Mapping[str, Any]]:
+        """Settings of every listed level alone: a text among them may name a file."""
+        return (level.settings for factor in self.factors for level in factor.listed)
+
+
+def design(spec: SweepSpec) -> Design:
+    """The points of a sweep; the same file gives the same points."""
+    factors = [factor(each) for each in spec.factors]
+    seeds = spec.seeds
+    replications = [level(seeds.set, seeds.first + i) for i in range(seeds.count)] if seeds else []
+    return Design(factors, replications, _samples(spec.design, len(factors)))
+
+
+def _samples(spec: DesignSpec, dimensions: int) -> np.ndarray | None:
+    if spec.runs is None or dimensions == 0:
+        return None
+    from scipy.stats import qmc
+
+    generator = np.random.default_rng(spec.seed)
+    kind = {"latin_hypercube": qmc.LatinHypercube, "sobol": qmc.Sobol}[spec.kind]
+    return np.minimum(kind(dimensions, rng=generator).random(spec.runs), _BELOW_ONE)

@@ -1,0 +1,240 @@
+"""The formats of `cosim sweep` and `cosim tune`; `cosim schema --sweep` and `--tune` print them as JSON Schema."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, Field, StringConstraints, model_validator
+
+from ..errors import did_you_mean
+from ..scenario.schema import CheckSpec, Names, Spec
+
+#: distribution -> its arguments; `min` and `max` of truncated_normal may be left out
+DISTRIBUTIONS = {
+    "uniform": ("min", "max"),
+    "normal": ("mean", "std"),
+    "truncated_normal": ("mean", "std", "min", "max"),
+    "lognormal": ("median", "sigma"),
+    "triangular": ("min", "mode", "max"),
+    "exponential": ("mean",),
+    "weibull": ("shape", "scale"),
+}
+_OPTIONAL = {"truncated_normal": {"min", "max"}}
+_POSITIVE = ("std", "sigma", "median", "shape", "scale")
+#: what makes the levels of a factor
+_LEVELS = ("values", "range", "distribution", "levels")
+#: columns of the table that factors may not be called
+RESERVED = ("run", "seed", "status", "passed", "failure")
+
+
+def _label(value: str) -> str:
+    if value in RESERVED:
+        raise ValueError(f"expected a name other than {', '.join(RESERVED)}")
+    return value
+
+
+Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_. ]*$"), AfterValidator(_label)]
+Scale = Literal["linear", "log"]
+
+
+def _ordered(low: float | None, high: float | None) -> None:
+    if low is not None and high is not None and not low < high:
+        raise ValueError('expected "min" to be less than "max"')
+
+
+def _logarithmic(scale: Scale, low: float) -> None:
+    if scale == "log" and low <= 0:
+        raise ValueError('a logarithmic scale needs a positive "min"')
+
+
+class RangeSpec(Spec):
+    """Evenly spread values from `min` to `max`; `count` of them in a full factorial design."""
+
+    min: float
+    max: float
+    count: int | None = Field(None, ge=2)
+    scale: Scale = "linear"
+
+    @model_validator(mode="after")
+    def _possible(self) -> RangeSpec:
+        _ordered(self.min, self.max)
+        _logarithmic(self.scale, self.min)
+        return self
+
+
+class DistributionSpec(Spec):
+    """A distribution of values; in a full factorial design the medians of `count` equally likely parts."""
+
+    kind: Literal["uniform", "normal", "truncated_normal", "lognormal", "triangular", "exponential", "weibull"]
+    min: float | None = None
+    max: float | None = None
+    mean: float | None = None
+    std: float | None = None
+    median: float | None = None
+    sigma: float | None = Field(None, description="standard deviation of the logarithm")
+    mode: float | None = None
+    shape: float | None = None
+    scale: float | None = None
+    count: int | None = Field(None, ge=1)
+
+    @model_validator(mode="after")
+    def _complete(self) -> DistributionSpec:
+        known, given = DISTRIBUTIONS[self.kind], self.arguments
+        if unknown := [name for name in given if name not in known]:
+            raise ValueError(f'"{self.kind}" has no "{unknown[0]}"{did_you_mean(unknown[0], known)}')
+        if missing := [name for name in known if name not in given and name not in _OPTIONAL.get(self.kind, ())]:
+            raise ValueError(f'"{self.kind}" needs {", ".join(missing)}')
+        if small := [name for name in _POSITIVE if given.get(name, 1.0) <= 0]:
+            raise ValueError(f'expected a positive "{small[0]}"')
+        if self.kind == "exponential" and given["mean"] <= 0:
+            raise ValueError('expected a positive "mean"')
+        _ordered(self.min, self.max)
+        if self.mode is not None and not given["min"] <= self.mode <= given["max"]:
+            raise ValueError('expected "mode" between "min" and "max"')
+        return self
+
+    @property
+    def arguments(self) -> dict[str, float]:
+        """What was given of the distribution's own numbers."""
+        return {name: value for name, value in self.model_dump(exclude={"kind", "count"}).items() if value is not None}
+
+
+class FactorSpec(Spec):
+    """What varies: paths as of `--set` and the values that they take, or named levels that set several things at once."""
+
+    name: Label
+    set: Names | None = Field(None, description="variable or JSON pointer; of several, all get the same value")
+    values: list[Any] | None = Field(None, min_length=1)
+    range: RangeSpec | None = None
+    distribution: DistributionSpec | None = None
+    levels: dict[str, dict[str, Any]] | None = Field(None, min_length=1, description="label -> settings")
+    integer: bool = Field(False, description="values of a range or distribution are rounded")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> FactorSpec:
+        given = [name for name in _LEVELS if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"expected exactly one of {', '.join(_LEVELS)}; found {' and '.join(given) or 'none'}")
+        if (self.levels is None) == (self.set is None):
+            raise ValueError('expected "set" beside values, range or distribution, and not beside levels')
+        return self
+
+
+class SeedsSpec(Spec):
+    """Replications: every point is run with each of `count` seeds, the same ones for all points."""
+
+    set: Names
+    first: int = 1
+    count: int = Field(ge=1)
+
+
+class DesignSpec(Spec):
+    """How points are chosen: all combinations, or `runs` samples."""
+
+    kind: Literal["full_factorial", "latin_hypercube", "sobol"] = "full_factorial"
+    runs: int | None = Field(None, ge=1)
+    seed: int = Field(1, ge=0)
+
+    @model_validator(mode="after")
+    def _sized(self) -> DesignSpec:
+        if (self.kind == "full_factorial") != (self.runs is None):
+            raise ValueError('expected "runs" with latin_hypercube and sobol, and not with full_factorial')
+        if self.kind == "sobol" and self.runs and self.runs & (self.runs - 1):
+            near = 2 ** round(math.log2(self.runs))
+            raise ValueError(f'a Sobol sequence is balanced for powers of two only, expected for example "runs": {near}')
+        return self
+
+
+class StudySpec(Spec):
+    """What sweeps and tunings have in common: a scenario, changes to it that all runs share, and a run's deadline."""
+
+    schema_: str | None = Field(None, alias="$schema")
+    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$")]
+    description: str = ""
+    scenario: str = Field(description="path relative to this file, or the name of a shipped scenario")
+    settings: dict[str, Any] = Field({}, description="changes to the scenario as of `--set`")
+    deadline: float | None = Field(None, gt=0, description="wall time a run may take (s)")
+
+
+class SweepSpec(StudySpec):
+    """A sweep: factors, a design, seeds, and what counts as success."""
+
+    factors: list[FactorSpec] = []
+    design: DesignSpec = DesignSpec(kind="full_factorial", runs=None, seed=1)
+    seeds: SeedsSpec | None = None
+    success: list[CheckSpec] | None = Field(None, description="limits on KPIs; default: the checks of the scenario")
+    by: list[Names] = Field([], description="factors, or lists of factors, whose levels are told apart in the aggregates")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> SweepSpec:
+        names = [factor.name for factor in self.factors]
+        _unique("factors", names)
+        if not names and self.seeds is None:
+            raise ValueError('expected "factors", "seeds" or both')
+        for name in (name for group in self.by for name in group):
+            if name not in (*names, "seed"):
+                raise ValueError(f'"by" names no factor "{name}"{did_you_mean(name, [*names, "seed"])}')
+        if self.design.kind == "full_factorial":
+            for factor in self.factors:
+                part = factor.range or factor.distribution
+                if part and part.count is None:
+                    raise ValueError(f'the factor "{factor.name}" needs a "count" in a full factorial design')
+        return self
+
+
+class ParameterSpec(Spec):
+    """What a tuning may change, and within which bounds."""
+
+    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$"), AfterValidator(_label)]
+    set: Names
+    min: float
+    max: float
+    start: float | None = None
+    scale: Scale = "linear"
+
+    @model_validator(mode="after")
+    def _possible(self) -> ParameterSpec:
+        _ordered(self.min, self.max)
+        _logarithmic(self.scale, self.min)
+        if self.start is not None and not self.min <= self.start <= self.max:
+            raise ValueError('expected "start" between "min" and "max"')
+        return self
+
+
+class MethodSpec(Spec):
+    """The optimizer and what it may cost."""
+
+    kind: Literal["differential_evolution", "nelder_mead", "powell"] = "differential_evolution"
+    population: int = Field(16, ge=5, description="points per generation (differential_evolution)")
+    generations: int = Field(20, ge=1, description="generations after the first (differential_evolution)")
+    evaluations: int = Field(200, ge=1, description="points at most (nelder_mead, powell)")
+    seed: int = Field(1, ge=0)
+
+
+class TuneSpec(StudySpec):
+    """A tuning: the expression of KPIs that shall become small, the parameters, and what must hold."""
+
+    parameters: list[ParameterSpec] = Field(min_length=1)
+    minimize: str = Field(description='arithmetic over KPIs and parameters, such as "landing.lateral_error + 0.1 * gain"')
+    constraints: list[str] = Field([], description='comparisons of such expressions, such as "heading.overshoot <= 0.1"')
+    cases: list[dict[str, Any]] = Field([{}], min_length=1, description="each point is run with each of these settings")
+    over_cases: Literal["mean", "max"] = "mean"
+    method: MethodSpec = MethodSpec(population=16, generations=20, evaluations=200, seed=1)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> TuneSpec:
+        _unique("parameters", [parameter.name for parameter in self.parameters])
+        return self
+
+
+def _unique(what: str, names: Iterable[str]) -> None:
+    names = list(names)
+    if twice := [name for i, name in enumerate(names) if name in names[:i]]:
+        raise ValueError(f'two {what} are called "{twice[0]}"')
+
+
+def json_schema(kind: type[BaseModel]) -> dict[str, Any]:
+    """JSON Schema (2020-12) of a sweep or tuning file."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **kind.model_json_schema(by_alias=True)}

@@ -1,0 +1,75 @@
+"""A study: the runs of one scenario under many settings, each of them made once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+from ..errors import InputError, Problem
+from ..scenario import load
+from .bundle import Bundle, bundle
+from .document import Read
+from .jobs import Engine, Job, Order, Record, key
+from .ledger import Ledger
+from .schema import StudySpec
+
+#: called after every run with its record
+Observer = Callable[[Record], None]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A scenario with the changes that all runs share; `variants` are settings that may name further files."""
+
+    read: Read[Any]
+    variants: tuple[Mapping[str, Any], ...] = ()
+
+    @property
+    def spec(self) -> StudySpec:
+        spec: StudySpec = self.read.spec
+        return spec
+
+    @cached_property
+    def all_variants(self) -> list[dict[str, Any]]:
+        return [{**self.spec.settings, **variant} for variant in ({}, *self.variants)]
+
+    @cached_property
+    def bundle(self) -> Bundle:
+        """Everything that the runs need."""
+        return bundle(self.read.scenario, self.all_variants)
+
+    @property
+    def order(self) -> Order:
+        return Order(self.read.scenario, self.bundle.root, self.spec.deadline)
+
+    def job(self, settings: Mapping[str, Any]) -> Job:
+        """The run with these settings beside the common ones."""
+        together = {**self.spec.settings, **settings}
+        return Job(key(self.bundle.digest, together), together)
+
+    @cached_property
+    def checks(self) -> list[dict[str, Any]]:
+        """The checks of the scenario."""
+        spec = load(self.read.scenario, {k: v for k, v in self.spec.settings.items() if k.startswith("/")}).spec
+        return [check.model_dump(exclude_none=True) for check in spec.checks]
+
+    def refuse(self, problems: Iterable[Problem]) -> None:
+        """Raises InputError, with places in the study's own file, if there are problems."""
+        if found := self.read.located(problems):
+            raise InputError(found)
+
+
+class Laboratory(Engine, AbstractContextManager["Laboratory"], Protocol):
+    """An engine that is a context and can check jobs."""
+
+    def check(self, job: Job) -> list[Problem]: ...
+
+
+def run_all(jobs: Iterable[Job], ledger: Ledger, engine: Engine, observe: Observer) -> None:
+    """Run what is not done; every record is kept as soon as it is there."""
+    for record in engine.results(ledger.open_jobs(jobs)):
+        ledger.add(record)
+        observe(record)

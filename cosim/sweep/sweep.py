@@ -1,0 +1,108 @@
+"""A sweep: all points of a design."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from ..errors import Problem
+from ..kpi import Number, evaluate_checks
+from .design import Design, Point, design
+from .document import Read, read
+from .jobs import Job, Record
+from .ledger import Ledger
+from .schema import SweepSpec
+from .study import Laboratory, Observer, Study, run_all
+
+
+@dataclass(frozen=True)
+class Row:
+    """A finished run of a sweep: its number, its point, what became of it, and whether that was a success."""
+
+    run: int
+    point: Point
+    record: Record
+    passed: bool
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep as its file describes it."""
+
+    read: Read[SweepSpec]
+    design: Design
+
+    @classmethod
+    def of(cls, file: str | Path) -> Sweep:
+        """Read a sweep file, or a shipped one by its name. Raises InputError with everything that is wrong in it."""
+        found = read(file, SweepSpec)
+        return cls(found, design(found.spec))
+
+    @cached_property
+    def study(self) -> Study:
+        return Study(self.read, tuple(self.design.variants()))
+
+    def __len__(self) -> int:
+        return len(self.design)
+
+    def jobs(self) -> Iterator[Job]:
+        return (self.study.job(point.settings) for point in self.design)
+
+    @cached_property
+    def criteria(self) -> list[dict[str, Any]]:
+        """What a run must meet to count as a success."""
+        own = self.read.spec.success
+        return self.study.checks if own is None else [check.model_dump(exclude_none=True) for check in own]
+
+    def passed(self, kpis: Mapping[str, Number]) -> bool:
+        """Whether these KPIs are a success. Raises InputError for criteria about KPIs that do not exist."""
+        return all(outcome.passed for outcome in evaluate_checks(kpis, self.criteria))
+
+    def check(self, engine: Laboratory) -> None:
+        """Raises InputError with everything that keeps a level of a factor from being run."""
+        problems: list[Problem] = []
+        for point in self._representatives():
+            problems += engine.check(self.study.job(point.settings))
+        self.study.refuse(problems)
+
+    def _representatives(self) -> Iterator[Point]:
+        """The first point, and the first with each further listed level of a factor."""
+        seen: set[tuple[str, str]] = set()
+        listed = {factor.name for factor in self.design.factors if factor.listed}
+        wanted = 1 + sum(len(factor.listed) for factor in self.design.factors)
+        for point in self.design:
+            new = {(name, repr(label)) for name, label in point.labels.items() if name in listed} - seen
+            if new or not seen:
+                seen |= new | {("", "")}
+                yield point
+            if len(seen) == wanted:
+                return
+
+    def run(self, ledger: Ledger, engine: Laboratory, observe: Observer) -> None:
+        """Run what is not done. Raises InputError before anything runs, and for criteria that the first run shows to be wrong."""
+
+        def look(record: Record) -> None:
+            if not record.failure:
+                self.passed(record.kpis)
+            observe(record)
+
+        if all(job.key in ledger for job in self.jobs()):
+            return
+        self.check(engine)
+        run_all(self.jobs(), ledger, engine, look)
+
+    def rows(self, ledger: Ledger) -> Iterator[Row]:
+        """Finished runs in the order of the design."""
+        for run, point in enumerate(self.design):
+            job = self.study.job(point.settings)
+            if job.key in ledger:
+                record = ledger[job.key]
+                yield Row(run, point, record, not record.failure and self.passed(record.kpis))
+
+
+def kpi_names(rows: Iterable[Row]) -> list[str]:
+    """Names of all KPIs, in the order in which runs show them."""
+    return list(dict.fromkeys(name for row in rows for name in row.record.kpis))

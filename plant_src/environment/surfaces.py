@@ -1,0 +1,62 @@
+"""What lies straight below a multirotor: decks, platforms and the water."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from .sea import Sea
+
+if TYPE_CHECKING:
+    from ..arguments import Platform
+    from ..shadow import Shadow
+
+#: so high above the still water (m) waves make no difference to a rotor any more
+HIGH = 5.0
+
+
+class Deck:
+    """The top of a vessel's highest box, of which the published `deck.position` is the centre."""
+
+    def __init__(self, vessel: Shadow):
+        half_x, half_y, _ = max(vessel.model.body.boxes, key=lambda box: box.position[2] + box.half_extents[2]).half_extents
+        self._half_x, self._half_y, self._reach = half_x, half_y, half_x + half_y
+        slots = vessel.model.slots("output")
+        self._outputs: Any = vessel.outputs.data
+        self._centre, self._orientation = slots.index("deck.position.x"), slots.index("orientation.w")
+
+    def height(self, x: float, y: float) -> float | None:
+        """Height of the deck (m, world frame) at a place that it is below or above."""
+        c, q, outputs = self._centre, self._orientation, self._outputs
+        dx, dy = x - outputs[c], y - outputs[c + 1]
+        if abs(dx) > self._reach or abs(dy) > self._reach:
+            return None
+        qw, qx, qy, qz = outputs[q], outputs[q + 1], outputs[q + 2], outputs[q + 3]
+        normal_x, normal_y, normal_z = 2 * (qx * qz + qw * qy), 2 * (qy * qz - qw * qx), 1 - 2 * (qx * qx + qy * qy)
+        if normal_z <= 0:
+            return None
+        dz = -(normal_x * dx + normal_y * dy) / normal_z
+        forward = (1 - 2 * (qy * qy + qz * qz)) * dx + 2 * (qx * qy + qw * qz) * dy + 2 * (qx * qz - qw * qy) * dz
+        left = 2 * (qx * qy - qw * qz) * dx + (1 - 2 * (qx * qx + qz * qz)) * dy + 2 * (qy * qz + qw * qx) * dz
+        inside = abs(forward) <= self._half_x and abs(left) <= self._half_y
+        return outputs[c + 2] + dz if inside else None
+
+
+class Below:
+    """Distances from the rotor planes of multirotors to the next surface straight below."""
+
+    def __init__(self, vessels: Sequence[Shadow], platforms: Sequence[Platform], sea: Sea):
+        self._decks, self._platforms, self._sea = [Deck(vessel) for vessel in vessels], platforms, sea
+
+    def distance(self, x: float, y: float, z: float, time: float, wave_gain: float) -> float:
+        """From a point in the world (m); zero below the water."""
+        surface = wave_gain * self._sea.elevation(x, y, time) if z < HIGH and len(self._sea.amplitude) else 0.0
+        for deck in self._decks:
+            height = deck.height(x, y)
+            if height is not None and surface < height <= z:
+                surface = height
+        for platform in self._platforms:
+            (px, py, pz), (ex, ey, ez) = platform.position, platform.size
+            if abs(x - px) <= ex / 2 and abs(y - py) <= ey / 2 and surface < pz + ez / 2 <= z:
+                surface = pz + ez / 2
+        return max(z - surface, 0.0)

@@ -1,0 +1,124 @@
+"""What a world looks like, as data for the 3-D replay: bodies, what keeps still, water, waypoints and what to plot.
+
+Everything follows from the scenario; nothing runs. Frame: world, z up, m; colours of parts: red, green, blue in 0 ... 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import cycle
+from typing import Any
+
+import numpy as np
+
+from ..catalogue import VEHICLES
+from ..environment import sea
+from ..environment.sea import Sea
+from .looks import looks
+from .models import platform
+
+Scene = dict[str, Any]
+
+#: trails of multirotors and vessels, as the figures draw the first of each
+FLYING, SAILING = ("#0072b2", "#56b4e9", "#cc79a7", "#7a5fb5"), ("#d55e00", "#e69f00", "#009e73", "#b8860b")
+
+#: at most so many vessels have a camera on board
+MOST_VIEWS = 3
+
+#: from a vessel's centre of mass (m): where the camera on board stands, and what it looks at
+ON_BOARD = {"eye": (-2.6, 0.0, 1.5), "target": (0.2, 0.0, 0.45)}
+
+
+def world(name: str, scenario: Mapping[str, Any]) -> Scene:
+    """The scene of the world that is the component `name` of a scenario."""
+    arguments = scenario["components"][name].get("arguments", {})
+    vehicles = {f"{name}.{vehicle}": about["model"] for vehicle, about in arguments["vehicles"].items()}
+    boxes = (platform(one["size"], one["position"]) for one in arguments.get("platforms", {}).values())
+    waves = _waves(sea(arguments.get("environment", {})))
+    return {
+        **_scene(vehicles, scenario),
+        "fixed": [part._asdict() for box in boxes for part in box],
+        "water": {"waves": waves, "gain": f"{name}.environment.wave_gain"},
+    }
+
+
+def free(scenario: Mapping[str, Any], vehicles: Mapping[str, str]) -> Scene:
+    """The scene of a scenario on plant FMUs alone; `vehicles`: component -> vehicle ("quadcopter": "ar_drone")."""
+    return {**_scene(vehicles, scenario), "fixed": [], "water": {"waves": [], "gain": 1}}
+
+
+def _waves(found: Sea) -> list[Scene]:
+    keys = ("amplitude", "frequency", "number", "direction", "phase")
+    return [dict(zip(keys, wave, strict=True)) for wave in np.stack(found, axis=1).tolist()]
+
+
+def _scene(vehicles: Mapping[str, str], scenario: Mapping[str, Any]) -> Scene:
+    colours = {False: cycle(FLYING), True: cycle(SAILING)}
+    bodies = [_body(name, vehicle, next(colours[_is_vessel(vehicle)])) for name, vehicle in vehicles.items()]
+    vessels = [name for name, vehicle in vehicles.items() if _is_vessel(vehicle)]
+    flying = [name for name in vehicles if name not in vessels]
+    colour_of = {body["name"]: body["colour"] for body in bodies}
+    return {
+        "bodies": bodies,
+        "views": [{"name": _view_name(vessel, vessels), "on": vessel, **ON_BOARD} for vessel in vessels[:MOST_VIEWS]],
+        "markers": list(_waypoints(scenario)),
+        "spans": [
+            {"signal": f"{name}.contact.touching", "label": f"{_short(name)} touches", "colour": colour_of[name]}
+            for name in flying
+        ],
+        "plots": _plots(flying[:1], vessels[:1]),
+    }
+
+
+def _is_vessel(vehicle: str) -> bool:
+    return next(iter(VEHICLES[vehicle].values())).is_vessel
+
+
+def _short(name: str) -> str:
+    return name.rpartition(".")[2]
+
+
+def _view_name(vessel: str, vessels: Sequence[str]) -> str:
+    return "Deck" if len(vessels) == 1 else f"Deck {_short(vessel)}"
+
+
+def _body(name: str, vehicle: str, colour: str) -> Scene:
+    return {
+        "name": name,
+        "title": _short(name),
+        "colour": colour,
+        "position": [f"{name}.position.{axis}" for axis in "xyz"],
+        "orientation": [f"{name}.orientation.{axis}" for axis in "wxyz"],
+        "parts": [part._asdict() for part in looks(vehicle)],
+    }
+
+
+def _waypoints(scenario: Mapping[str, Any]) -> Iterator[Scene]:
+    """Waypoints by the names of the vessel autopilots' parameters, those of nested systems too."""
+    for component in scenario["components"].values():
+        parameters = component.get("parameters", {})
+        for key, x in parameters.items():
+            prefix = key.removesuffix("waypoint_x")
+            y = parameters.get(f"{prefix}waypoint_y")
+            if prefix == key or not isinstance(x, list) or not isinstance(y, list):
+                continue
+            count = parameters.get(f"{prefix}waypoint_count", len(x))
+            radius = parameters.get(f"{prefix}acceptance_radius", 0.5)
+            for number, place in enumerate(list(zip(x, y, strict=False))[:count], start=1):
+                yield {"position": (*place, 0.0), "radius": radius, "label": str(number)}
+
+
+def _plots(flying: Sequence[str], sailing: Sequence[str]) -> list[list[str]]:
+    """Height, path, force and attitude: patterns of signals, a list for each plot."""
+    return [
+        [*_of(flying, "position.z"), *_of(sailing, "deck.position.z")],
+        [*_of(flying, "velocity.*")],
+        [*_of(flying, "attitude.roll"), *_of(flying, "attitude.pitch")],
+        [*_of(flying, "contact.force")],
+        [*_of(sailing, "attitude.yaw")],
+        [*_of(sailing, "velocity_body.u"), *_of(sailing, "velocity_body.v")],
+    ]
+
+
+def _of(names: Iterable[str], signal: str) -> list[str]:
+    return [f"{name}.{signal}" for name in names]

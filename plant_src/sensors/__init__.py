@@ -1,0 +1,1 @@
+"""Sensors and signal faults: components between the plant and its controllers."""

@@ -1,0 +1,60 @@
+"""Barometer: air pressure, and the altitude that follows from it in the standard atmosphere."""
+
+from __future__ import annotations
+
+from .noise import Noise, gauss_markov
+from .sampled import Measurement, SampledSensor, timing
+from .signals import parameter, real
+
+#: international standard atmosphere, ISO 2533: p = p0 (1 - L z / T0)^EXPONENT
+STANDARD_PRESSURE = 101325.0  # Pa
+_LAPSE_PER_METRE = 0.0065 / 288.15  # 1/m
+_EXPONENT = 9.80665 * 0.0289644 / (8.31446 * 0.0065)
+
+
+def pressure_at(altitude: float, at_zero: float = STANDARD_PRESSURE) -> float:
+    """Pressure (Pa) at an altitude (m) when it is `at_zero` (Pa) on the water."""
+    return at_zero * (1 - _LAPSE_PER_METRE * altitude) ** _EXPONENT
+
+
+def altitude_at(pressure: float, at_zero: float = STANDARD_PRESSURE) -> float:
+    """Altitude (m) at which there is a pressure (Pa)."""
+    return (1 - (pressure / at_zero) ** (1 / _EXPONENT)) / _LAPSE_PER_METRE
+
+
+class Barometer(SampledSensor):
+    """`pressure` (Pa), `altitude` (m, what a reader makes of it with the standard pressure at zero), `time` (s).
+
+    pressure = that of the true altitude + drift (Gauss-Markov) + white noise. Numbers: Bosch BMP388 data sheet
+    BST-BMP388-DS001: noise 1.2 Pa (standard resolution without filter), relative accuracy 8 Pa for the drift, whose time is
+    typical. `pressure_at_zero` (Pa) may change in time like the weather. Inputs: `vehicle.position.z`.
+    """
+
+    memory = (*SampledSensor.memory, "_drift")
+    _drift: float
+
+    def __init__(self, instance_name: str, seed: int = 0):
+        super().__init__(
+            instance_name,
+            [
+                real("vehicle.position.z", "m", "input"),
+                parameter("noise", "Pa", 1.2, "standard deviation of the white noise"),
+                parameter("drift", "Pa", 8.0, "standard deviation of the slow error"),
+                parameter("correlation_time", "s", 300.0, "of the slow error", 1e-3),
+                parameter("pressure_at_zero", "Pa", STANDARD_PRESSURE, "true pressure at z = 0", 5e4, 2e5),
+                real("pressure", "Pa", "output"),
+                real("altitude", "m", "output", description="of the centre of mass, from the pressure"),
+                *timing(50.0),
+            ],
+        )
+        self._noise = Noise(2, "barometer", instance_name, seed)
+
+    def measure(self, number: int, elapsed: float) -> Measurement:
+        p, (white, slow) = self.parameters, self._noise[number]
+        if elapsed:
+            keep, drive = gauss_markov(p["drift"], p["correlation_time"], elapsed)
+            self._drift = keep * self._drift + drive * slow
+        else:
+            self._drift = p["drift"] * slow
+        pressure = pressure_at(self.inputs[0], p["pressure_at_zero"]) + self._drift + p["noise"] * white
+        return (pressure, altitude_at(pressure)), ()

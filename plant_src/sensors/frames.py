@@ -1,0 +1,82 @@
+"""Rotations in plain floats: NumPy takes longer for three numbers. Quaternions are (w, x, y, z), body to world, of length 1."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+
+def to_world(q: Sequence[float], v: Sequence[float]) -> Vector:
+    """A vector in body axes as one in world axes."""
+    return _turn(q[0], q[1], q[2], q[3], v)
+
+
+def to_body(q: Sequence[float], v: Sequence[float]) -> Vector:
+    """A vector in world axes as one in body axes."""
+    return _turn(q[0], -q[1], -q[2], -q[3], v)
+
+
+def _turn(w: float, x: float, y: float, z: float, v: Sequence[float]) -> Vector:
+    a, b, c = v
+    s, t, u = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    return a + w * s + y * u - z * t, b + w * t + z * s - x * u, c + w * u + x * t - y * s
+
+
+def product(a: Sequence[float], b: Sequence[float]) -> Quaternion:
+    """The rotation b followed by a, in fixed axes."""
+    w, x, y, z = a
+    o, p, q, r = b
+    return (
+        w * o - x * p - y * q - z * r,
+        w * p + x * o + y * r - z * q,
+        w * q - x * r + y * o + z * p,
+        w * r + x * q - y * p + z * o,
+    )
+
+
+def inverse(q: Sequence[float]) -> Quaternion:
+    """World to body."""
+    return q[0], -q[1], -q[2], -q[3]
+
+
+def unit(q: Sequence[float]) -> Quaternion:
+    """The same direction, of length 1."""
+    w, x, y, z = q
+    length = math.sqrt(w * w + x * x + y * y + z * z)
+    return w / length, x / length, y / length, z / length
+
+
+def rotation(v: Sequence[float]) -> Quaternion:
+    """The quaternion of a rotation vector (rad)."""
+    x, y, z = v
+    angle = math.sqrt(x * x + y * y + z * z)
+    share = math.sin(angle / 2) / angle if angle > 1e-9 else 0.5
+    return math.cos(angle / 2), share * x, share * y, share * z
+
+
+def halfway(a: Sequence[float], b: Sequence[float]) -> Quaternion:
+    """The attitude in the middle of the shorter way from one to another."""
+    s = 1.0 if a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] >= 0 else -1.0
+    return unit((a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2], a[3] + s * b[3]))
+
+
+def angles(q: Sequence[float]) -> Vector:
+    """Roll, pitch and yaw (rad, ZYX)."""
+    w, x, y, z = q
+    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
+    return roll, pitch, math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def from_angles(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """The quaternion of roll, pitch and yaw (rad, ZYX)."""
+    about_z, about_y, about_x = rotation((0.0, 0.0, yaw)), rotation((0.0, pitch, 0.0)), rotation((roll, 0.0, 0.0))
+    return product(product(about_z, about_y), about_x)
+
+
+def cross(a: Sequence[float], b: Sequence[float]) -> Vector:
+    """The vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

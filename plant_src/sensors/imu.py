@@ -1,0 +1,138 @@
+"""Inertial measurement unit: three gyroscopes and three accelerometers in the body axes, one sample a step.
+
+Each axis: y = range(M x + c + b_0 + b + N / sqrt(h) n), with x the true value, M the matrix of scale and misalignment, c the
+constant bias, b_0 ~ turn-on bias, b a Gauss-Markov process driven by white noise of density K (bias walk), N the noise density
+and h the step: the model of IEEE Std 952 and of the kalibr and RotorS projects. Its Allan deviation is N / sqrt(tau) for short
+and K sqrt(tau / 3) for long averages well below the correlation time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from cosim.component import Variable
+
+from ..reading import Reader
+from .frames import Vector, halfway, to_body
+from .noise import Noise, gauss_markov
+from .parameters import INERTIAL, Numbers
+from .signals import SignalComponent, accept, parameter, real, vector
+
+GRAVITY = 9.81  # m/s2, as in the equations of the vehicles
+_IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+class _Triad(NamedTuple):
+    """What three like axes need in a step."""
+
+    matrix: Sequence[float] | None
+    offset: Vector
+    sigma: float
+    keep: float
+    drive: float
+    range: float
+
+
+class Imu(SignalComponent):
+    """`acceleration.x|y|z`: specific force (m/s2, body axes; +g upwards at rest, 0 in free fall), `rates.p|q|r` (rad/s).
+
+    The specific force is the mean over the step: the change of velocity, less that by gravity, in the attitude halfway. So
+    contact shows as it does in the published velocity. `device` names a set of numbers ("bmi088", "adis16448"), each of which
+    can be changed as a parameter; `seed` with the component's name determines all noise. Inputs: `vehicle.velocity`,
+    `vehicle.orientation`, `vehicle.rates`. Raises InputError for an unknown device.
+    """
+
+    memory = ("_step", "_last", "_biases")
+
+    def __init__(self, instance_name: str, seed: int = 0, device: str = "bmi088"):
+        reader = Reader()
+        device = reader.choice(device, ("device",), list(INERTIAL))
+        accept(reader)
+        super().__init__(
+            instance_name,
+            [
+                *vector("vehicle.velocity", "xyz", "m/s", "input"),
+                *(real(f"vehicle.orientation.{part}", "1", "input", float(part == "w")) for part in "wxyz"),
+                *vector("vehicle.rates", "pqr", "rad/s", "input"),
+                *_triad("gyroscope", "rad/s", INERTIAL[device]["gyroscope"]),
+                *_triad("accelerometer", "m/s2", INERTIAL[device]["accelerometer"]),
+                *vector("acceleration", "xyz", "m/s2", "output", text="specific force"),
+                *vector("rates", "pqr", "rad/s", "output", text="angular velocity"),
+            ],
+        )
+        self._noise = Noise(12, "imu", instance_name, seed)
+        self._turn_on = Noise(6, "imu turn-on", instance_name, seed)[0]
+        self._step_size = 0.01
+
+    def prepare(self) -> None:
+        self._accelerometer = self._coefficients("accelerometer", self._turn_on[:3])
+        self._gyroscope = self._coefficients("gyroscope", self._turn_on[3:])
+
+    def _coefficients(self, kind: str, turn_on: Sequence[float]) -> _Triad:
+        p = {name.partition(".")[2]: value for name, value in self.parameters.items() if name.startswith(kind)}
+        matrix, offset = p["matrix"], [c + p["turn_on_bias"] * n for c, n in zip(p["bias"], turn_on, strict=True)]
+        sigma = p["bias_walk"] * math.sqrt(p["correlation_time"] / 2)
+        keep, drive = gauss_markov(sigma, p["correlation_time"], self._step_size)
+        white = p["noise_density"] / math.sqrt(self._step_size)
+        return _Triad(
+            None if tuple(matrix) == _IDENTITY else matrix, (offset[0], offset[1], offset[2]), white, keep, drive, p["range"]
+        )
+
+    def begin(self) -> None:
+        self._step, self._last = 0, self.inputs
+        self._biases: Sequence[float] = (0.0,) * 6
+        self._measure((0.0, 0.0, GRAVITY), self.inputs[3:7], self._noise[0])
+
+    def advance(self, now: float, step_size: float) -> None:
+        if step_size != self._step_size:
+            self._step_size = step_size
+            self.prepare()
+        self._step += 1
+        row, last, new = self._noise[self._step], self._last, self.inputs
+        self._wander(row)
+        h = step_size
+        force = ((new[0] - last[0]) / h, (new[1] - last[1]) / h, (new[2] - last[2]) / h + GRAVITY)
+        self._last = new
+        self._measure(force, halfway(last[3:7], new[3:7]), row)
+
+    def _wander(self, row: Sequence[float]) -> None:
+        """The biases from the last step to this one."""
+        b, keep, drive = self._biases, self._accelerometer.keep, self._accelerometer.drive
+        x, y, z = keep * b[0] + drive * row[6], keep * b[1] + drive * row[7], keep * b[2] + drive * row[8]
+        keep, drive = self._gyroscope.keep, self._gyroscope.drive
+        p, q, r = keep * b[3] + drive * row[9], keep * b[4] + drive * row[10], keep * b[5] + drive * row[11]
+        self._biases = x, y, z, p, q, r
+
+    def _measure(self, force: Vector, attitude: Sequence[float], row: Sequence[float]) -> None:
+        """Outputs from the specific force in world axes and an attitude."""
+        x, y, z = _sensed(self._accelerometer, to_body(attitude, force), self._biases[:3], row)
+        self.outputs = (x, y, z, *_sensed(self._gyroscope, self.inputs[7:10], self._biases[3:], row[3:]))
+
+
+def _sensed(triad: _Triad, true: Sequence[float], bias: Sequence[float], row: Sequence[float]) -> Vector:
+    matrix, offset, sigma, limit = triad.matrix, triad.offset, triad.sigma, triad.range
+    x, y, z = true
+    if matrix:
+        a, b, c, d, e, f, g, h, i = matrix
+        x, y, z = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+    x += offset[0] + bias[0] + sigma * row[0]
+    y += offset[1] + bias[1] + sigma * row[1]
+    z += offset[2] + bias[2] + sigma * row[2]
+    if -limit <= x <= limit and -limit <= y <= limit and -limit <= z <= limit:
+        return x, y, z
+    return max(-limit, min(limit, x)), max(-limit, min(limit, y)), max(-limit, min(limit, z))
+
+
+def _triad(kind: str, unit: str, numbers: Numbers) -> list[Variable]:
+    # densities are in unit/sqrt(Hz), which integer exponents of units cannot say
+    return [
+        parameter(f"{kind}.noise_density", "", numbers["noise_density"], f"of white noise, {unit}/sqrt(Hz)"),
+        parameter(f"{kind}.bias_walk", "", numbers["bias_walk"], f"density that drives the bias, {unit}/s/sqrt(Hz)"),
+        parameter(f"{kind}.correlation_time", "s", numbers["correlation_time"], "of the wandering bias", 1e-3),
+        parameter(f"{kind}.turn_on_bias", unit, numbers["turn_on_bias"], "standard deviation of the bias at turn-on"),
+        parameter(f"{kind}.range", unit, numbers["range"], "largest value that is measured"),
+        real(f"{kind}.bias", unit, "parameter", (0.0,) * 3, "constant bias", shape=(3,)),
+        real(f"{kind}.matrix", "1", "parameter", _IDENTITY, "scale and misalignment, row by row", shape=(9,)),
+    ]

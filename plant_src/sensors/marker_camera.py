@@ -1,0 +1,101 @@
+"""A camera that finds the marker on a landing deck: where the deck is, seen from the vehicle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from .frames import Vector, angles, inverse, product, to_body, to_world
+from .noise import Noise, uniform
+from .optics import camera_attitude, pixels, seen_from
+from .sampled import Measurement, SampledSensor, timing
+from .signals import flag, parameter, pose_inputs, real, vector
+
+
+class MarkerCamera(SampledSensor):
+    """`position.x|y|z` (m): from the vehicle's centre of mass to the deck's centre, in the body axes of the vehicle;
+    `attitude.roll|pitch|yaw` (rad, ZYX): of the deck in these axes; `time` (s) of the picture; `valid`.
+
+    A square marker of edge `marker_size` (m) lies in the middle of the deck. It is found when its four corners are in the
+    picture (`width` by `height` pixels, pinhole of `focal_length` pixels), it is seen from above at no more than `incidence`
+    (rad) from its normal, and its edge seems at least `smallest` pixels long; then still a share `drop_out` of the pictures
+    fails. Otherwise `valid` is false and the last pose stays.
+
+    With `pixel_noise` s, focal length f, marker size m and depth z the errors are s z / f across the view, s z^2 / (f m) along
+    it, s z / (f m) in yaw and `tilt_ratio` times that in roll and pitch: what corners that are off by s pixels make of a pinhole
+    camera, to first order. Numbers: the camera below an AR.Drone, 320 by 240 pixels, 64 degrees across the diagonal; rate,
+    latency and drop-outs are typical of ArUco markers on small computers.
+
+    The camera sits at `mounting` (m, body axes), tilted forward from straight down by `tilt` (rad). Inputs: `vehicle` and
+    `deck`, each `position` and `orientation` ("plant.usv.deck" has the position, "plant.usv.orientation" the other).
+    """
+
+    def __init__(self, instance_name: str, seed: int = 0):
+        super().__init__(
+            instance_name,
+            [
+                *pose_inputs("vehicle"),
+                *pose_inputs("deck"),
+                parameter("marker_size", "m", 0.4, "edge of the marker", 1e-3),
+                parameter("focal_length", "1", 320.0, "pixels", 1.0),
+                parameter("width", "1", 320.0, "pixels of a picture from left to right", 1.0),
+                parameter("height", "1", 240.0, "pixels of a picture from top to bottom", 1.0),
+                parameter("smallest", "1", 12.0, "pixels along an edge of the marker that can still be read"),
+                parameter("incidence", "rad", 1.2, "largest angle between view and normal of the marker", 0.0, math.pi / 2),
+                parameter("drop_out", "1", 0.02, "share of pictures in which the marker is overlooked", 0.0, 1.0),
+                parameter("pixel_noise", "1", 0.3, "standard deviation of a corner, pixels"),
+                parameter("tilt_ratio", "1", 3.0, "how much worse roll and pitch are seen than yaw"),
+                parameter("tilt", "rad", 0.0, "of the camera, from straight down to ahead", -math.pi, math.pi),
+                real("mounting", "m", "parameter", (0.0, 0.0, 0.0), "place of the camera, body axes", shape=(3,)),
+                *vector("position", "xyz", "m", "output", text="centre of the deck, body axes"),
+                *(real(f"attitude.{angle}", "rad", "output") for angle in ("roll", "pitch", "yaw")),
+                *timing(30.0, 0.05),
+                flag("valid", "output", "the marker was found"),
+            ],
+        )
+        self._noise = Noise(7, "marker camera", instance_name, seed)
+
+    def prepare(self) -> None:
+        self._camera = camera_attitude(self.parameters["tilt"])
+
+    def measure(self, number: int, elapsed: float) -> Measurement:
+        row, attitude = self._noise[number], self.inputs[3:7]
+        a, b, c = to_world(attitude, self.parameters["mounting"])
+        place = (self.inputs[0] + a, self.inputs[1] + b, self.inputs[2] + c)
+        camera = product(attitude, self._camera)
+        if uniform(row[6]) < self.parameters["drop_out"] or not self._is_seen(place, camera):
+            return (), (False,)
+        seen = seen_from(place, camera, self.inputs[7:10])
+        return (*self._position(seen, row), *self._attitude(seen[2], row[3:])), (True,)
+
+    def _is_seen(self, place: Vector, camera: Sequence[float]) -> bool:
+        p, deck, attitude = self.parameters, self.inputs[7:10], self.inputs[10:14]
+        x, y, z = to_body(attitude, (place[0] - deck[0], place[1] - deck[1], place[2] - deck[2]))
+        if z <= 0 or z < math.cos(p["incidence"]) * math.sqrt(x * x + y * y + z * z):
+            return False
+        half = p["marker_size"] / 2
+        for side in ((half, half), (half, -half), (-half, -half), (-half, half)):
+            a, b, c = to_world(attitude, (*side, 0.0))
+            corner = seen_from(place, camera, (deck[0] + a, deck[1] + b, deck[2] + c))
+            if corner[2] <= 0 or not self._in_picture(*pixels(corner, p["focal_length"])):
+                return False
+        depth = seen_from(place, camera, deck)[2]
+        return p["focal_length"] * p["marker_size"] >= p["smallest"] * depth
+
+    def _in_picture(self, right: float, down: float) -> bool:
+        return abs(right) <= self.parameters["width"] / 2 and abs(down) <= self.parameters["height"] / 2
+
+    def _position(self, seen: Vector, row: Sequence[float]) -> Vector:
+        """Body axes, from the place in camera axes."""
+        p, (x, y, z), mounting = self.parameters, seen, self.parameters["mounting"]
+        across = p["pixel_noise"] * z / p["focal_length"]
+        along = across * z / p["marker_size"]
+        a, b, c = to_world(self._camera, (x + across * row[0], y + across * row[1], z + along * row[2]))
+        return a + mounting[0], b + mounting[1], c + mounting[2]
+
+    def _attitude(self, depth: float, row: Sequence[float]) -> Vector:
+        p = self.parameters
+        sigma = p["pixel_noise"] * depth / (p["focal_length"] * p["marker_size"])
+        roll, pitch, yaw = angles(product(inverse(self.inputs[3:7]), self.inputs[10:14]))
+        tilted = p["tilt_ratio"] * sigma
+        return roll + tilted * row[0], pitch + tilted * row[1], yaw + sigma * row[2]

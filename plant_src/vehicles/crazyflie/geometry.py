@@ -1,0 +1,18 @@
+"""What Bullet knows of the nano quadcopter, in the principal-axis frame at the centre of mass."""
+
+from __future__ import annotations
+
+from ..shapes import Body, standing_box
+from .parameters import AIRFRAME
+
+#: distance of the motor mounts, on which it stands, along x and y: the rotors' [pybullet-drones] (m)
+EDGE = 0.056
+
+#: bottom of the motor mounts and top of the battery from the centre of mass: 29 mm in all [bitcraze], the share below assumed (m)
+FEET_HEIGHT, TOP_HEIGHT = -0.012, 0.017
+
+BODY = Body(
+    AIRFRAME.mass,
+    tuple(AIRFRAME.principal_axes()[0].tolist()),
+    (standing_box(AIRFRAME.principal_axes()[1], (EDGE, EDGE), FEET_HEIGHT, TOP_HEIGHT),),
+)

@@ -1,0 +1,49 @@
+"""Sine, cosine and exponential in plain arithmetic, as CasADi expressions: several times as fast as those of the C library where
+many are needed, accurate to 1e-13, and the same on every machine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import casadi as ca
+
+_SINE = tuple((-1) ** k / math.factorial(2 * k + 1) for k in range(8))
+_COSINE = tuple((-1) ** k / math.factorial(2 * k) for k in range(9))
+_EXPONENTIAL = tuple(1 / math.factorial(k) for k in range(7))
+
+#: a whole turn in two parts, the first with so few digits that its multiples are exact
+_TURN = 6.28125
+_TURN_REST = 0.001935307179586476925286766559
+
+#: what is taken away from it is rounded to a whole number: it is so large that its last place counts 1
+_WHOLE = 1.5 * 2.0**52
+
+_SQUARINGS = 8
+
+
+def sine_and_cosine(angle: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Of an angle (rad) below 1e6: series for a quarter of what is left of it without whole turns, doubled twice."""
+    turns = _WHOLE - (_WHOLE - angle * (1 / (2 * math.pi)))
+    quarter = ((angle - turns * _TURN) - turns * _TURN_REST) * 0.25
+    square = quarter * quarter
+    sine, cosine = quarter * _series(_SINE, square), _series(_COSINE, square)
+    for _ in range(2):
+        sine, cosine = 2 * sine * cosine, 1 - 2 * sine * sine
+    return sine, cosine
+
+
+def exponential(x: ca.SX) -> ca.SX:
+    """Of a number of moderate size (|x| < 3 for 1e-13): a power of a series."""
+    power = _series(_EXPONENTIAL, x * 2.0**-_SQUARINGS)
+    for _ in range(_SQUARINGS):
+        power = power * power
+    return power
+
+
+def _series(coefficients: Sequence[float], x: ca.SX) -> ca.SX:
+    """A polynomial by Horner's rule, the lowest power first."""
+    result = ca.SX(coefficients[-1])
+    for coefficient in coefficients[-2::-1]:
+        result = result * x + coefficient
+    return result

@@ -1,0 +1,1 @@
+"""A hexacopter for survey flights, of the class of the Tarot FY680."""

@@ -1,0 +1,133 @@
+"""The world of one scenario as a PythonFMU class, for importers that know FMUs only.
+
+`world_fmu.json` beside this file holds the arguments of the world: Demo 1's plant. For another one write another file of that
+name and export again: `cosim build plant_src/world_fmu.py --output my_world.fmu`. The host needs Python with this project and
+PyBullet installed.
+"""
+
+from __future__ import annotations
+
+import json
+import weakref
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
+
+from cosim.component import Ports, Variable
+
+from .world import State, World
+
+ARGUMENTS = Path(__file__).parent / "world_fmu.json"
+
+
+class Quantity(Real):
+    """A Real variable with a unit."""
+
+    def __init__(self, name: str, unit: str, **attributes: Any):
+        super().__init__(name, **attributes)
+        self.unit = unit
+
+    def to_xml(self) -> Element:
+        element = super().to_xml()
+        if self.unit:
+            element[0].set("unit", self.unit)
+        return element
+
+
+class Saved:
+    """A state of the world with the bound values; Bullet forgets it together with this object."""
+
+    def __init__(self, world: World, ports: list[np.ndarray]):
+        self.state: State = world.get_state()
+        self.values = [array.copy() for array in ports]
+        weakref.finalize(self, world.free_state, self.state)
+
+
+class WorldFmu(Fmi2Slave):
+    """Vehicles, platforms and environment in one PyBullet client; variables are those of `world.World`, arrays by elements."""
+
+    description = "Quadcopter and vessel in one PyBullet world"
+
+    def __init__(self, **arguments: Any):
+        super().__init__(**arguments)
+        self._world = World(self.instance_name, **json.loads(ARGUMENTS.read_text()))
+        weakref.finalize(self, self._world.free)
+        inputs, outputs = (self._ports(causality) for causality in ("input", "output"))
+        for variable in inputs.variables:
+            self._view(inputs, variable)[:] = self._world.get(variable.name)
+        self._world.bind(inputs, outputs)
+        self._world.get_outputs()
+        self._arrays = [*inputs.arrays.values(), *outputs.arrays.values()]
+        self._start_time = 0.0
+        for ports in (inputs, outputs):
+            for variable in ports.variables:
+                self._register(variable, self._view(ports, variable))
+
+    def _ports(self, causality: str) -> Ports:
+        variables = [variable for variable in self._world.variables if variable.causality == causality]
+        counts: dict[np.dtype[Any], int] = {}
+        for variable in variables:
+            counts[variable.dtype] = counts.get(variable.dtype, 0) + len(variable.slots)
+        return Ports(variables, {dtype: np.zeros(count, dtype) for dtype, count in counts.items()})
+
+    @staticmethod
+    def _view(ports: Ports, variable: Variable) -> np.ndarray:
+        """The part of the ports where a variable lies."""
+        before = ports.variables[: ports.variables.index(variable)]
+        first = sum(len(other.slots) for other in before if other.dtype == variable.dtype)
+        return ports.arrays[variable.dtype][first : first + len(variable.slots)]
+
+    def _register(self, variable: Variable, values: np.ndarray) -> None:
+        data: Any = values.data
+        for index, slot in enumerate(variable.slots):
+            attributes: dict[str, Any] = {
+                "causality": Fmi2Causality[variable.causality],
+                "description": variable.description,
+                "getter": _getter(data, index),
+                "setter": _setter(data, index),
+            }
+            if variable.type == "Boolean":
+                made = Boolean(slot, variability=Fmi2Variability.discrete, **attributes)
+            else:
+                made = Quantity(slot, variable.unit.name if variable.unit else "", **attributes)
+            self.register_variable(made, nested=False)
+
+    def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
+        self._start_time = start_time
+
+    def enter_initialization_mode(self) -> None:
+        self._world.enter_initialization_mode(self._start_time, float("inf"))
+
+    def exit_initialization_mode(self) -> None:
+        self._world.set_inputs()
+        self._world.exit_initialization_mode()
+        self._world.get_outputs()
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        self._world.set_inputs()
+        self._world.do_step(current_time, step_size)
+        self._world.get_outputs()
+        return True
+
+    def _get_fmu_state(self) -> Any:
+        return Saved(self._world, self._arrays)
+
+    def _set_fmu_state(self, state: Any) -> None:
+        self._world.set_state(state.state)
+        for array, values in zip(self._arrays, state.values, strict=True):
+            array[:] = values
+
+
+def _getter(data: Any, index: int) -> Callable[[], Any]:
+    return lambda: data[index]
+
+
+def _setter(data: Any, index: int) -> Callable[[Any], None]:
+    def set_value(value: Any) -> None:
+        data[index] = value
+
+    return set_value

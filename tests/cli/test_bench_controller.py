@@ -1,0 +1,240 @@
+"""`cosim bench-controller`: controllers in the place of the Strider's autopilot, and of others."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from itertools import pairwise
+
+import pytest
+from faults.fault_fmu import FaultFmus, build_library
+
+from cosim import resources
+
+ROOT = resources.root()
+MISSION = {
+    "speed_command": 1.0,
+    "acceptance_radius": 0.5,
+    "waypoint_count": 2,
+    "waypoint_x": [4.0, 4.0],
+    "waypoint_y": [0.0, 4.0],
+    "heading_P": 1.0,
+}
+SAIL = {
+    "name": "sail",
+    "stop_time": 12,
+    "step_size": 0.01,
+    "components": {
+        "usv": {"fmu": str(ROOT / "fmus/strider_autopilot.fmu"), "parameters": MISSION},
+        "vessel": {"fmu": str(ROOT / "fmus/strider.fmu"), "parameters": {"initial.velocity_body.u": 0.5}},
+    },
+    "connections": [
+        {"from": "vessel", "to": "usv.vehicle"},
+        {"from": "usv.thrust", "to": "vessel.thrust"},
+        {"from": "usv.rudder_angle", "to": "vessel.rudder_angle"},
+    ],
+    "kpis": [
+        {
+            "name": "waypoints",
+            "python": str(ROOT / "plant_src/kpis.py:waypoints"),
+            "arguments": {"vehicle": "vessel", "x": [4.0, 4.0], "y": [0.0, 4.0], "radius": 0.5},
+        },
+        {"name": "away", "python": "cosim.kpis:final", "arguments": {"signal": "usv.distance"}},
+    ],
+    "checks": [{"kpi": "waypoints.all_reached", "equals": True}, {"kpi": "away.value", "max": 1.0}],
+    "reference": {"file": "references/sail.csv", "tolerances": {"vessel.*": {"absolute": 1e-9}}},
+}
+KEEPER = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+
+class Keeper(Fmi2Slave):
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        {first}
+        self.values = {{}}
+        for causality, names in {names}.items():
+            for name in names:
+                self.register(name, getattr(Fmi2Causality, causality), {units}.get(name))
+
+    def register(self, name, causality, unit):
+        variable = Real(name, causality=causality, getter=lambda: self.values.get(name, 0.0),
+                        setter=lambda value: self.values.update({{name: value}}))
+        variable.unit = unit
+        self.register_variable(variable)
+
+    def do_step(self, current_time, step_size):
+        self.values["thrust"] = 10.0
+        return True
+"""
+
+
+def keeper(folder, inputs=("vehicle.position.x",), outputs=("thrust", "rudder_angle"), units=None, first="pass"):
+    path = folder / "keeper.py"
+    path.write_text(KEEPER.format(first=first, names={"input": inputs, "output": outputs}, units=units or {}))
+    return f"{path}:Keeper"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "scenarios").mkdir()
+    (tmp_path / "scenarios/sail.json").write_text(json.dumps(SAIL))
+    return tmp_path
+
+
+def bench(folder, controller, *arguments, role="usv_autopilot"):
+    command = [sys.executable, "-m", "cosim", "bench-controller", str(controller), "--role", role, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
+
+
+def words(done, name):
+    """The words of a KPI's line in the table."""
+    return next(line.split() for line in done.stdout.splitlines() if line.startswith(name))
+
+
+def lazy(folder):
+    """The autopilot as a nested system whose rudder hardly moves."""
+    system = json.loads((ROOT / "scenarios/systems/strider_autopilot.json").read_text())
+    for component in system["components"].values():
+        component["fmu"] = str((ROOT / "scenarios/systems" / component["fmu"]).resolve())
+    system["components"]["heading"]["parameters"] = {"rudder_limit": 0.02}
+    path = folder / "lazy.json"
+    path.write_text(json.dumps(system))
+    return path
+
+
+def test_another_build_of_the_shipped_controller_is_neither_better_nor_worse(folder):
+    done = bench(folder, ROOT / "fmus/python/strider_autopilot.fmu", "--json")
+    assert done.returncode == 0, done.stdout + done.stderr
+    (sail,) = json.loads(done.stdout)["scenarios"]
+    assert len(sail["kpis"]) == 5 and all(kpi["against_shipped"] == "" for kpi in sail["kpis"])
+    assert [kpi["candidate"] for kpi in sail["kpis"]] == pytest.approx([kpi["shipped"] for kpi in sail["kpis"]], rel=1e-9)
+    assert {kpi["name"]: kpi["unit"] for kpi in sail["kpis"]}["away.value"] == "m"
+
+
+def test_a_worse_controller_is_told_so_and_a_better_one_too(folder):
+    path = lazy(folder)
+    worse = bench(folder, path)
+    assert worse.returncode == 3
+    assert "FAILED  sail" in worse.stdout and "waypoints.all_reached is 0, expected equals true" in worse.stdout
+    assert words(worse, "waypoints.reached")[1:] == ["1", "2", "worse"]
+    assert words(worse, "waypoints.time[2]")[1:] == ["s", "-", words(worse, "waypoints.time[2]")[3], "worse"]
+    assert "last run" not in worse.stdout
+    path.write_text(path.read_text().replace("0.02", "0.7"))
+    better = bench(folder, path)
+    assert better.returncode == 0
+    assert words(better, "waypoints.reached")[1:] == ["2", "2", "1", "better"]
+    assert "last run" in better.stdout
+
+
+def test_what_does_not_fit_is_said_at_once(folder):
+    source = keeper(
+        folder,
+        ["vehicle.position.x", "vehicle.postion.y", "wind"],
+        ["thrust", "rudder_angel"],
+        {"thrust": "m", "vehicle.position.x": "cm"},
+    )
+    done = bench(folder, source)
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        f'{source}: the output "rudder_angle" (rad) is missing; did you mean "rudder_angel"?',
+        f'{source}: nothing feeds the input "vehicle.postion.y" in this role; did you mean "vehicle.position.y"?',
+        f'{source}: nothing feeds the input "wind" in this role',
+        f'{source}: "thrust" has the unit "m", expected "N" or what converts to it',
+    ]
+    assert not (folder / "runs/bench/shipped").exists()
+
+
+def test_an_output_that_is_an_input_is_named(folder):
+    done = bench(folder, keeper(folder, ["rudder_angle"], ["thrust"]))
+    assert '"rudder_angle" is an input, expected an output' in done.stderr
+
+
+def test_what_the_scenario_says_about_missing_variables_is_left_out_and_noted(folder):
+    done = bench(folder, keeper(folder))
+    assert done.returncode == 3
+    assert 'note: sail: kpi "away" is left out: the candidate has no "usv.distance"' in done.stdout
+    assert 'note: sail: "usv.waypoint_count" is left out: the candidate has nothing of that name' in done.stdout
+    written = json.loads((folder / "runs/bench/usv_autopilot/Keeper/scenarios/sail.json").read_text())
+    assert written["components"]["usv"] == {"parameters": {}, "python": f"{folder / 'keeper.py'}:Keeper"}
+    assert [kpi["name"] for kpi in written["kpis"]] == ["waypoints"] and "reference" not in written
+
+
+def test_a_controller_that_ends_the_process_at_once_is_named(folder):
+    done = bench(folder, keeper(folder, first="import os; os.abort()"))
+    assert done.returncode == 1
+    assert "candidate" in done.stderr and "SIGABRT" in done.stderr
+
+
+@pytest.fixture(scope="module")
+def fault_libraries(tmp_path_factory):
+    library = tmp_path_factory.mktemp("fault")
+    return {2: build_library(2, library)}
+
+
+def test_an_fmu_that_crashes_in_flight_fails_its_scenario_alone(tmp_path, fault_libraries):
+    """A role of one's own: a lag."""
+    shipped = FaultFmus(fault_libraries, tmp_path)(2, name="shipped")
+    role = {"description": "A lag.", "controllers": ["shipped.fmu"], "inputs": {"u": ""}, "outputs": {"y": ""}}
+    (tmp_path / "lag.json").write_text(json.dumps(role))
+    (tmp_path / "scenarios").mkdir()
+    for name, stop_time in (("short", 0.03), ("long", 0.1)):
+        kpis = [{"name": "end", "python": "cosim.kpis:final", "arguments": {"signal": "lag.y"}}]
+        content = {"name": name, "stop_time": stop_time, "step_size": 0.01, "components": {"lag": {"fmu": str(shipped)}}}
+        (tmp_path / f"scenarios/{name}.json").write_text(json.dumps({**content, "kpis": kpis}))
+    crashing = FaultFmus(fault_libraries, tmp_path)(2, "DoStep 6 segv", name="crashing")
+    done = bench(tmp_path, crashing, role="lag.json")
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "passed  short" in done.stdout and "FAILED  long" in done.stdout
+    assert any("lag: do_step" in line and "SIGSEGV" in line for line in done.stdout.splitlines())
+    at_once = bench(tmp_path, FaultFmus(fault_libraries, tmp_path)(2, "Instantiate 1 segv", name="never"), role="lag.json")
+    assert at_once.returncode == 1 and "SIGSEGV" in at_once.stderr
+
+
+def test_the_shipped_controllers_run_is_used_again_until_something_changes(folder):
+    times = []
+    for rate in (0.5, 0.5, 0.6):
+        (folder / "scenarios/sail.json").write_text(
+            json.dumps(SAIL).replace('"initial.velocity_body.u": 0.5', f'"initial.velocity_body.u": {rate}')
+        )
+        assert bench(folder, lazy(folder)).returncode == 3
+        times.append((folder / "runs/bench/shipped/sail/run.json").stat().st_mtime_ns)
+    assert [earlier == later for earlier, later in pairwise(times)] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("controller", "role", "message"),
+    [
+        ("lazy.json", "usv_autopilo", 'there is no role "usv_autopilo"; did you mean "usv_autopilot"?'),
+        ("none.fmu", "usv_autopilot", 'there is no file "none.fmu"'),
+        ("lazy.json:Pilot", "usv_autopilot", "expected my.fmu, my.py:Class, my.mo:Model or a nested system my.json"),
+        ("lazy.json", "uav_mixer", '"rotor_speed[1]" (rad/s) is missing'),
+    ],
+)
+def test_wrong_words_are_refused(folder, controller, role, message):
+    lazy(folder)
+    done = bench(folder, controller, role=role)
+    assert (done.returncode, message in done.stderr) == (2, True), done.stderr
+
+
+def test_a_folder_without_a_place_is_refused(folder):
+    done = bench(folder, ROOT / "fmus/mixer.fmu", role="uav_mixer")
+    assert (done.returncode, 'no scenario has a place for the role "uav_mixer"' in done.stderr) == (2, True)
+
+
+def test_a_role_of_ones_own_is_validated(folder):
+    (folder / "bad.json").write_text('{"description": 5, "controllers": [], "inputs": {"u": 1}, "output": {}}')
+    done = bench(folder, lazy(folder), role="bad.json")
+    assert done.returncode == 2
+    assert all("bad.json:1:" in line for line in done.stderr.splitlines()) and len(done.stderr.splitlines()) >= 4
+
+
+def test_a_part_of_a_controller_is_replaced_inside_it(folder):
+    """The shipped autopilot stands in a scenario as one FMU; its nested twin takes a heading controller from elsewhere."""
+    shutil.copy(ROOT / "fmus/fmi3/heading_controller.fmu", folder / "heading.fmu")
+    done = bench(folder, "heading.fmu", "--json", role="usv_heading")
+    assert done.returncode == 0, done.stdout + done.stderr
+    (sail,) = json.loads(done.stdout)["scenarios"]
+    assert all(kpi["candidate"] == kpi["shipped"] for kpi in sail["kpis"])

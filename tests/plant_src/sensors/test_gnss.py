@@ -1,0 +1,88 @@
+"""Satellite navigation: when what comes, and how wrong it is."""
+
+import numpy as np
+import pytest
+from sensor_trial import SensorTrial, configured
+
+from cosim.errors import InputError
+from plant_src.sensors.gnss import Gnss
+
+NOISES = ("horizontal_noise", "vertical_noise", "horizontal_drift", "vertical_drift", "velocity_noise")
+EXACT = dict.fromkeys(NOISES, 0.0)
+POSITION = [f"position.{axis}" for axis in "xyz"]
+
+
+def moving(trial, steps):
+    """Step with position.x = time of the inputs; what is put out for it and as time of the sample."""
+    rows = []
+    for _ in range(steps):
+        now = (trial.steps + 1) * 0.01
+        trial.feed(vehicle__position=(now, 0, 0)).step()
+        rows.append((now, trial["position.x"], trial["time"]))
+    return np.array(rows)
+
+
+def test_samples_come_at_the_rate_and_exactly_a_latency_late():
+    trial = SensorTrial(configured(Gnss("gnss"), **EXACT, rate=5.0, latency=0.13))
+    now, position, time = moving(trial, 200).T
+    newest = np.floor((now - 0.13) / 0.2 + 1e-9) * 0.2
+    assert np.allclose(position, np.maximum(newest, 0), atol=1e-12)
+    assert np.allclose(time, position, atol=1e-12)
+
+
+def test_without_latency_a_sample_is_seen_at_once():
+    trial = SensorTrial(configured(Gnss("gnss"), **EXACT, rate=10.0, latency=0.0))
+    now, position, _ = moving(trial, 100).T
+    assert np.allclose(position, np.floor(now / 0.1 + 1e-9) * 0.1, atol=1e-12)
+
+
+def test_a_rate_that_is_no_part_of_the_step_rate_is_kept_on_average():
+    trial = SensorTrial(configured(Gnss("gnss"), **EXACT, rate=30.0, latency=0.0))
+    _, _, time = moving(trial, 300).T
+    assert len(np.unique(time)) == pytest.approx(3.0 * 30, abs=1)
+
+
+def test_white_noise_has_its_standard_deviations():
+    parameters = {**EXACT, "horizontal_noise": 0.5, "vertical_noise": 2.0, "velocity_noise": 0.1}
+    gnss = configured(Gnss("gnss", seed=2), **parameters, rate=100.0, latency=0.0)
+    names = [*POSITION, *(f"velocity.{axis}" for axis in "xyz")]
+    spread = SensorTrial(gnss).record(4000, names).std(axis=0)
+    assert spread == pytest.approx([0.5, 0.5, 2.0, 0.1, 0.1, 0.1], rel=0.06)
+
+
+def test_the_drift_is_correlated_as_a_gauss_markov_process():
+    parameters = {**EXACT, "horizontal_drift": 1.0, "vertical_drift": 1.0, "correlation_time": 2.0}
+    gnss = configured(Gnss("gnss", seed=6), **parameters, rate=10.0, latency=0.0)
+    drift = SensorTrial(gnss, step=0.1).record(30000, POSITION)
+    assert drift.std() == pytest.approx(1.0, rel=0.05)
+    for lag in (5, 20):
+        correlation = np.mean(drift[lag:] * drift[:-lag]) / drift.var()
+        assert correlation == pytest.approx(np.exp(-lag * 0.1 / 2.0), abs=0.05)
+
+
+def test_the_first_fix_is_as_wrong_as_any():
+    parameters = {**EXACT, "horizontal_drift": 3.0}
+    first = [SensorTrial(configured(Gnss("gnss", seed=seed), **parameters))["position.x"] for seed in range(300)]
+    assert np.std(first) == pytest.approx(3.0, rel=0.13)
+
+
+def test_without_satellites_the_last_fix_stays_and_is_not_valid():
+    trial = SensorTrial(configured(Gnss("gnss"), **EXACT, rate=10.0, latency=0.0))
+    moving(trial, 50)
+    trial.component.set("available", False)
+    moving(trial, 50)
+    assert (trial["valid"], trial["position.x"]) == (False, pytest.approx(0.5))
+    trial.component.set("available", True)
+    moving(trial, 50)
+    assert (trial["valid"], trial["position.x"]) == (True, pytest.approx(1.5))
+
+
+def test_sampling_noise_does_not_depend_on_the_step_size():
+    coarse, fine = (SensorTrial(configured(Gnss("gnss", seed=4), rate=10.0, latency=0.0), step=step) for step in (0.1, 0.01))
+    for _ in range(20):
+        assert np.allclose(coarse.step().vector("position"), fine.step(10).vector("position"), atol=1e-9)
+
+
+def test_an_unknown_receiver_is_refused():
+    with pytest.raises(InputError, match="standard, rtk"):
+        Gnss("gnss", receiver="galileo")
