@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from . import log
+from .journal import Phase, current
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGSEGV, signal.SIGFPE, signal.SIGABRT, signal.SIGPIPE, signal.SIGCHLD)
 _SIGACTION_SIZE = 512  # more than any platform's struct sigaction, which begins with the handler
@@ -64,13 +65,31 @@ class ProcessState:
 
 @contextmanager
 def contained(who: str) -> Iterator[None]:
-    """What components change in the process while the block lasts is changed back, and `who` is named."""
-    state = ProcessState.now()
+    """What components change in the process while the block lasts is changed back, and `who` is named.
+
+    A supervised process whose own output was closed ends here: only its supervisor can still say by whom, and save the rows.
+    """
+    state, voices = ProcessState.now(), _voices()
     try:
         yield
     finally:
+        journal = current()
+        if journal and voices != _voices():
+            journal.note(who, "a call that closed the files of the process")
+            journal.enter(Phase.CALLING)
+            os._exit(70)
         for what in state.restore():
             log.message(who, log.WARNING, f"changed {what} of the process; it was changed back")
+
+
+def _voices() -> list[tuple[int, int]]:
+    """What the streams of Python lead to, if they can be written."""
+    found = []
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError, AttributeError):
+            place = os.fstat(stream.fileno())
+            found.append((place.st_dev, place.st_ino))
+    return found
 
 
 @cache

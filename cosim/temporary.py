@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from shutil import rmtree
+from weakref import finalize
 
 #: what a folder is for: a run, an extracted FMU, what an FMU in a process of its own writes
 RUN, FMU, WORKER = "cosim-run-", "cosim-fmu-", "cosim-worker-"
@@ -24,13 +25,12 @@ class LockedFolder:
 
     def __init__(self, prefix: str):
         _remove_abandoned_in(tempfile.gettempdir())
-        self.name, self._lock = _locked_folder(prefix)
+        self.name, lock = _locked_folder(prefix)
+        self._finalizer = finalize(self, _remove, self.name, lock, os.getpid())
 
     def cleanup(self) -> None:
-        """Remove the folder. What cannot be removed stays, and the next process finds it."""
-        rmtree(self.name, ignore_errors=True)
-        with suppress(OSError):  # foreign code has closed all descriptors
-            os.close(self._lock)
+        """Remove the folder; done at the end of the process at the latest."""
+        self._finalizer()
 
 
 @contextmanager
@@ -41,6 +41,15 @@ def run_folder() -> Iterator[str]:
         yield folder.name
     finally:
         folder.cleanup()
+
+
+def _remove(folder: str, lock: int, owner: int) -> None:
+    """What cannot be removed stays, and the next process finds it. A child that was forked owns nothing."""
+    if os.getpid() != owner:
+        return
+    rmtree(folder, ignore_errors=True)
+    with suppress(OSError):  # foreign code has closed all descriptors
+        os.close(lock)
 
 
 def _locked_folder(prefix: str) -> tuple[str, int]:

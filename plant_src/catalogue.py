@@ -18,6 +18,8 @@ from .vehicles.ar_drone.parameters import AIRFRAME as AR_DRONE
 from .vehicles.crazyflie import geometry as crazyflie
 from .vehicles.crazyflie.parameters import AIRFRAME as CRAZYFLIE
 from .vehicles.interface import AFLOAT_STATES, SURROUNDINGS
+from .vehicles.otter import geometry as otter
+from .vehicles.otter import interface as otter_interface
 from .vehicles.shapes import Body, Vector
 from .vehicles.strider import geometry as strider
 from .vehicles.strider import interface as strider_interface
@@ -96,6 +98,15 @@ MODELS = {
             is_vessel=True,
             vehicle="strider",
             constants=strider_6dof_interface.CONSTANTS,
+        ),
+        Model(
+            "otter",
+            otter_interface.VARIABLES,
+            (*AFLOAT_STATES, *otter_interface.SHAFTS),
+            otter.BODY,
+            FloatingBody,
+            is_vessel=True,
+            constants=otter_interface.CONSTANTS,
         ),
     )
 }

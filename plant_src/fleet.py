@@ -72,13 +72,15 @@ class Fleet:
         """Let Bullet take part for those that are near something."""
         if UNSOUND in self._alarms:
             raise UnsoundError(self.shadows[self._alarms.tolist().index(UNSOUND)].fault())
+        self._leaving = False
+        if not any(self._alarms) and self.clearance.holds():
+            return
         near = self.clearance.survey()
         if near != self._near:
             for shadow, is_near, was_near in zip(self.shadows, near, self._near, strict=True):
                 if is_near != was_near:
                     shadow.engage(is_near)
             self._choose(near)
-        self._leaving = False
 
     def _choose(self, near: Sequence[bool]) -> None:
         """Make steps of Bullet ready, in which these vehicles take part."""
@@ -113,6 +115,7 @@ class Fleet:
         pybullet.restoreState(state.bullet, physicsClientId=self._client)
         self._memory.block[:], self._flags[:] = state.memory, state.flags
         self._choose(state.near)
+        self.clearance.forget()
         self._leaving = True
         self.contacts.any = bool(state.flags.any())
 

@@ -137,12 +137,12 @@ class Shadow(ABC):
 class FreeBody(Shadow):
     """A vehicle that moves freely in space; its frame in Bullet has the principal axes of inertia."""
 
-    PIECES = {"twist": 6, "motion": 6, "torque": 3, "pose": 7}
-    BEFORE = (
+    PIECES: ClassVar[Mapping[str, int]] = {"twist": 6, "motion": 6, "torque": 3, "pose": 7}
+    BEFORE: ClassVar[Names] = (
         ("state", "inputs", "surroundings", "constants", "step", "anchor", "leash"),
         ("start", "predicted", "twist", "motion", "torque", "pose", "path", "alarm"),
     )
-    AFTER = (("start", "predicted", "twist", "motion", "constants", "step"), ("state", "impulse", "outputs"))
+    AFTER: ClassVar[Names] = (("start", "predicted", "twist", "motion", "constants", "step"), ("state", "impulse", "outputs"))
     AT_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
     @staticmethod

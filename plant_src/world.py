@@ -230,7 +230,8 @@ class World(Component):
         self._surroundings.block[:] = state.surroundings
 
     def free_state(self, state: State) -> None:
-        self._fleet.free_state(state.fleet)
+        if self._client >= 0:
+            self._fleet.free_state(state.fleet)
 
 
 def _views(variables: Sequence[Variable], arrays: Mapping[np.dtype[Any], np.ndarray]) -> Iterator[tuple[Variable, np.ndarray]]:

@@ -21,7 +21,7 @@ from cosim.component import Ports, Variable
 
 from .world import State, World
 
-ARGUMENTS = Path(__file__).parent / "world_fmu.json"
+ARGUMENTS = "world_fmu.json"
 
 
 class Quantity(Real):
@@ -54,7 +54,9 @@ class WorldFmu(Fmi2Slave):
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        self._world = World(self.instance_name, **json.loads(ARGUMENTS.read_text()))
+        # every instance has resources of its own; the module may have been loaded from some that are gone by now
+        folder = Path(self.resources or Path(__file__).parent)
+        self._world = World(self.instance_name, **json.loads((folder / ARGUMENTS).read_text()))
         weakref.finalize(self, self._world.free)
         inputs, outputs = (self._ports(causality) for causality in ("input", "output"))
         for variable in inputs.variables:

@@ -95,4 +95,4 @@ def test_the_readme_lists_every_command():
     from cosim.cli import COMMANDS
 
     text = (ROOT / "README.md").read_text()
-    assert re.findall(r"^\| `cosim (\w+)", text, re.MULTILINE) == list(COMMANDS)
+    assert re.findall(r"^\| `cosim ([\w-]+)", text, re.MULTILINE) == list(COMMANDS)

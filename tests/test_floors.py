@@ -26,6 +26,7 @@ FLOORS = [
     {"kpi", "compare"},
     {"kpis"},
     {"api", "bench", "report"},
+    {"sweep"},
     {"cli"},
     {"__main__", "pytest_plugin"},
 ]

@@ -32,7 +32,6 @@ block ArDroneGeometric "Landing on decks that move in waves: path command in sti
   output Boolean motors_on(start = false);
   output Real horizontal_error(start = 0, unit = "m") "Distance to the centre of the deck";
   output Integer aborts(start = 0) "Aborted descents";
-  output Real deck_frequency(start = 0, unit = "rad/s") "Of the heaving deck";
   Fleet.DeckPredictor deck;
   Fleet.Vtol vtol;
   Fleet.GeometricController tracking;
@@ -97,7 +96,6 @@ equation
   motors_on = vtol.motors_on;
   horizontal_error = vtol.horizontal_error;
   aborts = vtol.aborts;
-  deck_frequency = deck.frequency;
 algorithm
   when sample(0, Fleet.sample_period) then
     near := pre(mode) == Fleet.FlightMode.approach or pre(mode) == Fleet.FlightMode.descend or pre(mode) == Fleet.FlightMode.landed;

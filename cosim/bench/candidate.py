@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -120,8 +120,8 @@ def _targets(root: Node, port: str, kind: str) -> list[Target]:
         raise InputError(str(error)) from None
 
 
-def problems(role: Role, found: Interface) -> list[Problem]:
-    """Why a controller with this interface cannot take the role, all at once."""
+def problems(role: Role, found: Interface, settings: Iterable[str] = ()) -> list[Problem]:
+    """Why a controller with this interface cannot take the role with these variables set, all at once."""
     expected = {**role.inputs, **role.outputs, **role.parameters}
     return [
         *(_missing(name, role, found) for name in role.outputs if name not in found.outputs),
@@ -134,7 +134,12 @@ def problems(role: Role, found: Interface) -> list[Problem]:
             and variable.unit
             and not variable.unit.converts_to(unit)
         ),
+        *(Problem(f'it has no variable "{name}"{_nearest(name, found)}') for name in settings if not found.has(name)),
     ]
+
+
+def _nearest(name: str, found: Interface) -> str:
+    return did_you_mean(name, {*found.parameters, *found.inner, *found.inputs})
 
 
 def _missing(name: str, role: Role, found: Interface) -> Problem:

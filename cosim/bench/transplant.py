@@ -27,25 +27,34 @@ _HEAD = re.compile(r"[^.\[]*")
 
 @dataclass
 class Transplant:
-    """Writes one scenario with the candidate into `folder`; `places` are its full names there, `notes` what was left out."""
+    """One scenario with the candidate in it, started with `parameters` of its own beside those of the scenario.
+
+    `places` are its full names there, `notes` what was left out.
+    """
 
     role: Role
     candidate: Source
     interface: Interface
-    folder: Path
+    file: Path
+    parameters: Mapping[str, Any] = field(default_factory=dict)
     places: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    _folder: Path = field(init=False)
 
-    def scenario(self, file: Path) -> Path | None:
-        """The changed scenario's file, None when the scenario has no place of this role. Raises InputError for a bad scenario."""
-        loaded = load(file)
+    def write(self, folder: Path) -> Path | None:
+        """Write the changed scenario, and what it consists of, to `folder`; None when it has no place of this role.
+
+        Raises InputError for a bad scenario.
+        """
+        loaded = load(self.file)
         if loaded.problems:
             raise InputError(loaded.problems)
-        changed, known = self._system(loaded.root.document.value, file.parent.resolve(), "")
+        self._folder, origin = folder, self.file.parent.resolve()
+        changed, known = self._system(loaded.root.document.value, origin, "")
         if not self.places:
             return None
-        path = self.folder / file.name
-        write_json(self._pruned_scenario(changed, known, file.parent.resolve()), path)
+        path = folder / self.file.name
+        write_json(self._pruned_scenario(changed, known, origin), path)
         return path
 
     # -- systems -------------------------------------------------------------------------------------------------------
@@ -76,7 +85,8 @@ class Transplant:
         if path in self.role.controllers:
             self.places.append(full_name)
             inside[name] = self.interface.has
-            return {key: value for key, value in spec.items() if key in ("parameters", "period")} | dict(self.candidate.entry)
+            period = {key: value for key, value in spec.items() if key == "period"}
+            return {**self.candidate.entry, **period, "parameters": {**spec.get("parameters", {}), **self.parameters}}
         system = self.role.stand_ins.get(path, path if kind == "system" else None)
         nested = self._nested(system, full_name) if system else None
         if nested is None:
@@ -91,7 +101,7 @@ class Transplant:
         if len(self.places) == before:
             return None
         ports, lost = self._pruned_ports(value.get("ports", {}), known)
-        path = self.folder / "systems" / f"{full_name}.json"
+        path = self._folder / "systems" / f"{self.file.stem}.{full_name}.json"
         write_json({**value, "ports": ports}, path)
         shown = {port for kind in ports.values() for port in kind}
 
@@ -129,6 +139,7 @@ class Transplant:
         kpis = {each["name"] for each in functions["kpis"]}
         events = [{**each, "set": self._settings(known, each["set"])} for each in value.get("events", [])]
         inputs = [{**each, "file": absolute(each["file"], folder)} for each in value.get("inputs", [])]
+        scene = value.get("scene")
         return {
             **{key: item for key, item in value.items() if key != "reference"},
             **functions,
@@ -136,6 +147,7 @@ class Transplant:
             "checks": [each for each in value.get("checks", []) if each["kpi"].partition(".")[0] in kpis],
             "events": [each for each in events if each["set"]],
             "inputs": inputs,
+            **({"scene": {**scene, "python": absolute(scene["python"], folder)}} if scene else {}),
         }
 
     def _settings(self, known: Known, settings: Mapping[str, Any]) -> dict[str, Any]:

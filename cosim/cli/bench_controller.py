@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from shutil import rmtree
@@ -14,7 +14,7 @@ import click
 from ..errors import InputError, Problem
 from . import supervision
 from .bench_trial import Flight, Trial, flights
-from .regress import SEVERITY, default_folder, found, processors
+from .regress import SEVERITY, default_folder, found, processors, refuse_same_names
 
 if TYPE_CHECKING:
     from ..bench.score import Row
@@ -28,6 +28,7 @@ _PREPARED = "bench.json"
 @click.option(
     "--role", required=True, help="Which place it takes: usv_autopilot, uav_position, ...; or the path of a role's JSON."
 )
+@click.option("--set", "settings", multiple=True, metavar="NAME=value", help="A parameter of the controller.")
 @click.option(
     "--scenarios",
     multiple=True,
@@ -40,7 +41,15 @@ _PREPARED = "bench.json"
 )
 @click.option("--jobs", type=click.IntRange(min=1), help="How many scenarios run at a time; default: one per processor.")
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
-def command(controller: str, role: str, scenarios: tuple[Path, ...], output_dir: Path, jobs: int | None, as_json: bool) -> int:
+def command(
+    controller: str,
+    role: str,
+    settings: tuple[str, ...],
+    scenarios: tuple[Path, ...],
+    output_dir: Path,
+    jobs: int | None,
+    as_json: bool,
+) -> int:
     """Put CONTROLLER in the place of the shipped one in every scenario that has such a place, and fly them all.
 
     CONTROLLER is an FMU, my.py:Class, my.mo:Model or a nested system's JSON. Its variables are examined first. The table shows
@@ -48,11 +57,15 @@ def command(controller: str, role: str, scenarios: tuple[Path, ...], output_dir:
     component failed, 2 when the controller does not fit.
     """
     from ..bench.candidate import source
+    from ..scenario.tree import parse_settings
 
     candidate = source(controller)
     files = list(found(scenarios or [default_folder()]))
+    refuse_same_names(files)
     own = output_dir / Path(role).stem / candidate.name
-    code = supervision.protected(lambda: _prepare(controller, role, files, own), "run", lambda outcome: None)
+    code = supervision.protected(
+        lambda: _prepare(controller, role, files, own, parse_settings(settings)), "run", lambda outcome: None
+    )
     if code:
         return code
     trials, notes = _trials(own, output_dir / "shipped")
@@ -68,7 +81,7 @@ def command(controller: str, role: str, scenarios: tuple[Path, ...], output_dir:
     return min((flight.outcome.code for flight in flown), key=SEVERITY.index)
 
 
-def _prepare(controller: str, role_name: str, files: Sequence[Path], own: Path) -> int:
+def _prepare(controller: str, role_name: str, files: Sequence[Path], own: Path, settings: Mapping[str, Any]) -> int:
     """Examine the candidate and write the scenarios with it; in a child process, since its code is run."""
     from ..bench.candidate import interface, problems, source
     from ..bench.role import read_role
@@ -77,13 +90,13 @@ def _prepare(controller: str, role_name: str, files: Sequence[Path], own: Path) 
 
     role, candidate = read_role(role_name), source(controller)
     variables = interface(candidate)
-    if misfits := problems(role, variables):
+    if misfits := problems(role, variables, settings):
         raise InputError([Problem(problem.message, controller) for problem in misfits])
     rmtree(own / "scenarios", ignore_errors=True)
     written, notes = [], []
     for file in files:
-        transplant = Transplant(role, candidate, variables, (own / "scenarios").absolute())
-        if path := transplant.scenario(file):
+        transplant = Transplant(role, candidate, variables, file, settings)
+        if path := transplant.write((own / "scenarios").absolute()):
             written.append({"file": path, "original": file})
             notes += [f"{file.stem}: {note}" for note in dict.fromkeys(transplant.notes)]
     if not written:

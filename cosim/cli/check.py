@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
 from ..system import Group, Stage
+from . import strict, supervision
 
 if TYPE_CHECKING:
     from ..scenario import Assembly
 
 
-@click.command()
+@click.command(cls=strict.Command)
 @click.argument("scenario")
 @click.option("--set", "settings", multiple=True, metavar="NAME=value", help="As for `cosim run`.")
 @click.option("--connections/--no-connections", default=True, help="List every connection.")
-def command(scenario: str, settings: tuple[str, ...], connections: bool) -> None:
-    """Load, wire and validate SCENARIO without running it; print components, stages, connections and conversions."""
+@supervision.option
+def command(scenario: str, settings: tuple[str, ...], connections: bool, isolation: str, sandbox: str | None) -> None:
+    """Load, wire and validate SCENARIO without running it; print components, processes, stages, connections and conversions.
+
+    --isolation and --sandbox are those of `cosim run`; here they only say what would run where.
+    """
     from ..api import load
     from ..scenario.tree import parse_settings
 
-    assembly = load(scenario, parse_settings(settings))
+    apart: Literal["fmu", "none"] = "fmu" if isolation == "fmu" else "none"
+    assembly = load(scenario, parse_settings(settings), isolation=apart, sandbox=bool(sandbox))
     try:
         _components(assembly)
+        _processes(assembly, isolation, sandbox)
         _stages(assembly)
         if connections:
             _connections(assembly)
@@ -45,6 +52,19 @@ def _components(assembly: Assembly) -> None:
         period = assembly.system.periods.get(name)
         every = f", every {float(period):g} s" if period else ""
         click.echo(f"  {name:{width}}  {assembly.origin(name)}, {counts['input']} inputs, {counts['output']} outputs{every}")
+
+
+def _processes(assembly: Assembly, isolation: str, sandbox: str | None) -> None:
+    from ..fmi.isolated.remote import RemoteFmu
+
+    components = assembly.system.components
+    apart = {name: component.isolation for name, component in components.items() if isinstance(component, RemoteFmu)}
+    together = [name for name in components if name not in apart]
+    click.echo("\nprocesses" + (", all of them in bubblewrap" if sandbox == "strict" else ""))
+    if together:
+        click.echo(f"  {'that of the command' if isolation == 'none' else 'the supervised run'}: {', '.join(together)}")
+    for name, how in apart.items():
+        click.echo(f"  {name}: one of its own{', in a sandbox' if how.sandbox else ''}")
 
 
 def _stages(assembly: Assembly) -> None:

@@ -39,7 +39,9 @@ def command(scenarios: tuple[Path, ...], update: bool, junit: Path | None, outpu
     a check or comparison was not met, 1 when a component failed, 2 when a scenario was refused.
     """
     files = list(_with_any(("reference",) if update else ("checks", "reference"), found(scenarios or [default_folder()])))
-    _refuse_same_names(files)
+    if not files:
+        raise InputError('there is no scenario with a "reference" (or, without --update, "checks")')
+    refuse_same_names(files)
     work = [Regression(file, output_dir / file.stem, update) for file in files]
     outcomes = []
     for outcome in in_parallel([each.outcome for each in work], jobs or processors()):
@@ -84,11 +86,9 @@ def _with_any(keys: Sequence[str], files: Iterable[Path]) -> Iterator[Path]:
             yield file
 
 
-def _refuse_same_names(files: Iterable[Path]) -> None:
-    """Each has a folder of its own for results."""
+def refuse_same_names(files: Iterable[Path]) -> None:
+    """Each has a folder of its own for results. Raises InputError."""
     counts = Counter(file.stem for file in files)
-    if not counts:
-        raise InputError('there is no scenario with a "reference" (or, without --update, "checks")')
     if several := [name for name, count in counts.items() if count > 1]:
         raise InputError(
             [f'{counts[name]} scenarios are called "{name}.json": their results would go to one folder' for name in several]
@@ -101,11 +101,17 @@ def processors() -> int:
 
 
 def in_parallel(work: Sequence[Callable[[], T]], jobs: int) -> Iterator[T]:
-    """What all functions return, in order; each is called on a thread that mostly waits for a child process."""
+    """What all functions return, in order; each is called on a thread that mostly waits for a child process.
+
+    When the caller is interrupted, those that wait for their turn are not called any more.
+    """
     from concurrent.futures import ThreadPoolExecutor
 
-    with ThreadPoolExecutor(jobs) as pool:
+    pool = ThreadPoolExecutor(jobs)
+    try:
         yield from pool.map(lambda function: function(), work)
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def _print(outcome: Outcome) -> None:

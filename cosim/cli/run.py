@@ -28,7 +28,7 @@ _LATENESS = {"max": "max_lateness", "mean": "mean_lateness", "99 %": "lateness_9
 #: folder of a run that is going on, inside its output directory
 UNFINISHED = ".unfinished"
 
-RESULTS = ("result.csv", "result.parquet", "kpis.json", "run.json", "report.html")
+RESULTS = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run.json", "report.html")
 
 
 @click.command(cls=strict.Command)
@@ -53,6 +53,7 @@ RESULTS = ("result.csv", "result.parquet", "kpis.json", "run.json", "report.html
     help="What happens when a real-time run falls more than one step behind.",
 )
 @click.option("--parquet", is_flag=True, help="Write result.parquet too (extra `parquet`).")
+@click.option("--mcap", is_flag=True, help="Write result.mcap too, for Foxglove and ROS 2 (extra `mcap`).")
 @click.option("--no-report", is_flag=True, help="Write no figures and no report.html.")
 @supervision.option
 def command(isolation: str, sandbox: str | None, **options: Any) -> int:
@@ -84,9 +85,11 @@ def _run(
     settings: tuple[str, ...],
     no_report: bool,
     parquet: bool,
+    mcap: bool,
     **conditions: Any,
 ) -> int:
     from ..api import executed, load
+    from ..results.mcap_files import require_mcap
     from ..results.parquet_files import require_parquet
     from ..scenario.tree import parse_settings
     from ..unfinished import unfinished
@@ -95,6 +98,8 @@ def _run(
     warnings = messages.show()
     if parquet:
         require_parquet()
+    if mcap:
+        require_mcap()
     began = time.perf_counter()
     assembly = load(scenario, parse_settings(settings), stop_time=stop_time, step_size=step_size, **conditions)
     supervision.configure(assembly.spec.deadlines)
@@ -114,6 +119,10 @@ def _run(
         code = _finish(execution, assembly, directory, shown, no_report, began)
         if parquet:
             execution.result.to_parquet(directory / "result.parquet")
+        if mcap:
+            from ..report.scene import scene_of
+
+            execution.result.to_mcap(directory / "result.mcap", scene_of(execution.result.metadata))
         return supervision.leaving(code)
 
 

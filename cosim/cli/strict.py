@@ -23,8 +23,8 @@ _INSIDE = "COSIM_INSIDE_STRICT_SANDBOX"
 #: where programs put what they make for themselves
 _HOMES = ("TMPDIR", "HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME")
 
-#: programs (compilers for Modelica sources) and shared libraries; they hold nothing private and nobody listens there
-_SYSTEM = ("/usr", "/bin", "/lib", "/lib64", "/etc/ld.so.cache", "/etc/alternatives")
+#: programs (compilers for Modelica sources), shared libraries and fonts; they hold nothing private and nobody listens there
+_SYSTEM = ("/usr", "/bin", "/lib", "/lib64", "/etc/ld.so.cache", "/etc/alternatives", "/etc/fonts")
 
 
 class Command(click.Command):

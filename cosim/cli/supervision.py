@@ -33,7 +33,7 @@ _sandbox = click.option(
 )
 
 
-def option(command: Callable[..., int]) -> Callable[..., int]:
+def option(command: Callable[..., Any]) -> Callable[..., Any]:
     """Where foreign code runs: `isolation` and `sandbox`."""
     return _isolation(_sandbox(command))
 

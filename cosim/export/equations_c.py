@@ -197,9 +197,7 @@ class _Statements:
         for i, size in enumerate(sizes):
             yield f"double r{k}_{i}[{size}]"
         results = [f"r{k}_{i}" for i in range(len(sizes))]
-        yield (
-            f"{callee.name()}((const double *const[]){{{', '.join(arguments)}}}, (double *const[]){{{', '.join(results)}}})"
-        )
+        yield (f"{callee.name()}((const double *const[]){{{', '.join(arguments)}}}, (double *const[]){{{', '.join(results)}}})")
         elements = [f"r{k}_{i}[{j}]" for i, size in enumerate(sizes) for j in range(size)]
         self._values |= dict(zip(self._function.instruction_output(k), elements, strict=True))
 

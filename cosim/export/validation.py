@@ -12,10 +12,21 @@ DESCRIPTION = "modelDescription.xml"
 
 
 def validate(description: bytes, source: Path) -> None:
-    """Raises InputError with everything that is wrong in a modelDescription.xml; `source` is the file to blame."""
+    """Raises InputError with everything that is wrong in a modelDescription.xml; `source` is the file to blame.
+
+    FMPy reads XML with all its dangers, so it gets only what was found to be without them.
+    """
     from fmpy import read_model_description
     from fmpy.model_description import ValidationError
 
+    from ..fmi.preflight import LIMITS
+    from ..fmi.preflight.findings import Flaw, refuse
+    from ..fmi.preflight.xml import parse
+
+    try:
+        parse(description, DESCRIPTION, LIMITS)
+    except Flaw as flaw:
+        refuse(source, [flaw.finding])
     archive = BytesIO()
     with ZipFile(archive, "w") as file:
         file.writestr(DESCRIPTION, description)

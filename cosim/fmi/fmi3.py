@@ -50,8 +50,15 @@ class Fmi3Instance(FmuInstance):
 
     def failed(self, name: str, status: int) -> StepResult:
         if name == _ENDED:
-            return StepResult(self._reached.value, self._flags[0], self._flags[1])
+            return self._result()
         self.fail(name, status)
+
+    def _result(self) -> StepResult:
+        """What the last step came to; a time that is none or lies before the step must not pass for its end."""
+        reached, start = self._reached.value, self._clock.value
+        if not reached >= start:
+            raise ComponentError(self.name, "fmi3DoStep", f"says that it ended at t = {reached!r} s", start)
+        return StepResult(reached, self._flags[0], self._flags[1])
 
     def get_state(self) -> Any:
         return self.call("getFMUState")

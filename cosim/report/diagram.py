@@ -41,7 +41,7 @@ class Wire(NamedTuple):
     path: str
     x: float
     y: float
-    count: int
+    connections: int
     about: str
 
 
@@ -81,7 +81,8 @@ def _sequence(stages: Sequence[Sequence[Any]]) -> _Block:
     """Stages one beside the other, each centred."""
     blocks = [_stack([_member(member) for member in stage]) for stage in stages]
     rows = max((block.rows for block in blocks), default=0)
-    places, columns = {}, 0
+    places: dict[str, tuple[float, float]] = {}
+    columns = 0
     for block in blocks:
         places |= _moved(block, columns, (rows - block.rows) / 2)
         columns += block.columns
@@ -90,7 +91,8 @@ def _sequence(stages: Sequence[Sequence[Any]]) -> _Block:
 
 def _stack(blocks: Sequence[_Block]) -> _Block:
     """What steps side by side, one below the other."""
-    places, rows = {}, 0.0
+    places: dict[str, tuple[float, float]] = {}
+    rows = 0.0
     for block in blocks:
         places |= _moved(block, 0, rows)
         rows += block.rows

@@ -54,7 +54,7 @@ def write_report(result: Result, outcomes: Sequence[CheckOutcome], pictures: Map
         cards=[_card(outcome, units) for outcome in outcomes],
         kpis=_grouped(result.kpis, units),
         warnings=result.metadata.get("warnings", []),
-        figures=[{"name": name, "svg": markup(_bare(svg))} for name, svg in pictures.items()],
+        figures=[_figure(name, svg) for name, svg in pictures.items()],
         d=diagram(about["system"]) if about["system"] else None,
         scenario=json.dumps(about["scenario"], indent=1, ensure_ascii=False),
         timings=list(_timings(result)),
@@ -118,6 +118,6 @@ def _timings(result: Result) -> Iterator[tuple[str, str]]:
         yield "real time", f"{pace['late_steps']} of {pace['steps']} steps late"
 
 
-def _bare(svg: str) -> str:
-    """An SVG file as an element of a page: without the declarations before it."""
-    return svg[svg.index("<svg") :]
+def _figure(name: str, svg: str) -> dict[str, Any]:
+    """An SVG file as an element of a page, without the declarations before it; `drawn`: there is no photograph in it."""
+    return {"name": name, "svg": markup(svg[svg.index("<svg") :]), "drawn": "<image" not in svg}

@@ -45,33 +45,32 @@ def _number(value: Any) -> float:
     return float(np.float32(value))
 
 
-def stride(rows: int, most: int) -> int:
-    """Every how manieth of `rows` rows is kept so that there are about `most`."""
-    return max(1, -(-rows // most))
+def _blocks(values: np.ndarray, most: int) -> tuple[np.ndarray, int]:
+    """Values in blocks of two strides, shape (blocks, 2 strides), the last one filled up with the last value; and the stride."""
+    stride = -(-len(values) // most)
+    count = -(-len(values) // (2 * stride))
+    return np.pad(values, (0, 2 * stride * count - len(values)), mode="edge").reshape(count, -1), stride
 
 
 def sampled(values: np.ndarray, most: int) -> np.ndarray:
-    """Every n-th value, and the last."""
-    step = stride(len(values), most)
-    kept = values[::step]
-    return kept if (len(values) - 1) % step == 0 else np.append(kept, values[-1:])
+    """All values if there are at most `most`; else every n-th, so that there are about as many, and the last."""
+    if len(values) <= most:
+        return values
+    blocks, stride = _blocks(values, most)
+    return np.append(blocks.ravel()[::stride], values[-1])
 
 
 def thinned(values: np.ndarray, most: int) -> np.ndarray:
-    """As `sampled`, but so that no peak is lost: of each two strides the smallest and the largest value, in their order.
-
-    Where these stand for the values of a smooth curve they are at most two strides away from their own time.
-    """
-    step, values = stride(len(values), most), values.astype(np.float32)
-    kept = sampled(values, most).copy()
-    if step == 1:
+    """As `sampled`, but so that no peak is lost: where there is one within two strides, the smallest and the largest value
+    there, in their order, stand for the two values at their beginnings."""
+    kept = sampled(values.astype(np.float32), most)
+    if len(values) <= most:
         return kept
-    pairs = len(values) // (2 * step)
-    blocks = values[: pairs * 2 * step].reshape(pairs, 2 * step)
-    lowest, highest = blocks.argmin(axis=1), blocks.argmax(axis=1)
-    order = np.sort(np.stack([lowest, highest], axis=1), axis=1)
-    rough = np.ptp(blocks, axis=1) > 4 * np.abs(blocks[:, -1] - blocks[:, 0])
-    kept[: 2 * pairs].reshape(pairs, 2)[rough] = np.take_along_axis(blocks, order, axis=1)[rough]
+    blocks, _ = _blocks(values.astype(np.float32), most)
+    order = np.sort(np.stack([blocks.argmin(axis=1), blocks.argmax(axis=1)], axis=1), axis=1)
+    change = np.abs(kept[2::2] - blocks[:, 0])  # from block to block
+    rough = np.ptp(blocks, axis=1) > 4 * change
+    kept[:-1].reshape(-1, 2)[rough] = np.take_along_axis(blocks, order, axis=1)[rough]
     return kept
 
 

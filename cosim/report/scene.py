@@ -2,10 +2,11 @@
 
 A Python component may say what it looks like by a static method `scene(name, scenario) -> dict`; a scenario of other components
 names a function `(scenario, **arguments) -> dict` under its key "scene". `name` is the component's, `scenario` the scenario as
-JSON. The answer is JSON as well, with any of these keys (m, rad, world frame z up; colours as CSS has them):
+JSON, where "components" holds those of nested systems by their full names. The answer is JSON as well, with any of these keys
+(m, rad, world frame z up; colours as CSS has them):
 
 - `bodies`: {"name", "title", "colour", "position": [x, y, z], "orientation": [w, x, y, z] or "attitude": [roll, pitch, yaw],
-  "parts"}; position and orientation are names of signals, or numbers
+  "parts"}; position, orientation and attitude are names of signals, their negatives ("-name"), or numbers
 - `parts` of a body, and `fixed`: {"shape", "size", "position", "orientation": [x, y, z, w], "colour": [r, g, b] in 0 ... 1,
   "opacity"}; a "box" has its edges as size, a "cylinder" (along z) radius and length, a "cone" lower and upper radius and length,
   a "sphere" its radius, a "ring" radius and thickness
@@ -24,6 +25,7 @@ from typing import Any
 from ..errors import ComponentError, InputError
 from ..python_component import load_object
 from ..results.files import plain
+from ..scenario.document import read_document
 from ..scenario.functions import load_function
 
 LISTS = ("bodies", "fixed", "markers", "views", "spans", "plots")
@@ -45,13 +47,31 @@ def scene_of(metadata: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _parts(scenario: Mapping[str, Any], folder: Path) -> Iterator[dict[str, Any]]:
-    for name, component in scenario.get("components", {}).items():
+    leaves = list(_leaves(scenario, folder))
+    flat = {**scenario, "components": {name: component for name, component, _ in leaves}}
+    for name, component, own_folder in leaves:
         if isinstance(reference := component.get("python"), str):
-            ask = getattr(load_object(reference, folder), "scene", None)
+            ask = getattr(load_object(reference, own_folder), "scene", None)
             if callable(ask):
-                yield _answer(f'component "{name}"', ask, name, scenario)
+                yield _answer(f'component "{name}"', ask, name, flat)
     if spec := scenario.get("scene"):
-        yield _answer("the scenario's scene", load_function(spec["python"], folder), scenario, **spec.get("arguments", {}))
+        yield _answer("the scenario's scene", load_function(spec["python"], folder), flat, **spec.get("arguments", {}))
+
+
+def _leaves(system: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, dict[str, Any], Path]]:
+    """(full name, component, where its paths start) of all components, those of nested systems instead of these.
+
+    Parameters that are set from outside ("usv.waypoint_x") reach the components inside.
+    """
+    for name, component in system.get("components", {}).items():
+        if "system" not in component:
+            yield name, component, folder
+            continue
+        file = folder / component["system"]
+        for inner, leaf, own_folder in _leaves(read_document(file).value, file.parent):
+            outside = component.get("parameters", {}).items()
+            given = {key.removeprefix(f"{inner}."): value for key, value in outside if key.startswith(f"{inner}.")}
+            yield f"{name}.{inner}", {**leaf, "parameters": {**leaf.get("parameters", {}), **given}}, own_folder
 
 
 def _answer(who: str, ask: Callable[..., Any], *values: Any, **named: Any) -> dict[str, Any]:

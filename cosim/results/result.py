@@ -14,6 +14,7 @@ from ..errors import InputError, did_you_mean
 from ..recording import Recording
 from .csv_files import read_csv, write_csv
 from .files import write_json
+from .mcap_files import write_mcap
 from .parquet_files import write_parquet
 
 
@@ -75,6 +76,11 @@ class Result:
     def to_parquet(self, path: str | Path) -> None:
         """Write all signals to a Parquet file (see `cosim.results.parquet_files`)."""
         write_parquet(self.recording, path)
+
+    def to_mcap(self, path: str | Path, scene: Mapping[str, Any] | None = None) -> None:
+        """Write poses, signals and the scene, when it is given, to an MCAP file (see `cosim.results.mcap_files`)."""
+        about = {key: value for key, value in self.metadata.items() if key in ("name", "versions", "sha256")}
+        write_mcap(self.recording, path, scene, about)
 
     @classmethod
     def from_csv(cls, path: str | Path) -> Result:

@@ -208,6 +208,8 @@ class Assembler:
             for i, spec in kept(getattr(self.spec, kind)):
                 if spec.name in names[:i]:
                     self.problems.append(Problem(f'the name "{spec.name}" stands twice', self.root.where(kind, i, "name")))
+        if self.spec.scene and (text := function_problem(self.spec.scene, self.root.folder)):
+            self.problems.append(Problem(text, self.root.where("scene")))
         names = [spec.name for _, spec in kept(self.spec.kpis)]
         for i, check in kept(self.spec.checks):
             if check.kpi.partition(".")[0] not in names:

@@ -62,7 +62,8 @@ class Assembly:
         """All files that the run depends on, by their path from the scenario: scenario, FMUs, Python, Modelica, profiles."""
         own = [node.document.file for node in self.root.walk()]
         own += [self.root.folder / spec.file for spec in self.spec.inputs]
-        places = (spec.python.rpartition(":")[0] for spec in (*self.spec.kpis, *self.spec.figures))
+        calls = (*self.spec.kpis, *self.spec.figures, *([self.spec.scene] if self.spec.scene else []))
+        places = (spec.python.rpartition(":")[0] for spec in calls)
         functions = [self.root.folder / place for place in places if place.endswith(".py")]
         python = [member for file in (*functions, *self.workshop.python) for member in package_files(file)]
         files = {file.resolve() for file in (*own, *python, *self.workshop.fmus, *self.workshop.modelica)}

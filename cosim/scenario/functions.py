@@ -1,4 +1,4 @@
-"""Functions that a scenario names: KPIs and figures."""
+"""Functions that a scenario names: KPIs, figures, and what the 3-D replay draws."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from typing import Any
 from ..errors import did_you_mean
 from ..python_component import load_object
 from ..resources import is_file
-from .schema import FunctionSpec
+from .schema import CallSpec
 
 
-def function_problem(spec: FunctionSpec, folder: Path) -> str:
+def function_problem(spec: CallSpec, folder: Path) -> str:
     """Why `file.py:function` or `package.module:function` cannot be called with its arguments later; "" when it can.
 
     The file is read, not run.
@@ -60,7 +60,7 @@ def load_function(reference: str, folder: Path) -> Callable[..., Any]:
 
 
 def _argument_problem(name: str, declared: ast.arguments, given: Collection[str]) -> str:
-    """What is wrong with the keyword arguments of a function whose first argument is the result."""
+    """What is wrong with the keyword arguments of a function whose first argument is the result (or the scenario)."""
     positional = [argument.arg for argument in (*declared.posonlyargs, *declared.args)]
     optional = positional[len(positional) - len(declared.defaults) :]
     keywords = dict(zip((argument.arg for argument in declared.kwonlyargs), declared.kw_defaults, strict=True))

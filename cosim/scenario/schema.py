@@ -175,12 +175,17 @@ class InputSpec(Spec):
     interpolation: Literal["linear", "hold"] = "linear"
 
 
-class FunctionSpec(Spec):
+class CallSpec(Spec):
+    """A Python function and its keyword arguments; the first argument is what it is about."""
+
+    python: str = Field(description='"file.py:function" or "package.module:function"')
+    arguments: dict[str, Any] = {}
+
+
+class FunctionSpec(CallSpec):
     """A Python function of the result: a KPI (returns numbers) or a figure (returns a matplotlib Figure)."""
 
     name: Name
-    python: str = Field(description='"file.py:function" or "package.module:function"')
-    arguments: dict[str, Any] = {}
 
 
 class CheckSpec(Spec):
@@ -264,6 +269,7 @@ class ScenarioSpec(SystemSpec):
     kpis: list[FunctionSpec] = []
     checks: list[CheckSpec] = []
     figures: list[FunctionSpec] = []
+    scene: CallSpec | None = Field(None, description="function of the scenario that says what the 3-D replay draws")
     reference: ReferenceSpec | None = None
     deadlines: DeadlinesSpec = DeadlinesSpec(load=10.0, initialization=10.0, step=5.0, end=5.0)
     non_finite: Literal["error", "allow"] = Field("error", description="what NaN or infinity on a connected output is")

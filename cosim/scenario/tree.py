@@ -13,7 +13,7 @@ from .. import resources
 from ..errors import InputError, Problem, did_you_mean
 from ..python_component import package_files
 from .document import Document, read_document
-from .schema import NestedSpec, ScenarioSpec, SystemSpec, kept
+from .schema import CallSpec, NestedSpec, ScenarioSpec, SystemSpec, kept
 from .validate import validate
 
 
@@ -75,7 +75,8 @@ class Scenario:
         """All files that are named, there or not: nested systems, sources with their packages, profiles, KPIs and figures."""
         files = [node.document.file for node in self.root.walk()]
         files += [self.root.folder / spec.file for _, spec in kept(self.spec.inputs)]
-        functions = [spec for _, spec in (*kept(self.spec.kpis), *kept(self.spec.figures))]
+        functions: list[CallSpec] = [spec for _, spec in (*kept(self.spec.kpis), *kept(self.spec.figures))]
+        functions += [self.spec.scene] if self.spec.scene else []
         python = [self.root.folder / spec.python.rpartition(":")[0] for spec in functions if ".py:" in spec.python]
         for node, name in self.root.leaves():
             spec = node.spec.components[name]

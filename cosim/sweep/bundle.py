@@ -24,7 +24,7 @@ def identity() -> str:
     package = Path(__file__).resolve().parents[1]
     own = sorted(path for path in package.rglob("*.py") if "_bundle" not in path.parts)
     digest = sha256()
-    for path in (*own, resources.root() / "fmus" / "manifest.json"):
+    for path in (*own, *resources.root().glob("fmus/manifest.json")):
         digest.update(path.name.encode() + path.read_bytes())
     return f"{__version__} ({digest.hexdigest()[:12]})"
 

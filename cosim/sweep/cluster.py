@@ -5,6 +5,7 @@ No file system is shared: a worker that lacks files is sent them by content hash
 
 from __future__ import annotations
 
+import logging
 import queue
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -79,12 +80,15 @@ class ClusterEngine:
         window = _AHEAD * max(1, sum(self._client.nthreads().values()))
         waiting: dict[str, Job] = {}
         kills: Counter[str] = Counter()
-        for job in jobs:
-            self._submit(job, check, waiting)
-            while len(waiting) >= window:
+        try:
+            for job in jobs:
+                self._submit(job, check, waiting)
+                while len(waiting) >= window:
+                    yield from self._next(check, waiting, kills)
+            while waiting:
                 yield from self._next(check, waiting, kills)
-        while waiting:
-            yield from self._next(check, waiting, kills)
+        except OSError:  # those of distributed's connections
+            raise self._gone() from None
 
     def _submit(self, job: Job, check: bool, waiting: dict[str, Job]) -> None:
         future = self._client.submit(worker.work, self._cargo, job.key, dict(job.settings), check, pure=False)
@@ -156,6 +160,7 @@ def _connect(scheduler: str) -> Any:
     """A client of a scheduler that has workers."""
     import distributed
 
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in our own words
     try:
         client = distributed.Client(scheduler, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:

@@ -6,6 +6,7 @@ import json
 import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
+from os.path import normpath
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +75,7 @@ def _failures(sweep: Sweep, rows: Iterator[Row]) -> Iterator[list[Any]]:
 def run_command(scenario: Path, settings: Any) -> str:
     """The command that makes this run alone."""
     words = [word for name, value in settings.items() for word in ("--set", f"{name}={_text(value)}")]
-    return shlex.join(["cosim", "run", str(scenario), *words])
+    return shlex.join(["cosim", "run", normpath(scenario), *words])
 
 
 def _text(value: Any) -> str:

@@ -12,6 +12,7 @@ Directions are drawn likewise from bins of equal energy of the spreading functio
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -43,8 +44,13 @@ class Sea(NamedTuple):
 
     def elevation(self, x: float, y: float, time: float) -> float:
         """Height of the water (m) at a place in the world (m) and a time (s)."""
-        along = x * np.cos(self.direction) + y * np.sin(self.direction)
-        return float((self.amplitude * np.cos(self.wave_number * along - self.frequency * time + self.phase)).sum())
+        return self.surface()(x, y, time)
+
+    def surface(self) -> Callable[[float, float, float], float]:
+        """`elevation` for frequent use."""
+        east, north = self.wave_number * np.cos(self.direction), self.wave_number * np.sin(self.direction)
+        rates = np.array([east, north, -self.frequency, self.phase])
+        return lambda x, y, time: float(self.amplitude.dot(np.cos(np.dot((x, y, time, 1.0), rates))))
 
 
 @dataclass(frozen=True)

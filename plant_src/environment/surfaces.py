@@ -46,11 +46,12 @@ class Below:
     """Distances from the rotor planes of multirotors to the next surface straight below."""
 
     def __init__(self, vessels: Sequence[Shadow], platforms: Sequence[Platform], sea: Sea):
-        self._decks, self._platforms, self._sea = [Deck(vessel) for vessel in vessels], platforms, sea
+        self._decks, self._platforms = [Deck(vessel) for vessel in vessels], platforms
+        self._elevation = sea.surface() if len(sea.amplitude) else None
 
     def distance(self, x: float, y: float, z: float, time: float, wave_gain: float) -> float:
         """From a point in the world (m); zero below the water."""
-        surface = wave_gain * self._sea.elevation(x, y, time) if z < HIGH and len(self._sea.amplitude) else 0.0
+        surface = wave_gain * self._elevation(x, y, time) if z < HIGH and self._elevation else 0.0
         for deck in self._decks:
             height = deck.height(x, y)
             if height is not None and surface < height <= z:

@@ -49,7 +49,7 @@ class Surroundings:
         self.inputs[:] = [variable.start for variable in self.input_variables]
         #: vessels that the waves pass by
         self.unmoved = [s.name for s in shadows if environment.waves and s.model.is_vessel and s not in self._waved]
-        self._sea, self._gain = read.sea, self._input("wave_gain") if environment.waves else np.ones(1).data
+        self._elevation, self._gain = read.sea.surface(), self._input("wave_gain") if environment.waves else np.ones(1).data
         self.updates = list(self._updates(read, shadows))
         first = 3 * len(self._blown)
         self._floating = [(shadow.outputs.data, first + k) for k, shadow in enumerate(self._waved)]
@@ -81,7 +81,7 @@ class Surroundings:
     def publish(self, time: float) -> None:
         """Write the outputs that follow from where the vehicles are now."""
         for outputs, place in self._floating:
-            self._published[place] = self._gain[0] * self._sea.elevation(outputs[0], outputs[1], time)
+            self._published[place] = self._gain[0] * self._elevation(outputs[0], outputs[1], time)
 
 
 def _with(shadows: Sequence[Shadow], name: str) -> list[Shadow]:
@@ -181,7 +181,8 @@ class _Ground:
     def __init__(self, multirotors: Sequence[Shadow], below: Below, wave_gain: Any):
         self._below, self._gain = below, wave_gain
         self._vehicles = [
-            (_slot(shadow, "ground_distance"), shadow.outputs.data, shadow.model.rotor_plane) for shadow in multirotors
+            (_slot(shadow, "ground_distance"), shadow.outputs.data, shadow.model.rotor_plane or (0.0, 0.0, 0.0))
+            for shadow in multirotors
         ]
 
     def update(self, time: float) -> None:

@@ -19,6 +19,7 @@ from cosim.errors import ComponentError, InputError, Problem, did_you_mean
 from .. import arguments
 from ..arguments import Platform
 from ..bullet import pybullet
+from ..scene import replay
 from ..shadow import LARGEST_STATE, compound, set_dynamics
 from ..vehicles.ar_drone.parameters import GRAVITY
 from ..vehicles.shapes import Box
@@ -72,6 +73,11 @@ class World(Component):
         except BaseException:
             self.free()
             raise
+
+    @staticmethod
+    def scene(name: str, scenario: Mapping[str, Any]) -> dict[str, Any]:
+        """What the 3-D replay draws of this world, see `scene.replay`."""
+        return replay.published(name, scenario)
 
     def _populate(self, spawns: Mapping[str, arguments.Spawn], platforms: list[Platform]) -> None:
         pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)

@@ -29,10 +29,11 @@ MOST_VIEWS = 3
 ON_BOARD = {"eye": (-2.6, 0.0, 1.5), "target": (0.2, 0.0, 0.45)}
 
 
-def world(name: str, scenario: Mapping[str, Any]) -> Scene:
-    """The scene of the world that is the component `name` of a scenario."""
+def world(name: str, scenario: Mapping[str, Any], models: Mapping[str, str] | None = None) -> Scene:
+    """The scene of the world that is the component `name` of a scenario; `models`: those of its vehicles, if it names none."""
     arguments = scenario["components"][name].get("arguments", {})
-    vehicles = {f"{name}.{vehicle}": about["model"] for vehicle, about in arguments["vehicles"].items()}
+    models = models or {vehicle: about["model"] for vehicle, about in arguments["vehicles"].items()}
+    vehicles = {f"{name}.{vehicle}": model for vehicle, model in models.items()}
     boxes = (platform(one["size"], one["position"]) for one in arguments.get("platforms", {}).values())
     waves = _waves(sea(arguments.get("environment", {})))
     return {
@@ -45,6 +46,17 @@ def world(name: str, scenario: Mapping[str, Any]) -> Scene:
 def free(scenario: Mapping[str, Any], vehicles: Mapping[str, str]) -> Scene:
     """The scene of a scenario on plant FMUs alone; `vehicles`: component -> vehicle ("quadcopter": "ar_drone")."""
     return {**_scene(vehicles, scenario), "fixed": [], "water": {"waves": [], "gain": 1}}
+
+
+def published(name: str, scenario: Mapping[str, Any]) -> Scene:
+    """The scene of the published simulator's world (see `replica.interface`): the quadcopter's angles are turned to ours."""
+    scene = world(name, scenario, {"uav": "ar_drone", "usv": "strider"})
+    uav, usv = (f"{name}.{vehicle}.attitude" for vehicle in ("uav", "usv"))
+    attitudes: list[list[Any]] = [[f"{uav}.phi", f"-{uav}.theta", f"-{uav}.psi"], [0, 0, f"{usv}.yaw"]]
+    for body, attitude in zip(scene["bodies"], attitudes, strict=True):
+        body["attitude"] = attitude
+        del body["orientation"]
+    return scene
 
 
 def _waves(found: Sea) -> list[Scene]:
@@ -113,10 +125,10 @@ def _plots(flying: Sequence[str], sailing: Sequence[str]) -> list[list[str]]:
     return [
         [*_of(flying, "position.z"), *_of(sailing, "deck.position.z")],
         [*_of(flying, "velocity.*")],
-        [*_of(flying, "attitude.roll"), *_of(flying, "attitude.pitch")],
+        [*_of(flying, "attitude.*")],
         [*_of(flying, "contact.force")],
         [*_of(sailing, "attitude.yaw")],
-        [*_of(sailing, "velocity_body.u"), *_of(sailing, "velocity_body.v")],
+        [*_of(sailing, "velocity_body.*")],
     ]
 
 

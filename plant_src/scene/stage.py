@@ -31,7 +31,7 @@ class Stage:
         self.client = pybullet.connect(pybullet.DIRECT)
         self.things = [[(self._create(part), part) for part in thing] for thing in things]
         parts = [part for thing in self.things for _, part in thing]
-        self._centres = np.array([part.position for part in parts])  # in the order of Bullet's numbers: 0, 1, ...
+        self._centres = np.array([part.position for part in parts]).reshape(-1, 3)  # in the order of Bullet's numbers: 0, 1, ...
         self._radii = np.array([part.reach() for part in parts])
 
     def __enter__(self) -> Self:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from .noise import Noise, gauss_markov
+from .noise import gauss_markov
 from .sampled import Measurement, SampledSensor, timing
-from .signals import parameter, real
+from .signals import parameter, real, seed_parameter
 
 #: international standard atmosphere, ISO 2533: p = p0 (1 - L z / T0)^EXPONENT
 STANDARD_PRESSURE = 101325.0  # Pa
@@ -25,12 +25,13 @@ def altitude_at(pressure: float, at_zero: float = STANDARD_PRESSURE) -> float:
 class Barometer(SampledSensor):
     """`pressure` (Pa), `altitude` (m, what a reader makes of it with the standard pressure at zero), `time` (s).
 
-    pressure = that of the true altitude + drift (Gauss-Markov) + white noise. Numbers: Bosch BMP388 data sheet
-    BST-BMP388-DS001: noise 1.2 Pa (standard resolution without filter), relative accuracy 8 Pa for the drift, whose time is
-    typical. `pressure_at_zero` (Pa) may change in time like the weather. Inputs: `vehicle.position.z`.
+    pressure = that of the true altitude + drift (Gauss-Markov) + white noise. The drift is the relative accuracy of 8 Pa of a
+    Bosch BMP388 (data sheet BST-BMP388-DS001); its time and the noise of 1.2 Pa, or 0.1 m, are typical. `pressure_at_zero` (Pa)
+    may change in time like the weather. Inputs: `vehicle.position.z`.
     """
 
     memory = (*SampledSensor.memory, "_drift")
+    random_numbers = 2
     _drift: float
 
     def __init__(self, instance_name: str, seed: int = 0):
@@ -42,15 +43,15 @@ class Barometer(SampledSensor):
                 parameter("drift", "Pa", 8.0, "standard deviation of the slow error"),
                 parameter("correlation_time", "s", 300.0, "of the slow error", 1e-3),
                 parameter("pressure_at_zero", "Pa", STANDARD_PRESSURE, "true pressure at z = 0", 5e4, 2e5),
+                seed_parameter(seed),
                 real("pressure", "Pa", "output"),
                 real("altitude", "m", "output", description="of the centre of mass, from the pressure"),
                 *timing(50.0),
             ],
         )
-        self._noise = Noise(2, "barometer", instance_name, seed)
 
     def measure(self, number: int, elapsed: float) -> Measurement:
-        p, (white, slow) = self.parameters, self._noise[number]
+        p, (white, slow) = self.parameters, self.noise[number]
         if elapsed:
             keep, drive = gauss_markov(p["drift"], p["correlation_time"], elapsed)
             self._drift = keep * self._drift + drive * slow

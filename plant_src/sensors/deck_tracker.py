@@ -33,7 +33,7 @@ class DeckTracker(SignalComponent):
                 *vector("marker.position", "xyz", "m", "input"),
                 real("marker.time", "s", "input"),
                 parameter("fix_gain", "1", 0.2, "share of the position error that a fix takes away", 0.0, 1.0),
-                parameter("velocity_gain", "1", 0.3, "share of the velocity error that a fix takes away", 0.0, 1.0),
+                parameter("velocity_gain", "1", 0.6, "share of the velocity error that a fix takes away", 0.0, 1.0),
                 parameter("sight_gain", "1", 0.2, "share of the position error that a sight takes away", 0.0, 1.0),
                 *vector("position", "xyz", "m", "output"),
                 *vector("velocity", "xyz", "m/s", "output"),

@@ -12,8 +12,7 @@ from cosim.errors import did_you_mean
 from cosim.units import parse
 
 from ..reading import Reader
-from .noise import Noise
-from .signals import SignalComponent, accept, flag, parameter, real
+from .signals import SignalComponent, accept, flag, parameter, read_seed, real, seed_parameter
 
 #: what happens to the affected signals
 MODES = ("normal", "frozen", "stuck", "missing")
@@ -49,13 +48,15 @@ class SignalFault(SignalComponent):
     memory = ("_step", "_history")
 
     def __init__(self, instance_name: str, signals: Mapping[str, str], gain_of: str = "signal", seed: int = 0):
-        shapes = _read(signals, gain_of)
+        shapes = _read(signals, gain_of, seed)
         mode = Variable("mode", "String", "parameter", "tunable", "normal", description=", ".join(MODES))
         variables = [variable for name, (unit, shape) in shapes.items() for variable in _channel(name, unit, shape)]
         valid = flag("valid", "output", "false while the mode is missing")
-        super().__init__(instance_name, [*variables, mode, parameter("delay", "s", 0.0, "of all signals"), valid])
+        super().__init__(
+            instance_name, [*variables, mode, parameter("delay", "s", 0.0, "of all signals"), seed_parameter(seed), valid]
+        )
         self._names, self._factor = list(shapes), GAIN_OF[gain_of]
-        self._noise = Noise(len(self.inputs), "fault", instance_name, seed)
+        self.random_numbers = len(self.inputs)
 
     def prepare(self) -> None:
         mode = self.parameters["mode"]
@@ -98,7 +99,7 @@ class SignalFault(SignalComponent):
         return history[0][1]
 
     def _spoil(self, inputs: Sequence[float]) -> None:
-        row = self._noise[self._step]
+        row = self.noise[self._step]
         changes = zip(inputs, self._factors, self._biases, self._sigmas, row, strict=True)
         spoilt = [x * factor + bias + sigma * n for x, factor, bias, sigma, n in changes]
         held = self.outputs if self._stuck is None else self._stuck
@@ -124,7 +125,7 @@ def _channel(name: str, unit: str, shape: tuple[int, ...]) -> list[Variable]:
     ]
 
 
-def _read(signals: Mapping[str, str], gain_of: str) -> dict[str, tuple[str, tuple[int, ...]]]:
+def _read(signals: Mapping[str, str], gain_of: str, seed: int) -> dict[str, tuple[str, tuple[int, ...]]]:
     """Unit and shape of each signal. Raises InputError with all problems."""
     reader = Reader()
     shapes: dict[str, tuple[str, tuple[int, ...]]] = {}
@@ -135,11 +136,12 @@ def _read(signals: Mapping[str, str], gain_of: str) -> dict[str, tuple[str, tupl
         else:
             reader.complain(path, f'found "{text}", expected a name such as "rudder_angle" or "rotor_speed[4]"')
         try:
-            parse(unit or "1")
-        except (ValueError, TypeError, AttributeError) as error:
+            parse(str(unit) or "1")
+        except ValueError as error:
             reader.complain(path, f"found {unit!r}, expected a unit: {error}")
     if signals == {}:
         reader.complain(("signals",), "found no signal, expected at least one")
     reader.choice(gain_of, ("gain_of",), list(GAIN_OF))
+    read_seed(reader, seed)
     accept(reader)
     return shapes

@@ -59,8 +59,11 @@ def rotation(v: Sequence[float]) -> Quaternion:
 
 def halfway(a: Sequence[float], b: Sequence[float]) -> Quaternion:
     """The attitude in the middle of the shorter way from one to another."""
-    s = 1.0 if a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] >= 0 else -1.0
-    return unit((a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2], a[3] + s * b[3]))
+    w, x, y, z = a
+    o, p, q, r = b
+    if w * o + x * p + y * q + z * r >= 0:
+        return unit((w + o, x + p, y + q, z + r))
+    return unit((w - o, x - p, y - q, z - r))
 
 
 def angles(q: Sequence[float]) -> Vector:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..reading import Reader
-from .noise import Noise, gauss_markov
+from .noise import gauss_markov
 from .parameters import SATELLITE
 from .sampled import Measurement, SampledSensor, timing
-from .signals import accept, flag, parameter, vector
+from .signals import accept, flag, parameter, read_seed, seed_parameter, vector
 
 
 class Gnss(SampledSensor):
@@ -21,11 +21,13 @@ class Gnss(SampledSensor):
     """
 
     memory = (*SampledSensor.memory, "_drift")
+    random_numbers = 9
     _drift: Sequence[float]
 
     def __init__(self, instance_name: str, seed: int = 0, receiver: str = "standard"):
         reader = Reader()
         numbers = SATELLITE[reader.choice(receiver, ("receiver",), list(SATELLITE))]
+        read_seed(reader, seed)
         accept(reader)
         noise = [(name, numbers[name]) for name in numbers if name.endswith(("_noise", "_drift"))]
         super().__init__(
@@ -35,6 +37,7 @@ class Gnss(SampledSensor):
                 *vector("vehicle.velocity", "xyz", "m/s", "input"),
                 *(parameter(name, "m/s" if name[0:4] == "velo" else "m", value, "standard deviation") for name, value in noise),
                 parameter("correlation_time", "s", numbers["correlation_time"], "of the drift", 1e-3),
+                seed_parameter(seed),
                 flag("available", "parameter", "satellites are seen", True),
                 *vector("position", "xyz", "m", "output"),
                 *vector("velocity", "xyz", "m/s", "output"),
@@ -42,10 +45,9 @@ class Gnss(SampledSensor):
                 flag("valid", "output", "there is a solution"),
             ],
         )
-        self._noise = Noise(9, "gnss", instance_name, seed)
 
     def measure(self, number: int, elapsed: float) -> Measurement:
-        p, row = self.parameters, self._noise[number]
+        p, row = self.parameters, self.noise[number]
         self._let_drift(elapsed, row[6:])
         if not p["available"]:
             return (), (False,)

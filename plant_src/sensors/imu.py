@@ -18,7 +18,7 @@ from ..reading import Reader
 from .frames import Vector, halfway, to_body
 from .noise import Noise, gauss_markov
 from .parameters import INERTIAL, Numbers
-from .signals import SignalComponent, accept, parameter, real, vector
+from .signals import SignalComponent, accept, parameter, read_seed, real, seed_parameter, vector
 
 GRAVITY = 9.81  # m/s2, as in the equations of the vehicles
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -44,11 +44,13 @@ class Imu(SignalComponent):
     `vehicle.orientation`, `vehicle.rates`. Raises InputError for an unknown device.
     """
 
+    random_numbers = 12
     memory = ("_step", "_last", "_biases")
 
     def __init__(self, instance_name: str, seed: int = 0, device: str = "bmi088"):
         reader = Reader()
         device = reader.choice(device, ("device",), list(INERTIAL))
+        read_seed(reader, seed)
         accept(reader)
         super().__init__(
             instance_name,
@@ -58,17 +60,17 @@ class Imu(SignalComponent):
                 *vector("vehicle.rates", "pqr", "rad/s", "input"),
                 *_triad("gyroscope", "rad/s", INERTIAL[device]["gyroscope"]),
                 *_triad("accelerometer", "m/s2", INERTIAL[device]["accelerometer"]),
+                seed_parameter(seed),
                 *vector("acceleration", "xyz", "m/s2", "output", text="specific force"),
                 *vector("rates", "pqr", "rad/s", "output", text="angular velocity"),
             ],
         )
-        self._noise = Noise(12, "imu", instance_name, seed)
-        self._turn_on = Noise(6, "imu turn-on", instance_name, seed)[0]
         self._step_size = 0.01
 
     def prepare(self) -> None:
-        self._accelerometer = self._coefficients("accelerometer", self._turn_on[:3])
-        self._gyroscope = self._coefficients("gyroscope", self._turn_on[3:])
+        turn_on = Noise(6, "turn-on", self.name, self.parameters["seed"])[0]
+        self._accelerometer = self._coefficients("accelerometer", turn_on[:3])
+        self._gyroscope = self._coefficients("gyroscope", turn_on[3:])
 
     def _coefficients(self, kind: str, turn_on: Sequence[float]) -> _Triad:
         p = {name.partition(".")[2]: value for name, value in self.parameters.items() if name.startswith(kind)}
@@ -83,14 +85,14 @@ class Imu(SignalComponent):
     def begin(self) -> None:
         self._step, self._last = 0, self.inputs
         self._biases: Sequence[float] = (0.0,) * 6
-        self._measure((0.0, 0.0, GRAVITY), self.inputs[3:7], self._noise[0])
+        self._measure((0.0, 0.0, GRAVITY), self.inputs[3:7], self.noise[0])
 
     def advance(self, now: float, step_size: float) -> None:
         if step_size != self._step_size:
             self._step_size = step_size
             self.prepare()
         self._step += 1
-        row, last, new = self._noise[self._step], self._last, self.inputs
+        row, last, new = self.noise[self._step], self._last, self.inputs
         self._wander(row)
         h = step_size
         force = ((new[0] - last[0]) / h, (new[1] - last[1]) / h, (new[2] - last[2]) / h + GRAVITY)
@@ -99,11 +101,11 @@ class Imu(SignalComponent):
 
     def _wander(self, row: Sequence[float]) -> None:
         """The biases from the last step to this one."""
-        b, keep, drive = self._biases, self._accelerometer.keep, self._accelerometer.drive
-        x, y, z = keep * b[0] + drive * row[6], keep * b[1] + drive * row[7], keep * b[2] + drive * row[8]
-        keep, drive = self._gyroscope.keep, self._gyroscope.drive
-        p, q, r = keep * b[3] + drive * row[9], keep * b[4] + drive * row[10], keep * b[5] + drive * row[11]
-        self._biases = x, y, z, p, q, r
+        _, _, _, keep, drive, _ = self._accelerometer
+        _, _, _, kept, driven, _ = self._gyroscope
+        x, y, z, p, q, r = self._biases
+        x, y, z = keep * x + drive * row[6], keep * y + drive * row[7], keep * z + drive * row[8]
+        self._biases = x, y, z, kept * p + driven * row[9], kept * q + driven * row[10], kept * r + driven * row[11]
 
     def _measure(self, force: Vector, attitude: Sequence[float], row: Sequence[float]) -> None:
         """Outputs from the specific force in world axes and an attitude."""
@@ -112,14 +114,14 @@ class Imu(SignalComponent):
 
 
 def _sensed(triad: _Triad, true: Sequence[float], bias: Sequence[float], row: Sequence[float]) -> Vector:
-    matrix, offset, sigma, limit = triad.matrix, triad.offset, triad.sigma, triad.range
+    matrix, (offset_x, offset_y, offset_z), sigma, _, _, limit = triad
     x, y, z = true
     if matrix:
         a, b, c, d, e, f, g, h, i = matrix
         x, y, z = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
-    x += offset[0] + bias[0] + sigma * row[0]
-    y += offset[1] + bias[1] + sigma * row[1]
-    z += offset[2] + bias[2] + sigma * row[2]
+    x += offset_x + bias[0] + sigma * row[0]
+    y += offset_y + bias[1] + sigma * row[1]
+    z += offset_z + bias[2] + sigma * row[2]
     if -limit <= x <= limit and -limit <= y <= limit and -limit <= z <= limit:
         return x, y, z
     return max(-limit, min(limit, x)), max(-limit, min(limit, y)), max(-limit, min(limit, z))

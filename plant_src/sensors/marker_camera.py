@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 
 from .frames import Vector, angles, inverse, product, to_body, to_world
-from .noise import Noise, uniform
+from .noise import uniform
 from .optics import camera_attitude, pixels, seen_from
 from .sampled import Measurement, SampledSensor, timing
-from .signals import flag, parameter, pose_inputs, real, vector
+from .signals import flag, parameter, pose_inputs, real, seed_parameter, vector
 
 
 class MarkerCamera(SampledSensor):
@@ -30,6 +30,8 @@ class MarkerCamera(SampledSensor):
     `deck`, each `position` and `orientation` ("plant.usv.deck" has the position, "plant.usv.orientation" the other).
     """
 
+    random_numbers = 7
+
     def __init__(self, instance_name: str, seed: int = 0):
         super().__init__(
             instance_name,
@@ -47,19 +49,19 @@ class MarkerCamera(SampledSensor):
                 parameter("tilt_ratio", "1", 3.0, "how much worse roll and pitch are seen than yaw"),
                 parameter("tilt", "rad", 0.0, "of the camera, from straight down to ahead", -math.pi, math.pi),
                 real("mounting", "m", "parameter", (0.0, 0.0, 0.0), "place of the camera, body axes", shape=(3,)),
+                seed_parameter(seed),
                 *vector("position", "xyz", "m", "output", text="centre of the deck, body axes"),
                 *(real(f"attitude.{angle}", "rad", "output") for angle in ("roll", "pitch", "yaw")),
                 *timing(30.0, 0.05),
                 flag("valid", "output", "the marker was found"),
             ],
         )
-        self._noise = Noise(7, "marker camera", instance_name, seed)
 
     def prepare(self) -> None:
         self._camera = camera_attitude(self.parameters["tilt"])
 
     def measure(self, number: int, elapsed: float) -> Measurement:
-        row, attitude = self._noise[number], self.inputs[3:7]
+        row, attitude = self.noise[number], self.inputs[3:7]
         a, b, c = to_world(attitude, self.parameters["mounting"])
         place = (self.inputs[0] + a, self.inputs[1] + b, self.inputs[2] + c)
         camera = product(attitude, self._camera)

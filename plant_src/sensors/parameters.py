@@ -1,10 +1,9 @@
 """Numbers of sensors that can be bought, SI units, and where they come from.
 
-[BMI088] Bosch Sensortec, BMI088 data sheet BST-BMI088-DS001 [ADIS] Analog Devices ADIS16448 as in the RotorS simulator (Furrer
+[BMI088] Bosch Sensortec BMI088, data sheet BST-BMI088-DS001 [ADIS] Analog Devices ADIS16448 as in the RotorS simulator (Furrer
 et al., "RotorS - A modular Gazebo MAV simulator framework", 2016; gazebo_imu_plugin.h), which doubles the densities of the data
-sheet [F9P] u-blox ZED-F9P data sheet UBX-17051259, RTK fixed [M8N] u-blox NEO-M8N data sheet UBX-15031086 [BMP388] Bosch
-Sensortec BST-BMP388-DS001 [IST8310] Isentek IST8310 data sheet [TFMINI] Benewake TFmini-S data sheet [typical] no data sheet
-says it: what is usual.
+sheet [F9P] u-blox ZED-F9P, data sheet UBX-17051259, RTK fixed, short base line [M8N] u-blox NEO-M8N, data sheet UBX-15031086
+[typical] no data sheet says it: what is usual. The numbers of single-device sensors stand in their docstrings.
 """
 
 from __future__ import annotations

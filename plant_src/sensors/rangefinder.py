@@ -12,9 +12,8 @@ from ..reading import Reader
 from ..shadow import compound
 from ..vehicles.shapes import Box
 from .frames import Vector, to_world
-from .noise import Noise
 from .sampled import Measurement, SampledSensor, timing
-from .signals import accept, flag, parameter, pose_inputs, real
+from .signals import accept, flag, parameter, pose_inputs, read_seed, real, seed_parameter
 
 _POSE = 7  # numbers of a position and an orientation
 _HIT, _FRACTION = 0, 2  # fields of what Bullet says of a ray
@@ -28,11 +27,13 @@ class Rangefinder(SampledSensor):
     `direction` (body axes). Numbers: Benewake TFmini-S data sheet: 0.1 to 12 m, 100 Hz, 6 cm, 1 % beyond 6 m, taken for three
     standard deviations.
 
-    `vessels`: name -> vehicle of the catalogue ("usv": "strider"), for each of which there are inputs `NAME.position` and
-    `NAME.orientation`; `platforms` as in the world; `water`: whether the plane z = 0 stops the beam. Vehicles' bodies and
+    `vessels`: name -> vehicle of the catalogue ("usv": "strider"), for each of which there are inputs `NAME.deck.position`
+    and `NAME.orientation`; `platforms` as in the world; `water`: whether the plane z = 0 stops the beam. Vehicles' bodies and
     platforms are copies in a Bullet client of its own: those of the world are put aside while nothing is near. Raises InputError
     with all problems. Inputs: `vehicle.position`, `vehicle.orientation`.
     """
+
+    random_numbers = 1
 
     def __init__(
         self,
@@ -45,24 +46,26 @@ class Rangefinder(SampledSensor):
         reader = Reader()
         bodies = _vessels(reader, vessels or {})
         boxes = _platforms(reader, platforms or {})
+        read_seed(reader, seed)
         accept(reader)
         super().__init__(
             instance_name,
             [
                 *pose_inputs("vehicle"),
-                *(variable for name in bodies for variable in pose_inputs(name)),
+                *(variable for name in bodies for variable in pose_inputs(name, "deck.position")),
                 parameter("noise_floor", "m", 0.02, "standard deviation close by"),
                 parameter("noise_share", "1", 0.01 / 3, "standard deviation per distance far away"),
                 parameter("nearest", "m", 0.1, "smallest distance that is measured"),
                 parameter("farthest", "m", 12.0, "largest distance that is measured"),
                 real("mounting", "m", "parameter", (0.0, 0.0, 0.0), "place on the vehicle, body axes", shape=(3,)),
                 real("direction", "1", "parameter", (0.0, 0.0, -1.0), "of the beam, body axes", shape=(3,)),
+                seed_parameter(seed),
                 real("distance", "m", "output"),
                 *timing(100.0),
                 flag("valid", "output", "something is in reach"),
             ],
         )
-        self._noise, self._water = Noise(1, "rangefinder", instance_name, seed), water
+        self._water = water
         self._client = pybullet.connect(pybullet.DIRECT)
         for size, position in boxes:
             self._add([Box((size[0] / 2, size[1] / 2, size[2] / 2), (0.0, 0.0, 0.0))], position)
@@ -82,7 +85,7 @@ class Rangefinder(SampledSensor):
         p, true = self.parameters, self._distance()
         if not p["nearest"] <= true <= p["farthest"]:
             return (p["farthest"],), (False,)
-        return (true + max(p["noise_floor"], p["noise_share"] * true) * self._noise[number][0],), (True,)
+        return (true + max(p["noise_floor"], p["noise_share"] * true) * self.noise[number][0],), (True,)
 
     def _distance(self) -> float:
         """True distance along the beam, infinite when nothing is in reach."""
@@ -111,11 +114,21 @@ class Rangefinder(SampledSensor):
 
 
 def _vessels(reader: Reader, vessels: Any) -> dict[str, Sequence[Box]]:
-    """The shapes of each vessel in its body frame; Bullet's frame of other vehicles is another."""
+    """The shapes of each vessel in its axes, from the centre of its deck."""
     known = {name: next(iter(models.values())) for name, models in VEHICLES.items()}
     valid = [name for name, model in known.items() if model.is_vessel]
     named = reader.named(vessels, ("vessels",)).items()
-    return {name: known[reader.choice(kind, ("vessels", name), valid)].body.boxes for name, kind in named}
+    return {name: _from_deck(known[reader.choice(kind, ("vessels", name), valid)].body.boxes) for name, kind in named}
+
+
+def _from_deck(boxes: Sequence[Box]) -> Sequence[Box]:
+    """Shapes moved so that the middle of the top of the first one, which is the deck, is the origin.
+
+    The deck is what all vessels publish; where their centre of mass is depends on the payload of some.
+    """
+    a, b, c = boxes[0].position
+    top = c + boxes[0].half_extents[2]
+    return [box._replace(position=(box.position[0] - a, box.position[1] - b, box.position[2] - top)) for box in boxes]
 
 
 def _platforms(reader: Reader, platforms: Any) -> Sequence[tuple[Sequence[float], Sequence[float]]]:

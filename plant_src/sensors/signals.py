@@ -16,6 +16,7 @@ from cosim.errors import ComponentError, InputError, did_you_mean
 from cosim.units import parse
 
 from ..reading import Reader
+from .noise import Noise
 
 _FLOAT, _FLAG = DTYPES["Float64"], DTYPES["Boolean"]
 
@@ -35,6 +36,9 @@ class SignalComponent(Component):
     has_state = True
     #: attributes that change while it runs, besides inputs, outputs and parameters
     memory: tuple[str, ...] = ()
+    #: random numbers that a sample needs; they follow from the class, the instance's name, the parameter `seed` and its number
+    random_numbers = 0
+    noise: Noise
 
     def __init__(self, instance_name: str, variables: Sequence[Variable]):
         self.name, self.variables = instance_name, list(variables)
@@ -112,6 +116,8 @@ class SignalComponent(Component):
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
         self.start_time, self._initializing = start_time, True
+        if self.random_numbers:
+            self.noise = Noise(self.random_numbers, type(self).__name__, self.name, self.parameters["seed"])
         self.prepare()
         self.begin()
 
@@ -172,7 +178,7 @@ def _places(variables: Sequence[Variable]) -> dict[str, tuple[int, int]]:
 
 def _flat(variable: Variable, value: Any) -> Any:
     """A value as a scalar or flat list of the variable's type. Raises ComponentError for what is no such value."""
-    kind: type = {"Float64": float, "Boolean": bool, "String": str}[variable.type]
+    kind: type = {"Float64": float, "Boolean": bool, "String": str, "Int32": int}[variable.type]
     flat = np.ravel(value).tolist() if variable.shape else [value]
     try:
         values = [kind(x) for x in flat]
@@ -182,6 +188,11 @@ def _flat(variable: Variable, value: Any) -> Any:
         expected = f"{math.prod(variable.shape)} values of type {variable.type}"
         raise ComponentError(variable.name, "set", f"found {value!r}, expected {expected}")
     return values if variable.shape else values[0]
+
+
+def read_seed(reader: Reader, seed: Any) -> None:
+    """Complain about a seed that is none."""
+    reader.integer(seed, ("seed",), 0, 2**31 - 1)
 
 
 def accept(reader: Reader) -> None:
@@ -225,13 +236,21 @@ def parameter(
     return real(name, unit, "parameter", start, description, minimum=minimum, maximum=maximum)
 
 
+def seed_parameter(seed: int) -> Variable:
+    """The parameter `seed` of everything random in a component. Raises InputError for what is no such number."""
+    reader = Reader()
+    read_seed(reader, seed)
+    accept(reader)
+    return Variable("seed", "Int32", "parameter", "fixed", seed, description="of all random numbers", minimum=0)
+
+
 def flag(name: str, causality: Causality, description: str, start: bool | None = None) -> Variable:
     """A Boolean variable."""
     kind: Variability = "tunable" if causality == "parameter" else "discrete"
     return Variable(name, "Boolean", causality, kind, start, description=description)
 
 
-def pose_inputs(name: str) -> list[Variable]:
+def pose_inputs(name: str, place: str = "position") -> list[Variable]:
     """Inputs `name.position.x|y|z` (m, world) and `name.orientation.w|x|y|z` (unit quaternion, body to world), 7 numbers."""
     orientation = [real(f"{name}.orientation.{part}", "1", "input", float(part == "w")) for part in "wxyz"]
-    return [*vector(f"{name}.position", "xyz", "m", "input"), *orientation]
+    return [*vector(f"{name}.{place}", "xyz", "m", "input"), *orientation]

@@ -54,6 +54,21 @@ def euler_angles(q: ca.SX) -> ca.SX:
     return ca.vertcat(ca.atan2(r[2, 1], r[2, 2]), ca.asin(ca.fmin(1, ca.fmax(-1, -r[2, 0]))), ca.atan2(r[1, 0], r[0, 0]))
 
 
+def rates_of_euler(roll: ca.SX, pitch: ca.SX) -> ca.SX:
+    """The matrix (3, 3) that makes rates (body) of the time derivatives of roll, pitch and yaw."""
+    cos, sin = ca.cos(roll), ca.sin(roll)
+    about_y, about_z = ca.vertcat(0, cos, -sin), ca.vertcat(-ca.sin(pitch), sin * ca.cos(pitch), cos * ca.cos(pitch))
+    return ca.horzcat(ca.SX([1, 0, 0]), about_y, about_z)
+
+
+def euler_of_rates(roll: ca.SX, pitch: ca.SX) -> ca.SX:
+    """The matrix (3, 3) that makes time derivatives of roll, pitch and yaw of rates (body); singular at a pitch of 90 degrees."""
+    cos, sin, steepness = ca.cos(roll), ca.sin(roll), ca.tan(pitch)
+    about_y = ca.vertcat(sin * steepness, cos, sin / ca.cos(pitch))
+    about_z = ca.vertcat(cos * steepness, -sin, cos / ca.cos(pitch))
+    return ca.horzcat(ca.SX([1, 0, 0]), about_y, about_z)
+
+
 def rotation_vector(q: ca.SX) -> ca.SX:
     """Axis times angle (rad) of a unit quaternion, by the shorter way; a series where the angle is tiny."""
     shorter = ca.if_else(q[0] < 0, -1, 1) * q

@@ -19,7 +19,7 @@ from cosim.export.equations import ContinuousModel
 from . import kinematics
 from .shadow_maps import LINEAR_ANGULAR, alarm, constants_of, contact, foreseen, symbols, symbols_after, symbols_before
 from .shapes import Body
-from .vessel import Hull, Vessel
+from .vessel import Frame, Hull, Vessel
 
 
 class _Impulse(NamedTuple):
@@ -81,8 +81,11 @@ class FloatingBody:
         found = ca.if_else(strength > 0, ca.vertcat(linear, angular), ca.SX.zeros(6)) + 0 * strength
         touched = ca.logic_or(strength > 0, ca.norm_2(previous) > 0)
         surplus = _about_centre(hull, attitude, found - previous)
-        corrected = _moved(predicted, start, motion, step, predicted[7:13] + _answer(hull, predicted, surplus))
-        frame = hull.frame(corrected[3:7])
+        pose = _moved(start, motion, step)
+        before, frame = hull.frame(predicted[3:7]), hull.frame(pose[3:7])
+        nu = predicted[7:13] + hull.inverse @ _load(hull, before, surplus)
+        velocity = frame.to_world.T @ (before.to_world @ nu[0:3])  # that in the world stays, though Bullet has turned the body
+        corrected = ca.vertcat(pose, velocity, nu[3:6], predicted[13:])
         label = ca.vertcat(frame.to_world.T @ motion[0:3], ca.inv(frame.spin) @ (frame.attitude.T @ motion[3:6]))
         state = ca.if_else(touched, corrected, predicted)
         seen = ca.vertcat(state[0:7], ca.if_else(strength > 0, label, state[7:13]), state[13:])
@@ -107,17 +110,16 @@ def _about_centre(hull: Hull, attitude: ca.SX, impulse: ca.SX) -> _Impulse:
     return _Impulse(impulse[0:3], impulse[3:6] - ca.cross(attitude @ hull.centre, impulse[0:3]))
 
 
-def _answer(hull: Hull, state: ca.SX, impulse: _Impulse) -> ca.SX:
-    """The change of nu by an impulse."""
-    frame = hull.frame(state[3:7])
+def _load(hull: Hull, frame: Frame, impulse: _Impulse) -> ca.SX:
+    """The impulse as a load in the equations of motion."""
     lever = frame.attitude @ hull.centre
-    return hull.inverse @ frame.load(impulse.linear, impulse.angular + ca.cross(lever, impulse.linear))
+    return frame.load(impulse.linear, impulse.angular + ca.cross(lever, impulse.linear))
 
 
-def _moved(predicted: ca.SX, start: ca.SX, motion: ca.SX, step: ca.SX, nu: ca.SX) -> ca.SX:
-    """The state where Bullet has moved the body, with this velocity."""
+def _moved(start: ca.SX, motion: ca.SX, step: ca.SX) -> ca.SX:
+    """Position and orientation to which Bullet has moved the body."""
     orientation = kinematics.product(kinematics.turned_by(motion[3:6] * step), start[3:7])
-    return ca.vertcat(start[0:3] + motion[0:3] * step, kinematics.normalised(orientation), nu, predicted[13:])
+    return ca.vertcat(start[0:3] + motion[0:3] * step, kinematics.normalised(orientation))
 
 
 def _pose(state: ca.SX) -> ca.SX:

@@ -43,12 +43,14 @@ class Frame:
     """How the body's frame stands in the world.
 
     `attitude` (3, 3) turns points of the hull into the world, `to_world` (3, 3) the velocity of O; they differ only if the
-    velocity is counted in a frame that is level at rest. `spin` (3, 3) makes the angular velocity (body) of the rates.
+    velocity is counted in a frame that is level at rest. `spin` (3, 3) makes the angular velocity (body) of the rates, and
+    `from_stream` (3, 3) turns the current into the body's frame.
     """
 
     attitude: ca.SX
     to_world: ca.SX
     spin: ca.SX
+    from_stream: ca.SX
 
     @property
     def heading(self) -> tuple[ca.SX, ca.SX]:
@@ -85,7 +87,7 @@ class Situation:
 def upright(orientation: ca.SX) -> Frame:
     """The frame of a hull that is level at rest."""
     attitude = kinematics.matrix(orientation)
-    return Frame(attitude, attitude, ca.SX.eye(3))
+    return Frame(attitude, attitude, ca.SX.eye(3), attitude.T)
 
 
 @dataclass(frozen=True)
@@ -130,9 +132,8 @@ class Hull:
         frame = self.frame(orientation)
         spin = nu[3:6]
         sea = self._water(state, frame, inputs["wave_gain"])
-        current, orbital, flow = (
-            frame.to_world.T @ vector for vector in (ca.vertcat(inputs["current"], 0), sea.velocity, sea.acceleration)
-        )
+        current = frame.from_stream @ ca.vertcat(inputs["current"], 0)
+        orbital, flow = frame.to_world.T @ sea.velocity, frame.to_world.T @ sea.acceleration
         drift = ca.vertcat(nu[0:3] - current, spin)
         relative = ca.vertcat(drift[0:3] - orbital, spin)
         now = self._situation(state, frame, relative, sea, inputs)
@@ -258,9 +259,7 @@ class Vessel:
             self.variables,
             (*AFLOAT_STATES, *self.actuators),
             lambda c: self.at(c).initial_state(self.unpacked(c), len(self.actuators)),
-            lambda x, u, c: ca.vertcat(
-                self.at(c).rate(x, named(u, self._of("input"))), ca.SX.zeros(len(self.actuators))
-            ),
+            lambda x, u, c: ca.vertcat(self.at(c).rate(x, named(u, self._of("input"))), ca.SX.zeros(len(self.actuators))),
             lambda x, u, c: ca.vertcat(self.at(c).observe(x), ca.SX.zeros(3)),
             normalised,
             constants=self.constants,

@@ -1,10 +1,13 @@
-/* The misbehaving lag as FMI 3.0 FMU. Value references: Float64 0 time, 1 u, 2 y, 3 y_start, 4 T; String 5 fault. */
+/* The misbehaving lag as FMI 3.0 FMU. Value references: Float64 0 time, 1 u, 2 y, 3 y_start, 4 T; String 5 fault;
+   Float64 6 v, an array of 3 elements: y, 2 y, 3 y. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "fmi3FunctionTypes.h"
 #include "misbehave.h"
 
+enum { ARRAY = 6, LENGTH = 3 };
 const char PREFIX[] = "fmi3";
 static fmi3LogMessageCallback voice;
 static fmi3InstanceEnvironment voice_environment;
@@ -54,12 +57,27 @@ CALL(Terminate, )
 CALL(Reset, lag_start(m))
 
 static double value(Lag *m, fmi3ValueReference vr) { return vr ? m->x[(vr - 1) % REALS] : m->time; }
+/* 1 when there is no room for exactly these variables */
+static int get(Lag *m, const fmi3ValueReference vr[], size_t n, fmi3Float64 v[], size_t nv) {
+    size_t needed = 0, place = 0;
+    for (size_t k = 0; k < n; k++) needed += vr[k] == ARRAY ? LENGTH : 1;
+    if (nv != needed) {
+        say(ERROR, "error", "the number of values is not that of these variables");
+        return 1;
+    }
+    for (size_t k = 0; k < n; k++)
+        if (vr[k] == ARRAY)
+            for (int i = 1; i <= LENGTH; i++) v[place++] = m->spoiled && i == 2 ? NAN : i * m->x[Y];
+        else
+            v[place++] = value(m, vr[k]);
+    return 0;
+}
 fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Float64 v[], size_t nv) {
-    for (size_t k = 0; k < n; k++) v[k] = value(c, vr[k]);
+    if (get(c, vr, n, v, nv)) return fmi3Error;
     char values[512];
     record_values(values, sizeof values, vr, n, v);
     ENTER("GetFloat64", "%s", values);
-    for (size_t k = 0; k < n; k++) v[k] = value(m, vr[k]);
+    get(m, vr, n, v, nv);
     return (fmi3Status)status;
 }
 fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Float64 v[], size_t nv) {
@@ -84,7 +102,7 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean 
     ((Lag *)c)->time = t;
     ENTER("DoStep", "t=%.17g h=%.17g", t, h);
     double y = m->x[Y];
-    lag_step(m, t, m->early ? h / 2 : h);
+    lag_step(m, t, m->early ? m->part * h : h);
     if (y - y != 0) m->x[Y] = y; /* what is not finite stays so */
     *event = m->event;
     *terminate = m->terminate;

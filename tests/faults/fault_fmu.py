@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import subprocess
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ HEADERS = Path(fmpy.__file__).parent / "c-code"
 PLATFORMS = {2: fmpy.platform, 3: fmpy.platform_tuple}
 #: macro step (s) and number of steps of every run here; the FMUs' DefaultExperiment says the same
 STEP, COUNT = 0.01, 10
+NOTHING: Mapping[str, str] = {}
 #: functions that have another name in FMI 3.0
 IN_FMI3 = {"Instantiate": "InstantiateCoSimulation", "GetReal": "GetFloat64", "SetReal": "SetFloat64"}
 
@@ -37,10 +39,17 @@ def build_library(version: int, folder: Path) -> Path:
     return library
 
 
+def changed(text: str, changes: Mapping[str, str]) -> str:
+    for old, new in changes.items():
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return text
+
+
 @dataclass(frozen=True)
 class FaultFmus:
     """`fmus(2, "DoStep 6 segv")` is an FMI 2.0 FMU that crashes in its sixth step; the orders stand in misbehave.h, with
-    the names of FMI 2.0 for both versions.
+    the names of FMI 2.0 for both versions. `changes` replaces words of its description.
 
     Each of its calls, and what became of an order, is a line in the file `calls`.
     """
@@ -48,12 +57,12 @@ class FaultFmus:
     libraries: dict[int, Path]
     folder: Path
 
-    def __call__(self, version: int, order: str = "", name: str = "lag") -> Path:
+    def __call__(self, version: int, order: str = "", name: str = "lag", changes: Mapping[str, str] = NOTHING) -> Path:
         target = self.folder / f"{name}.fmu"
         where, _, rest = order.partition(" ")
         order = f"{IN_FMI3.get(where, where) if version == 3 else where} {rest}"
         with ZipFile(target, "w") as archive:
-            archive.write(HERE / f"fault{version}.xml", "modelDescription.xml")
+            archive.writestr("modelDescription.xml", changed((HERE / f"fault{version}.xml").read_text(), changes))
             archive.write(self.libraries[version], f"binaries/{PLATFORMS[version]}/fault.so")
             archive.writestr("resources/fault.txt", f"fault {order}\nrecord {self.calls}\n")
         return target

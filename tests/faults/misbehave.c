@@ -173,7 +173,13 @@ static int processes(Lag *m) { record("process %d child of %d", getpid(), getppi
 static int put(Lag *m, double y) { if (m) m->x[Y] = y; return OK; }
 static int nan_(Lag *m) { return put(m, NAN); }
 static int infinity(Lag *m) { return put(m, INFINITY); }
-static int early(Lag *m) { m->early = 1; return OK; }
+static int ends(Lag *m, double part) { m->early = 1; m->part = part; return OK; }
+static int early(Lag *m) { return ends(m, 0.5); }
+static int stuck(Lag *m) { return ends(m, 0); }
+static int back(Lag *m) { return ends(m, -3); }
+static int beyond(Lag *m) { return ends(m, 2); }
+static int nowhere(Lag *m) { return ends(m, NAN); }
+static int spoil(Lag *m) { m->spoiled = 1; return OK; }
 static int event(Lag *m) { m->event = 1; return OK; }
 static int terminate(Lag *m) { m->terminate = 1; return OK; }
 #define STATUS(NAME, VALUE) static int NAME(Lag *m) { say(VALUE, "status", "told to return " #NAME); return VALUE; }
@@ -183,6 +189,7 @@ STATUS(pending, PENDING) STATUS(undefined, 17)
 static const struct { const char *name; int (*act)(Lag *); } FAULTS[] = {
     {"warning", warning}, {"discard", discard}, {"error", error}, {"fatal", fatal}, {"pending", pending},
     {"undefined", undefined}, {"nan", nan_}, {"infinity", infinity}, {"early", early}, {"event", event},
+    {"stuck", stuck}, {"back", back}, {"beyond", beyond}, {"nowhere", nowhere}, {"spoil", spoil},
     {"terminate", terminate}, {"segv", segv}, {"bus", bus}, {"divide", divide}, {"illegal", illegal}, {"deep", deep},
     {"abort", abort_}, {"free_twice", free_twice}, {"exit_0", exit_0}, {"exit_3", exit_3}, {"exit_at_once", exit_at_once},
     {"kill", kill_}, {"loop", loop}, {"sleep", sleep_}, {"read_stdin", read_stdin}, {"memory", memory},

@@ -16,8 +16,8 @@ typedef struct {
 } Fault;
 
 typedef struct {
-    double x[REALS], time, reached;
-    int event, terminate, early;
+    double x[REALS], time, reached, part; /* an early step ends after this part of it */
+    int event, terminate, early, spoiled;
     Fault fault;
     char name[64], text[96];
 } Lag;

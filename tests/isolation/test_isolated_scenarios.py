@@ -15,7 +15,7 @@ import pytest
 from foreign import FOREIGN, HEADERS
 
 import cosim
-from cosim import api
+from cosim import api, cli
 from cosim.errors import InputError
 from cosim.fmi.isolated.remote import RemoteFmu
 from cosim.sandbox import available, landlock
@@ -61,6 +61,22 @@ def test_all_are_told_from_outside(probe, tmp_path, how):
     file = scenario(tmp_path, {"a": {"fmu": str(probe)}, "b": {"fmu": str(probe)}})
     assert apart(api.load(file, **how)) == ["a", "b"]
     assert apart(api.load(file)) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "where"),
+    [
+        ([], ["the supervised run: b", "a: one of its own"]),
+        (["--isolation", "none"], ["that of the command: b", "a: one of its own"]),
+        (["--sandbox"], ["a: one of its own, in a sandbox", "b: one of its own, in a sandbox"]),
+        (["--sandbox", "strict"], ["processes, all of them in bubblewrap", "b: one of its own, in a sandbox"]),
+    ],
+)
+def test_check_says_what_runs_where(probe, tmp_path, words, where, capsys):
+    file = scenario(tmp_path, {"a": {"fmu": str(probe), "isolation": "fmu"}, "b": {"fmu": str(probe)}})
+    assert cli._code(["check", str(file), *words]) == 0
+    shown = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    assert set(where) < set(shown)
 
 
 def test_only_fmus_can_be_apart(tmp_path):

@@ -79,7 +79,8 @@ _KF = 0.062 * 1.22 * 0.4064**4 / (4 * np.pi**2)
 VEHICLES = {
     "crazyflie": Vehicle(
         mass=0.027,
-        inertia=np.array([[16.571710, 0.830806, 0.718277], [0.830806, 16.655602, 1.800197], [0.718277, 1.800197, 29.261652]]) * 1e-6,
+        inertia=np.array([[16.571710, 0.830806, 0.718277], [0.830806, 16.655602, 1.800197], [0.718277, 1.800197, 29.261652]])
+        * 1e-6,
         rotors=np.array([[0.028, -0.028, 0.008], [-0.028, -0.028, 0.008], [-0.028, 0.028, 0.008], [0.028, 0.028, 0.008]]),
         turning=(1, -1, 1, -1),
         thrust=3.16e-10 / RPM**2,
@@ -123,22 +124,23 @@ class Held:
 
 
 def start(position: Sequence[float], velocity: Sequence[float], rates: Sequence[float], speed: float, count: int) -> np.ndarray:
-    """A level vehicle with its nose along x: position and velocity (world), rotation, rates (forward-right-down), rotor speeds."""
+    """A level vehicle with its nose along x: position and velocity (world), rotation and rates (forward-right-down), rotors."""
     return np.concatenate([position, velocity, FLIP.ravel(), FLIP @ rates, np.full(count, speed)])
 
 
-Pilot = Callable[[int, np.ndarray], Held]  # number of a segment and state at its start -> what acts in it
+#: number of a segment; velocity (world), upward direction and rates (forward-left-up) at its start -> what acts in it
+Pilot = Callable[[int, np.ndarray, np.ndarray, np.ndarray], Held]
 
 
-def fly(vehicle: Vehicle, state: np.ndarray, count: int, pilot: Pilot) -> tuple[list[Held], np.ndarray]:
-    """What a pilot does in so many segments, and the state at the end of each."""
-    acted, states = [], []
+def fly(vehicle: Vehicle, state: np.ndarray, count: int, pilot: Pilot) -> np.ndarray:
+    """The state after each of so many segments."""
+    states = []
     for k in range(count):
-        acted.append(held := pilot(k, state))
+        held = pilot(k, state[3:6], FLIP @ state[12:15], FLIP @ state[15:18])
         rate = lambda t, x, held=held: _rate(vehicle, x, held)  # noqa: E731
         state = solve_ivp(rate, (0, held.duration), state, "DOP853", rtol=1e-11, atol=1e-11).y[:, -1]
         states.append(state)
-    return acted, np.array(states)
+    return np.array(states)
 
 
 def _rate(vehicle: Vehicle, state: np.ndarray, held: Held) -> np.ndarray:

@@ -155,7 +155,5 @@ class Otter:
         k2 = self.rate(*(a + h / 2 * b for a, b in zip(x, k1, strict=True)))
         k3 = self.rate(*(a + h / 2 * b for a, b in zip(x, k2, strict=True)))
         k4 = self.rate(*(a + h * b for a, b in zip(x, k3, strict=True)))
-        self.eta, self.nu = (
-            a + h / 6 * (p + 2 * q + 2 * r + s) for a, p, q, r, s in zip(x, k1, k2, k3, k4, strict=True)
-        )
+        self.eta, self.nu = (a + h / 6 * (p + 2 * q + 2 * r + s) for a, p, q, r, s in zip(x, k1, k2, k3, k4, strict=True))
         self.shafts = self.shafts + 0.1 * (np.array(commands) - self.shafts)

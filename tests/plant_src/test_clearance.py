@@ -69,3 +69,27 @@ def test_nothing_comes_near_while_all_keep_to_their_leashes() -> None:
         assert not any(places.survey())
         far += 1
     assert far > 20
+
+
+def test_what_holds_is_what_a_survey_would_find_again() -> None:
+    """Random places about the threshold: near pairs hold exactly as long as the survey says so."""
+    random, floor = np.random.default_rng(2), Enclosure((-9.0, -9.0, -2.0), (9.0, 9.0, -1.0))
+    seen = set()
+    for _ in range(300):
+        places = Places([[0.0, 0.0, -0.5 + NEAR / 2], [0.0, 0.0, 0.5 + NEAR]], (floor,))
+        before = places.survey()
+        places.path += random.uniform(-NEAR / 2, NEAR / 2, places.path.shape)
+        held = places.clearance.holds()
+        pairs = places.clearance._pairs
+        seen.add((held, before == places.survey()))
+        assert held == set(map(tuple, pairs)).issubset(map(tuple, places.clearance._pairs))
+    assert len(seen) > 1
+
+
+def test_nothing_holds_before_a_survey_or_after_vehicles_were_placed() -> None:
+    places = Places([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    assert not places.clearance.holds()
+    places.survey()
+    assert places.clearance.holds()
+    places.clearance.forget()
+    assert not places.clearance.holds()

@@ -1,10 +1,13 @@
 """The manoeuvres of MSC.137(76) on tracks whose measures are known in closed form."""
 
+import json
 import math
 
 import numpy as np
 import pytest
 
+import cosim
+from cosim import resources
 from cosim.errors import InputError
 from cosim.recording import Recording
 from cosim.results import Result
@@ -160,3 +163,28 @@ def test_a_vessel_that_coasts_has_stopped_at_a_speed():
 def test_an_order_outside_the_run_is_refused():
     with pytest.raises(InputError, match="starts at 99 s, where nothing was recorded"):
         turning_circle(circle(1), "usv", 99.0, LENGTH)
+
+
+def test_the_strider_turns_on_the_circle_of_its_speed_and_rate(tmp_path):
+    """Named by a scenario; on the last circle the speed is the rate times the radius."""
+    root = resources.root()
+    turn = {"name": "turn", "python": str(root / "plant_src/manoeuvres.py:turning_circle")}
+    content = {
+        "name": "circle",
+        "stop_time": 60,
+        "step_size": 0.01,
+        "components": {
+            "vessel": {"fmu": str(root / "fmus/strider.fmu"), "parameters": {"thrust": 2.0, "initial.velocity_body.u": 1.0}}
+        },
+        "events": [{"time": 20.0, "set": {"vessel.rudder_angle": 35 * DEGREE}}],
+        "kpis": [{**turn, "arguments": {"vehicle": "vessel", "start": 20.0, "length": 1.0}}],
+    }
+    (tmp_path / "circle.json").write_text(json.dumps(content))
+    result = cosim.run(tmp_path / "circle.json")
+    speed = math.hypot(*(result[f"vessel.velocity.{axis}"][-1] for axis in "xy"))
+    rate = abs(result["vessel.rates.r"][-1])
+    kpis = {name.removeprefix("turn."): value for name, value in result.kpis.items()}
+    assert kpis["steady_diameter"] == pytest.approx(2 * speed / rate, rel=1e-3)
+    assert kpis["period"] == pytest.approx(2 * math.pi / rate, rel=1e-3)
+    assert 0 < kpis["speed_loss"] < 1 and kpis["tactical_diameter"] > kpis["transfer"] > 0
+    assert result.metadata["kpi_units"]["turn.steady_diameter"] == "m"

@@ -11,17 +11,16 @@ STEP = 0.01
 
 
 def pilot(vehicle: Vehicle) -> Pilot:
-    """Every 0.1 s other commands, loads, wind and heights, now and then beyond the limits of the motors; torques and thrust that
-    keep the vehicle from tumbling and falling."""
+    """Every 0.1 s other commands, loads, wind and heights, now and then beyond the limits of the motors; torque and thrust that
+    keep the vehicle, which is unstable, upright."""
     random, count = np.random.default_rng(3), len(vehicle.rotors)
 
-    def segment(k: int, state: np.ndarray) -> Held:
-        velocity, tilt, rates = state[3:6], FLIP @ state[12:15] @ FLIP, FLIP @ state[15:18]
-        upright = np.array([-tilt[1], tilt[0], 0.0])
+    def segment(k: int, velocity: np.ndarray, up: np.ndarray, rates: np.ndarray) -> Held:
+        upright = np.array([-up[1], up[0], 0.0])
         torque = vehicle.inertia @ (9 * upright - 6 * rates + random.standard_normal(3))
         climbing = np.clip(1 - 0.1 * velocity[2], 0.5, 1.5)
         command = vehicle.hover_speed * climbing * (1 + 0.002 * random.standard_normal(count))
-        command += {10: vehicle.limit, 11: -2 * vehicle.limit}.get(k % 25, 0.0)
+        command += {40: vehicle.limit, 41: -2 * vehicle.limit}.get(k % 50, 0.0)
         force, wind = 0.2 * vehicle.mass * random.standard_normal(3), 2 * random.standard_normal(3)
         height = float(vehicle.radius * (0.3, 0.6, 1.5, 4.0, 1e4)[k % 5])
         return Held(0.1, command, force, torque, wind, height)
@@ -37,18 +36,24 @@ def inputs(held: Held) -> dict[str, float]:
     return named | {"ground_distance": held.height}
 
 
+def up(orientation: np.ndarray) -> np.ndarray:
+    """The upward direction in the body frame of a quaternion (w, x, y, z)."""
+    w, x, y, z = orientation
+    return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
+
+
 @pytest.mark.parametrize("name", VEHICLES)
 def test_flight_with_all_effects(name: str) -> None:
-    vehicle, rates = VEHICLES[name], {"p": 0.2, "q": -0.1, "r": 0.3}
-    speed, velocity = vehicle.hover_speed, {"u": 1.0, "v": 0.5, "w": -0.2}
-    state = start([0, 0, 50], [*velocity.values()], [*rates.values()], speed, len(vehicle.rotors))
-    acted, expected = fly(vehicle, state, 100, pilot(vehicle))
-    initial = {f"velocity_body.{axis}": value for axis, value in velocity.items()} | {"position.z": 50.0}
-    initial |= {f"rates.{axis}": value for axis, value in rates.items()}
-    fmu = PlantFmu(name, {f"initial.{key}": value for key, value in initial.items()} | {"initial_rotor_speed": speed})
-    found = []
-    for held in acted:
-        fmu.set(inputs(held))
+    vehicle, velocity, rates = VEHICLES[name], (1.0, 0.5, -0.2), (0.2, -0.1, 0.3)
+    speed = vehicle.hover_speed
+    expected = fly(vehicle, start([0, 0, 50], velocity, rates, speed, len(vehicle.rotors)), 100, pilot(vehicle))
+    initial = {"initial.position.z": 50.0, "initial_rotor_speed": speed}
+    initial |= {f"initial.velocity_body.{axis}": value for axis, value in zip("uvw", velocity, strict=True)}
+    initial |= {f"initial.rates.{axis}": value for axis, value in zip("pqr", rates, strict=True)}
+    fmu, segment, found = PlantFmu(name, initial), pilot(vehicle), []
+    for k in range(100):
+        seen = fmu.vector("velocity"), up(fmu.vector("orientation", "wxyz")), fmu.vector("rates", "pqr")
+        fmu.set(inputs(segment(k, *seen)))
         fmu.step(STEP, 10)
         found.append(np.concatenate([fmu.vector("position"), fmu.vector("rates", "pqr")]))
     assert np.linalg.norm(np.array(found)[:, :3] - expected[:, :3], axis=1).max() < 1e-6

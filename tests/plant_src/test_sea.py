@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ def area(spectrum, *arguments, low=0.0, high=math.inf):
     cuts = [peak * r for r in (0.3, 0.8, 1.0, 1.3, 2.0, 4.0, 10.0, 1000.0)]
     cuts = [low, *(cut for cut in cuts if low < cut < high), *([high] if math.isfinite(high) else [])]
     density = lambda w: float(spectrum(np.array(max(w, 1e-9)), *arguments))  # noqa: E731
-    return sum(quad(density, a, b, epsabs=1e-14)[0] for a, b in zip(cuts, cuts[1:], strict=False))
+    return sum(quad(density, a, b, epsabs=1e-14)[0] for a, b in pairwise(cuts))
 
 
 def realisation(seed: int = 0, **waves):

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import logging
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from worlds import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, Trial, quadcopter, vessel
 
+import cosim
 from cosim.errors import ComponentError, InputError
 from plant_src.environment import sea
 from plant_src.world import World
@@ -223,3 +225,24 @@ def test_a_vessel_rides_the_waves_that_are_seen() -> None:
     heave, elevation = rows[500:].T - rows[500:].T.mean(axis=1, keepdims=True)
     assert np.abs(elevation).max() > 0.1
     assert np.abs(heave - elevation).max() < 0.2 * np.abs(elevation).max()
+
+
+EVENTFUL = """
+{"name": "eventful", "stop_time": 3, "step_size": 0.01,
+ "components": {"plant": {"python": "ROOT/plant_src/world.py:World", "arguments": {
+   "vehicles": {"usv": {"model": "strider", "motion": "6dof", "position": [0, 0]}},
+   "environment": {"seed": 1, "wind": {"speed": 0}, "waves": {"significant_height": 0.2, "peak_period": 3}}}}},
+ "inputs": [{"file": "gain.csv", "to": {"gain": "plant.environment.wave_gain"}}],
+ "events": [{"time": 1, "set": {"plant.environment.wind.x": 4}}, {"time": 2, "set": {"plant.environment.wind.x": -4}}]}
+"""
+
+
+def test_events_and_profiles_change_the_weather(tmp_path: Path) -> None:
+    """The wind is that of the step that ends at a row; waves that fade by a profile are gone at its end."""
+    (tmp_path / "gain.csv").write_text('"time","gain"\n0,1\n1,1\n2,0\n3,0\n')
+    (tmp_path / "eventful.json").write_text(EVENTFUL.replace("ROOT", str(Path(__file__).parents[2])))
+    result = cosim.run(tmp_path / "eventful.json")
+    wind, elevation = result["plant.usv.wind.x"], result["plant.usv.wave.elevation"]
+    assert wind[[0, 100, 101, 200, 201, 300]].tolist() == [0.0, 0.0, 4.0, 4.0, -4.0, -4.0]
+    assert np.abs(elevation[:100]).max() > 0.02
+    assert np.abs(elevation[202:]).max() == 0.0

@@ -79,7 +79,7 @@ def together(folder, seed: int, count: int = 10) -> None:
 
 
 def test_no_more_than_a_second_is_lost(tmp_path):
-    together(tmp_path, 1)
+    together(tmp_path, 1, 6)
 
 
 @pytest.mark.long

@@ -119,3 +119,20 @@ def test_what_a_killed_program_left_goes_at_the_start_of_the_next_one(workplace,
     finally:
         other.kill()
         other.communicate()
+
+
+FORGETFUL = """
+import os, sys
+from cosim.temporary import FMU, LockedFolder
+folder = LockedFolder(FMU)
+if os.fork() == 0:
+    sys.exit()
+os.wait()
+print(os.listdir(os.environ["TMPDIR"]) == [os.path.basename(folder.name)])
+"""
+
+
+def test_a_forgotten_folder_goes_with_its_process_and_not_with_a_child(workplace):
+    environment = {**os.environ, "TMPDIR": str(workplace.tmp)}
+    done = subprocess.run([sys.executable, "-c", FORGETFUL], env=environment, capture_output=True, text=True, check=True)
+    assert (done.stdout, list(workplace.tmp.iterdir())) == ("True\n", [])

@@ -127,6 +127,14 @@ def test_without_bubblewrap_it_is_refused_before_anything_runs(home, tmp_path):
     assert not (home / "runs").exists()
 
 
+def test_a_bubblewrap_that_starts_nothing_is_no_success(home):
+    (home / "bwrap").write_text("#!/bin/sh\nexit 0\n")
+    (home / "bwrap").chmod(0o755)
+    done = cosim(home, "run", prowling(home), "--sandbox", "strict", PATH=f"{home}:/bin")
+    assert (done.returncode, done.stderr) == (2, "bubblewrap could not start the command (exit code 0)\n")
+    assert not (home / "runs").exists()
+
+
 def test_one_fmu_alone(home, probe):
     done = cosim(home, "simulate", probe, "--output-file", "out/x.csv", "--sandbox", "strict")
     assert done.returncode == 0, done.stderr

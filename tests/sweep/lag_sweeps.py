@@ -31,11 +31,12 @@ class Done:
     err: str
 
 
-@dataclass(frozen=True)
+@dataclass
 class Lag:
-    """A folder with a scenario around the FMU, and commands in it."""
+    """A folder with a scenario around the FMU, and commands in it; `done` is what came of the last one."""
 
     folder: Path
+    done: Done | None = None
 
     @classmethod
     def made(cls, folder: Path, library: Path, **more: Any) -> Lag:
@@ -57,7 +58,8 @@ class Lag:
         out, err = StringIO(), StringIO()
         with chdir(self.folder), redirect_stdout(out), redirect_stderr(err):
             code = guarded(lambda: cli.main([*map(str, words)], standalone_mode=False))
-        return Done(code, out.getvalue(), err.getvalue())
+        self.done = Done(code, out.getvalue(), err.getvalue())
+        return self.done
 
     def start(self, *words: object) -> subprocess.Popen[str]:
         """A command that goes on in a process of its own while the test does something to it."""

@@ -37,7 +37,7 @@ class RemoteFmu(Component):
         if not hasattr(os, "fork"):
             raise InputError("FMUs in processes of their own need an operating system with fork (Linux, macOS)")
         file.check_platform()
-        self.name, self._file, self._kind, self._isolation = instance_name, file, kind, isolation
+        self.name, self._file, self._kind, self.isolation = instance_name, file, kind, isolation
         self.description = file.description
         self.variables, self.has_state = self.description.variables, self.description.has_state
         self._logging_on = logging_on
@@ -61,11 +61,11 @@ class RemoteFmu(Component):
         self._has_texts = len(self._texts_in) + len(self._texts_out) > 0
         self._start(folder, Path(self._temporary.name))
         self._ask("bind")
-        self._deadline = self._isolation.deadlines.initialization
+        self._deadline = self.isolation.deadlines.initialization
 
     def _start(self, folder: Path, temporary: Path) -> None:
         import_module(f"fmpy.fmi{self.description.major}")  # once here and not once in every worker
-        enter = self._isolation.entrance(folder, temporary, os.getpid())
+        enter = self.isolation.entrance(folder, temporary, os.getpid())
 
         def serve(commands: int, answers: int) -> None:
             instance = self._kind(self._file.lent(), self.name, self._logging_on)
@@ -78,15 +78,15 @@ class RemoteFmu(Component):
 
     def exit_initialization_mode(self) -> None:
         self._ask("exit_initialization_mode")
-        self._deadline = self._isolation.deadlines.step
+        self._deadline = self.isolation.deadlines.step
 
     def terminate(self) -> None:
-        self._deadline = self._isolation.deadlines.end
+        self._deadline = self.isolation.deadlines.end
         if not self._file.corrupt:
             self._at_the_end("terminate")
 
     def free(self) -> None:
-        self._deadline = self._isolation.deadlines.end
+        self._deadline = self.isolation.deadlines.end
         if self._process and not self._file.corrupt:
             self._at_the_end("free")
         if self._process:

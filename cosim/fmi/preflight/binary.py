@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
-from . import elf, pe
+from . import elf, macho, pe
 from .archive import Archive
 from .findings import Finding, Rule
 from .library import Damaged, Library
@@ -15,7 +15,7 @@ from .machine import Machine
 from .model import Model
 
 _BINARIES = "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5.1"
-_FUNCTIONS = "FMI 2.0.5 sections 2.1 and 4.2, FMI 3.0.2 sections 2.3 and 4.2"
+_FUNCTIONS = "FMI 2.0.5 sections 2.1 and 4.2, FMI 3.0.2 section 2.5"
 PLATFORM = Rule("binary.platform", _BINARIES)
 PRESENT = Rule("binary.present", _BINARIES)
 FORMAT = Rule("binary.format", _BINARIES)
@@ -23,8 +23,11 @@ FUNCTIONS = Rule("binary.functions", _FUNCTIONS)
 SIZE = Rule("binary.size", "limits")
 NEEDED = Rule("binary.needed", _BINARIES, "warning")
 
-#: for other systems only the name is checked
-_READERS: Mapping[str, Callable[[bytes, str], Library]] = {".so": elf.read_library, ".dll": pe.read_library}
+_READERS: Mapping[str, Callable[[bytes, str], Library]] = {
+    ".so": elf.read_library,
+    ".dll": pe.read_library,
+    ".dylib": macho.read_library,
+}
 _SUFFIXES = (".so", ".dll", ".dylib")
 _STATE = ("FreeFMUState", "GetFMUState", "SerializeFMUState", "SerializedFMUStateSize", "SetFMUState")
 _COMMON = (
@@ -80,7 +83,7 @@ def check_binary(archive: Archive, model: Model, machine: Machine, limits: Limit
         yield PRESENT(f"the library cannot be loaded: {member} does not exist; there is: {there}")
     elif archive.members[member].size > limits.library:
         yield SIZE(f"the library has {archive.members[member].size} bytes, expected at most {limits.library}", member)
-    elif machine.suffix in _READERS:
+    else:
         yield from _check_library(archive, member, model.major, machine)
 
 

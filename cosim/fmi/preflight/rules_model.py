@@ -12,7 +12,7 @@ from .model import Model, UnitDefinition
 from .values import real
 
 _ROOT = "FMI 2.0.5 section 2.2.1, FMI 3.0.2 section 2.4.1"
-_INTERFACE = "FMI 2.0.5 section 4.3.1, FMI 3.0.2 section 4.3.1"
+_INTERFACE = "FMI 2.0.5 section 4.3.1, FMI 3.0.2 sections 2.4.2 and 4.4"
 _UNITS = "FMI 2.0.5 section 2.2.2, FMI 3.0.2 section 2.4.3"
 _TYPES = "FMI 2.0.5 section 2.2.3, FMI 3.0.2 section 2.4.4"
 _CATEGORIES = "FMI 2.0.5 section 2.2.4, FMI 3.0.2 section 2.4.5"

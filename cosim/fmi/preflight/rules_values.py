@@ -11,7 +11,7 @@ from .model import Model, ModelVariable
 from .values import real, value
 
 _START = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.5"
-_DIMENSION = "FMI 3.0.2 section 2.4.7.5"
+_DIMENSION = "FMI 3.0.2 section 2.4.7.2"
 
 MISSING = Rule("start.missing", _START)
 UNWANTED = Rule("start.unwanted", _START, "warning")
@@ -20,7 +20,7 @@ FINITE = Rule("start.finite", _START)
 INFINITE = Rule("start.infinite", _START, "warning")
 RANGE = Rule("start.range", _START)
 OWN_RANGE = Rule("start.own-range", _START, "warning")
-COUNT = Rule("start.count", _DIMENSION)
+COUNT = Rule("start.count", "FMI 3.0.2 section 2.4.7.5")
 LIMIT = Rule("variable.limits", _START)
 LIMIT_VALUE = Rule("variable.limit-value", _START, "warning")
 DIMENSION = Rule("variable.dimension", _DIMENSION)

@@ -13,25 +13,26 @@ from .model import INITIAL, Model, ModelVariable
 
 _VARIABLES = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7"
 _ATTRIBUTES = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.4"
+_TYPE_SPECIFIC = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.5"
 _UNITS = "FMI 2.0.5 section 2.2.2, FMI 3.0.2 section 2.4.3"
 
 NAME = Rule("variable.name", _VARIABLES)
 UNIQUE = Rule("variable.unique", _VARIABLES)
-CONVENTION = Rule("variable.convention", "FMI 2.0.5 section 2.2.9, FMI 3.0.2 section 2.4.9", "warning")
+CONVENTION = Rule("variable.convention", "FMI 2.0.5 section 2.2.9, FMI 3.0.2 section 2.4.7.5.1", "warning")
 KIND = Rule("variable.type", _VARIABLES)
 WORD = Rule("variable.word", _ATTRIBUTES)
 COMBINATION = Rule("variable.combination", _ATTRIBUTES)
 CONTINUOUS = Rule("variable.continuous", _ATTRIBUTES)
 IMPLIED = Rule("variable.implied-continuous", _ATTRIBUTES, "warning")
-INITIAL_RULE = Rule("variable.initial", _ATTRIBUTES)
-INITIAL_NOT_ALLOWED = Rule("variable.initial-not-allowed", _ATTRIBUTES, "warning")
+INITIAL_RULE = Rule("variable.initial", _TYPE_SPECIFIC)
+INITIAL_NOT_ALLOWED = Rule("variable.initial-not-allowed", _TYPE_SPECIFIC, "warning")
 INDEPENDENT = Rule("variable.independent", _ATTRIBUTES, "warning")
 REFERENCE = Rule("reference.value", _ATTRIBUTES)
 SHARED = Rule("reference.shared", _ATTRIBUTES)
 ALIAS = Rule("reference.alias", _ATTRIBUTES, "warning")
-DECLARED = Rule("variable.declared-type", _VARIABLES)
+DECLARED = Rule("variable.declared-type", _TYPE_SPECIFIC)
 UNIT = Rule("variable.unit", _UNITS, "warning")
-DERIVATIVE = Rule("variable.derivative", _ATTRIBUTES)
+DERIVATIVE = Rule("variable.derivative", _TYPE_SPECIFIC)
 CLOCK = Rule("variable.clocks", "FMI 3.0.2 section 2.4.7.4")
 
 _WORDS = {

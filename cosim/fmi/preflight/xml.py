@@ -12,7 +12,7 @@ from .limits import Limits
 
 SIZE = Rule("xml.size", "limits")
 ENCODING = Rule("xml.encoding", "FMI 2.0.5 section 2.2, FMI 3.0.2 section 2.4")
-DOCTYPE = Rule("xml.doctype", "FMI 2.0.5 section 2.2, FMI 3.0.2 section 2.4")
+DOCTYPE = Rule("xml.doctype", "caution: entities")
 SYNTAX = Rule("xml.syntax", "XML 1.0")
 
 #: FMI demands UTF-8; the others occur, and mean the same to every reader

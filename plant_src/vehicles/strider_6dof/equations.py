@@ -64,11 +64,15 @@ def water_loads(now: Situation) -> ca.SX:
 
 
 def restoring(now: Situation) -> ca.SX:
-    """Buoyancy less weight, along the world's z axis, and righting moments relative to the slopes of the water."""
+    """Buoyancy less weight, along the world's z axis, and righting moments relative to the slopes of the water.
+
+    Buoyancy has no moment about the vertical: it acts at a lever, which is why the righting moment is a cross product with it.
+    """
     up = now.frame.attitude[2, :].T
     heave, roll, pitch = p.STIFFNESS
     lift = heave * (CENTRE_OF_MASS_HEIGHT + now.elevation - now.rise)
-    return ca.vertcat(lift * up, -roll * (up[1] - now.slopes[1]), pitch * (up[0] - now.slopes[0]), 0)
+    lever = -ca.vertcat(pitch * (up[0] - now.slopes[0]), roll * (up[1] - now.slopes[1]), 0)
+    return ca.vertcat(lift * up, ca.cross(lever, up))
 
 
 def damping(relative: ca.SX) -> ca.SX:
@@ -96,9 +100,7 @@ def in_plane(load: ca.SX, height: float) -> ca.SX:
     return ca.vertcat(load[0:2], 0, -height * load[1], height * load[0], load[2])
 
 
-VESSEL = vessel.Vessel(
-    "strider_6dof", "Strider V1.0 catamaran afloat, in six degrees of freedom", VARIABLES, prepare, hull
-)
+VESSEL = vessel.Vessel("strider_6dof", "Strider V1.0 catamaran afloat, in six degrees of freedom", VARIABLES, prepare, hull)
 
 
 def block() -> Block:

@@ -1,5 +1,6 @@
 """Dangerous and broken XML: refused with its line, quickly, without a look at other files or at the network."""
 
+import re
 import socket
 import threading
 import time
@@ -8,6 +9,8 @@ from contextlib import contextmanager
 import pytest
 from fmu_corpus import found, members, pack, refusal
 
+from cosim.errors import InputError
+from cosim.export.validation import validate
 from cosim.fmi import FmuFile
 
 HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -162,3 +165,12 @@ def test_very_many_tags_are_refused_before_they_are_parsed(good, tmp_path):
     xml = good[2]["modelDescription.xml"] + b"<a/>" * 500_001
     path.write_bytes(pack(members(good[2] | {"modelDescription.xml": xml})))
     assert "tags, expected at most 500000" in refusal(path)
+
+
+@pytest.mark.parametrize("case", [case for case, (_, rule, _) in CASES.items() if rule.startswith("xml.")])
+def test_what_is_to_be_exported_is_refused_as_well(case, good, tmp_path):
+    """A description that came with C or Python sources never reaches FMPy's reader, which knows no caution."""
+    change, rule, words = CASES[case]
+    with pytest.raises(InputError, match=re.escape(rule)) as error:
+        validate(change(good[2]["modelDescription.xml"]), tmp_path / "modelDescription.xml")
+    assert words in str(error.value)

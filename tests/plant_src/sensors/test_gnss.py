@@ -53,7 +53,7 @@ def test_white_noise_has_its_standard_deviations():
 def test_the_drift_is_correlated_as_a_gauss_markov_process():
     parameters = {**EXACT, "horizontal_drift": 1.0, "vertical_drift": 1.0, "correlation_time": 2.0}
     gnss = configured(Gnss("gnss", seed=6), **parameters, rate=10.0, latency=0.0)
-    drift = SensorTrial(gnss, step=0.1).record(30000, POSITION)
+    drift = SensorTrial(gnss, step=0.1).record(15000, POSITION)
     assert drift.std() == pytest.approx(1.0, rel=0.05)
     for lag in (5, 20):
         correlation = np.mean(drift[lag:] * drift[:-lag]) / drift.var()

@@ -7,9 +7,10 @@ from sensor_trial import SensorTrial, configured, quaternion
 
 from cosim.errors import InputError
 from plant_src.sensors.rangefinder import Rangefinder
-from plant_src.vehicles.strider.geometry import DECK_CENTRE
 from plant_src.vehicles.strider.parameters import DECK_X
+from plant_src.world import World
 
+POSE = {"deck.position": "xyz", "orientation": "wxyz"}
 TABLE = {"table": {"size": [4.0, 4.0, 0.1], "position": [10.0, 0.0, 0.45]}}  # its top is at 0.5 m
 
 
@@ -47,19 +48,23 @@ def test_the_mounting_turns_with_the_vehicle(sensor):
 
 
 def test_the_deck_of_a_heeling_vessel_where_it_is(sensor):
-    heel, place = 0.2, np.array([5.0, -3.0, 0.3])
-    inputs = {"usv__position": place, "usv__orientation": quaternion((1, 0, 0), heel), "vehicle__position": (5.1, -3.05, 2.0)}
+    heel, point = 0.2, np.array([5.0, -3.0, 0.3])
+    inputs = {
+        "usv__deck__position": point,
+        "usv__orientation": quaternion((1, 0, 0), heel),
+        "vehicle__position": (5.1, -3.05, 2.0),
+    }
     trial = sensor(vessels={"usv": "strider"}, inputs=inputs)
     turn = Rotation.from_rotvec([heel, 0, 0])
-    normal, point = turn.apply([0, 0, 1]), place + turn.apply(DECK_CENTRE)
+    normal = turn.apply([0, 0, 1])
     height = point[2] - (normal[0] * (5.1 - point[0]) + normal[1] * (-3.05 - point[1])) / normal[2]
     assert trial["distance"] == pytest.approx(2.0 - height, abs=1e-6)
 
 
 def test_the_deck_moves_on_and_leaves_the_water(sensor):
-    trial = sensor(vessels={"usv": "strider"}, inputs={"vehicle__position": (0, 0, 2.0), "usv__position": (0, 0, 0.1245)})
-    assert trial["distance"] == pytest.approx(2.0 - 0.1245 - DECK_CENTRE[2], abs=1e-6)
-    trial.feed(usv__position=(-DECK_X[1] - 0.01, 0, 0.1245)).step()
+    trial = sensor(vessels={"usv": "strider"}, inputs={"vehicle__position": (0, 0, 2.0), "usv__deck__position": (0, 0, 0.27)})
+    assert trial["distance"] == pytest.approx(2.0 - 0.27, abs=1e-6)
+    trial.feed(usv__deck__position=((DECK_X[0] - DECK_X[1]) / 2 - 0.01, 0, 0.27)).step()
     assert trial["distance"] == pytest.approx(2.0, abs=1e-6)
 
 
@@ -85,3 +90,15 @@ def test_a_vehicle_that_is_no_vessel_is_refused_with_the_rest():
     with pytest.raises(InputError) as caught:
         Rangefinder("range", vessels={"uav": "ar_drone"}, platforms={"start": {"size": [1, 2], "position": [0, 0, 0]}})
     assert [problem.subject[1:3] for problem in caught.value.problems] == [("vessels", "uav"), ("platforms", "start")]
+
+
+@pytest.mark.parametrize(("vehicle", "motion"), [("strider", "planar"), ("strider", "6dof"), ("otter", "6dof")])
+def test_it_meets_the_deck_where_the_world_says_it_is(sensor, vehicle, motion):
+    world = World("plant", {"usv": {"model": vehicle, "motion": motion, "position": [3.0, -2.0], "yaw": 0.6}})
+    try:
+        pose = {f"usv.{name}": [world.get(f"usv.{name}.{axis}") for axis in axes] for name, axes in POSE.items()}
+        deck = np.array([world.get(f"usv.deck.position.{axis}") for axis in "xyz"])
+    finally:
+        world.free()
+    trial = sensor(vessels={"usv": vehicle}, inputs=pose | {"vehicle__position": deck + np.array([0, 0, 1.5])})
+    assert trial["distance"] == pytest.approx(1.5, abs=1e-6)

@@ -6,8 +6,8 @@ const PAUSE = '<svg viewBox="0 0 16 16"><path d="M4 2.5h3v11H4zM9 2.5h3v11H9z"/>
 
 const PAGE = `
 <div class="stage"><canvas aria-label="3-D replay"></canvas>
-  <div class="chips" role="group" aria-label="Vehicles"></div>
-  <div class="cameras segmented" role="group" aria-label="Camera"></div></div>
+  <div class="overlay"><div class="chips" role="group" aria-label="Vehicles"></div>
+  <div class="cameras segmented" role="group" aria-label="Camera"></div></div></div>
 <div class="bar">
   <button type="button" class="play" aria-label="Play or pause (space)"></button>
   <output class="clock"></output>
@@ -38,7 +38,7 @@ export function connectTime(page, player) {
   page.root.addEventListener("keydown", (event) => key(event, player));
   page.root.tabIndex = -1;
   const digits = player.last < 1000 ? 2 : 1;
-  player.onChange(() => {
+  player.onReading(() => {
     page.play.innerHTML = player.playing ? PAUSE : PLAY;
     page.scrubber.value = player.time;
     page.clock.innerHTML = `<b>${player.time.toFixed(digits)}</b> / ${player.last.toFixed(digits)} s`;

@@ -1,16 +1,28 @@
 // The clock of the replay: one moment that everything shows, moved by the user or by playing.
 
+const READING = 100; // ms
+
 export class Player {
   constructor(first, last) {
-    Object.assign(this, { first, last, time: first, speed: 1, playing: false, listeners: [] });
+    Object.assign(this, { first, last, time: first, speed: 1, playing: false, listeners: [], readers: [], toldReaders: 0 });
   }
 
+  /** Call `listener` at every change. */
   onChange(listener) {
     this.listeners.push(listener);
   }
 
+  /** Call `reader` as often as people can read, and at the end of every change. */
+  onReading(reader) {
+    this.readers.push(reader);
+  }
+
   tell() {
     for (const listener of this.listeners) listener(this);
+    const now = performance.now();
+    if (this.playing && now - this.toldReaders < READING) return;
+    this.toldReaders = now;
+    for (const reader of this.readers) reader(this);
   }
 
   seek(time) {

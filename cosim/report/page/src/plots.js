@@ -75,7 +75,15 @@ class Plot {
   }
 
   update() {
+    this.move();
+    this.read();
+  }
+
+  move() {
     this.line.style.transform = `translateX(${this.chart.valToPos(this.player.time, "x")}px)`;
+  }
+
+  read() {
     const unit = this.element.dataset.unit;
     for (const { name, value } of this.values) {
       const texts = this.runs.filter((run) => run.has(name)).map((run) => shown(run.value(name, this.player.time)));
@@ -103,7 +111,8 @@ export class Plots {
   constructor(parent, runs, player) {
     Object.assign(this, { parent, runs, player, list: [] });
     new ResizeObserver(() => this.list.forEach((plot) => plot.resize())).observe(parent);
-    player.onChange(() => this.list.forEach((plot) => plot.update()));
+    player.onChange(() => this.list.forEach((plot) => plot.move()));
+    player.onReading(() => this.list.forEach((plot) => plot.read()));
   }
 
   /** A plot of the signals that match any of the patterns; "*" stands for any text. False when nothing matches. */

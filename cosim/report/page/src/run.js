@@ -40,7 +40,9 @@ export class Run {
   }
 
   has(name) {
-    return typeof name === "number" || this.columns.has(name) || name in this.constants;
+    if (typeof name === "number") return true;
+    const signal = name.replace(/^-/, "");
+    return this.columns.has(signal) || signal in this.constants;
   }
 
   /** The row at or before a moment and how far the moment is on the way to the next. */
@@ -57,9 +59,10 @@ export class Run {
     return { row: low, next, share: step > 0 ? Math.min(Math.max((time - this.time[low]) / step, 0), 1) : 0 };
   }
 
-  /** Value of a signal (or of a number that stands in its place) in a row. */
+  /** Value of a signal, of its negative ("-signal"), or of a number that stands in its place, in a row. */
   at(name, row) {
     if (typeof name === "number") return name;
+    if (name.startsWith("-")) return -this.at(name.slice(1), row);
     const values = this.columns.get(name);
     return values ? values[row] : this.constants[name];
   }

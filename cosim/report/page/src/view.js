@@ -1,6 +1,6 @@
 // The scene: light, sky, water, bodies with their trails, and the camera; drawn only when something has changed.
 import {
-  BackSide, Color, DirectionalLight, Euler, Group, HemisphereLight, Mesh, MeshLambertMaterial, PCFShadowMap, Scene,
+  BackSide, BasicShadowMap, Color, DirectionalLight, Euler, Group, HemisphereLight, Mesh, MeshLambertMaterial, PCFShadowMap, Scene,
   ShaderMaterial, SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
 import { bodyOf, reachOf } from "./bodies.js";
@@ -44,7 +44,7 @@ export class View {
     const software = drawnBySoftware();
     this.renderer = new WebGLRenderer({ canvas, antialias: !software });
     this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.type = PCFShadowMap;
+    this.renderer.shadowMap.type = software ? BasicShadowMap : PCFShadowMap;
     this.ratio = software ? 0.8 : Math.min(devicePixelRatio, 1.5);
     this.#surroundings(scene);
     this.actors = runs.flatMap((run, i) => scene.bodies.filter((body) => run.knows(body)).map((body) => this.#actor(run, body, i > 0)));

@@ -4,7 +4,7 @@ import { BufferAttribute, BufferGeometry, Color, Mesh, ShaderMaterial, Vector2, 
 const MOST_WAVES = 64;
 const MOST_SHADES = 16;
 const REACH = 600; // m
-const CELLS = 168;
+const CELLS = { calm: 64, waves: 160 };
 const FINE = 26; // m: to here the mesh is as fine as waves need it
 
 const VERTEX = `
@@ -57,7 +57,7 @@ void main() {
   glint *= glint; glint *= glint; glint *= glint; glint *= glint;
   colour += 0.10 * glint * glint;
   vec2 width = fwidth(place.xy) + 0.003;
-  colour = mix(colour, ink, 0.055 * lines(1.0, width) + 0.10 * lines(5.0, width));
+  colour = mix(colour, ink, 0.05 * lines(1.0, width) + 0.08 * lines(5.0, width));
   float dark = 0.0;
   for (int i = 0; i < shadeCount; i++) {
     vec2 off = place.xy - shades[i].xy + sun.xy / sun.z * shades[i].z;
@@ -70,17 +70,17 @@ void main() {
 }`;
 
 /** A square mesh that is fine in its middle. */
-function mesh() {
-  const line = Array.from({ length: CELLS + 1 }, (_, i) => {
-    const s = (2 * i) / CELLS - 1;
+function mesh(count) {
+  const line = Array.from({ length: count + 1 }, (_, i) => {
+    const s = (2 * i) / count - 1;
     return Math.sign(s) * (1.6 * FINE * Math.abs(s) + (REACH - 1.6 * FINE) * Math.abs(s) ** 7);
   });
   const places = new Float32Array(line.flatMap((y) => line.flatMap((x) => [x, y, 0])));
   const cells = [];
-  for (let j = 0; j < CELLS; j++) {
-    for (let i = 0; i < CELLS; i++) {
-      const a = j * (CELLS + 1) + i;
-      cells.push(a, a + 1, a + CELLS + 2, a, a + CELLS + 2, a + CELLS + 1);
+  for (let j = 0; j < count; j++) {
+    for (let i = 0; i < count; i++) {
+      const a = j * (count + 1) + i;
+      cells.push(a, a + 1, a + count + 2, a, a + count + 2, a + count + 1);
     }
   }
   const geometry = new BufferGeometry().setAttribute("position", new BufferAttribute(places, 3));
@@ -99,7 +99,7 @@ export class Water {
       shades: { value: empty(MOST_SHADES) }, shadeCount: { value: 0 },
     };
     const material = new ShaderMaterial({ uniforms: this.uniforms, vertexShader: VERTEX, fragmentShader: FRAGMENT });
-    this.mesh = new Mesh(mesh(), material);
+    this.mesh = new Mesh(mesh(spec.waves.length ? CELLS.waves : CELLS.calm), material);
     this.mesh.frustumCulled = false;
   }
 

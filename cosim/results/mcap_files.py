@@ -1,0 +1,155 @@
+"""Recordings as MCAP, which Foxglove, PlotJuggler and the tools of ROS 2 open (extra `mcap`).
+
+- /tf (foxglove.FrameTransforms): everything that was recorded with `position.x|y|z` and `orientation.w|x|y|z`, in the frame
+  "world" (z up, m), each under its own name ("plant.uav")
+- /scene (foxglove.SceneUpdate): what it looks like, once, see `scene` of `write_mcap`
+- /signals/NAME (JSON): all signals of a component, nested by the dots of their names, arrays as arrays; NaN and infinities are
+  null, units stand in the schema
+
+The file's clock begins with the run's: 1 s is 1 s after 1970-01-01, and a run that starts before 0 s is shifted to 0 s.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pydantic_core
+
+from ..errors import InputError
+from ..recording import Recording
+from .files import pieces, plain, replacing
+
+ROWS_AT_A_TIME = 2000
+_POSE = [*(f"position.{axis}" for axis in "xyz"), *(f"orientation.{axis}" for axis in "wxyz")]
+_ELEMENT = re.compile(r"(.*)\[[\d,]+\]")
+#: names -> column, columns of an array, or names further down
+Tree = dict[str, "int | list[int] | Tree"]
+
+
+def require_mcap() -> None:
+    """Raises InputError when the package that writes MCAP is not installed."""
+    try:
+        import foxglove  # noqa: F401
+    except ImportError:
+        raise InputError('MCAP files need the package foxglove-sdk: pip install "fmi-cosim[mcap]"') from None
+
+
+def write_mcap(
+    recording: Recording, path: str | Path, scene: Mapping[str, Any] | None = None, about: Mapping[str, Any] | None = None
+) -> None:
+    """Write `recording` to `path`, which is replaced only when the file is complete.
+
+    `scene` holds "bodies", "fixed" and "markers" as `cosim.report.scene` has them, `about` whatever describes the run (metadata).
+    Raises InputError when the file cannot be written or the package foxglove-sdk is not installed.
+    """
+    require_mcap()
+    import foxglove
+    from foxglove.mcap import MCAPWriteOptions
+
+    context = foxglove.Context()
+    options = MCAPWriteOptions(compression_threads=0)
+    with (
+        replacing(path) as temporary,
+        foxglove.open_mcap(temporary, context=context, writer_options=options) as writer,
+    ):
+        if about:
+            writer.write_metadata("run", {key: json.dumps(plain(value)) for key, value in about.items()})
+        times = _nanoseconds(recording.time)
+        if scene and len(times):
+            from .mcap_scene import log_scene
+
+            log_scene(scene, times[0], context)
+        _log_poses(recording, times, context)
+        _log_signals(recording, times, context)
+
+
+def _nanoseconds(time: np.ndarray) -> list[int]:
+    shifted = time - min(float(time[0]), 0.0) if len(time) else time
+    return [round(1e9 * second) for second in shifted.tolist()]
+
+
+def _log_poses(recording: Recording, times: list[int], context: Any) -> None:
+    from foxglove.channels import FrameTransformsChannel
+    from foxglove.messages import FrameTransform, FrameTransforms, Quaternion, Timestamp, Vector3
+
+    names = poses(recording)
+    if not names:
+        return
+    channel = FrameTransformsChannel("/tf", context=context)
+    columns = [recording.columns[f"{name}.{rest}"] for name in names for rest in _POSE]
+    for now, row in zip(times, _rows(columns), strict=True):
+        stamp = Timestamp(*divmod(now, 10**9))
+        numbers = (row[first : first + len(_POSE)] for first in range(0, len(row), len(_POSE)))
+        transforms = [
+            FrameTransform(
+                timestamp=stamp,
+                parent_frame_id="world",
+                child_frame_id=name,
+                translation=Vector3(x=x, y=y, z=z),
+                rotation=Quaternion(w=qw, x=qx, y=qy, z=qz),
+            )
+            for name, (x, y, z, qw, qx, qy, qz) in zip(names, numbers, strict=True)
+        ]
+        channel.log(FrameTransforms(transforms=transforms), log_time=now)
+
+
+def poses(recording: Recording) -> list[str]:
+    """Names of everything that was recorded with position and orientation."""
+    heads = (name.removesuffix(".position.x") for name in recording.columns if name.endswith(".position.x"))
+    return [head for head in heads if all(f"{head}.{rest}" in recording.columns for rest in _POSE)]
+
+
+def _log_signals(recording: Recording, times: list[int], context: Any) -> None:
+    from foxglove import Channel, Schema
+
+    columns, tree = list(recording.columns.values()), _tree(list(recording.columns))
+    channels = {}
+    for component, node in tree.items():
+        data = json.dumps(_schema(node, columns, list(recording.units.values()))).encode()
+        schema = Schema(name=f"cosim.{component}", encoding="jsonschema", data=data)
+        channels[component] = Channel(f"/signals/{component}", schema=schema, message_encoding="json", context=context)
+    for now, row in zip(times, _rows(columns), strict=True):
+        for component, channel in channels.items():
+            channel.log(pydantic_core.to_json(_values(tree[component], row), inf_nan_mode="null"), log_time=now)
+
+
+def _rows(columns: list[np.ndarray]) -> Iterator[tuple[Any, ...]]:
+    for piece in pieces(columns, ROWS_AT_A_TIME) if columns else ():
+        yield from zip(*(column[piece].tolist() for column in columns), strict=True)
+
+
+def _tree(names: list[str]) -> Tree:
+    """Columns by component and the parts of their names. A name with others below it becomes their neighbour `value`."""
+    inner = {name[:place] for name in names for place, letter in enumerate(name) if letter == "."}
+    tree: Tree = {}
+    for column, name in enumerate(names):
+        *path, leaf = [*name.split("."), *(["value"] if name in inner or "." not in name else [])]
+        node: Any = tree
+        for part in path:
+            node = node.setdefault(part, {})
+        if element := _ELEMENT.fullmatch(leaf):
+            node.setdefault(element[1], []).append(column)
+        else:
+            node[leaf] = column
+    return tree
+
+
+def _values(node: Any, row: tuple[Any, ...]) -> Any:
+    if isinstance(node, dict):
+        return {name: _values(child, row) for name, child in node.items()}
+    return [row[column] for column in node] if isinstance(node, list) else row[node]
+
+
+def _schema(node: Any, columns: list[np.ndarray], units: list[str]) -> dict[str, Any]:
+    """JSON Schema of what `_values` gives."""
+    if isinstance(node, dict):
+        return {"type": "object", "properties": {name: _schema(child, columns, units) for name, child in node.items()}}
+    if isinstance(node, list):
+        return {"type": "array", "items": _schema(node[0], columns, units)}
+    kind = {"b": "boolean", "i": "integer", "u": "integer", "f": "number"}.get(columns[node].dtype.kind, "string")
+    return {"type": kind, **({"description": units[node]} if units[node] else {})}

@@ -1,0 +1,1 @@
+"""The Maritime Robotics Otter: an uncrewed surface vehicle with two propellers."""

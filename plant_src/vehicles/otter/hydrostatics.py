@@ -1,0 +1,54 @@
+"""Buoyancy and damping of the Otter with a given load, by the formulas of MSS."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..vessel import shift
+from . import parameters as p
+
+
+@dataclass(frozen=True)
+class Hydrostatics:
+    """`draught` (m); `stiffness` of heave (N/m), roll and pitch (N m/rad) at the centre of flotation; `settling` (3, 3): heave,
+    roll and pitch at O per load there; `footprint`: squares of the waterplane's radii of gyration (m2) and the draught."""
+
+    draught: ca.SX
+    stiffness: ca.SX
+    settling: ca.SX
+    footprint: ca.SX
+
+
+def hydrostatics(mass: ca.SX, centre: ca.SX) -> Hydrostatics:
+    """Of a vessel with this mass and centre of mass."""
+    volume = mass / p.WATER_DENSITY
+    draught = volume / (2 * p.BLOCK_COEFFICIENT * p.PONTOON_BEAM * p.LENGTH)
+    area = 2 * p.WATERLINE_COEFFICIENT * p.LENGTH * p.PONTOON_BEAM
+    c = p.WATERLINE_COEFFICIENT
+    own = 2 * p.LENGTH * p.PONTOON_BEAM**3 / 12 * 6 * c**3 / ((1 + c) * (1 + 2 * c))
+    moments = ca.SX([own + area * p.PONTOON_DISTANCE**2, 0.8 * 2 * p.PONTOON_BEAM * p.LENGTH**3 / 12])
+    buoyancy_height = (5 * draught / 2 - volume / (2 * p.LENGTH * p.PONTOON_BEAM)) / 3
+    metacentric_heights = buoyancy_height + moments / volume - (draught + centre[2])
+    weight = p.WATER_DENSITY * p.GRAVITY
+    stiffness = ca.vertcat(weight * area, weight * volume * metacentric_heights)
+    move = shift(ca.SX(p.FLOTATION))[2:5, 2:5]
+    settling = ca.inv(move.T @ ca.diag(stiffness) @ move)
+    return Hydrostatics(draught, stiffness, settling, ca.vertcat(moments[1] / area, moments[0] / area, draught))
+
+
+def linear_damping(mass: ca.SX, stiffness: ca.SX) -> ca.SX:
+    """The diagonal (6) of the linear damping for the diagonal of the mass matrix."""
+    frequencies = ca.sqrt(stiffness / mass[2:5])
+    oscillating = 2 * ca.SX(p.DAMPING_RATIOS) * frequencies * mass[2:5]
+    sway, yaw = p.TIME_CONSTANTS
+    return ca.vertcat(p.MAX_THRUST / p.MAX_SPEED, mass[1] / sway, oscillating, mass[5] / yaw)
+
+
+def cross_flow_drag(draught: ca.SX) -> ca.SX:
+    """N s2/m2 of one of the stations."""
+    slenderness, coefficients = zip(*p.HOERNER, strict=True)
+    inside = ca.fmin(ca.fmax(p.PONTOON_BEAM / (2 * draught), slenderness[0]), slenderness[-1])
+    coefficient = ca.pw_lin(inside, ca.DM(slenderness), ca.DM(coefficients))
+    return p.WATER_DENSITY / 2 * draught * coefficient * p.LENGTH / (p.STATIONS - 1)

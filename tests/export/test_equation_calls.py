@@ -1,0 +1,154 @@
+"""Equations that call functions: as C functions, as loops over tables, and constants that are computed once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from test_equations import Compiled
+
+from cosim.component import Variable
+from cosim.export import equations
+from cosim.export.equations import ContinuousModel
+from cosim.export.equations_c import Callee, c_function, sum_over_rows
+
+ROWS = 16
+NEVER_INLINE = {"never_inline": True}
+
+
+def parameter(name: str, *values: float) -> Variable:
+    shape = (len(values),) if len(values) > 1 else ()
+    return Variable(name, causality="parameter", variability="fixed", start=values if shape else values[0], shape=shape)
+
+
+def model(rate: Callable[..., ca.SX], *parameters: Variable, **more: object) -> ContinuousModel:
+    """x' = rate(x, inputs, parameters) from x = 0, with x as output."""
+    variables = (*parameters, Variable("u", causality="input", start=1.0), Variable("x", causality="output"))
+    return ContinuousModel(
+        "called",
+        "A model that calls functions",
+        variables,
+        ("x",),
+        lambda _: ca.SX(0),
+        rate,
+        lambda x, u, p: x,
+        **more,  # type: ignore[arg-type]
+    )
+
+
+def waves() -> Callee:
+    """Sum over rows (amplitude, frequency) of amplitude * cos(frequency * (x + 2 t)), and of amplitudes."""
+    common, row = ca.SX.sym("common", 2), ca.SX.sym("row", 2)
+    term = ca.Function("term", [common, row], [ca.vertcat(row[0] * ca.cos(row[1] * (common[0] + 2 * common[1])), row[0])])
+    return sum_over_rows("waves", term, ROWS)
+
+
+def numbers(count: int) -> np.ndarray:
+    return np.random.default_rng(count).uniform(0.1, 2.0, count)
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 16])
+def test_a_sum_over_rows_counts_only_those_in_use(count: int, tmp_path: Path) -> None:
+    callee, x, n, table = waves(), ca.SX.sym("x", 2), ca.SX.sym("n"), ca.SX.sym("table", ROWS, 2)
+    probe = ca.Function("probe", [x, n, table], [3 * callee.function(x, n, table)])
+    compiled = Compiled(equations.block(model(lambda x, u, p: u, callees=[callee]), [probe]), tmp_path)
+    amplitude, frequency = np.split(numbers(2 * ROWS), 2)
+    amplitude[count:] = np.nan
+    found = compiled.call("probe", 2, [0.3, 0.2], [float(count)], [*amplitude, *frequency])
+    used, speed = amplitude[:count], frequency[:count]
+    assert found == pytest.approx([3 * (used * np.cos(0.7 * speed)).sum(), 3 * used.sum()], rel=1e-14)
+
+
+def test_casadi_computes_the_same_sum() -> None:
+    table = numbers(2 * ROWS).reshape(2, ROWS).T
+    found = np.array(waves().function([0.3, 0.2], 5, table)).ravel()
+    assert found == pytest.approx([(table[:5, 0] * np.cos(0.7 * table[:5, 1])).sum(), table[:5, 0].sum()], rel=1e-14)
+
+
+def test_a_table_that_lies_among_the_arguments_is_not_copied() -> None:
+    callee, parameters = waves(), ca.SX.sym("p", 2 * ROWS + 1)
+    total = callee.function(parameters[0:2], 3, ca.reshape(parameters[1:], ROWS, 2))
+    text = c_function(ca.Function("probe", [parameters], [total]))
+    assert "in[0] + 1}" in text
+    assert f"in[0][{2 * ROWS}]" not in text
+
+
+def test_a_function_that_is_never_inlined_is_called(tmp_path: Path) -> None:
+    """Also by one that is called itself, with several arguments and results in any order."""
+    a, b = ca.SX.sym("a", 2), ca.SX.sym("b")
+    inner = ca.Function("inner", [a, b], [a * b, a[0] - b], NEVER_INLINE)
+    scaled, difference = inner(a[[1, 0]], 2 * b)
+    outer = ca.Function("outer", [b, a], [ca.sum1(scaled) + difference], NEVER_INLINE)
+    probe = ca.Function("probe", [a, b], [ca.vertcat(outer(b, a), inner(a, b)[1], inner(a, outer(b, a))[0])])
+    block = equations.block(model(lambda x, u, p: u), [probe])
+    text = block.files["model.c"]
+    assert text.count("static void inner(") == text.count("static void outer(") == 1
+    assert text.index("static void inner(") < text.index("static void outer(")
+    found = Compiled(block, tmp_path).call("probe", 4, [3.0, 5.0], [0.5])
+    expected = 5.0 + 3.0 + (5.0 - 1.0)
+    assert found == [expected, 2.5, 3.0 * expected, 5.0 * expected]
+
+
+def test_a_callee_with_a_body_of_its_own_and_what_it_needs(tmp_path: Path) -> None:
+    """A branch, of which only one side is computed: a square root that would not exist is not taken."""
+    x = ca.SX.sym("x")
+    root = ca.Function("root", [x], [ca.sqrt(x)])
+    either = ca.Function("either", [x], [ca.if_else(x > 0, ca.sqrt(ca.fabs(x)), -1)], NEVER_INLINE)
+    branch = Callee(either, "{\n    if (in[0][0] > 0) root(in, out);\n    else out[0][0] = -1;\n}\n", [root])
+    probe = ca.Function("probe", [x], [2 * either(x)])
+    compiled = Compiled(equations.block(model(lambda x, u, p: u, callees=[branch]), [probe]), tmp_path)
+    assert [compiled.call("probe", 1, [value]) for value in (9.0, -4.0)] == [[6.0], [-2.0]]
+
+
+def test_the_loop_is_part_of_the_rate(tmp_path: Path) -> None:
+    """x' = sum of a cos(w (x + 2 t)) with t = u / 2 = 0.5 held: one Runge-Kutta step against the same in Python."""
+    callee, (amplitude, frequency) = waves(), np.split(numbers(2 * ROWS), 2)
+
+    def rate(x: ca.SX, u: ca.SX, p: ca.SX) -> ca.SX:
+        return callee.function(ca.vertcat(x, u / 2), ROWS, ca.reshape(p, ROWS, 2))[0]
+
+    table = parameter("table", *amplitude, *frequency)
+    compiled = Compiled(equations.block(model(rate, table, callees=[callee])), tmp_path)
+    compiled.initialize()
+    compiled.step(0.005)
+
+    def slope(x: float) -> float:
+        return float((amplitude * np.cos(frequency * (x + 1.0))).sum())
+
+    h, k1 = 0.005, slope(0.0)
+    k2 = slope(h / 2 * k1)
+    k3 = slope(h / 2 * k2)
+    expected = h / 6 * (k1 + 2 * k2 + 2 * k3 + slope(h * k3))
+    assert compiled.model.output[0] == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.fixture
+def exponential(tmp_path: Path) -> Compiled:
+    """x' = u / (time constant), which is computed of mass and damping."""
+    model_ = model(
+        lambda x, u, c: u / c[1],
+        parameter("mass", 6.0),
+        parameter("damping", 2.0),
+        constants=lambda p: ca.vertcat(p[0], p[0] / p[1], p[1]),
+    )
+    return Compiled(equations.block(model_), tmp_path)
+
+
+def test_constants_follow_from_the_parameters_at_initialization(exponential: Compiled) -> None:
+    exponential.initialize()
+    assert list(exponential.model.constant) == [6.0, 3.0, 2.0]
+    exponential.model.parameter[1] = 12.0
+    exponential.initialize()
+    exponential.step(0.1)
+    assert exponential.model.output[0] == pytest.approx(0.2, rel=1e-14)
+
+
+def test_a_model_without_constants_has_no_room_for_them(tmp_path: Path) -> None:
+    compiled = Compiled(equations.block(model(lambda x, u, p: u * p[0], parameter("gain", 2.0))), tmp_path)
+    assert not hasattr(compiled.model, "constant")
+    compiled.initialize()
+    compiled.step(0.1)
+    assert compiled.model.output[0] == pytest.approx(0.2, rel=1e-14)

@@ -1,0 +1,41 @@
+"""Multirotors of all sizes stand on what is below them."""
+
+from __future__ import annotations
+
+import pytest
+from worlds import PLATFORM, PLATFORM_TOP, Trial
+
+from plant_src.vehicles.crazyflie import geometry as crazyflie
+from plant_src.vehicles.survey_hexacopter import geometry as survey_hexacopter
+
+FEET = {"crazyflie": crazyflie.FEET_HEIGHT, "survey_hexacopter": survey_hexacopter.FEET_HEIGHT}
+MASS = {"crazyflie": 0.027, "survey_hexacopter": 4.78}
+
+
+def dropped(model: str) -> Trial:
+    """2 s after a fall from 5 cm onto a platform."""
+    vehicle = {"model": model, "position": [0.1, -0.2, PLATFORM_TOP + 0.05 - FEET[model]], "yaw": 0.3}
+    return Trial({"uav": vehicle}, {"pad": PLATFORM}).step(200)
+
+
+@pytest.mark.parametrize("model", FEET)
+def test_it_stands_on_its_feet(model: str) -> None:
+    trial = dropped(model)
+    assert trial["uav.position.z"] == pytest.approx(PLATFORM_TOP - FEET[model], abs=1e-3)
+    assert trial.vector("uav.attitude", ("roll", "pitch", "yaw")) == pytest.approx([0, 0, 0.3], abs=1e-3)
+
+
+@pytest.mark.parametrize("model", FEET)
+def test_the_platform_carries_its_weight(model: str) -> None:
+    assert dropped(model)["uav.contact.force"] == pytest.approx(MASS[model] * 9.81, rel=1e-3)
+
+
+@pytest.mark.parametrize("model", FEET)
+def test_it_takes_off_again(model: str) -> None:
+    trial = dropped(model)
+    count = len(trial["uav.rotor_speed"])
+    trial["uav.rotor_speed"] = [1.05 * {"crazyflie": 1516.0, "survey_hexacopter": 387.0}[model]] * count
+    trial.step(100)
+    assert not trial["uav.contact.touching"]
+    assert trial["uav.position.z"] > PLATFORM_TOP - FEET[model] + 0.2
+    assert trial.vector("uav.position", "xy") == pytest.approx([0.1, -0.2], abs=0.02)

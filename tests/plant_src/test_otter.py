@@ -1,0 +1,138 @@
+"""The Otter against the values of Fossen's Marine Systems Simulator, and against an implementation of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from otter_reference import Otter
+from worlds import Trial
+
+FLIP = np.array([1.0, -1.0, -1.0])
+ORIGIN_FROM_CENTRE = -np.array([0.153125, 0.0, 0.246875])  # with the reference payload, forward-left-up
+
+
+def otter(**more: object) -> Trial:
+    return Trial({"usv": {"model": "otter", "position": [0.0, 0.0], **more}})
+
+
+def run(trial: Trial, port: float, starboard: float, steps: int) -> Trial:
+    trial["usv.propeller_speed"] = [port, starboard]
+    return trial.step(steps)
+
+
+def origin(trial: Trial) -> np.ndarray:
+    """Position of the origin of the hull's frame, by its published attitude."""
+    w, *v = trial.vector("usv.orientation", "wxyz")
+    turned = np.cross(v, ORIGIN_FROM_CENTRE)
+    return trial.vector("usv.position") + ORIGIN_FROM_CENTRE + 2 * (w * turned + np.cross(v, turned))
+
+
+@pytest.fixture(scope="module")
+def dash() -> tuple[Trial, float]:
+    """30 s at 100 rad/s from rest, and when 63.2 % of the final speed were reached."""
+    trial, reached = otter(), 0.0
+    while trial.steps < 3000:
+        run(trial, 100.0, 100.0, 1)
+        if not reached and trial["usv.velocity_body.u"] > 0.632 * 2.85735:
+            reached = trial.steps * 0.01
+    return trial, reached
+
+
+def test_speed_is_thrust_over_damping(dash: tuple[Trial, float]) -> None:
+    u = dash[0]["usv.velocity_body.u"]
+    assert u == pytest.approx(2.85735, abs=5e-6)
+    assert u == pytest.approx(221.6 / (24.4 * 9.81 / (6 * 0.5144)), rel=1e-6)
+
+
+def test_time_to_speed(dash: tuple[Trial, float]) -> None:
+    assert dash[1] == pytest.approx(1.26, abs=1e-9)
+
+
+def test_sinkage_and_trim(dash: tuple[Trial, float]) -> None:
+    """Bow down is a positive pitch here."""
+    assert origin(dash[0])[2] == pytest.approx(-0.03771, abs=5e-6)
+    assert np.degrees(dash[0]["usv.attitude.pitch"]) == pytest.approx(1.49063, abs=5e-6)
+
+
+def test_coasting() -> None:
+    trial = run(otter(), 100.0, 100.0, 3000)
+    start = origin(trial)[0]
+    run(trial, 0.0, 0.0, 2000)
+    assert origin(trial)[0] - start == pytest.approx(3.2933, abs=5e-5)
+    assert trial["usv.velocity_body.u"] == pytest.approx(0.0, abs=5e-6)
+
+
+def test_mass_matrix() -> None:
+    casadi = pytest.importorskip("casadi")
+    from plant_src.vehicles.otter import equations
+
+    model = equations.VESSEL.model(equations.SampledShafts)
+    parameters = np.concatenate([np.ravel(v.start) for v in model.variables if v.causality == "parameter"])
+    assert model.constants is not None
+    inverse = casadi.DM(equations.VESSEL.unpacked(model.constants(casadi.SX(parameters)))["inverse"])
+    diagonal = np.diag(np.linalg.inv(inverse.full()))
+    assert diagonal == pytest.approx([85.282, 162.500, 135.000, 17.657, 32.894, 40.045], abs=5e-4)
+
+
+def test_without_thrust_it_rests() -> None:
+    trial = otter().step(1000)
+    assert np.abs(trial.vector("usv.velocity")).max() < 1e-12
+    assert np.abs(trial.vector("usv.position")[:2]).max() < 1e-9
+
+
+@pytest.mark.parametrize("payload", [0.0, 25.0, 45.0])
+def test_circle_agrees_with_an_independent_implementation(payload: float) -> None:
+    """2 s ahead, then 10 s of a turning circle."""
+    reference, trial = Otter(payload), otter(parameters={"payload_mass": payload})
+    for _ in range(50):
+        reference.eta = reference.trim(reference.eta)
+    offset = trial.vector("usv.position")[:2] - centre(reference)[:2]
+    for port, starboard, steps in ((100.0, 100.0, 200), (100.0, 60.0, 1000)):
+        run(trial, port, starboard, steps)
+        for _ in range(steps):
+            reference.step((port, starboard))
+        found = trial.vector("usv.position") - [*offset, 0.0]
+        assert found == pytest.approx(centre(reference), abs=1e-6)
+        attitude = trial.vector("usv.attitude", ("roll", "pitch", "yaw")) * FLIP
+        assert np.angle(np.exp(1j * (attitude - reference.eta[3:]))) == pytest.approx(0.0, abs=1e-6)
+    assert abs(reference.eta[5]) > 2.0
+
+
+def centre(reference: Otter) -> np.ndarray:
+    """Position of the centre of mass, world frame of the plant."""
+    from otter_reference import rotation
+
+    return FLIP * (reference.eta[:3] + rotation(reference.eta[3:]) @ reference.centre)
+
+
+def test_current_carries_it_like_the_independent_implementation() -> None:
+    reference = Otter(current=(0.3, 0.2))
+    for _ in range(50):
+        reference.eta = reference.trim(reference.eta)
+    trial = Trial({"usv": {"model": "otter", "position": [0.0, 0.0]}}, environment={"current": {"velocity": [0.3, -0.2]}})
+    offset = trial.vector("usv.position")[:2] - centre(reference)[:2]
+    run(trial, 80.0, 50.0, 500)
+    for _ in range(500):
+        reference.step((80.0, 50.0))
+    assert trial.vector("usv.position") - [*offset, 0.0] == pytest.approx(centre(reference), abs=1e-6)
+
+
+@pytest.mark.parametrize(("speed", "force"), [(200.0, 24.4 * 9.81), (-200.0, -13.6 * 9.81)])
+def test_motors_reach_no_more_than_their_bollard_pull(speed: float, force: float) -> None:
+    """The first step from rest without lag: force over mass."""
+    trial = run(otter(parameters={"propeller_time_constant": 0.0}), speed, speed, 1)
+    slow = run(otter(parameters={"propeller_time_constant": 0.0}), np.sign(speed) * 10.0, np.sign(speed) * 10.0, 1)
+    coefficient = 0.02216 if speed > 0 else -0.01289
+    ratio = trial["usv.velocity_body.u"] / slow["usv.velocity_body.u"]
+    assert ratio == pytest.approx(force / (coefficient * 100.0), rel=1e-3)
+
+
+def test_port_propeller_turns_to_starboard() -> None:
+    assert run(otter(), 50.0, 0.0, 100)["usv.attitude.yaw"] < -0.01
+
+
+def test_wind_from_abeam_pushes_and_heels_it() -> None:
+    trial = Trial({"usv": {"model": "otter", "position": [0.0, 0.0]}}, environment={"wind": {"velocity": [0.0, 10.0, 0.0]}})
+    trial.step(300)
+    assert trial["usv.velocity.y"] > 0.1
+    assert trial["usv.attitude.roll"] < -1e-3

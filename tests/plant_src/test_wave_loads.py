@@ -1,0 +1,93 @@
+"""What hulls feel of waves: limits of long and short waves, and the arithmetic behind."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from floating_reference import felt
+from worlds import Trial, vessel
+
+from plant_src.environment.sea import Sea
+from plant_src.vehicles import elementary, waves
+from plant_src.vehicles.strider_6dof import parameters as p
+
+VESSELS = [{"model": "strider", "motion": "6dof"}, {"model": "otter"}]
+
+
+def swell(height: float, period: float, direction: float = 0.0) -> dict[str, Any]:
+    """Nearly regular waves: one component."""
+    sea = {"significant_height": height, "peak_period": period, "direction": direction, "components": 1}
+    return {"seed": 1, "waves": sea}
+
+
+@pytest.mark.parametrize("vehicle", VESSELS)
+@pytest.mark.parametrize("direction", [0.0, 1.2])
+def test_long_waves_carry_the_hull(vehicle: dict[str, str], direction: float) -> None:
+    """It rises with the water and lies on its slopes: waves of 150 m and more."""
+    trial = Trial({"usv": {**vehicle, "position": [0.0, 0.0]}}, environment=swell(0.5, 10.0, direction))
+    calm = Trial({"usv": {**vehicle, "position": [0.0, 0.0]}})
+    rise, water, heel, slope = [], [], [], []
+    for _ in range(300):
+        trial.step(10)
+        rise.append(trial["usv.position.z"] - calm["usv.position.z"])
+        water.append(trial["usv.wave.elevation"])
+        heel.append([trial["usv.attitude.roll"], trial["usv.attitude.pitch"] - calm["usv.attitude.pitch"]])
+    late = slice(100, None)  # after a start from rest in calm water
+    assert np.ptp(water[late]) > 0.1
+    assert np.abs(np.array(rise) - water)[late].max() < 0.05 * np.ptp(water)
+    steepest = np.abs(heel[late]).max(axis=0)
+    assert steepest[1] > 1e-3 if direction == 0 else steepest[0] > 1e-3
+
+
+def test_short_waves_pass_under_the_hull() -> None:
+    """Waves of 0.4 m length, half that of the hull, leave it within a fiftieth of their height."""
+    trial = Trial({"usv": vessel([0.0, 0.0], motion="6dof")}, environment=swell(0.1, 0.5))
+    heights = [trial.step()["usv.position.z"] for _ in range(500)]
+    assert np.ptp(heights) < 0.002
+
+
+def test_gain_scales_the_waves() -> None:
+    trials = [Trial({"usv": vessel([0.0, 0.0], motion="6dof")}, environment=swell(0.02, 3.0)) for _ in range(2)]
+    trials[1]["environment.wave_gain"] = 0.5
+    full, half = (np.array([trial.step()["usv.position.z"] for _ in range(300)]) - p.CENTRE_OF_MASS_HEIGHT for trial in trials)
+    assert half == pytest.approx(full / 2, abs=0.01 * np.abs(full).max())
+
+
+def test_the_hull_feels_what_linear_theory_says() -> None:
+    """Against the functions of numpy: elevation, slopes, velocity, acceleration."""
+    random, count = np.random.default_rng(1), 5
+    frequency = random.uniform(1.0, 7.0, count)
+    sea = Sea(random.uniform(0, 0.1, count), frequency, frequency**2 / 9.81, *random.uniform(-3, 3, (2, count)))
+    footprint = waves.Footprint(
+        *(ca.SX(x) for x in (p.LONGITUDINAL_MOMENT / p.WATERPLANE_AREA, p.TRANSVERSE_MOMENT / p.WATERPLANE_AREA, p.DRAUGHT))
+    )
+    columns = [ca.SX([*column, *np.zeros(64 - count)]) for column in (sea.amplitude, sea.frequency, sea.direction, sea.phase)]
+    heading = ca.SX(np.cos(0.7)), ca.SX(np.sin(0.7))
+    water = waves.water(ca.SX([3.0, -2.0]), heading, ca.SX(11.0), footprint, ca.SX(count), waves.table(footprint, *columns))
+    elevation, *vectors = felt(sea, 3.0, -2.0, 0.7, 11.0)
+    assert float(water.elevation) == pytest.approx(elevation, rel=1e-12)
+    for found, expected in zip((water.slopes, water.velocity, water.acceleration), vectors, strict=True):
+        assert np.array(ca.DM(found)).ravel() == pytest.approx(expected, rel=1e-11)
+
+
+def test_sine_and_cosine_are_those_of_numpy() -> None:
+    angles = np.random.default_rng(2).uniform(-1e5, 1e5, 5000)
+    sine, cosine = computed(elementary.sine_and_cosine, angles)
+    assert np.abs(sine - np.sin(angles)).max() < 1e-13
+    assert np.abs(cosine - np.cos(angles)).max() < 1e-13
+
+
+def test_the_exponential_is_that_of_numpy() -> None:
+    numbers = np.random.default_rng(2).uniform(-3, 3, 5000)
+    (found,) = computed(lambda x: (elementary.exponential(x),), numbers)
+    assert found == pytest.approx(np.exp(numbers), rel=1e-13)
+
+
+def computed(expression: Any, values: np.ndarray) -> list[np.ndarray]:
+    x = ca.SX.sym("x")
+    function = ca.Function("f", [x], list(expression(x)))
+    results = function(ca.DM(values).T)
+    return [np.array(result).ravel() for result in (results if isinstance(results, tuple) else (results,))]

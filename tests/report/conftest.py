@@ -1,0 +1,86 @@
+"""A real flight, and a real browser to look at pages with."""
+
+import shutil
+import time
+
+import pytest
+
+import cosim
+
+#: the first without a graphics card, the others so that Chromium asks nobody for anything
+FLAGS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox", "--disable-quic"]
+FLAGS += ["--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"]
+
+
+@pytest.fixture(scope="session")
+def flight():
+    """Demo 1 until shortly after the landing: one of its five checks is not met, it has not been round the box."""
+    return cosim.run("demo1_box", stop_time=16)
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if path is None:
+        pytest.skip("no chromium here")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=path, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+class Visit:
+    """A page opened from disk, and what it asked for and complained about."""
+
+    def __init__(self, browser, file):
+        self.context = browser.new_context(viewport={"width": 640, "height": 480})
+        self.page = self.context.new_page()
+        self.requests, self.complaints, self.url = [], [], file.absolute().as_uri()
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.on("console", lambda said: self.complaints.append(said.text) if said.type in ("error", "warning") else None)
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.goto(self.url)
+        self.page.wait_for_selector("#replay[data-ready]", timeout=60_000)
+
+    def __call__(self, script):
+        return self.page.evaluate(script)
+
+    def seek(self, time):
+        self(f"cosimReplay.player.seek({time})")
+
+    def until(self, condition, seconds=30):
+        """Wait until a condition in the page holds."""
+        end = time.monotonic() + seconds
+        while not self(condition):
+            assert time.monotonic() < end, f"waited {seconds} s in vain for {condition}"
+            self.page.wait_for_timeout(50)
+
+    def check(self):
+        """The page has asked for nothing but itself, and complained of nothing."""
+        assert self.requests == [self.url]
+        assert [text for text in self.complaints if "GPU stall" not in text] == []
+
+    @property
+    def time(self):
+        return self("cosimReplay.player.time")
+
+    def body(self, number):
+        """Position and orientation (w, x, y, z) of a body as it stands in the scene."""
+        of = f"cosimReplay.view.actors[{number}].object"
+        return self(f"[{of}.position.toArray(), [{of}.quaternion.w, ...{of}.quaternion.toArray().slice(0, 3)]]")
+
+
+@pytest.fixture(scope="module")
+def visit(chromium):
+    """Opens files in the browser; at the end none may have asked for anything else or complained."""
+    visits = []
+
+    def opened(file):
+        visits.append(Visit(chromium, file))
+        return visits[-1]
+
+    yield opened
+    for one in visits:
+        one.context.close()
+        one.check()

@@ -1,0 +1,165 @@
+"""The replay in a real browser. Every visit also proves that the page loads nothing and complains of nothing."""
+
+from copy import deepcopy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cosim.report.html import write_report
+from cosim.report.replay import write_replay
+from plant_src.environment import sea
+
+BODIES = ("plant.uav", "plant.usv")
+
+
+@pytest.fixture(scope="module")
+def shared(visit, flight, tmp_path_factory):
+    file = tmp_path_factory.mktemp("replay") / "replay.html"
+    write_replay([flight], file)
+    return visit(file)
+
+
+@pytest.fixture
+def opened(shared):
+    """The replay of the flight at its start, as seen by the camera that it begins with; one page for all, since it takes long."""
+    shared.page.get_by_role("button", name="Orbit", exact=True).click()
+    shared.seek(0)
+    yield shared
+    shared.check()
+
+
+def column(result, name, time):
+    return float(np.interp(time, result.time, result[name]))
+
+
+def test_bodies_are_where_they_were(opened, flight):
+    for time in (0.0, 3.21, 9.999, 14.505, 16.0):
+        opened.seek(time)
+        for number, body in enumerate(BODIES):
+            position, orientation = opened.body(number)
+            assert position == pytest.approx([column(flight, f"{body}.position.{axis}", time) for axis in "xyz"], abs=2e-5)
+            recorded = [column(flight, f"{body}.orientation.{part}", time) for part in "wxyz"]
+            assert abs(np.dot(orientation, recorded)) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_the_scrubber_the_keys_and_the_plots_move_time(opened, flight):
+    box = opened.page.locator(".scrubber").bounding_box()
+    opened.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    assert opened.time == pytest.approx(8.0, abs=0.1)
+    opened.page.keyboard.press("ArrowRight")
+    opened.page.keyboard.press("Shift+ArrowRight")
+    assert opened.time == pytest.approx(9.1, abs=0.1)
+    over = opened.page.locator(".u-over").first
+    over.click(position={"x": over.bounding_box()["width"] / 4, "y": 20})
+    assert opened.time == pytest.approx(4.0, abs=0.1)
+    assert opened.page.locator(".clock b").inner_text() == f"{opened.time:.2f}"
+    altitude = flight["plant.uav.position.z"][np.searchsorted(flight.time, opened.time, side="right") - 1]
+    assert opened.page.locator(".plot b").first.inner_text() == f"{altitude:.4g} m"
+
+
+def test_it_plays_at_its_speed_to_the_end_and_begins_again(opened):
+    opened.page.select_option(".speed", "8")
+    opened.seek(12.0)
+    opened.page.click(".play")
+    opened.until("!cosimReplay.player.playing")
+    assert opened.time == 16.0
+    opened.page.click(".play")
+    opened.until("cosimReplay.player.time > 0 && cosimReplay.player.time < 16")
+    opened.page.click(".play")
+    assert opened("!cosimReplay.player.playing")
+
+
+def test_cameras_look_at_what_they_promise(opened):
+    camera = "cosimReplay.view.cameras.camera"
+    opened.page.get_by_role("button", name="Chase", exact=True).click()
+    distances = []
+    for time in (2.0, 9.0):
+        opened.seek(time)
+        distances.append(opened(f"{camera}.position.distanceTo(cosimReplay.view.actors[0].object.position)"))
+    assert distances[0] == pytest.approx(distances[1], abs=1e-6)
+    opened.page.get_by_role("button", name="Deck", exact=True).click()
+    vessel = "cosimReplay.view.actors[1].object"
+    on_board = f"{vessel}.worldToLocal({camera}.position.clone()).toArray()"
+    assert opened(on_board) == pytest.approx([-2.6, 0.0, 1.5], abs=1e-4)
+    opened.page.get_by_role("button", name="Top", exact=True).click()
+    assert opened(f"{camera}.getWorldDirection({camera}.position.clone()).z") < -0.999
+
+
+def test_trails_grow_and_ghosts_appear_when_asked_for(opened):
+    past = "cosimReplay.view.actors[0].trail.past.geometry.instanceCount"
+    opened.seek(4.0)
+    early = opened(past)
+    opened.seek(8.0)
+    assert opened(past) == pytest.approx(2 * early, abs=2)
+    opened.page.get_by_role("button", name="Ghosts").click()
+    assert opened("cosimReplay.view.actors[0].ghosts.mesh.visible")
+    assert opened("cosimReplay.view.actors[0].ghosts.mesh.count") == 9  # one a second
+    opened.page.get_by_role("button", name="Ghosts").click()
+
+
+def test_something_is_drawn(opened):
+    """Where the vessel is, the middle of the picture has another colour than the water beside it."""
+    opened.page.click("text=usv")
+    colours = opened(
+        """() => { const {view} = cosimReplay, gl = view.renderer.getContext(), pixel = new Uint8Array(4);
+        view.show("trails", false);
+        view.renderer.render(view.scene, view.cameras.camera);
+        view.show("trails", true);
+        return [0.5, 0.97].map((x) => (gl.readPixels(gl.drawingBufferWidth * x, gl.drawingBufferHeight / 2, 1, 1, gl.RGBA,
+          gl.UNSIGNED_BYTE, pixel), [...pixel.slice(0, 3)])); }"""
+    )
+    deck, water = np.array(colours, float)
+    assert np.ptp(deck) < 30  # grey
+    assert water[2] > water[0] + 30  # blue
+
+
+ENVIRONMENT = {"seed": 5, "waves": {"spectrum": "jonswap", "significant_height": 0.3, "peak_period": 3.0, "spreading": 2}}
+
+
+@pytest.fixture(scope="module")
+def compared(visit, flight, tmp_path_factory):
+    """The flight as if on a rough sea, and over it the same one metre higher."""
+    scenario = deepcopy(flight.metadata["scenario"])
+    scenario["components"]["plant"]["arguments"]["environment"] = ENVIRONMENT
+    rough = replace(flight, metadata={**flight.metadata, "scenario": scenario})
+    moved = {**flight.recording.columns, "plant.uav.position.z": flight["plant.uav.position.z"] + 1.0}
+    higher = replace(flight, recording=replace(flight.recording, columns=moved))
+    file = tmp_path_factory.mktemp("compared") / "two.html"
+    write_replay([rough, higher], file)
+    return visit(file)
+
+
+def test_a_second_run_is_laid_over_the_first(compared):
+    compared.seek(5.0)
+    first, second = compared.body(0)[0], compared.body(2)[0]
+    assert np.subtract(second, first) == pytest.approx([0, 0, 1], abs=1e-5)
+    one, two = compared.page.locator(".plot b").first.inner_text().removesuffix(" m").split(" | ")
+    assert float(two) == pytest.approx(float(one) + 1, abs=2e-3)
+
+
+def test_the_water_has_the_waves_of_the_run(compared):
+    for x, y, time in ((0.0, 0.0, 0.0), (3.0, -2.0, 7.5), (-4.0, 5.0, 16.0)):
+        compared.seek(time)
+        assert compared(f"cosimReplay.view.water.height({x}, {y})") == pytest.approx(
+            sea(ENVIRONMENT).elevation(x, y, time), abs=1e-6
+        )
+
+
+def test_the_report_shows_what_a_stranger_wrote_as_text(visit, flight, tmp_path):
+    evil = "</script><script>window.caught = true</script><img src=x onerror='window.caught = true'>"
+    result = replace(flight, metadata={"scenario": {"description": evil}, "name": evil, "warnings": [evil]})
+    write_report(result, [], {}, tmp_path / "report.html")
+    opened = visit(tmp_path / "report.html")
+    assert opened("window.caught === undefined")
+    assert opened.page.locator("h1").inner_text() == evil
+    assert opened.page.locator(".warnings li").inner_text() == evil
+
+
+def test_a_result_without_a_scene_has_its_signals_still(visit, flight, tmp_path):
+    write_replay([replace(flight, metadata={"name": "numbers"})], tmp_path / "numbers.html")
+    opened = visit(tmp_path / "numbers.html")
+    assert opened.page.locator("canvas[aria-label='3-D replay']").count() == 0
+    opened.page.locator(".add input").fill("plant.usv.position.*")
+    opened.page.keyboard.press("Enter")
+    assert opened.page.locator(".plot figcaption span").count() == 3

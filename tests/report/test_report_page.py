@@ -1,0 +1,158 @@
+"""`report.html`: what stands in it, and how the command line makes it."""
+
+import json
+import re
+from html.parser import HTMLParser
+
+import pytest
+from click.testing import CliRunner
+
+from cosim.api import load
+from cosim.cli.replay import command as replay
+from cosim.cli.report_page import command as report
+from cosim.cli.run import command as run
+from cosim.errors import InputError
+from cosim.report import pages
+from cosim.results import write_run
+
+
+class Reader(HTMLParser):
+    """Tags, and the text of each element that is no script or style."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.texts, self.links, self._open = [], [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        self._open.append(tag)
+        self.links += [value for key, value in attributes if key in ("src", "href", "xlink:href") and not value.startswith("#")]
+
+    def handle_data(self, data):
+        if data.strip() and self._open[-1:] not in (["script"], ["style"]):
+            self.texts.append(data.strip())
+
+
+def invoke(command, *words):
+    return CliRunner().invoke(command, [str(word) for word in words])
+
+
+@pytest.fixture(scope="module")
+def directory(tmp_path_factory):
+    """What `cosim run` leaves of Demo 1 as it is shipped."""
+    folder = tmp_path_factory.mktemp("demo1")
+    done = invoke(run, "demo1_box", "--isolation", "none", "--output-dir", folder)
+    assert done.exit_code == 0, done.output
+    return folder
+
+
+@pytest.fixture(scope="module")
+def page(directory):
+    return Reader((directory / "report.html").read_text())
+
+
+def test_kpis_stand_there_with_their_units_and_checks(page, directory):
+    kpis = json.loads((directory / "kpis.json").read_text())
+    assert "✓ 5 of 5 checks passed" in page.texts
+    assert {name.partition(".")[2] for name in kpis} <= set(page.texts)
+    card = page.texts.index("landing.lateral_error")
+    assert page.texts[card + 1 : card + 4] == [f"{kpis['landing.lateral_error']:.4g}", "m", "✓ max 0.1"]
+
+
+def test_system_versions_timings_and_scenario_stand_there(page):
+    assert {"plant.uav.position.x", "uav.vtol.vehicle.position.x", "rad/s", "pybullet", "stepping loop"} <= set(page.texts)
+    assert any('"stop_time": 40.0' in text for text in page.texts)
+    assert page.tags.count("svg") >= 4  # two figures, the diagram, icons
+
+
+def test_it_is_one_file_of_at_most_3_megabytes_that_loads_nothing(page, directory):
+    assert (directory / "report.html").stat().st_size <= 3_000_000
+    assert [link for link in page.links if not link.startswith("data:")] == []
+
+
+def test_the_same_page_can_be_made_again(directory, tmp_path):
+    done = invoke(report, directory, "--output-file", tmp_path / "again.html")
+    assert done.exit_code == 0, done.output
+    first, again = ((directory / "report.html").read_text(), (tmp_path / "again.html").read_text())
+    assert _without_data(again) == _without_data(first)
+
+
+def _without_data(text):
+    """Booleans come back from CSV as numbers, so the packed signals may differ in their last bits of compression."""
+    return re.sub(r'"samples":"[^"]*"', "", text)
+
+
+def test_a_replay_of_two_runs_is_written_beside_the_first(directory):
+    done = invoke(replay, directory, directory)
+    assert done.output.strip() == str(directory / "replay.html")
+    data = re.search(r'id="replay-data">(.*?)</script>', (directory / "replay.html").read_text(), re.S).group(1)
+    assert [one["name"] for one in json.loads(data)["runs"]] == ["demo1_box", "demo1_box"]
+
+
+def test_checks_that_are_not_met_are_said_first(flight, tmp_path):
+    write_run(flight, tmp_path)
+    assert invoke(report, tmp_path).exit_code == 0
+    texts = Reader((tmp_path / "report.html").read_text()).texts
+    assert texts[1] == "✗ 4 of 5 checks passed"
+    assert "✗ not met: equals true" in texts
+
+
+def short_run(folder):
+    words = ("--stop-time", "0.1", "--isolation", "none", "--no-report")
+    return invoke(run, "demo1_box", *words, "--output-dir", folder)
+
+
+def test_no_report_writes_no_page_and_removes_the_old_one(tmp_path):
+    (tmp_path / "report.html").write_text("old")
+    assert short_run(tmp_path).exception is None
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["kpis.json", "result.csv", "run.json"]
+
+
+def test_a_folder_without_a_run_is_refused(tmp_path):
+    for command in (report, replay):
+        assert isinstance(invoke(command, tmp_path).exception, InputError)
+
+
+def test_data_in_a_page_cannot_end_its_element():
+    text = pages.embedded({"name": "</script><!--<script>", "missing": float("nan")})
+    assert "<" not in text
+    assert json.loads(text) == {"name": "</script><!--<script>", "missing": None}
+
+
+def test_warnings_of_components_reach_the_page(tmp_path):
+    (tmp_path / "loud.py").write_text(LOUD)
+    components = {"loud": {"python": "loud.py:Loud"}}
+    scenario = {"name": "loud", "stop_time": 0.02, "step_size": 0.01, "components": components}
+    (tmp_path / "loud.json").write_text(json.dumps(scenario))
+    done = invoke(run, tmp_path / "loud.json", "--isolation", "none", "--output-dir", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    texts = Reader((tmp_path / "out/report.html").read_text()).texts
+    assert "WARNING loud: rotor <3> hot" in texts
+
+
+LOUD = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+from pythonfmu.enums import Fmi2Status
+
+
+class Loud(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.y = 0.0
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+
+    def do_step(self, time, step_size):
+        if time == 0:
+            self.log("rotor <3> hot", Fmi2Status.warning)
+        return True
+"""
+
+
+def test_units_and_wiring_stand_in_run_json(directory):
+    about = json.loads((directory / "run.json").read_text())
+    assert about["units"]["plant.uav.velocity.x"] == "m/s"
+    assembly = load("demo1_box")
+    assembly.free()
+    assert len(about["system"]["connections"]) == len(assembly.system.connections)
+    assert {one["name"] for one in about["system"]["components"]} == set(assembly.system.components)

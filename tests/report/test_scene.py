@@ -1,0 +1,103 @@
+"""What components say they look like."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from cosim.errors import ComponentError, InputError
+from cosim.report.scene import scene_of
+from cosim.resources import root
+
+SHIPPED = sorted((root() / "scenarios").glob("*.json"))
+
+
+def scene(file):
+    return scene_of({"scenario": json.loads(Path(file).read_text()), "scenario_file": str(file)})
+
+
+@pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
+def test_every_shipped_scenario_has_vehicles_to_show(file):
+    found = scene(file)
+    assert found["bodies"] and found["plots"]
+    for body in found["bodies"]:
+        assert len(body["position"]) == 3 and body["parts"]
+    assert json.loads(json.dumps(found)) is not None
+
+
+def test_signals_of_the_scene_are_recorded(flight):
+    found = scene_of(flight.metadata)
+    for body in found["bodies"]:
+        assert all(name in flight for name in (*body["position"], *body["orientation"]))
+    assert all(span["signal"] in flight for span in found["spans"])
+    assert all(any(flight.signals(pattern) for pattern in patterns) for patterns in found["plots"])
+
+
+def test_waypoints_and_platforms_of_demo_1():
+    found = scene(root() / "scenarios/demo1_box.json")
+    assert [marker["label"] for marker in found["markers"]] == ["1", "2", "3", "4", "5"]
+    assert found["markers"][1] == {"position": (10 / 3, -10 / 3, 0.0), "radius": 0.5, "label": "2"}
+    planks = [part for part in found["fixed"] if part["shape"] == "box"]
+    lengths = [part["size"][0] for part in planks]
+    assert set(lengths) == {5.0} and {part["position"][2] for part in planks} == {0.45}
+
+
+def test_a_world_inside_a_nested_system_is_found_by_its_full_name():
+    found = scene(root() / "scenarios/performance_1.json")
+    assert [body["position"][0] for body in found["bodies"]] == ["demo1.plant.uav.position.x", "demo1.plant.usv.position.x"]
+    assert len(found["markers"]) == 5
+
+
+def test_angles_of_the_published_simulator_are_turned():
+    body = scene(root() / "scenarios/demo1_replica.json")["bodies"][0]
+    assert body["attitude"] == ["plant.uav.attitude.phi", "-plant.uav.attitude.theta", "-plant.uav.attitude.psi"]
+
+
+LAMP = """
+class Lamp:
+    @staticmethod
+    def scene(name, scenario):
+        return {answer}
+
+def night(scenario, bodies):
+    return {{"bodies": bodies, "water": None}}
+"""
+
+
+def lamp(folder, answer="{'bodies': [{'name': name}]}", **scenario):
+    (folder / "lamp.py").write_text(LAMP.format(answer=answer))
+    components = {"a": {"python": "lamp.py:Lamp"}, "b": {"fmu": "b.fmu"}}
+    return {"scenario": {"components": components, **scenario}, "scenario_file": str(folder / "s.json")}
+
+
+def test_any_component_may_have_a_scene_and_the_scenario_one_more(tmp_path):
+    more = {"python": "lamp.py:night", "arguments": {"bodies": [{"name": "moon"}]}}
+    assert [body["name"] for body in scene_of(lamp(tmp_path, scene=more))["bodies"]] == ["a", "moon"]
+
+
+def test_no_scene_and_no_scenario_are_nothing_to_draw(tmp_path):
+    shutil.copy(root() / "controllers/python/course_keeper.py", tmp_path)
+    components = {"keeper": {"python": "course_keeper.py:CourseKeeper"}}
+    assert scene_of({"scenario": {"components": components}, "scenario_file": str(tmp_path / "s.json")})["bodies"] == []
+    assert scene_of({})["water"] is None
+
+
+WRONG = {
+    "1 / 0": 'component "a".*ZeroDivisionError',
+    "[]": "list, expected a dict",
+    "{'bodies': [object()]}": "not JSON serializable",
+}
+
+
+@pytest.mark.parametrize(("answer", "message"), WRONG.items())
+def test_a_wrong_answer_names_the_component(tmp_path, answer, message):
+    with pytest.raises(ComponentError, match=message):
+        scene_of(lamp(tmp_path, answer))
+
+
+def test_a_missing_file_is_named(tmp_path):
+    about = lamp(tmp_path)
+    (tmp_path / "lamp.py").unlink()
+    with pytest.raises(InputError, match=r'file "lamp.py" does not exist'):
+        scene_of(about)

@@ -1,0 +1,131 @@
+"""Sweeps and tunings that cannot be: every problem at once, with its place and the nearest name."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from cosim.cli import cli
+from cosim.errors import InputError
+from cosim.sweep.document import read
+from cosim.sweep.schema import SweepSpec, TuneSpec
+from cosim.sweep.tune import Tuning
+
+FACTOR = {"name": "f", "set": "a.b", "values": [1]}
+PARAMETER = {"name": "p", "set": "a.b", "min": 0.0, "max": 1.0}
+
+
+def problems(folder, kind, content):
+    """What is said about a file whose scenario is a shipped one."""
+    file = folder / "study.json"
+    file.write_text(json.dumps({"name": "s", "scenario": "demo1_box", **content}))
+    with pytest.raises(InputError) as refusal:
+        Tuning.of(file) if kind is TuneSpec else read(file, kind)
+    return [str(problem).removeprefix(str(file)) for problem in refusal.value.problems]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"factors": [FACTOR], "scenario": "demo1_bax"}, ["$.scenario", 'did you mean "demo1_box"?']),
+        ({"factors": [FACTOR], "desing": {}}, ["$.desing", 'did you mean "design"?']),
+        ({}, ['expected "factors", "seeds" or both']),
+        ({"factors": [FACTOR, FACTOR]}, ['two factors are called "f"']),
+        ({"factors": [FACTOR], "by": ["g"]}, ['"by" names no factor "g"', "valid: f, seed"]),
+        ({"factors": [FACTOR | {"range": {"min": 0.0, "max": 1.0}}]}, ["$.factors[0]", "found values and range"]),
+        ({"factors": [{"name": "f", "set": "a.b"}]}, ["$.factors[0]", "found none"]),
+        ({"factors": [{"name": "f", "values": [1]}]}, ["$.factors[0]", 'expected "set"']),
+        ({"factors": [FACTOR | {"name": "status"}]}, ["$.factors[0].name", "expected a name other than"]),
+        ({"factors": [{"name": "f", "set": "a", "range": {"min": 1.0, "max": 1.0}}]}, ["$.factors[0].range", "less than"]),
+        ({"factors": [{"name": "f", "set": "a", "range": {"min": 0.0, "max": 1.0}}]}, ['the factor "f" needs a "count"']),
+        (
+            {"factors": [{"name": "f", "set": "a", "range": {"min": 0.0, "max": 1.0, "scale": "log", "count": 2}}]},
+            ["a logarithmic scale needs a positive"],
+        ),
+        ({"factors": [{"name": "f", "set": "a", "distribution": {"kind": "normal", "mean": 0.0}}]}, ['"normal" needs std']),
+        (
+            {"factors": [{"name": "f", "set": "a", "distribution": {"kind": "normal", "mean": 0.0, "sigma": 1.0}}]},
+            ['"normal" has no "sigma"', "valid: mean, std"],
+        ),
+        ({"factors": [FACTOR], "design": {"kind": "sobol", "runs": 100}}, ["$.design", '"runs": 128']),
+        ({"factors": [FACTOR], "design": {"kind": "latin_hypercube"}}, ["$.design", 'expected "runs"']),
+        ({"factors": [FACTOR], "seeds": {"set": "/seed", "count": 0}}, ["$.seeds.count", "found 0"]),
+        ({"factors": [FACTOR], "deadline": -1}, ["$.deadline", "found -1"]),
+    ],
+)
+def test_a_sweep_is_refused_with_its_place(tmp_path, content, words):
+    (line,) = problems(tmp_path, SweepSpec, content)
+    assert all(word in line for word in words), line
+
+
+def test_everything_that_is_wrong_is_said_at_once(tmp_path):
+    found = problems(
+        tmp_path, SweepSpec, {"factors": [{"name": "f"}, FACTOR | {"values": []}], "dedline": 1, "design": {"kind": "grid"}}
+    )
+    assert [line.split(": ")[1] for line in found] == ["$.factors[0]", "$.factors[1].values", "$.design.kind", "$.dedline"]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"minimize": "1 +", "parameters": [PARAMETER]}, ["$.minimize", "is no expression"]),
+        ({"minimize": "k", "parameters": [PARAMETER], "constraints": ["k < 1"]}, ["$.constraints[0]", "<= or >="]),
+        ({"minimize": "k", "parameters": [PARAMETER | {"start": 2.0}]}, ["$.parameters[0]", 'expected "start" between']),
+        ({"minimize": "k", "parameters": []}, ["$.parameters"]),
+        ({"minimize": "k", "parameters": [PARAMETER], "method": {"kind": "magic"}}, ["$.method.kind", "magic"]),
+    ],
+)
+def test_a_tuning_is_refused_with_its_place(tmp_path, content, words):
+    (line,) = problems(tmp_path, TuneSpec, content)
+    assert all(word in line for word in words), line
+
+
+def test_what_cannot_be_set_is_found_before_anything_runs(lag):
+    """Three levels are wrong in three ways."""
+    wrong = [{"name": "T", "set": "lag.Tau", "values": [1.0]}, {"name": "y", "set": "lag.y_start", "values": [1.0, "high"]}]
+    levels = {"one": {"/components/lga/fmu": "x.fmu"}, "two": {}}
+    done = lag.call("sweep", lag.write(factors=[*wrong, {"name": "l", "levels": levels}]))
+    lines = done.err.splitlines()
+    assert (done.code, len(lines)) == (2, 3), done.err
+    for words in (
+        ("$.factors[0].set", '"Tau"; valid: u, y_start, T'),
+        ("$.factors[1].set", 'found "high"'),
+        ("$.factors[2]", "components/lga"),
+    ):
+        assert any(all(word in line for word in words) for line in lines), done.err
+    assert lag.records() == []
+
+
+def test_criteria_about_kpis_that_do_not_exist_end_the_sweep_at_its_first_run(lag):
+    factors = [{"name": "y", "set": "lag.y_start", "values": list(range(50))}]
+    done = lag.call("sweep", lag.write(factors=factors, success=[{"kpi": "end.valeu", "max": 1.0}]))
+    assert done.code == 2
+    assert 'no such KPI; did you mean "end.value"?' in done.err
+    assert len(lag.records()) < 50
+
+
+def test_a_file_that_cannot_be_imported_is_named(lag):
+    (lag.folder / "broken.py").write_text("import no_such_module\n\ndef f(result):\n    return {}\n")
+    kpis = [{"name": "k", "python": "broken.py:f"}]
+    factors = [{"name": "y", "set": "lag.y_start", "values": [1.0]}]
+    lag.call("sweep", lag.write(factors=factors, settings={"/kpis": kpis}))
+    assert "No module named 'no_such_module'" in lag.table()[0]["failure"]
+
+
+def test_a_component_that_ends_the_process_as_it_is_imported_fails_its_own_runs(lag):
+    """The template, which imports in advance what the scenario names, does without."""
+    (lag.folder / "deadly.py").write_text("import os\nos.abort()\n")
+    content = json.loads((lag.folder / "lag.json").read_text())
+    content["components"]["deadly"] = {"python": "deadly.py:Component"}
+    (lag.folder / "lag.json").write_text(json.dumps(content))
+    good = {"/components/deadly": {"fmu": "lag.fmu"}}
+    lag.call("sweep", lag.write(factors=[{"name": "level", "levels": {"good": good}}]))
+    assert [row["status"] for row in lag.table()] == ["ok"], lag.done
+
+
+def test_schemas_are_printed():
+    for option, key in (("--sweep", "factors"), ("--tune", "minimize")):
+        done = CliRunner().invoke(cli, ["schema", option])
+        assert key in json.loads(done.output)["properties"]

@@ -1,0 +1,110 @@
+"""Tuning a lag whose end is known: y = (1 - h / T)^10 after ten Euler steps of h = 0.01 s."""
+
+from __future__ import annotations
+
+import pytest
+from faults.fault_fmu import lag_output
+from lag_sweeps import SEGV
+
+import cosim
+from cosim.errors import InputError
+from cosim.sweep.jobs import Record
+from cosim.sweep.ledger import Ledger
+from cosim.sweep.tune import Tuning
+
+PARAMETER = {"name": "T", "set": "lag.T", "min": 0.02, "max": 2.0, "scale": "log"}
+SEARCH = {"kind": "nelder_mead", "evaluations": 25}
+#: T at which y ends at a half and at a quarter of its start
+HALF, QUARTER = 0.01 / (1 - 0.5**0.1), 0.01 / (1 - 0.25**0.1)
+
+
+class HereAndNow:
+    """The simplest engine: every run in this process."""
+
+    def __init__(self, order):
+        self.scenario, self.runs = order.scenario, 0
+
+    def check(self, job):
+        return []
+
+    def results(self, jobs):
+        for job in jobs:
+            self.runs += 1
+            yield Record(job.key, dict(cosim.run(self.scenario, job.settings).kpis))
+
+
+def tuned(lag, **content):
+    """The best trial, all trials, and how many runs they took."""
+    minimize = "abs(end.value - 0.5)"
+    tuning = Tuning.of(lag.write("tune", **{"parameters": [PARAMETER], "minimize": minimize, "method": SEARCH, **content}))
+    engine = HereAndNow(tuning.study.order)
+    with Ledger(lag.folder) as ledger:
+        best = tuning.run(ledger, engine, lambda record: None)
+    return best, tuning.trials, engine.runs
+
+
+@pytest.mark.parametrize("kind", ["nelder_mead", "powell", "differential_evolution"])
+def test_the_minimum_is_found(lag, kind):
+    method = {"kind": kind, "evaluations": 40, "population": 8, "generations": 10, "seed": 1}
+    assert tuned(lag, method=method)[0].parameters["T"] == pytest.approx(HALF, rel=0.03)
+
+
+def test_the_same_tuning_goes_the_same_way_and_runs_nothing_again(lag):
+    best, trials, runs = tuned(lag)
+    assert runs == len({trial.parameters["T"] for trial in trials}) > 10
+    assert tuned(lag) == (best, trials, 0)
+
+
+def test_the_start_is_tried_first(lag):
+    _, trials, _ = tuned(lag, parameters=[PARAMETER | {"start": 0.4}])
+    assert trials[0].parameters["T"] == pytest.approx(0.4, rel=1e-11)
+    assert trials[0].value == pytest.approx(abs(lag_output(10, 1.0, 0.4) - 0.5), rel=1e-9)
+
+
+def test_parameters_keep_their_bounds(lag):
+    best, trials, _ = tuned(lag, minimize="0 - T", parameters=[PARAMETER | {"max": 1.1}])
+    assert all(0.02 <= trial.parameters["T"] <= 1.1 for trial in trials)
+    assert best.parameters["T"] == pytest.approx(1.1, rel=0.01)
+
+
+def test_constraints_are_kept(lag):
+    """The smallest end that is not below 0.3 is 0.3."""
+    method = {"kind": "differential_evolution", "population": 8, "generations": 6, "seed": 1}
+    best, _, _ = tuned(lag, minimize="end.value", constraints=["end.value >= 0.3"], method=method)
+    assert best.feasible
+    assert 0.3 <= best.value < 0.32
+
+
+def test_of_points_that_keep_no_constraint_the_one_that_violates_least_is_best(lag):
+    best, trials, _ = tuned(lag, constraints=["end.value >= 3"])
+    assert not best.feasible
+    assert best.violation == min(trial.violation for trial in trials) == pytest.approx(3 - best.parameters["T"] ** 0, abs=0.2)
+
+
+@pytest.mark.parametrize("over", ["mean", "max"])
+def test_all_cases_count(lag, over):
+    """Only the second case has any error: the first looks at the start, which is right."""
+    cases = [{"/kpis/0/arguments/stop": 0.0, "lag.y_start": 0.5}, {"lag.y_start": 2.0}]
+    best, _, _ = tuned(lag, cases=cases, over_cases=over)
+    assert best.parameters["T"] == pytest.approx(QUARTER, rel=0.01)
+
+
+def test_unknown_names_are_refused_after_the_first_point(lag):
+    with pytest.raises(InputError) as refusal:
+        tuned(lag, minimize="end.vlaue", constraints=["start >= 1"])
+    first, second = map(str, refusal.value.problems)
+    assert '$.minimize: no KPI or parameter "end.vlaue"; did you mean "end.value"?' in first
+    assert '$.constraints[0]: no KPI or parameter "start"' in second
+
+
+def test_the_command_prints_how_to_run_the_best_and_says_when_all_crash(lag):
+    """Every point fails in its second case, so the first one is as good as any."""
+    lag.write(
+        "tune", parameters=[PARAMETER], minimize="end.value", cases=[{}, {"lag.fault": SEGV}], method=SEARCH | {"evaluations": 3}
+    )
+    done = lag.call("tune", "tune.json")
+    assert done.code == 1
+    assert "SIGSEGV" in done.err
+    trials = lag.table("runs/tune", "trials.csv")
+    assert all("SIGSEGV" in trial["failure"] for trial in trials)
+    assert done.out.splitlines()[-1] == f"cosim run lag.json --set lag.T={trials[0]['T']}"
