@@ -49,13 +49,19 @@ class Contacts:
         for place in self._published.values():
             self._outputs[place.force] = 0.0
 
-    def add(self, share: float) -> None:
-        """Add the contacts of the last step of Bullet, which is this share of the component's step."""
+    def add(self, share: float) -> int:
+        """Add the contacts of the last step of Bullet, which is this share of the component's step.
+
+        Returns how many vehicles had some.
+        """
         self.any = True
+        touching = set()
         for (a, b), points in groupby(pybullet.getContactPoints(physicsClientId=self._client), _bodies):
             if force := sum(map(_normal_force, points)) * share:
                 self._touch(a, b, force)
                 self._touch(b, a, force)
+                touching |= {a, b}
+        return len(touching & self._published.keys())
 
     def _touch(self, body: int, other: int, force: float) -> None:
         if body in self._published:  # no platform

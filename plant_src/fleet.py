@@ -87,7 +87,6 @@ class Fleet:
         self._near = near
         engaged = [shadow for shadow, is_near in zip(self.shadows, near, strict=True) if is_near]
         self._push, self._measure = [shadow.push for shadow in engaged], [shadow.measure for shadow in engaged]
-        self._parked = len(self.shadows) - len(engaged)
 
     def _collide(self) -> None:
         """One step of Bullet."""
@@ -98,13 +97,13 @@ class Fleet:
             measure()
 
     def _find_contacts(self, share: float) -> None:
-        impulses = self._impulses.tolist()
-        self._leaving = impulses.count(0.0) > self._parked
+        impulses, touching = self._impulses.tolist(), 0
         if total := sum(impulses):
             if math.isnan(total):
                 culprit = next(shadow for shadow, value in zip(self.shadows, impulses, strict=True) if math.isnan(value))
                 raise UnsoundError(f"{culprit.name}: the contact forces are not finite")
-            self.contacts.add(share)
+            touching = self.contacts.add(share)
+        self._leaving = touching < len(self._push)
 
     # -- state ---------------------------------------------------------------------------------------------------------
 

@@ -1,8 +1,9 @@
 """Standard manoeuvres of ships: turning circle, zig-zag, initial turning and stopping of IMO resolution MSC.137(76), section 5.
 
 A manoeuvre begins with the order to rudder or engine at `start` (s); the original course is the heading at that time, `length`
-(m) the vessel's length, by which the resolution's criteria go. Places are those of the centre of mass, in the x-y plane of the
-world. Between rows headings, speeds and places are straight lines; what was not reached is NaN.
+(m) the vessel's length, by which the resolution's criteria go. Places are those of the point `midships` (m, body frame, from the
+centre of mass; default: the centre of mass itself) in the x-y plane of the world. Between rows headings, speeds and places are
+straight lines; what was not reached is NaN.
 
 The criteria, made for ships of 100 m and more: advance <= 4.5 lengths, tactical diameter <= 5, initial turning <= 2.5, track
 reach <= 15; first overshoot of the 10/10 zig-zag <= 10 deg at length/speed < 10 s, second <= 25 deg; of the 20/20 <= 25 deg.
@@ -11,6 +12,7 @@ reach <= 15; first overshoot of the 10/10 zig-zag <= 10 deg at length/speed < 10
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +22,9 @@ from cosim.kpi import Number, better, first_time, units
 from cosim.results import Result
 
 DEGREE = math.pi / 180
+
+Point = Sequence[float]
+CENTRE_OF_MASS: Point = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -48,13 +53,13 @@ class Track:
         return -1 if beyond.size and beyond[0] < 0 else 1
 
 
-def track(result: Result, vehicle: str, start: float) -> Track:
+def track(result: Result, vehicle: str, start: float, midships: Point = CENTRE_OF_MASS) -> Track:
     """The motion of `vehicle` ("plant.usv") from `start` (s) on. Raises InputError for a start outside the result."""
     time = result.time
     if not time.size or not time[0] <= start <= time[-1]:
         raise InputError(f"the manoeuvre starts at {start:g} s, where nothing was recorded")
     later = time > start
-    place = result[f"{vehicle}.position.x"] + 1j * result[f"{vehicle}.position.y"]
+    place = result[f"{vehicle}.position.x"] + 1j * result[f"{vehicle}.position.y"] + _offset(result, vehicle, midships)
     place, heading = (
         np.concatenate([[np.interp(start, time, values)], values[later]])
         for values in (place, np.unwrap(result[f"{vehicle}.attitude.yaw"]))
@@ -62,6 +67,17 @@ def track(result: Result, vehicle: str, start: float) -> Track:
     travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(place)))])
     ahead_and_left = (place - place[0]) * np.exp(-1j * heading[0])
     return Track(np.concatenate([[start], time[later]]), ahead_and_left, heading - heading[0], travelled)
+
+
+def _offset(result: Result, vehicle: str, point: Point) -> np.ndarray:
+    """Where a point of the vehicle (body frame) is from its centre of mass, x + i * y in the world."""
+    if not any(point):
+        return np.zeros(len(result.time), complex)
+    w, x, y, z = (result[f"{vehicle}.orientation.{axis}"] for axis in "wxyz")
+    ahead = 1 - 2 * (y * y + z * z) + 2j * (x * y + w * z)
+    left = 2 * (x * y - w * z) + 1j * (1 - 2 * (x * x + z * z))
+    up = 2 * (x * z + w * y) + 2j * (y * z - w * x)
+    return np.asarray(point[0] * ahead + point[1] * left + point[2] * up)
 
 
 @better(advance="lower", transfer="lower", tactical_diameter="lower", advance_lengths="lower", tactical_diameter_lengths="lower")
@@ -75,7 +91,9 @@ def track(result: Result, vehicle: str, start: float) -> Track:
     period="s",
     steady_speed="m/s",
 )
-def turning_circle(result: Result, vehicle: str, start: float, length: float) -> dict[str, Number]:
+def turning_circle(
+    result: Result, vehicle: str, start: float, length: float, midships: Point = CENTRE_OF_MASS
+) -> dict[str, Number]:
     """The turning circle of `vehicle`, to either side, rudder hard over from `start` on (MSC.137(76), 5.2.1).
 
     advance                     m    way made good along the original course until the heading has changed by 90 deg
@@ -89,7 +107,7 @@ def turning_circle(result: Result, vehicle: str, start: float, length: float) ->
     steady_speed                m/s  mean speed over the last full turn
     speed_loss                  1    share of the speed at the order that is lost by then
     """
-    own = track(result, vehicle, start)
+    own = track(result, vehicle, start, midships)
     quarter, half = own.time_of_turn(math.pi / 2), own.time_of_turn(math.pi)
     advance, transfer = own.at(own.place, quarter).real, own.at(own.place, quarter).imag
     tactical = own.at(own.place, half).imag
@@ -178,14 +196,16 @@ def _back_on_course(own: Track, reversal: float) -> float:
 
 @better(distance="lower", distance_lengths="lower", time="lower")
 @units(distance="m", time="s")
-def initial_turning(result: Result, vehicle: str, start: float, length: float, angle: float = 10 * DEGREE) -> dict[str, Number]:
+def initial_turning(
+    result: Result, vehicle: str, start: float, length: float, angle: float = 10 * DEGREE, midships: Point = CENTRE_OF_MASS
+) -> dict[str, Number]:
     """How quickly `vehicle` answers 10 deg of rudder from `start` on (MSC.137(76), 5.2.2).
 
     distance          m  along the track until the heading has changed by `angle` (rad)
     distance_lengths  1  the same in lengths of the vessel
     time              s  from the order until then
     """
-    own = track(result, vehicle, start)
+    own = track(result, vehicle, start, midships)
     when = own.time_of_turn(angle)
     distance = own.at(own.travelled, when).real
     return {"distance": distance, "distance_lengths": distance / length, "time": when - start}
@@ -193,7 +213,9 @@ def initial_turning(result: Result, vehicle: str, start: float, length: float, a
 
 @better(track_reach="lower", track_reach_lengths="lower", head_reach="lower", lateral_deviation="lower", time="lower")
 @units(track_reach="m", head_reach="m", lateral_deviation="m", time="s")
-def stopping(result: Result, vehicle: str, start: float, length: float, speed: float = 0.0) -> dict[str, Number]:
+def stopping(
+    result: Result, vehicle: str, start: float, length: float, speed: float = 0.0, midships: Point = CENTRE_OF_MASS
+) -> dict[str, Number]:
     """How `vehicle` stops after the engine's order at `start` (MSC.137(76), 5.2.4).
 
     It has stopped when its forward speed through `velocity_body.u` is first at `speed` (m/s) or below: more than zero for a
@@ -205,7 +227,7 @@ def stopping(result: Result, vehicle: str, start: float, length: float, speed: f
     lateral_deviation    m  from the line of the original course, to either side
     time                 s  from the order until then
     """
-    own = track(result, vehicle, start)
+    own = track(result, vehicle, start, midships)
     forward = np.interp(own.time, result.time, result[f"{vehicle}.velocity_body.u"])
     when = first_time(own.time, -forward, -speed)
     place, reach = own.at(own.place, when), own.at(own.travelled, when).real

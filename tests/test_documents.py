@@ -44,10 +44,18 @@ def test_python_examples_run(code, tmp_path):
 def test_json_examples_satisfy_the_schema(text):
     import jsonschema
 
-    from cosim.scenario import json_schema
-
     example = json.loads(text)
-    jsonschema.validate(example, json_schema(nested="ports" in example))
+    jsonschema.validate(example, schema(example))
+
+
+def schema(example):
+    """The schema of what an example is."""
+    from cosim.scenario import json_schema
+    from cosim.sweep import schema as sweeps
+
+    if "factors" in example or "minimize" in example:
+        return sweeps.json_schema(sweeps.SweepSpec if "factors" in example else sweeps.TuneSpec)
+    return json_schema(nested="ports" in example)
 
 
 def test_the_example_scenario_runs(tmp_path):

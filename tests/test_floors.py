@@ -97,7 +97,7 @@ def test_only_faces_print():
             assert room(path) in ("cli", "report"), path
 
 
-HEAVY = ("numpy", "scipy", "matplotlib", "fmpy", "pybullet", "pydantic", "rich", "casadi", "rumoca")
+HEAVY = ("numpy", "scipy", "matplotlib", "fmpy", "pybullet", "pydantic", "rich", "casadi", "rumoca", "jinja2")
 
 
 @pytest.mark.parametrize("statement", ["import cosim", "from cosim.cli import cli; cli(['--help'], standalone_mode=False)"])

@@ -44,9 +44,11 @@ class Transplant:
     def write(self, folder: Path) -> Path | None:
         """Write the changed scenario, and what it consists of, to `folder`; None when it has no place of this role.
 
-        Raises InputError for a bad scenario.
+        Raises InputError for a bad scenario; JSON without components is none at all.
         """
         loaded = load(self.file)
+        if "components" not in loaded.root.document.value:
+            return None
         if loaded.problems:
             raise InputError(loaded.problems)
         self._folder, origin = folder, self.file.parent.resolve()

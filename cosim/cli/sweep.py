@@ -48,13 +48,18 @@ def command(sweep: str, output_dir: Path | None, parquet: bool, **where: Any) ->
 
 
 def _run(sweep: Sweep, ledger: Ledger, folder: Path, parquet: bool, workers: int | None, scheduler: str | None) -> int:
+    from ..supervise import polite_ends
     from ..sweep.outcome import write
 
     began, interrupted = time.monotonic(), False
-    done = sum(1 for job in sweep.jobs() if job.key in ledger)
+    done = sum(key in ledger for key in sweep.keys)
     if done < len(sweep):
         try:
-            with studies.progress(len(sweep)) as progress, studies.engine(sweep.study, workers, scheduler) as engine:
+            with (
+                polite_ends(),
+                studies.progress(len(sweep)) as progress,
+                studies.engine(sweep.study, workers, scheduler) as engine,
+            ):
                 progress.begin(done)
                 sweep.run(ledger, engine, progress)
         except KeyboardInterrupt:

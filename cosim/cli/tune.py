@@ -38,10 +38,15 @@ def command(tuning: str, output_dir: Path | None, **where: Any) -> int:
 
 
 def _run(tuning: Tuning, ledger: Ledger, folder: Path, workers: int | None, scheduler: str | None) -> int:
+    from ..supervise import polite_ends
     from ..sweep.trials import write
 
     try:
-        with studies.progress(_most(tuning)) as progress, studies.engine(tuning.study, workers, scheduler) as engine:
+        with (
+            polite_ends(),
+            studies.progress(_most(tuning)) as progress,
+            studies.engine(tuning.study, workers, scheduler) as engine,
+        ):
             tuning.run(ledger, engine, progress)
     except (CosimError, KeyboardInterrupt) as error:
         if not isinstance(error, InputError):

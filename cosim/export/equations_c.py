@@ -64,13 +64,22 @@ _OPERATIONS = {
 class Callee:
     """A function that expressions call, with its body in C.
 
-    `function` says what it computes; it has the option `never_inline`. `body` reads `in[i][j]`, writes `out[i][j]` and may
-    call the functions that it `needs`.
+    `function` says what it computes, with one result. `body` reads `in[i][j]`, writes `out[i][j]` and may call the functions
+    that it `needs`.
     """
 
     function: ca.Function
     body: str
     needs: Sequence[ca.Function] = ()
+
+    def __call__(self, *arguments: ca.SX) -> ca.SX:
+        """The result, by a call that stays one in C."""
+        return called(self.function, *arguments)[0]
+
+
+def called(function: ca.Function, *arguments: ca.SX) -> list[ca.SX]:
+    """The results of a function that is called in C instead of becoming part of the caller."""
+    return function.call(list(arguments), False, True)
 
 
 class _Places(NamedTuple):
@@ -93,7 +102,7 @@ def sum_over_rows(name: str, term: ca.Function, rows: int) -> Callee:
     common, table = ca.SX.sym("common", term.size1_in(0)), ca.SX.sym("table", rows, term.size1_in(1))
     count = ca.SX.sym("count")
     terms = [ca.if_else(count > k, term(common, table[k, :].T), 0) for k in range(rows)]
-    total = ca.Function(name, [common, count, table], [sum(terms)], {"never_inline": True})
+    total = ca.Function(name, [common, count, table], [sum(terms)])
     places = _Places(lambda i, j: f"row[{rows * j} + k]" if i else f"common[{j}]", lambda i, j: f"value[{j}][k]")
     statements = "".join(f"            {statement};\n" for statement in _Statements(_dense(term), places))
     sizes = {"size": term.size1_out(0), "rows": rows, "common": term.size1_in(0)}
@@ -121,19 +130,19 @@ def callees(functions: Iterable[ca.Function], known: Sequence[Callee] = ()) -> d
     given = {callee.function.name(): callee for callee in known}
     found: dict[str, str] = {}
     for function in functions:
-        for called in function.find_functions(0):
-            callee = given.get(called.name())
-            found |= callees([called] if callee is None else [], known)
+        for inner in function.find_functions(0):
+            callee = given.get(inner.name())
+            found |= callees([inner] if callee is None else [], known)
             for needed in callee.needs if callee else ():
                 found |= callees([needed], known) | {needed.name(): c_function(needed)}
-            found[called.name()] = callee.body if callee else c_function(called)
+            found[inner.name()] = callee.body if callee else c_function(inner)
     return found
 
 
 def c_function(function: ca.Function) -> str:
     """The body of the function: reads `in[i][j]` and writes `out[i][j]`, element j of argument and result i.
 
-    Functions with the option `never_inline` are called (`callees` has their bodies).
+    What it calls by `called` is called (`callees` has the bodies).
     Raises ValueError for an operation that has no counterpart in C.
     """
     return "{\n" + "".join(f"    {statement};\n" for statement in _Statements(_dense(function))) + "}\n"
@@ -142,7 +151,7 @@ def c_function(function: ca.Function) -> str:
 def _dense(function: ca.Function) -> ca.Function:
     """The function without structural zeros and common subexpressions."""
     arguments = [ca.SX.sym(f"a{i}", function.size_in(i)) for i in range(function.n_in())]
-    results = ca.cse([ca.densify(result) for result in function.call(arguments, True, False)])
+    results = ca.cse([ca.densify(result) for result in function.call(arguments)])
     return ca.Function(function.name(), arguments, results)
 
 
@@ -155,7 +164,7 @@ class _Statements:
     def __init__(self, function: ca.Function, places: _Places = _POINTERS):
         self._function, self._places = function, places
         self._values: dict[int, str] = {}
-        self._called = {called.name(): called for called in function.find_functions(0)}
+        self._called = {inner.name(): inner for inner in function.find_functions(0)}
         text = function.str(True).partition("Algorithm:\n")[2].splitlines() if self._called else []
         self._names = [line.partition(" = ")[2].partition("(")[0] for line in text]
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
+from inspect import getattr_static
 from pathlib import Path
 from typing import Any
 
@@ -51,8 +52,8 @@ def _parts(scenario: Mapping[str, Any], folder: Path) -> Iterator[dict[str, Any]
     flat = {**scenario, "components": {name: component for name, component, _ in leaves}}
     for name, component, own_folder in leaves:
         if isinstance(reference := component.get("python"), str):
-            ask = getattr(load_object(reference, own_folder), "scene", None)
-            if callable(ask):
+            ask = getattr_static(load_object(reference, own_folder), "scene", None)
+            if isinstance(ask, staticmethod):
                 yield _answer(f'component "{name}"', ask, name, flat)
     if spec := scenario.get("scene"):
         yield _answer("the scenario's scene", load_function(spec["python"], folder), flat, **spec.get("arguments", {}))

@@ -40,8 +40,8 @@ class Bundle:
 
     @cached_property
     def digest(self) -> str:
-        """What the files are, wherever they lie."""
-        return sha256(json.dumps([str(self.scenario), sorted(self.files.items())]).encode()).hexdigest()
+        """What the files are, wherever they lie, and the cosim that runs them."""
+        return sha256(json.dumps([identity(), str(self.scenario), sorted(self.files.items())]).encode()).hexdigest()
 
     def contents(self, hashes: Iterable[str]) -> dict[str, bytes]:
         """Contents by their hash. Raises InputError when a file has changed since."""

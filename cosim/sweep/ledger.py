@@ -42,14 +42,14 @@ class Ledger:
         self._size = self._read(retry)
 
     def _read(self, retry: bool) -> int:
-        """Index the file and cut off a line that was not finished; returns the size."""
+        """Index the file and cut it off where a line is not whole, as after a power cut; returns the size."""
         size = 0
         with self.path.open("rb") as file:
             for line in file:
-                if not line.endswith(b"\n"):
+                record = _record(line)
+                if record is None:
                     os.ftruncate(self._file, size)
                     break
-                record = Record.from_json(line)
                 if retry and record.failure:
                     self._positions.pop(bytes.fromhex(record.key), None)
                 else:
@@ -98,3 +98,11 @@ class Ledger:
         self._sync()
         self._reader.close()
         os.close(self._file)
+
+
+def _record(line: bytes) -> Record | None:
+    """A line's record; None when it is not whole."""
+    try:
+        return Record.from_json(line) if line.endswith(b"\n") else None
+    except (ValueError, TypeError):
+        return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, Field, StringConstraints, model_validator
@@ -171,6 +171,7 @@ class SweepSpec(StudySpec):
     def _consistent(self) -> SweepSpec:
         names = [factor.name for factor in self.factors]
         _unique("factors", names)
+        _set_once(self.factors, self.seeds)
         if not names and self.seeds is None:
             raise ValueError('expected "factors", "seeds" or both')
         for name in (name for group in self.by for name in group):
@@ -233,6 +234,21 @@ def _unique(what: str, names: Iterable[str]) -> None:
     names = list(names)
     if twice := [name for i, name in enumerate(names) if name in names[:i]]:
         raise ValueError(f'two {what} are called "{twice[0]}"')
+
+
+def _set_once(factors: Sequence[FactorSpec], seeds: SeedsSpec | None) -> None:
+    """Raises ValueError when two factors set the same thing."""
+    setters = {
+        factor.name: {*(factor.set or ()), *(path for level in (factor.levels or {}).values() for path in level)}
+        for factor in factors
+    }
+    setters["seed"] = {*(seeds.set if seeds else ())}
+    owners: dict[str, str] = {}
+    for name, paths in setters.items():
+        for path in sorted(paths):
+            if path in owners:
+                raise ValueError(f'both "{owners[path]}" and "{name}" set "{path}"')
+            owners[path] = name
 
 
 def json_schema(kind: type[BaseModel]) -> dict[str, Any]:

@@ -56,6 +56,11 @@ class Sweep:
         return (self.study.job(point.settings) for point in self.design)
 
     @cached_property
+    def keys(self) -> list[str]:
+        """Keys of all runs."""
+        return [job.key for job in self.jobs()]
+
+    @cached_property
     def criteria(self) -> list[dict[str, Any]]:
         """What a run must meet to count as a success."""
         own = self.read.spec.success
@@ -93,18 +98,15 @@ class Sweep:
                 self.passed(record.kpis)
             observe(record)
 
-        if all(job.key in ledger for job in self.jobs()):
-            return
         self.check(engine)
         run_all(self.jobs(), ledger, engine, look)
 
     def rows(self, ledger: Ledger) -> Iterator[Row]:
         """Finished runs in the order of the design."""
-        for run, point in enumerate(self.design):
-            job = self.study.job(point.settings)
-            if job.key in ledger:
-                record = ledger[job.key]
-                yield Row(run, point, record, not record.failure and self.passed(record.kpis))
+        for run, key in enumerate(self.keys):
+            if key in ledger:
+                record = ledger[key]
+                yield Row(run, self.design[run], record, not record.failure and self.passed(record.kpis))
 
 
 def kpi_names(rows: Iterable[Row]) -> list[str]:

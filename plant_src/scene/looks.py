@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator, Mapping
 from ..catalogue import VEHICLES as CATALOGUE
 from ..vehicles.airframe import Airframe, Rotor
 from ..vehicles.crazyflie.parameters import AIRFRAME as CRAZYFLIE
-from ..vehicles.shapes import Body, Quaternion, Vector
+from ..vehicles.shapes import Body, Box, Quaternion, Vector
 from ..vehicles.survey_hexacopter.parameters import AIRFRAME as SURVEY_HEXACOPTER
-from .models import BLACK, GREY, ORANGE, RED, SILVER, Part, ar_drone, strider
+from .models import ALONG_X, BLACK, GREY, ORANGE, RED, SILVER, YELLOW, Part, ar_drone, mark, strider
 
 DRAWN: Mapping[str, Callable[[], list[Part]]] = {"ar_drone": ar_drone, "strider": strider}
 AIRFRAMES: Mapping[str, Airframe] = {airframe.name: airframe for airframe in (CRAZYFLIE, SURVEY_HEXACOPTER)}
@@ -20,8 +20,10 @@ def looks(vehicle: str) -> list[Part]:
     """The parts of a vehicle ("crazyflie") in its body frame."""
     if vehicle in DRAWN:
         return DRAWN[vehicle]()
-    body = next(iter(CATALOGUE[vehicle].values())).body
-    return list(multirotor(AIRFRAMES[vehicle], body) if vehicle in AIRFRAMES else boxes(body))
+    model = next(iter(CATALOGUE[vehicle].values()))
+    if vehicle in AIRFRAMES:
+        return list(multirotor(AIRFRAMES[vehicle], model.body))
+    return list(catamaran(model.body) if model.is_vessel else boxes(model.body))
 
 
 def boxes(body: Body) -> Iterator[Part]:
@@ -29,6 +31,26 @@ def boxes(body: Body) -> Iterator[Part]:
     for box in body.boxes:
         x, y, z = box.half_extents
         yield Part("box", (2 * x, 2 * y, 2 * z), box.position, GREY, box.orientation)
+
+
+def catamaran(body: Body) -> Iterator[Part]:
+    """Round hulls in the place of the lower boxes, and struts from them to the landing deck, the highest box."""
+    deck = max(body.boxes, key=lambda box: box.position[2])
+    (length, width, thickness), (x, y, z) = deck.half_extents, deck.position
+    yield Part("box", (2 * length, 2 * width, 2 * thickness), deck.position, GREY)
+    yield from mark(x, y, z + thickness)
+    for hull in body.boxes:
+        if hull is not deck:
+            yield from _hull(hull, x - 0.8 * length, x + 0.8 * length, z)
+
+
+def _hull(hull: Box, aft: float, fore: float, deck: float) -> Iterator[Part]:
+    (length, beam, _), (x, y, z) = hull.half_extents, hull.position
+    yield Part("cylinder", (beam, 2 * (length - beam)), hull.position, YELLOW, ALONG_X)
+    for end in (-1.0, 1.0):
+        yield Part("sphere", (beam,), (x + end * (length - beam), y, z), YELLOW)
+    for place in (aft, fore):
+        yield Part("cylinder", (0.16 * beam, deck - z), (place, y, (deck + z) / 2), SILVER)
 
 
 def multirotor(airframe: Airframe, body: Body) -> Iterator[Part]:

@@ -85,7 +85,7 @@ def strider() -> list[Part]:
         Part("box", (0.004, 0.06, 0.09), (-0.46, 0.0, -0.11), BLACK),
         Part("cylinder", (0.008, 0.2), (-0.46, 0.0, 0.0), BLACK),
         Part("box", (0.16, 0.012, 0.012), (-0.40, 0.0, 0.09), BLACK),
-        *_mark(x, y, DECK_TOP),
+        *mark(x, y, DECK_TOP),
     ]
     for side in (-1.0, 1.0):
         parts += _hull(side * strider_geometry.HULL_DISTANCE)
@@ -93,7 +93,7 @@ def strider() -> list[Part]:
     return parts
 
 
-def _mark(x: float, y: float, z: float) -> list[Part]:
+def mark(x: float, y: float, z: float) -> list[Part]:
     """The landing mark: white ring, white H."""
     disc = [Part("cylinder", (radius, 0.002), (x, y, z + rise), colour) for radius, rise, colour in _RINGS]
     bars = [Part("box", (0.20, 0.03, 0.002), (x, y + side * 0.06, z + 0.004), WHITE) for side in (-1.0, 1.0)]

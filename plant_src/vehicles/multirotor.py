@@ -22,7 +22,7 @@ the times of its stages, so that no time constant is too short. Where all effect
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import casadi as ca
@@ -135,7 +135,7 @@ class Equations:
         rotors = ca.repmat(parameters[10], len(self.airframe.rotors))
         return ca.vertcat(parameters[0:3], orientation, velocity, parameters[7:10], rotors)
 
-    def rigid_rate(self, state: ca.SX, rotors: Spinning, inputs: ca.SX, parameters: ca.SX) -> ca.SX:
+    def body_rate(self, state: ca.SX, rotors: Spinning, inputs: ca.SX, parameters: ca.SX) -> ca.SX:
         """Time derivative of the rigid body's states with all effects."""
         acting, effects = self.acting(inputs), self.switched(parameters)
         force, torque = rotor_loads(self.airframe, rotors.speed)
@@ -151,7 +151,7 @@ class Equations:
     def rate(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX) -> ca.SX:
         """Time derivative of the state where the rotors lag."""
         rotors = self.spinning(state[RIGID:], inputs, parameters)
-        return ca.vertcat(self.rigid_rate(state[:RIGID], rotors, inputs, parameters), rotors.rate)
+        return ca.vertcat(self.body_rate(state[:RIGID], rotors, inputs, parameters), rotors.rate)
 
     def plain_step(self, state: ca.SX, inputs: ca.SX, step: ca.SX) -> ca.SX:
         """The state after a step without any effect."""
@@ -167,7 +167,7 @@ class Equations:
         share = ca.exp(-step / 2 / lag)  # of the way to go that is left after half a step; zero without a lag
         middle, end = (target + left * (start - target) for left in (share, share**2))
         stages = (self.spinning(speed, inputs, parameters) for speed in (start, middle, middle, end))
-        rigid = runge_kutta_4(lambda x: self.rigid_rate(x, next(stages), inputs, parameters), state[:RIGID], step)
+        rigid = runge_kutta_4(lambda x: self.body_rate(x, next(stages), inputs, parameters), state[:RIGID], step)
         return ca.vertcat(normalised(rigid), end)
 
 
@@ -185,11 +185,10 @@ def observe(state: ca.SX) -> ca.SX:
 class Multirotor(ContinuousModel):
     """A multirotor in free flight, whose step is one of the compiled function `free_step`."""
 
-    free_step: ca.Function | None = None
+    free_step: ca.Function = field(kw_only=True)
 
     def advance(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1) -> ca.SX:
         """The state after `step` (s) with held inputs, in equal sub-steps."""
-        assert self.free_step is not None
         for _ in range(sub_steps):
             state = self.free_step(state, inputs, parameters, step / sub_steps)
         return state

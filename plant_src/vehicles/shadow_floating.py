@@ -19,7 +19,8 @@ from cosim.export.equations import ContinuousModel
 from . import kinematics
 from .shadow_maps import LINEAR_ANGULAR, alarm, constants_of, contact, foreseen, symbols, symbols_after, symbols_before
 from .shapes import Body
-from .vessel import Frame, Hull, Vessel
+from .vessel import Frame, Hull
+from .vessel_model import Vessel
 
 
 class _Impulse(NamedTuple):
@@ -31,7 +32,7 @@ class _Impulse(NamedTuple):
 
 @dataclass(frozen=True)
 class FloatingBody:
-    """A vessel with the state of `vessel.Vessel`.
+    """A vessel with the state of `vessel_model.Vessel`.
 
     Bullet's body has its centre of mass in the origin O of the vessel's frame and mass and inertia of `body`, whatever the
     payload: an impulse is an impulse, and with the one carried over the ratio of masses does not matter. They should not

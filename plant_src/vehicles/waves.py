@@ -24,6 +24,8 @@ from .interface import COMPONENTS
 
 GRAVITY = 9.81  # m/s2
 
+_SLOWEST = 1e-9  # rad/s: a wave of frequency 0 is no wave, not a division by 0
+
 _COLUMNS = 6  # of the table: amplitude, kx, ky, frequency, phase, g / frequency
 
 
@@ -50,7 +52,7 @@ class Water:
 def table(footprint: Footprint, amplitude: ca.SX, frequency: ca.SX, direction: ca.SX, phase: ca.SX) -> ca.SX:
     """The components as `water` needs them, column by column; the amplitude is that felt where the heading does not matter."""
     number = frequency**2 / GRAVITY
-    celerity = ca.if_else(frequency > 0, GRAVITY / frequency, 0)
+    celerity = GRAVITY / ca.fmax(frequency, _SLOWEST)
     felt = amplitude * ca.exp(-(number**2) * footprint.across / 2 - number * footprint.draught)
     return ca.vertcat(felt, number * ca.cos(direction), number * ca.sin(direction), frequency, phase, celerity)
 
@@ -75,6 +77,6 @@ SUM = sum_over_rows("waves", _term(), COMPONENTS)
 def water(place: ca.SX, heading: tuple[ca.SX, ca.SX], time: ca.SX, footprint: Footprint, count: ca.SX, sea: ca.SX) -> Water:
     """The waves at a place (x, y), for a hull with this heading (cosine and sine of the yaw angle); `sea` is a `table`."""
     common = ca.vertcat(place, time, *heading, (footprint.along - footprint.across) / 2)
-    felt = SUM.function(common, count, ca.reshape(sea, COMPONENTS, _COLUMNS))
+    felt = SUM(common, count, ca.reshape(sea, COMPONENTS, _COLUMNS))
     slopes = felt[1:3]
     return Water(felt[0], slopes, felt[3:6], ca.vertcat(-GRAVITY * slopes, felt[6]))

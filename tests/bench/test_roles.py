@@ -65,6 +65,17 @@ def test_a_scenario_without_the_role_is_left_alone(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_other_json_is_no_scenario_and_a_bad_one_is_refused(tmp_path):
+    role = read_role("usv_autopilot")
+    candidate = source(str(min(role.controllers)))
+    shape = interface(candidate)
+    (tmp_path / "data.json").write_text('{"checks": []}')
+    assert Transplant(role, candidate, shape, tmp_path / "data.json").write(tmp_path / "out") is None
+    (tmp_path / "bad.json").write_text('{"name": "bad", "components": {"a": {"fmu": 5}}}')
+    with pytest.raises(InputError, match=r"bad.json:1:.*components.a.fmu"):
+        Transplant(role, candidate, shape, tmp_path / "bad.json").write(tmp_path / "out")
+
+
 def test_ports_that_lead_nowhere_disappear_with_what_sets_them(tmp_path):
     """The cascade as one FMU shows no port `landing_time`: it is a parameter of the nested system around it."""
     keeper = tmp_path / "bare.py"

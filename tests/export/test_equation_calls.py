@@ -13,10 +13,9 @@ from test_equations import Compiled
 from cosim.component import Variable
 from cosim.export import equations
 from cosim.export.equations import ContinuousModel
-from cosim.export.equations_c import Callee, c_function, sum_over_rows
+from cosim.export.equations_c import Callee, c_function, called, sum_over_rows
 
 ROWS = 16
-NEVER_INLINE = {"never_inline": True}
 
 
 def parameter(name: str, *values: float) -> Variable:
@@ -53,7 +52,7 @@ def numbers(count: int) -> np.ndarray:
 @pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 16])
 def test_a_sum_over_rows_counts_only_those_in_use(count: int, tmp_path: Path) -> None:
     callee, x, n, table = waves(), ca.SX.sym("x", 2), ca.SX.sym("n"), ca.SX.sym("table", ROWS, 2)
-    probe = ca.Function("probe", [x, n, table], [3 * callee.function(x, n, table)])
+    probe = ca.Function("probe", [x, n, table], [3 * callee(x, n, table)])
     compiled = Compiled(equations.block(model(lambda x, u, p: u, callees=[callee]), [probe]), tmp_path)
     amplitude, frequency = np.split(numbers(2 * ROWS), 2)
     amplitude[count:] = np.nan
@@ -70,19 +69,20 @@ def test_casadi_computes_the_same_sum() -> None:
 
 def test_a_table_that_lies_among_the_arguments_is_not_copied() -> None:
     callee, parameters = waves(), ca.SX.sym("p", 2 * ROWS + 1)
-    total = callee.function(parameters[0:2], 3, ca.reshape(parameters[1:], ROWS, 2))
+    total = callee(parameters[0:2], ca.SX(3), ca.reshape(parameters[1:], ROWS, 2))
     text = c_function(ca.Function("probe", [parameters], [total]))
     assert "in[0] + 1}" in text
     assert f"in[0][{2 * ROWS}]" not in text
 
 
-def test_a_function_that_is_never_inlined_is_called(tmp_path: Path) -> None:
+def test_a_called_function_is_a_function_in_c(tmp_path: Path) -> None:
     """Also by one that is called itself, with several arguments and results in any order."""
     a, b = ca.SX.sym("a", 2), ca.SX.sym("b")
-    inner = ca.Function("inner", [a, b], [a * b, a[0] - b], NEVER_INLINE)
-    scaled, difference = inner(a[[1, 0]], 2 * b)
-    outer = ca.Function("outer", [b, a], [ca.sum1(scaled) + difference], NEVER_INLINE)
-    probe = ca.Function("probe", [a, b], [ca.vertcat(outer(b, a), inner(a, b)[1], inner(a, outer(b, a))[0])])
+    inner = ca.Function("inner", [a, b], [a * b, a[0] - b])
+    scaled, difference = called(inner, a[[1, 0]], 2 * b)
+    outer = ca.Function("outer", [b, a], [ca.sum1(scaled) + difference])
+    (total,) = called(outer, b, a)
+    probe = ca.Function("probe", [a, b], [ca.vertcat(total, called(inner, a, b)[1], called(inner, a, total)[0])])
     block = equations.block(model(lambda x, u, p: u), [probe])
     text = block.files["model.c"]
     assert text.count("static void inner(") == text.count("static void outer(") == 1
@@ -96,9 +96,9 @@ def test_a_callee_with_a_body_of_its_own_and_what_it_needs(tmp_path: Path) -> No
     """A branch, of which only one side is computed: a square root that would not exist is not taken."""
     x = ca.SX.sym("x")
     root = ca.Function("root", [x], [ca.sqrt(x)])
-    either = ca.Function("either", [x], [ca.if_else(x > 0, ca.sqrt(ca.fabs(x)), -1)], NEVER_INLINE)
+    either = ca.Function("either", [x], [ca.if_else(x > 0, ca.sqrt(ca.fabs(x)), -1)])
     branch = Callee(either, "{\n    if (in[0][0] > 0) root(in, out);\n    else out[0][0] = -1;\n}\n", [root])
-    probe = ca.Function("probe", [x], [2 * either(x)])
+    probe = ca.Function("probe", [x], [2 * branch(x)])
     compiled = Compiled(equations.block(model(lambda x, u, p: u, callees=[branch]), [probe]), tmp_path)
     assert [compiled.call("probe", 1, [value]) for value in (9.0, -4.0)] == [[6.0], [-2.0]]
 
@@ -108,7 +108,7 @@ def test_the_loop_is_part_of_the_rate(tmp_path: Path) -> None:
     callee, (amplitude, frequency) = waves(), np.split(numbers(2 * ROWS), 2)
 
     def rate(x: ca.SX, u: ca.SX, p: ca.SX) -> ca.SX:
-        return callee.function(ca.vertcat(x, u / 2), ROWS, ca.reshape(p, ROWS, 2))[0]
+        return callee(ca.vertcat(x, u / 2), ca.SX(ROWS), ca.reshape(p, ROWS, 2))[0]
 
     table = parameter("table", *amplitude, *frequency)
     compiled = Compiled(equations.block(model(rate, table, callees=[callee])), tmp_path)

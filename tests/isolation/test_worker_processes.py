@@ -52,8 +52,15 @@ def worker():
         process.end()
 
 
-def children() -> list[str]:
-    return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+@pytest.fixture
+def children() -> Callable[[], list[str]]:
+    """Processes that this one has started since; other tests may have left some at work."""
+
+    def now() -> list[str]:
+        return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+
+    before = set(now())
+    return lambda: [process for process in now() if process not in before]
 
 
 def test_lines_come_back_whole_however_long_they_are(worker):
@@ -94,7 +101,7 @@ def test_the_exit_code_of_a_process_is_told(worker):
         process.request(TURN, 5.0)
 
 
-def test_a_process_that_ended_between_two_commands_is_missed(worker):
+def test_a_process_that_ended_between_two_commands_is_missed(children, worker):
     process = worker(lambda line: line)
     (child,) = children()
     os.kill(int(child), signal.SIGKILL)
@@ -161,7 +168,7 @@ def lags(probe: Path, *names: str) -> dict[str, object]:
     return {name: instantiate(file, name, isolation=Isolation()) for name in names}
 
 
-def test_many_runs_leave_nothing_behind(probe, tmp_path, monkeypatch):
+def test_many_runs_leave_nothing_behind(children, probe, tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     run(system(lags(probe, "a")), "1/100")  # imports
     descriptors = sorted(DESCRIPTORS.iterdir())
@@ -174,7 +181,7 @@ def test_many_runs_leave_nothing_behind(probe, tmp_path, monkeypatch):
     assert (list(tmp_path.iterdir()), children()) == ([], [])
 
 
-def test_an_instance_that_is_never_bound_needs_no_process(probe):
+def test_an_instance_that_is_never_bound_needs_no_process(children, probe):
     for component in lags(probe, "a", "b").values():
         component.free()
     assert children() == []

@@ -140,12 +140,12 @@ class Otter:
     def damping(self, relative: np.ndarray) -> np.ndarray:
         load = -self.linear * relative
         load[5] *= 1 + 10 * abs(relative[5])
-        for x in np.linspace(-L / 2, L / 2, 21):
-            for axis, turn, turned in ((1, 5, 5), (2, 4, 4)):
-                speed = relative[axis] + x * relative[turn]
-                force = -0.5 * RHO * self.draught * self.drag * abs(speed) * speed * L / 20
-                load[axis] += force
-                load[turned] += x * force
+        x = np.linspace(-L / 2, L / 2, 21)
+        for axis, turned in ((1, 5), (2, 4)):
+            speed = relative[axis] + x * relative[turned]
+            force = -0.5 * RHO * self.draught * self.drag * abs(speed) * speed * L / 20
+            load[axis] += force.sum()
+            load[turned] += (x * force).sum()
         return load
 
     def step(self, commands: tuple[float, float]) -> None:

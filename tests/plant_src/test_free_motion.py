@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import cache
 
 import numpy as np
 import plant_reference as reference
 import pytest
-from fmpy import extract, read_model_description
-from fmpy.fmi2 import FMU2Slave
+from plant_fmu import PlantFmu
 from worlds import Trial, quadcopter, vessel
-
-from cosim import resources
 
 STEP = 0.01
 
@@ -91,48 +87,12 @@ def test_vessel_sails_as_its_equations_say(voyage: np.ndarray) -> None:
     assert deviation(positions, voyage[:, :2]) < 1e-6
 
 
-@cache
-def unpacked(name: str) -> str:
-    return extract(str(resources.root() / "fmus" / f"{name}.fmu"))
-
-
-class PlantFmu:
-    """One of the project's plant FMUs, run by FMPy."""
-
-    def __init__(self, name: str, start: dict[str, float]):
-        folder = unpacked(name)
-        description = read_model_description(folder)
-        self.references = {variable.name: variable.valueReference for variable in description.modelVariables}
-        self.slave = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=folder,
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName=name,
-        )
-        self.slave.instantiate()
-        self.slave.setupExperiment(startTime=0.0)
-        self.set(list(start), list(start.values()))
-        self.slave.enterInitializationMode()
-        self.slave.exitInitializationMode()
-        self.time = 0.0
-
-    def set(self, names: Sequence[str], values: Sequence[float]) -> None:
-        self.slave.setReal([self.references[name] for name in names], [float(value) for value in values])
-
-    def get(self, *names: str) -> np.ndarray:
-        return np.array(self.slave.getReal([self.references[name] for name in names]))
-
-    def step(self, size: float) -> None:
-        self.slave.doStep(self.time, size)
-        self.time += size
-
-
 def positions(fmu: PlantFmu, names: Sequence[str], axes: str, schedule: list[tuple[float, np.ndarray]]) -> Iterator[np.ndarray]:
     for duration, inputs in schedule:
-        fmu.set(names, inputs)
+        fmu.set(dict(zip(names, inputs, strict=True)))
         for _ in range(round(duration / STEP)):
             fmu.step(STEP)
-        yield fmu.get(*(f"position.{axis}" for axis in axes))
+        yield fmu.vector("position", axes)
 
 
 LOADS = [f"external_{kind}.{axis}" for kind in ("force", "torque") for axis in "xyz"]
@@ -160,7 +120,7 @@ def test_fmu_makes_as_many_sub_steps_as_a_longer_step_needs() -> None:
     start = initial(QUADCOPTER_START)
     short, long = (PlantFmu("ar_drone", start) for _ in range(2))
     for fmu in (short, long):
-        fmu.set([f"rotor_speed[{k}]" for k in (1, 2, 3, 4)], [340.0, 345.0, 350.0, 345.0])
+        fmu.set({f"rotor_speed[{k}]": speed for k, speed in enumerate((340.0, 345.0, 350.0, 345.0), 1)})
     for _ in range(10):
         short.step(0.01)
     long.step(0.1)

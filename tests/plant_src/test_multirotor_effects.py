@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 from multirotor_reference import GRAVITY, VEHICLES, Vehicle
 from plant_fmu import PlantFmu
+
+from plant_src.vehicles.crazyflie.parameters import AIRFRAME
+from plant_src.vehicles.multirotor import Equations
 
 CRAZYFLIE, HEXACOPTER = VEHICLES["crazyflie"], VEHICLES["survey_hexacopter"]
 HIGH = {"initial.position.z": 100.0}
@@ -148,3 +152,14 @@ def test_without_effects_shorter_code_gives_the_same_flight() -> None:
         fmu.step(0.01, 200)
         found.append([*fmu.vector("position"), *fmu.vector("orientation", "wxyz"), *fmu.vector("rates", "pqr")])
     assert found[0] == pytest.approx(found[1], rel=1e-12, abs=1e-12)
+
+
+def test_the_rate_of_the_state_is_the_derivative_of_a_step() -> None:
+    random, moment = np.random.default_rng(5), 1e-6
+    state = np.concatenate([random.standard_normal(3), [1, 0, 0, 0], random.standard_normal(6), 1500 + random.standard_normal(4)])
+    inputs = np.concatenate([1600 + random.standard_normal(4), 0.01 * random.standard_normal(6), [1, 2, 3], [0.05]])
+    parameters = np.concatenate([np.zeros(11), [0.07, 5e-8, 1e-6, 2e-6, 1e-6, 0.01, 0.02, 0.03, 1.0]])
+    equations, symbols = Equations(AIRFRAME), [ca.SX.sym("", len(vector)) for vector in (state, inputs, parameters)]
+    rate = ca.Function("rate", symbols, [equations.rate(*symbols)])(state, inputs, parameters)
+    after = ca.Function("after", symbols, [equations.step(*symbols, ca.SX(moment))])(state, inputs, parameters)
+    assert ((after - state) / moment).full().ravel() == pytest.approx(rate.full().ravel(), rel=1e-3, abs=1e-3)

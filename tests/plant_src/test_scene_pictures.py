@@ -8,11 +8,13 @@ from scene_recording import scene_mission
 
 from cosim.errors import InputError
 from plant_src.bullet import pybullet
+from plant_src.catalogue import VEHICLES
 from plant_src.scene.cameras import CAMERAS, NEAR, View
 from plant_src.scene.land import add_land, bank
 from plant_src.scene.light import rays, water_distance
+from plant_src.scene.looks import looks
 from plant_src.scene.mission import recorded
-from plant_src.scene.models import VEHICLES, Part
+from plant_src.scene.models import Part
 from plant_src.scene.render import Layer, Scene
 from plant_src.scene.stage import Picture, Stage
 
@@ -215,10 +217,12 @@ def test_no_client_is_left_behind():
     assert not any(pybullet.getConnectionInfo(client)["isConnected"] for client in clients)
 
 
-def test_every_vehicle_model_has_a_look():
-    from plant_src.catalogue import MODELS
-
-    assert VEHICLES.keys() == MODELS.keys()
+@pytest.mark.parametrize("vehicle", VEHICLES)
+def test_every_vehicle_has_a_look_of_about_the_size_of_its_body(vehicle):
+    parts = looks(vehicle)
+    seen = max(math.hypot(*part.position) for part in parts)
+    solid = max(np.linalg.norm(box.corners(), axis=1).max() for box in next(iter(VEHICLES[vehicle].values())).body.boxes)
+    assert 0.5 * solid < seen < 2.5 * solid
 
 
 def test_an_unknown_camera_is_refused():

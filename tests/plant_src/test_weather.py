@@ -246,3 +246,10 @@ def test_events_and_profiles_change_the_weather(tmp_path: Path) -> None:
     assert wind[[0, 100, 101, 200, 201, 300]].tolist() == [0.0, 0.0, 4.0, 4.0, -4.0, -4.0]
     assert np.abs(elevation[:100]).max() > 0.02
     assert np.abs(elevation[202:]).max() == 0.0
+
+
+@pytest.mark.parametrize("mass", [-1.0, 46.0])
+def test_a_payload_of_impossible_mass_is_refused_with_its_path(mass: float) -> None:
+    with pytest.raises(InputError, match=f"parameters.payload_mass: found {mass}, expected a number from 0 to 45") as caught:
+        World("plant", {"usv": {"model": "otter", "position": [0, 0], "parameters": {"payload_mass": mass}}})
+    assert caught.value.problems[0].subject == ("arguments", "vehicles", "usv", "parameters", "payload_mass")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from cosim.api import load
 from cosim.errors import ComponentError, InputError
 from cosim.report.scene import scene_of
 from cosim.resources import root
@@ -20,7 +21,7 @@ def scene(file):
 @pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
 def test_every_shipped_scenario_has_vehicles_to_show(file):
     found = scene(file)
-    assert found["bodies"] and found["plots"]
+    assert found["bodies"] and found["plots"], 'scenarios on plant FMUs alone need a "scene"'
     for body in found["bodies"]:
         assert len(body["position"]) == 3 and body["parts"]
     assert json.loads(json.dumps(found)) is not None
@@ -76,6 +77,12 @@ def test_any_component_may_have_a_scene_and_the_scenario_one_more(tmp_path):
     assert [body["name"] for body in scene_of(lamp(tmp_path, scene=more))["bodies"]] == ["a", "moon"]
 
 
+def test_a_method_that_happens_to_be_called_scene_is_left_alone(tmp_path):
+    about = lamp(tmp_path)
+    (tmp_path / "lamp.py").write_text("class Lamp:\n    def scene(self):\n        return 'backstage'\n")
+    assert scene_of(about)["bodies"] == []
+
+
 def test_no_scene_and_no_scenario_are_nothing_to_draw(tmp_path):
     shutil.copy(root() / "controllers/python/course_keeper.py", tmp_path)
     components = {"keeper": {"python": "course_keeper.py:CourseKeeper"}}
@@ -94,6 +101,17 @@ WRONG = {
 def test_a_wrong_answer_names_the_component(tmp_path, answer, message):
     with pytest.raises(ComponentError, match=message):
         scene_of(lamp(tmp_path, answer))
+
+
+def test_a_scene_that_cannot_be_asked_is_refused_before_the_run(tmp_path):
+    scenario = json.loads((root() / "scenarios/free_flight.json").read_text())
+    scenario["scene"]["arguments"] = {"vehicle": {}}
+    for component in scenario["components"].values():
+        component["fmu"] = str(root() / "fmus" / Path(component["fmu"]).name)
+    scenario["scene"]["python"] = f"{root()}/plant_src/scene/replay.py:free"
+    (tmp_path / "flight.json").write_text(json.dumps(scenario))
+    with pytest.raises(InputError, match=r'scene: "free" takes no argument "vehicle"; did you mean "vehicles"'):
+        load(tmp_path / "flight.json")
 
 
 def test_a_missing_file_is_named(tmp_path):

@@ -79,4 +79,5 @@ def test_a_run_is_three_files(result, tmp_path):
         '  "landing.landed_at_end": true,\n  "landing.bounces": 2\n}\n'
     )
     run = json.loads((folder / "run.json").read_text())
+    assert run.pop("units") == result.recording.units
     assert run == {"name": "demo", "seeds": [1, 2], "limit": None, "scenario": "a/b.json", "timing": {"loop_seconds": 0.5}}

@@ -33,6 +33,7 @@ def problems(folder, kind, content):
         ({"factors": [FACTOR], "desing": {}}, ["$.desing", 'did you mean "design"?']),
         ({}, ['expected "factors", "seeds" or both']),
         ({"factors": [FACTOR, FACTOR]}, ['two factors are called "f"']),
+        ({"factors": [FACTOR, FACTOR | {"name": "g"}]}, ['both "f" and "g" set "a.b"']),
         ({"factors": [FACTOR], "by": ["g"]}, ['"by" names no factor "g"', "valid: f, seed"]),
         ({"factors": [FACTOR | {"range": {"min": 0.0, "max": 1.0}}]}, ["$.factors[0]", "found values and range"]),
         ({"factors": [{"name": "f", "set": "a.b"}]}, ["$.factors[0]", "found none"]),

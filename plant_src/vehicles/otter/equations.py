@@ -9,7 +9,7 @@ from cosim.export.block import Block
 from cosim.export.equations import ContinuousModel
 from cosim.export.equations import block as as_block
 
-from .. import kinematics, shadow_floating, vessel
+from .. import kinematics, shadow_floating, vessel, vessel_model
 from ..interface import AFLOAT_STATES
 from ..vessel import Frame, Hull, Named, Situation, at, shift
 from ..waves import Footprint
@@ -35,7 +35,7 @@ def prepare(parameters: Named) -> Named:
     water = hydrostatics.hydrostatics(mass, centre)
     load = ca.vertcat(0, 0, -payload * p.GRAVITY)
     constants = {
-        **vessel.initial(parameters),
+        **vessel_model.initial(parameters),
         "mass": mass,
         "centre": centre,
         "inertia": inertia,
@@ -51,7 +51,7 @@ def prepare(parameters: Named) -> Named:
         "payload_position": place,
         "propeller_time_constant": parameters["propeller_time_constant"],
         "wave.count": parameters["wave.count"],
-        "sea": vessel.sea_of(parameters, _footprint(water.footprint)),
+        "sea": vessel_model.sea_of(parameters, _footprint(water.footprint)),
     }
     return constants | {"rest": _rest(constants)}
 
@@ -167,7 +167,7 @@ class SampledShafts(ContinuousModel):
         return ca.vertcat(end[:first], shafts + ca.fmin(1, ca.if_else(lag > 0, step / lag, 1)) * (commands - shafts))
 
 
-VESSEL = vessel.Vessel("otter", "Maritime Robotics Otter with a landing deck, afloat", VARIABLES, prepare, hull, SHAFTS)
+VESSEL = vessel_model.Vessel("otter", "Maritime Robotics Otter with a landing deck, afloat", VARIABLES, prepare, hull, SHAFTS)
 
 
 def block() -> Block:

@@ -8,7 +8,7 @@ import numpy as np
 from cosim.export.block import Block
 from cosim.export.equations import block as as_block
 
-from .. import shadow_floating, vessel
+from .. import shadow_floating, vessel_model
 from ..strider.equations import air_drag, hull_loads, rudder_loads
 from ..strider.geometry import DECK_CENTRE
 from ..strider.parameters import CENTRE_OF_MASS_HEIGHT, INERTIA, MASS
@@ -29,11 +29,11 @@ def prepare(parameters: Named) -> Named:
     """What the equations need of the parameters."""
     share = parameters["hydrodynamics"]
     return {
-        **vessel.initial(parameters),
+        **vessel_model.initial(parameters),
         "hydrodynamics": share,
         "inverse": ca.inv(_RIGID_BODY + share * ca.SX(p.ADDED_MASS)),
         "wave.count": parameters["wave.count"],
-        "sea": vessel.sea_of(parameters, _FOOTPRINT),
+        "sea": vessel_model.sea_of(parameters, _FOOTPRINT),
     }
 
 
@@ -100,7 +100,7 @@ def in_plane(load: ca.SX, height: float) -> ca.SX:
     return ca.vertcat(load[0:2], 0, -height * load[1], height * load[0], load[2])
 
 
-VESSEL = vessel.Vessel("strider_6dof", "Strider V1.0 catamaran afloat, in six degrees of freedom", VARIABLES, prepare, hull)
+VESSEL = vessel_model.Vessel("strider_6dof", "Strider V1.0 catamaran afloat, in six degrees of freedom", VARIABLES, prepare, hull)
 
 
 def block() -> Block:

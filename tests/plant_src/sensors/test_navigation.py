@@ -30,11 +30,20 @@ def swing(t):
     return ramp * shape, rate * shape + ramp * slope, bend * shape + 2 * rate * slope + ramp * curve, attitude
 
 
-class Flight:
-    """Navigation fed with what exact sensors would say of a motion; `latency` (s) and `interval` (steps) of the fixes."""
+@cache
+def felt(n):
+    """Specific force, rates and field in body axes that exact sensors feel in the step that ends at n STEP."""
+    (_, v0, _, r0), (_, v1, _, r1) = (swing(max(k, 0) / 100) for k in (n - 1, n))
+    turn = (r0.inv() * r1).as_rotvec()
+    middle = r0 * Rotation.from_rotvec(turn / 2)
+    return middle.inv().apply((v1 - v0) / STEP + UP), turn / STEP, r1.inv().apply(FIELD)
 
-    def __init__(self, motion=swing, latency=0.0, interval=10, gyro_bias=(0, 0, 0)):
-        self.motion, self.latency, self.interval, self.bias = motion, round(latency / STEP), interval, np.array(gyro_bias)
+
+class Flight:
+    """Navigation fed with what exact sensors would say of the motion; fixes come ten times a second, `latency` (s) late."""
+
+    def __init__(self, latency=0.0, gyro_bias=(0, 0, 0)):
+        self.latency, self.bias = round(latency / STEP), np.array(gyro_bias)
         self.trial = SensorTrial(Navigation("navigation"))
         self.feed(0)
         self.trial.component.enter_initialization_mode(0.0, 100.0)
@@ -42,19 +51,16 @@ class Flight:
         self.trial.component.exit_initialization_mode()
 
     def feed(self, n):
-        (_, v0, _, r0), (_, v1, _, r1) = (self.motion(max(k, 0) / 100) for k in (n - 1, n))
-        middle = r0 * Rotation.from_rotvec((r0.inv() * r1).as_rotvec() / 2)
-        force = middle.inv().apply((v1 - v0) / STEP + UP)
-        rates = (r0.inv() * r1).as_rotvec() / STEP + self.bias
-        taken = max(0, (n - self.latency) // self.interval * self.interval)
-        place, velocity, _, _ = self.motion(taken / 100)
+        force, rates, field = felt(n)
+        taken = max(0, (n - self.latency) // 10 * 10) / 100
+        place, velocity, _, _ = swing(taken)
         self.trial.feed(
             imu__acceleration=force,
-            imu__rates=rates,
+            imu__rates=rates + self.bias,
             gnss__position=place,
             gnss__velocity=velocity,
-            gnss__time=taken * STEP,
-            magnetometer__field=r1.inv().apply(FIELD),
+            gnss__time=taken,
+            magnetometer__field=field,
             magnetometer__time=n * STEP,
         )
 
@@ -70,7 +76,7 @@ class Flight:
         return np.max(errors, axis=0)
 
     def errors(self, t):
-        place, velocity, _, attitude = self.motion(t)
+        place, velocity, _, attitude = swing(t)
         found = Rotation.from_quat([self.trial[f"orientation.{part}"] for part in "xyzw"])
         pairs = ((self.trial.vector("position"), place), (self.trial.vector("velocity"), velocity))
         return [*(np.linalg.norm(a - b) for a, b in pairs), (found.inv() * attitude).magnitude()]

@@ -64,7 +64,7 @@ export class Cameras {
   }
 }
 
-/** The box around places of all bodies, at least a metre in each direction. */
+/** The box around places of bodies, and half a metre more. */
 export function boxAround(places) {
   return new Box3().setFromPoints(places).expandByScalar(0.5);
 }

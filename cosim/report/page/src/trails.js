@@ -19,7 +19,7 @@ function spread(run, count) {
 
 export class Trail {
   constructor(run, body, colour, isOther) {
-    this.rows = spread(run, MOST_POINTS);
+    this.rows = spread(run, MOST_POINTS).filter((row) => run.position(body, row).toArray().every(Number.isFinite));
     const points = this.rows.map((row) => run.position(body, row));
     const thin = new LineBasicMaterial({ color: colour, transparent: true, opacity: 0.4, depthWrite: false });
     this.whole = new Line(new BufferGeometry().setFromPoints(points), thin);

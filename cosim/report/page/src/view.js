@@ -51,7 +51,8 @@ export class View {
     this.own = this.actors.filter((actor) => actor.run === runs[0]);
     this.subject = this.own[0];
     const places = this.own.flatMap(({ run, body }) => Array.from({ length: 60 }, (_, i) => run.position(body, Math.floor((i * run.time.length) / 60))));
-    this.cameras = new Cameras(canvas, boxAround(places), Object.fromEntries(scene.views.map((view) => [view.name, view])));
+    const known = places.filter((place) => place.toArray().every(Number.isFinite));
+    this.cameras = new Cameras(canvas, boxAround(known), Object.fromEntries(scene.views.map((view) => [view.name, view])));
     this.cameras.controls.addEventListener("change", () => this.request());
     this.recolour();
     new ResizeObserver(() => this.#resize()).observe(canvas.parentElement);

@@ -1,0 +1,40 @@
+"""The catalogue says of each model what its equations say."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import pytest
+
+from plant_src.catalogue import MODELS, VEHICLES
+from plant_src.vehicles.interface import SURROUNDINGS
+
+ALL = pytest.mark.parametrize("name", MODELS)
+
+
+def equations(name: str) -> Any:
+    return importlib.import_module(f"plant_src.vehicles.{name}.equations")
+
+
+@ALL
+def test_the_fmu_has_the_variables_of_the_catalogue(name: str) -> None:
+    block = equations(name).block()
+    assert [(v.name, v.causality) for v in block.variables] == [(v.name, v.causality) for v in MODELS[name].interface]
+
+
+@ALL
+def test_surroundings_come_last_among_the_inputs(name: str) -> None:
+    inputs = [variable.name in SURROUNDINGS for variable in MODELS[name].interface if variable.causality == "input"]
+    assert inputs == sorted(inputs)
+
+
+@pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.constants is not None])
+def test_the_number_of_constants_is_that_of_the_equations(name: str) -> None:
+    assert equations(name).VESSEL.model().constant_symbols().numel() == MODELS[name].constants
+
+
+def test_strider_moves_in_the_plane_unless_told_otherwise() -> None:
+    assert [model.name for model in VEHICLES["strider"].values()] == ["strider", "strider_6dof"]
+    assert next(iter(VEHICLES["strider"])) == "planar"
+    assert list(VEHICLES["otter"]) == ["6dof"]
