@@ -26,6 +26,8 @@ class Zigzag(Sampled):
         self.parameter("inner_speed", 60.0, "rad/s", "Of the inner propeller in a turn")
         self.local("course", 0.0, "rad", "Heading at the first order")
 
+    side: float
+
     def tick(self, time: float) -> None:
         yaw = self.vehicle.attitude.yaw
         if self.side == 0.0:

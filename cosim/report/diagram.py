@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN, LANE = 152.0, 52.0, 62.0, 34.0, 24.0, 14.0  # px
+WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN, LANE = 152.0, 52.0, 70.0, 34.0, 44.0, 14.0  # px
 FRAME_GAP = 12.0  # px between a frame and what it holds
 FRAME = 0.2  # rows above and below a nested system, for its frame
 LONGEST_TITLE, LONGEST_ORIGIN = 20, 25  # characters
@@ -140,7 +141,7 @@ def _component(name: str, boxes: Mapping[str, Box]) -> str:
 
 
 def _wires(flows: Mapping[tuple[str, str], list[str]], boxes: Mapping[str, Box], bottom: float) -> Iterator[Wire]:
-    lane = bottom - GAP_Y / 2
+    lanes = 0
     for (source, target), lines in flows.items():
         start, end = boxes[source], boxes[target]
         more = [f"and {len(lines) - LONGEST_LIST} more"] if len(lines) > LONGEST_LIST else []
@@ -148,8 +149,8 @@ def _wires(flows: Mapping[tuple[str, str], list[str]], boxes: Mapping[str, Box],
         if end.x > start.x:
             path, x, y = _forward(start, end)
         else:
-            lane += LANE
-            path, x, y = _back(start, end, lane)
+            path, x, y = _back(start, end, lanes, bottom)
+            lanes += 1
         yield Wire(path, x, y, len(lines), about)
 
 
@@ -163,15 +164,26 @@ def _forward(start: Box, end: Box) -> tuple[str, float, float]:
     return path, (x1 + x2) / 2, (y1 + y2) / 2 + 0.75 * lift
 
 
-def _back(start: Box, end: Box, lane: float) -> tuple[str, float, float]:
-    """From the lower side of a box, along a lane below everything, up to the lower side of an earlier one."""
-    x1, y1, x2, y2 = start.x + 0.62 * WIDTH, start.y + HEIGHT, end.x + 0.38 * WIDTH, end.y + HEIGHT
-    corner = 12.0
-    path = (
-        f"M{x1:g} {y1:g}V{lane - corner:g}Q{x1:g} {lane:g} {x1 - corner:g} {lane:g}"
-        f"H{x2 + corner:g}Q{x2:g} {lane:g} {x2:g} {lane - corner:g}V{y2:g}"
-    )
-    return path, (x1 + x2) / 2, lane
+def _back(start: Box, end: Box, number: int, bottom: float) -> tuple[str, float, float]:
+    """From the right side of a box, along a lane of its own below everything, to the left side of a box further left."""
+    aside, lane = 12 + 4 * (number % 6), bottom - GAP_Y / 2 + LANE * (number + 1)
+    x1, y1, x2, y2 = start.x + WIDTH, start.y + 0.75 * HEIGHT, end.x, end.y + 0.75 * HEIGHT
+    right, left = x1 + aside, x2 - aside
+    return _rounded([(x1, y1), (right, y1), (right, lane), (left, lane), (left, y2), (x2, y2)]), (left + right) / 2, lane
+
+
+def _rounded(points: Sequence[tuple[float, float]], radius: float = 6.0) -> str:
+    """A path along horizontal and vertical lines through `points`, with round corners."""
+    path = "M{:g} {:g}".format(*points[0])
+    for before, corner, after in zip(points, points[1:], points[2:], strict=False):
+        (x1, y1), (x2, y2) = (_towards(corner, other, radius) for other in (before, after))
+        path += f"L{x1:g} {y1:g}Q{corner[0]:g} {corner[1]:g} {x2:g} {y2:g}"
+    return path + "L{:g} {:g}".format(*points[-1])
+
+
+def _towards(corner: tuple[float, float], other: tuple[float, float], distance: float) -> tuple[float, float]:
+    share = min(0.5, distance / max(math.dist(corner, other), 1e-9))
+    return corner[0] + share * (other[0] - corner[0]), corner[1] + share * (other[1] - corner[1])
 
 
 def _frames(boxes: Iterable[Box]) -> Iterator[Frame]:

@@ -11,7 +11,7 @@ from scipy.signal import welch
 from plant_src.environment.noise import GRID, Channel, Noise
 from plant_src.environment.wind import Gusts, Turbulence, Wind, deviations, scales
 
-COUNT = 100_000
+COUNT = 200_000
 FAST, SLOW = 0.02, 0.5  # time constants (s)
 
 
@@ -35,7 +35,7 @@ def second_order() -> np.ndarray:
 
 
 def test_noise_has_its_deviation(first_order, second_order):
-    """Standard error of a deviation: sigma sqrt(T / duration), here 0.3 % and 2.2 %."""
+    """Standard error of a deviation: sigma sqrt(T / duration), here 0.2 % and 1.6 %."""
     for values in (first_order, second_order):
         assert values[0].std() == pytest.approx(2.0, rel=0.01)
         assert values[1].std() == pytest.approx(0.7, rel=0.05)

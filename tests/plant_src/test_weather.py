@@ -253,3 +253,9 @@ def test_a_payload_of_impossible_mass_is_refused_with_its_path(mass: float) -> N
     with pytest.raises(InputError, match=f"parameters.payload_mass: found {mass}, expected a number from 0 to 45") as caught:
         World("plant", {"usv": {"model": "otter", "position": [0, 0], "parameters": {"payload_mass": mass}}})
     assert caught.value.problems[0].subject == ("arguments", "vehicles", "usv", "parameters", "payload_mass")
+
+
+def test_floating_vessels_may_not_start_inside_each_other() -> None:
+    with pytest.raises(InputError, match="overlaps") as caught:
+        World("plant", {"a": vessel([0.0, 0.0], motion="6dof"), "b": vessel([0.3, 0.0], motion="6dof")})
+    assert caught.value.problems[0].subject in [("arguments", "vehicles", name, "position") for name in "ab"]
