@@ -33,12 +33,6 @@ def _bundle() -> dict[str, Any]:
     return {"script": markup(script.replace("</script", "<\\/script")), "style": markup(style), "policy": POLICY}
 
 
-def prepare() -> None:
-    """Load everything that does not depend on a run."""
-    _bundle()
-    _environment()
-
-
 def markup(text: str) -> str:
     """Text that stands in a page as it is; only for what this package has made."""
     from markupsafe import Markup

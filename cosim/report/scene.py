@@ -7,7 +7,7 @@ JSON, where "components" holds those of nested systems by their full names. The 
 
 - `bodies`: {"name", "title", "colour", "position": [x, y, z], "orientation": [w, x, y, z] or "attitude": [roll, pitch, yaw],
   "parts"}; position, orientation and attitude are names of signals, their negatives ("-name"), or numbers
-- `parts` of a body, and `fixed`: {"shape", "size", "position", "orientation": [x, y, z, w], "colour": [r, g, b] in 0 ... 1,
+- `parts` of a body, and `fixed`, all but shape and size with defaults: {"shape", "size", "position", "orientation": [x, y, z, w], "colour": [r, g, b] in 0 ... 1,
   "opacity"}; a "box" has its edges as size, a "cylinder" (along z) radius and length, a "cone" lower and upper radius and length,
   a "sphere" its radius, a "ring" radius and thickness
 - `water`: {"waves": [{"amplitude", "frequency", "number", "direction", "phase"}], "gain": signal or number}; it lies at z = 0
@@ -23,13 +23,19 @@ from inspect import getattr_static
 from pathlib import Path
 from typing import Any
 
-from ..errors import ComponentError, InputError
+from ..errors import ComponentError, InputError, did_you_mean
 from ..python_component import load_object
 from ..results.files import plain
 from ..scenario.document import read_document
 from ..scenario.functions import load_function
 
 LISTS = ("bodies", "fixed", "markers", "views", "spans", "plots")
+
+#: shape -> how many numbers its size has
+SIZES: Mapping[str, int] = {"box": 3, "cylinder": 2, "cone": 3, "sphere": 1, "ring": 2}
+
+_BODY: Mapping[str, Any] = {"colour": "#0072b2", "parts": ()}
+_PART: Mapping[str, Any] = {"position": (0, 0, 0), "orientation": (0, 0, 0, 1), "colour": (0.6, 0.6, 0.6), "opacity": 1}
 
 
 def scene_of(metadata: Mapping[str, Any]) -> dict[str, Any]:
@@ -78,11 +84,34 @@ def _leaves(system: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, dict
 def _answer(who: str, ask: Callable[..., Any], *values: Any, **named: Any) -> dict[str, Any]:
     try:
         answer = ask(*values, **named)
+        if not isinstance(answer, dict):
+            raise TypeError(f"returned {type(answer).__name__}, expected a dict")
         json.dumps(plain(answer))
+        return _completed(answer)
     except InputError:
         raise
     except Exception as error:
         raise ComponentError(who, "scene", f"{type(error).__name__}: {error}") from error
-    if not isinstance(answer, dict):
-        raise ComponentError(who, "scene", f"returned {type(answer).__name__}, expected a dict")
-    return answer
+
+
+def _completed(scene: Mapping[str, Any]) -> dict[str, Any]:
+    """The scene with everything that may be left out. Raises TypeError or ValueError for what cannot be drawn."""
+    if unknown := [key for key in scene if key not in (*LISTS, "water")]:
+        raise ValueError(f'unknown key "{unknown[0]}"{did_you_mean(unknown[0], (*LISTS, "water"))}')
+    bodies = [{**_BODY, "title": body.get("name"), **body} for body in scene.get("bodies", [])]
+    for body in bodies:
+        body["parts"] = [_part(part) for part in body["parts"]]
+        if lacking := [key for key in ("name", "position") if key not in body]:
+            raise ValueError(f'a body has no "{lacking[0]}"')
+        if ("orientation" in body) == ("attitude" in body):
+            raise ValueError(f'body "{body["name"]}" needs either "orientation" or "attitude"')
+    return {**scene, "bodies": bodies, "fixed": [_part(part) for part in scene.get("fixed", [])]}
+
+
+def _part(part: Mapping[str, Any]) -> dict[str, Any]:
+    shape, size = part.get("shape"), part.get("size", ())
+    if shape not in SIZES:
+        raise ValueError(f'unknown shape "{shape}"{did_you_mean(str(shape), SIZES)}')
+    if len(size) != SIZES[shape]:
+        raise ValueError(f"a {shape} has {SIZES[shape]} numbers as its size, found {list(size)}")
+    return {**_PART, **part}

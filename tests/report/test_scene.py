@@ -66,15 +66,25 @@ def night(scenario, bodies):
 """
 
 
-def lamp(folder, answer="{'bodies': [{'name': name}]}", **scenario):
+LIT = (
+    "{'bodies': [{'name': name, 'position': [0, 0, 'a.z'], 'attitude': [0, 0, 0], 'parts': [{'shape': 'sphere', 'size': [1]}]}]}"
+)
+
+
+def lamp(folder, answer=LIT, **scenario):
     (folder / "lamp.py").write_text(LAMP.format(answer=answer))
     components = {"a": {"python": "lamp.py:Lamp"}, "b": {"fmu": "b.fmu"}}
     return {"scenario": {"components": components, **scenario}, "scenario_file": str(folder / "s.json")}
 
 
 def test_any_component_may_have_a_scene_and_the_scenario_one_more(tmp_path):
-    more = {"python": "lamp.py:night", "arguments": {"bodies": [{"name": "moon"}]}}
-    assert [body["name"] for body in scene_of(lamp(tmp_path, scene=more))["bodies"]] == ["a", "moon"]
+    more = {
+        "python": "lamp.py:night",
+        "arguments": {"bodies": [{"name": "moon", "position": [0, 0, 9], "orientation": [1, 0, 0, 0]}]},
+    }
+    found = scene_of(lamp(tmp_path, scene=more))["bodies"]
+    assert [body["title"] for body in found] == ["a", "moon"]
+    assert found[0]["parts"][0]["opacity"] == 1
 
 
 def test_a_method_that_happens_to_be_called_scene_is_left_alone(tmp_path):
@@ -94,6 +104,11 @@ WRONG = {
     "1 / 0": 'component "a".*ZeroDivisionError',
     "[]": "list, expected a dict",
     "{'bodies': [object()]}": "not JSON serializable",
+    "{'body': []}": 'unknown key "body"; did you mean "bodies"',
+    "{'fixed': [{'shape': 'bax', 'size': [1, 1, 1]}]}": 'unknown shape "bax"; did you mean "box"',
+    "{'fixed': [{'shape': 'box', 'size': [1]}]}": r"a box has 3 numbers as its size, found \[1\]",
+    "{'bodies': [{'name': 'b'}]}": 'a body has no "position"',
+    "{'bodies': [{'name': 'b', 'position': [0, 0, 0]}]}": 'body "b" needs either "orientation" or "attitude"',
 }
 
 

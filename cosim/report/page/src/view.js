@@ -78,7 +78,7 @@ export class View {
     const object = new Group().add(bodyOf(body.parts));
     if (isOther) this.#veil(object);
     const trail = new Trail(run, body, isOther ? OTHER : body.colour, isOther);
-    const ghosts = isOther ? null : new Ghosts(run, body);
+    const ghosts = isOther || !body.parts.some((part) => part.opacity === 1) ? null : new Ghosts(run, body);
     this.scene.add(object, ...trail.lines, ...(ghosts ? [ghosts.mesh] : []));
     const reach = reachOf(body.parts);
     return { run, body, object, trail, ghosts, reach, get position() { return object.position; } };
