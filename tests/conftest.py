@@ -1,12 +1,36 @@
 """Fixtures for all rooms."""
 
+from pathlib import Path
+
 import pytest
 from foreign import probe, probes
+from validation import Measured, Writer
 
 from cosim.engine import EXECUTORS
 from cosim.engine import available as native_available
 
 __all__ = ["executor", "probe", "probes"]
+
+
+def pytest_addoption(parser):
+    parser.addoption("--validation", metavar="FILE", help="run only the tests that validate the plant; write what they measured")
+
+
+def pytest_configure(config):
+    target = config.getoption("--validation")
+    if target and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(Writer(Path(target)))
+
+
+def pytest_collection_modifyitems(config, items):
+    if config.getoption("--validation"):
+        items[:] = [item for item in items if "measured" in getattr(item, "fixturenames", ())]
+
+
+@pytest.fixture
+def measured(request):
+    """States a quantity of the plant beside its reference (tests/validation.py)."""
+    return Measured(request.node)
 
 
 @pytest.fixture(params=sorted(EXECUTORS))

@@ -6,6 +6,7 @@ from statistics import median
 from time import perf_counter
 
 import pytest
+
 import cosim
 from cosim.fmi import FmuFile
 from cosim.kpi import evaluate_kpis

@@ -27,7 +27,7 @@ export function geometryOf(parts) {
     const [x, y, z, w] = part.orientation;
     piece.applyMatrix4(new Matrix4().compose(new Vector3(...part.position), new Quaternion(x, y, z, w), new Vector3(1, 1, 1)));
     piece.deleteAttribute("uv");
-    const colour = new Color().setRGB(...part.colour, "srgb");
+    const colour = new Color().setRGB(...part.colour);
     const colours = new Float32Array(piece.attributes.position.count * 3);
     for (let i = 0; i < colours.length; i += 3) colour.toArray(colours, i);
     piece.setAttribute("color", new Float32BufferAttribute(colours, 3));

@@ -1,5 +1,5 @@
 // Waypoints: a ring of acceptance on the water and a number above it.
-import { CanvasTexture, DoubleSide, Group, Mesh, MeshBasicMaterial, RingGeometry, Sprite, SpriteMaterial, SRGBColorSpace } from "three";
+import { CanvasTexture, DoubleSide, Group, Mesh, MeshBasicMaterial, RingGeometry, Sprite, SpriteMaterial } from "three";
 
 function label(text) {
   const canvas = document.createElement("canvas");
@@ -15,7 +15,6 @@ function label(text) {
   pen.textBaseline = "middle";
   pen.fillText(text, 48, 51);
   const map = new CanvasTexture(canvas);
-  map.colorSpace = SRGBColorSpace;
   const sprite = new Sprite(new SpriteMaterial({ map, sizeAttenuation: false, depthTest: false, transparent: true }));
   sprite.scale.setScalar(0.026);
   return sprite;

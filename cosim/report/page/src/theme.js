@@ -2,12 +2,12 @@
 
 export const THEMES = {
   light: {
-    zenith: "#bcd3e3", horizon: "#eef3f6", deep: "#2f7488", shallow: "#a5cdd6", line: "#ffffff", shade: 0.3,
-    sun: 2.3, sky: 1.5, ground: "#8fb0b8", ink: "#5b6875", rule: "#e3e8ec",
+    horizon: "#e9f0f4", deep: "#3c8196", shallow: "#b4d5dc", line: "#ffffff", shade: 0.22,
+    sun: 1.9, sky: 1.75, ground: "#8fb0b8", ink: "#5b6875", rule: "#e3e8ec",
   },
   dark: {
-    zenith: "#070b11", horizon: "#16202b", deep: "#0b2a38", shallow: "#1d4353", line: "#7fb4c8", shade: 0.55,
-    sun: 1.7, sky: 0.9, ground: "#24404c", ink: "#92a1b0", rule: "#26313c",
+    horizon: "#141d27", deep: "#0d2c3a", shallow: "#24505f", line: "#7fb4c8", shade: 0.4,
+    sun: 1.5, sky: 1.25, ground: "#24404c", ink: "#92a1b0", rule: "#26313c",
   },
 };
 

@@ -1,7 +1,7 @@
 // The scene: light, sky, water, bodies with their trails, and the camera; drawn only when something has changed.
 import {
-  BackSide, BasicShadowMap, Color, DirectionalLight, Euler, Group, HemisphereLight, Mesh, MeshLambertMaterial, PCFShadowMap, Scene,
-  ShaderMaterial, SphereGeometry, Vector3, WebGLRenderer,
+  BasicShadowMap, Color, ColorManagement, DirectionalLight, Euler, Group, HemisphereLight, LinearSRGBColorSpace, MeshLambertMaterial,
+  PCFShadowMap, Scene, Vector3, WebGLRenderer,
 } from "three";
 import { bodyOf, reachOf } from "./bodies.js";
 import { boxAround, Cameras } from "./cameras.js";
@@ -15,20 +15,7 @@ const COARSEST = 0.5; // pixels of the picture per pixel of the page
 const SUN = new Vector3(-0.45, -0.6, 0.66).normalize();
 const OTHER = "#c2185b";
 
-function skyDome() {
-  const uniforms = { zenith: { value: new Color() }, horizon: { value: new Color() } };
-  const material = new ShaderMaterial({
-    uniforms, side: BackSide, depthWrite: false,
-    vertexShader: "varying vec3 way; void main() { way = position; gl_Position = (projectionMatrix * modelViewMatrix * vec4(position, 1.0)).xyww; }",
-    fragmentShader: `uniform vec3 zenith, horizon; varying vec3 way; void main() {
-      gl_FragColor = vec4(mix(horizon, zenith, smoothstep(0.0, 0.55, normalize(way).z)), 1.0);
-      #include <colorspace_fragment>
-    }`,
-  });
-  const dome = new Mesh(new SphereGeometry(1200, 24, 16), material);
-  dome.renderOrder = 1; // where nothing else is
-  return dome;
-}
+ColorManagement.enabled = false; // colours are mixed as they are shown: powers for each pixel take a processor long
 
 /** Whether the processor has to draw, because there is no graphics card to do it. */
 function drawnBySoftware() {
@@ -43,6 +30,7 @@ export class View {
     this.scene = new Scene();
     const software = drawnBySoftware();
     this.renderer = new WebGLRenderer({ canvas, antialias: !software });
+    this.renderer.outputColorSpace = LinearSRGBColorSpace;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = software ? BasicShadowMap : PCFShadowMap;
     this.ratio = software ? 0.8 : Math.min(devicePixelRatio, 1.5);
@@ -67,8 +55,7 @@ export class View {
     this.light.shadow.bias = -1e-3;
     this.light.shadow.normalBias = 0.01;
     this.around = new HemisphereLight("#ffffff", "#8fb0b8", 1.5);
-    this.sky = skyDome();
-    this.scene.add(this.sky, this.light, this.light.target, this.around);
+    this.scene.add(this.light, this.light.target, this.around);
     this.water = scene.water && new Water(scene.water);
     if (this.water) this.scene.add(this.water.mesh);
     this.scene.add(bodyOf(scene.fixed), ...scene.markers.map(markerOf));
@@ -98,8 +85,7 @@ export class View {
     this.light.intensity = colours.sun;
     this.around.intensity = colours.sky;
     this.around.groundColor.set(colours.ground);
-    this.sky.material.uniforms.zenith.value.set(colours.zenith);
-    this.sky.material.uniforms.horizon.value.set(colours.horizon);
+    this.scene.background = new Color(colours.horizon);
     this.water?.colour(colours);
     this.request();
   }
@@ -169,7 +155,6 @@ export class View {
   draw(elapsed) {
     if (!this.stale) return;
     this.stale = false;
-    this.sky.position.copy(this.cameras.camera.position);
     this.renderer.render(this.scene, this.cameras.camera);
     this.#adapt(elapsed);
   }

@@ -66,7 +66,6 @@ void main() {
   }
   colour *= 1.0 - shade * min(dark, 1.0);
   gl_FragColor = vec4(mix(colour, horizon, haze), 1.0);
-  #include <colorspace_fragment>
 }`;
 
 /** A square mesh that is fine in its middle. */
