@@ -2,7 +2,7 @@
 
 A test asks for the fixture `measured` and states
 
-    measured("Otter", "steady speed at 100 rad/s", found, expected, unit="m/s", within=5e-6, source="MSS `otter.m`")
+    measured("Otter", "speed at 100/100 rad/s", found, expected, "m/s", "golden value of MSS `otter.m`", within=5e-6)
 
 which fails unless both agree. `pytest -m "" --validation FILE` runs the tests that do so and writes the document.
 """
@@ -50,8 +50,10 @@ never by hand: a statement that is not met fails its test, and `tests/test_valid
 statements than the tests make. Speed has a page of its own: [performance.md](performance.md).
 
 * *Reference* and *measured* are left out where the quantity is a deviation by itself. Of several values the worst stands here.
-* *Deviation* is absolute, or a share of the reference where it says "rel."; what is below 1e-12 is rounding. *Exact* means to the last bit.
-* *DOP853* is the eighth-order Runge-Kutta method of SciPy at tolerances of 1e-11 and less, on equations written a second time in NumPy.
+* *Deviation* is absolute, or a share of the reference where it says "rel."; what is below 1e-12 is rounding. *Exact*: to the
+  last bit.
+* *DOP853* is the eighth-order Runge-Kutta method of SciPy with tolerances of 1e-11 and less, on equations written a second
+  time in NumPy.
 """
 COLUMNS = ("quantity", "unit", "reference", "measured", "deviation", "limit", "source", "test")
 
@@ -68,9 +70,7 @@ class Statement:
     test: str
 
 
-def statement(
-    test: str, model: str, what: str, *, source: str, within: float = 0.0, relative: float = 0.0, unit: str = "1"
-) -> Statement:
+def statement(test: str, model: str, what: str, unit: str, source: str, within: float = 0.0, relative: float = 0.0) -> Statement:
     """The statement that these arguments of `measured` make."""
     assert model in MODELS, f"{model} is none of {MODELS}"
     return Statement(model, what, unit, f"{relative:g} rel." if relative else f"{within:g}" if within else "exact", source, test)
@@ -88,19 +88,20 @@ class Measured:
         what: str,
         found: ArrayLike,
         expected: ArrayLike,
-        *,
+        unit: str,
         source: str,
+        *,
         within: float = 0.0,
         relative: float = 0.0,
-        unit: str = "1",
         case: str = "",
     ) -> None:
         """Assert |found - expected| <= within, or relative |expected|, in every element; the test may state several cases."""
         file, line, _ = self.node.location
         test = f"{Path(file).relative_to('tests').as_posix()}::{self.node.originalname}"
-        said = statement(test, model, what, source=source, within=within, relative=relative, unit=unit)
+        said = statement(test, model, what, unit, source, within, relative)
         values = worst(found, expected, bool(relative))
-        self.node.user_properties.append(("measured", {**asdict(said), "case": case, "line": line, **values}))
+        place = {"case": case, "line": line, "order": len(self.node.user_properties)}
+        self.node.user_properties.append(("measured", {**asdict(said), **place, **values}))
         assert values["deviation"] <= (relative or within), f"{model}: {what} {case}: {values}, expected within {said.limit}"
 
 
@@ -130,10 +131,14 @@ def line(cells: Iterable[str]) -> str:
 def rows(records: Iterable[dict[str, Any]]) -> Iterator[list[str]]:
     groups: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
     for record in records:
-        place = (record["test"].partition("::")[0], record["line"])
-        groups.setdefault((*place, record["what"], record["case"]), []).append(record)
-    for key in sorted(groups):
-        yield row(max(groups[key], key=lambda record: record["deviation"]))
+        groups.setdefault((record["test"], record["what"], record["case"]), []).append(record)
+    for group in sorted(groups.values(), key=place):
+        yield row(max(group, key=lambda record: record["deviation"]))
+
+
+def place(group: list[dict[str, Any]]) -> tuple[Any, ...]:
+    """Where in the tests a quantity is stated first."""
+    return min((record["test"].partition("::")[0], record["line"], record["order"], record["case"]) for record in group)
 
 
 def row(record: dict[str, Any]) -> list[str]:

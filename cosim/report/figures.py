@@ -49,7 +49,7 @@ STYLE: Mapping[Any, Any] = {
 
 
 @contextmanager
-def _style() -> Iterator[None]:
+def style() -> Iterator[None]:
     """Within the block STYLE holds, whatever the user's own matplotlib settings are."""
     from matplotlib import rc_context, rcdefaults, rcParams
 
@@ -64,7 +64,7 @@ def draw(result: Result, name: str, function: Callable[..., Figure], arguments: 
     from matplotlib.figure import Figure
 
     evaluation = Evaluation(name, function, arguments)
-    with _style():
+    with style():
         figure = evaluation.evaluate("figure", result)
     if not isinstance(figure, Figure):
         raise evaluation.failure("figure", f"returned {type(figure).__name__}, expected a matplotlib.figure.Figure")
@@ -76,7 +76,7 @@ def save(figure: Figure, path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
-    with _style(), replacing(path) as temporary:
+    with style(), replacing(path) as temporary:
         if path.suffix == ".png":
             FigureCanvasAgg(figure).print_png(temporary, metadata={"Software": None})
         else:
@@ -88,7 +88,7 @@ def svg(figure: Figure) -> str:
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     text = StringIO()
-    with _style():
+    with style():
         FigureCanvasSVG(figure).print_svg(text, metadata={"Date": None, "Creator": None})
     return text.getvalue()
 

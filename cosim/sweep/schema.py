@@ -130,6 +130,25 @@ class SeedsSpec(Spec):
     count: int = Field(ge=1)
 
 
+class MapSpec(Spec):
+    """A map of success over two factors; panels side by side (`columns`) and below each other (`rows`) tell further ones apart."""
+
+    x: str
+    y: str
+    columns: str | None = None
+    rows: str | None = None
+
+    @property
+    def factors(self) -> list[str]:
+        """Names of the factors that tell cells apart, panels first."""
+        return [name for name in (self.rows, self.columns, self.y, self.x) if name is not None]
+
+    @model_validator(mode="after")
+    def _different(self) -> MapSpec:
+        _unique("axes of a map", self.factors)
+        return self
+
+
 class DesignSpec(Spec):
     """How points are chosen: all combinations, or `runs` samples."""
 
@@ -166,6 +185,7 @@ class SweepSpec(StudySpec):
     seeds: SeedsSpec | None = None
     success: list[CheckSpec] | None = Field(None, description="limits on KPIs; default: the checks of the scenario")
     by: list[Names] = Field([], description="factors, or lists of factors, whose levels are told apart in the aggregates")
+    maps: list[MapSpec] = Field([], description="maps of success, as figures and in sweep.html")
 
     @model_validator(mode="after")
     def _consistent(self) -> SweepSpec:
@@ -177,6 +197,8 @@ class SweepSpec(StudySpec):
         for name in (name for group in self.by for name in group):
             if name not in (*names, "seed"):
                 raise ValueError(f'"by" names no factor "{name}"{did_you_mean(name, [*names, "seed"])}')
+        for each in self.maps:
+            _mapped(each, self)
         if self.design.kind == "full_factorial":
             for factor in self.factors:
                 part = factor.range or factor.distribution
@@ -234,6 +256,16 @@ def _unique(what: str, names: Iterable[str]) -> None:
     names = list(names)
     if twice := [name for i, name in enumerate(names) if name in names[:i]]:
         raise ValueError(f'two {what} are called "{twice[0]}"')
+
+
+def _mapped(map_: MapSpec, sweep: SweepSpec) -> None:
+    """Raises ValueError when a factor of a map does not exist or has no levels."""
+    sampled = sweep.design.kind != "full_factorial"
+    known = [each.name for each in sweep.factors if not sampled or each.values is not None or each.levels is not None]
+    known += ["seed"] if sweep.seeds else []
+    for name in map_.factors:
+        if name not in known:
+            raise ValueError(f'"maps" names no factor with levels "{name}"{did_you_mean(name, known)}')
 
 
 def _set_once(factors: Sequence[FactorSpec], seeds: SeedsSpec | None) -> None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from otter_reference import Otter
+from validation import Measured
 from worlds import Trial
 
+GOLDEN, NUMPY = "golden value of MSS `otter.m`", "`otter.m` a second time in NumPy"
 FLIP = np.array([1.0, -1.0, -1.0])
 ORIGIN_FROM_CENTRE = -np.array([0.153125, 0.0, 0.246875])  # with the reference payload, forward-left-up
 
@@ -38,31 +40,32 @@ def dash() -> tuple[Trial, float]:
     return trial, reached
 
 
-def test_speed_is_thrust_over_damping(dash: tuple[Trial, float]) -> None:
-    u = dash[0]["usv.velocity_body.u"]
-    assert u == pytest.approx(2.85735, abs=5e-6)
-    assert u == pytest.approx(221.6 / (24.4 * 9.81 / (6 * 0.5144)), rel=1e-6)
+def test_speed_is_thrust_over_damping(dash: tuple[Trial, float], measured: Measured) -> None:
+    u, thrust, damping = dash[0]["usv.velocity_body.u"], 221.6, 24.4 * 9.81 / (6 * 0.5144)
+    measured("Otter", "speed at 100/100 rad/s", u, 2.85735, "m/s", GOLDEN, within=5e-6)
+    measured("Otter", "the same, as thrust over damping", u, thrust / damping, "m/s", "closed form", relative=1e-6)
 
 
-def test_time_to_speed(dash: tuple[Trial, float]) -> None:
-    assert dash[1] == pytest.approx(1.26, abs=1e-9)
+def test_time_to_speed(dash: tuple[Trial, float], measured: Measured) -> None:
+    measured("Otter", "time to 63.2 % of it from rest", dash[1], 1.26, "s", GOLDEN, within=1e-9)
 
 
-def test_sinkage_and_trim(dash: tuple[Trial, float]) -> None:
+def test_sinkage_and_trim(dash: tuple[Trial, float], measured: Measured) -> None:
     """Bow down is a positive pitch here."""
-    assert origin(dash[0])[2] == pytest.approx(-0.03771, abs=5e-6)
-    assert np.degrees(dash[0]["usv.attitude.pitch"]) == pytest.approx(1.49063, abs=5e-6)
+    measured("Otter", "sinkage with 25 kg of payload", -origin(dash[0])[2], 0.03771, "m", GOLDEN, within=5e-6)
+    trim = np.degrees(dash[0]["usv.attitude.pitch"])
+    measured("Otter", "trim, bow down", trim, 1.49063, "deg", GOLDEN, within=5e-6)
 
 
-def test_coasting() -> None:
+def test_coasting(measured: Measured) -> None:
     trial = run(otter(), 100.0, 100.0, 3000)
     start = origin(trial)[0]
     run(trial, 0.0, 0.0, 2000)
-    assert origin(trial)[0] - start == pytest.approx(3.2933, abs=5e-5)
-    assert trial["usv.velocity_body.u"] == pytest.approx(0.0, abs=5e-6)
+    measured("Otter", "way in 20 s without thrust", origin(trial)[0] - start, 3.2933, "m", GOLDEN, within=5e-5)
+    measured("Otter", "speed left after them", trial["usv.velocity_body.u"], 0.0, "m/s", GOLDEN, within=5e-6)
 
 
-def test_mass_matrix() -> None:
+def test_mass_matrix(measured: Measured) -> None:
     casadi = pytest.importorskip("casadi")
     from plant_src.vehicles.otter import equations
 
@@ -71,17 +74,18 @@ def test_mass_matrix() -> None:
     assert model.constants is not None
     inverse = casadi.DM(equations.VESSEL.unpacked(model.constants(casadi.SX(parameters)))["inverse"])
     diagonal = np.diag(np.linalg.inv(inverse.full()))
-    assert diagonal == pytest.approx([85.282, 162.500, 135.000, 17.657, 32.894, 40.045], abs=5e-4)
+    golden = [85.282, 162.500, 135.000, 17.657, 32.894, 40.045]
+    measured("Otter", "diagonal of the mass matrix", diagonal, golden, "kg, kg.m2", GOLDEN, within=5e-4)
 
 
-def test_without_thrust_it_rests() -> None:
+def test_without_thrust_it_rests(measured: Measured) -> None:
     trial = otter().step(1000)
-    assert np.abs(trial.vector("usv.velocity")).max() < 1e-12
-    assert np.abs(trial.vector("usv.position")[:2]).max() < 1e-9
+    measured("Otter", "speed after 10 s at zero thrust", trial.vector("usv.velocity"), 0.0, "m/s", "equilibrium", within=1e-12)
+    measured("Otter", "way in them", trial.vector("usv.position", "xy"), 0.0, "m", "equilibrium", within=1e-9)
 
 
 @pytest.mark.parametrize(("payload", "turning"), [(0.0, 100), (25.0, 800), (45.0, 100)])
-def test_circle_agrees_with_an_independent_implementation(payload: float, turning: int) -> None:
+def test_circle_agrees_with_an_independent_implementation(payload: float, turning: int, measured: Measured) -> None:
     """1 s ahead, then a turning circle, with the reference payload for 8 s."""
     reference, trial = Otter(payload), otter(parameters={"payload_mass": payload})
     for _ in range(50):
@@ -92,9 +96,10 @@ def test_circle_agrees_with_an_independent_implementation(payload: float, turnin
         for _ in range(steps):
             reference.step((port, starboard))
         found = trial.vector("usv.position") - [*offset, 0.0]
-        assert found == pytest.approx(centre(reference), abs=1e-6)
+        measured("Otter", "place on a circle at 100/60 rad/s", found - centre(reference), 0.0, "m", NUMPY, within=1e-6)
         attitude = trial.vector("usv.attitude", ("roll", "pitch", "yaw")) * FLIP
-        assert np.angle(np.exp(1j * (attitude - reference.eta[3:]))) == pytest.approx(0.0, abs=1e-6)
+        turned = np.angle(np.exp(1j * (attitude - reference.eta[3:])))
+        measured("Otter", "attitude on it", turned, 0.0, "rad", NUMPY, within=1e-6)
     assert abs(reference.eta[5]) > turning * 1e-3
 
 
@@ -105,7 +110,7 @@ def centre(reference: Otter) -> np.ndarray:
     return FLIP * (reference.eta[:3] + rotation(reference.eta[3:]) @ reference.centre)
 
 
-def test_current_carries_it_like_the_independent_implementation() -> None:
+def test_current_carries_it_like_the_independent_implementation(measured: Measured) -> None:
     reference = Otter(current=(0.3, 0.2))
     for _ in range(50):
         reference.eta = reference.trim(reference.eta)
@@ -114,7 +119,8 @@ def test_current_carries_it_like_the_independent_implementation() -> None:
     run(trial, 80.0, 50.0, 200)
     for _ in range(200):
         reference.step((80.0, 50.0))
-    assert trial.vector("usv.position") - [*offset, 0.0] == pytest.approx(centre(reference), abs=1e-6)
+    error = trial.vector("usv.position") - [*offset, 0.0] - centre(reference)
+    measured("Otter", "place after 2 s in a current", error, 0.0, "m", NUMPY, within=1e-6)
 
 
 @pytest.mark.parametrize(("speed", "force"), [(200.0, 24.4 * 9.81), (-200.0, -13.6 * 9.81)])
