@@ -9,8 +9,11 @@ which fails unless both agree. `pytest -m "" --validation FILE` runs the tests t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import re
+import sys
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -96,12 +99,11 @@ class Measured:
         case: str = "",
     ) -> None:
         """Assert |found - expected| <= within, or relative |expected|, in every element; the test may state several cases."""
-        file, line, _ = self.node.location
-        test = f"{Path(file).relative_to('tests').as_posix()}::{self.node.originalname}"
+        test = f"{self.node.path.relative_to(TESTS).as_posix()}::{self.node.originalname}"
         said = statement(test, model, what, unit, source, within, relative)
         values = worst(found, expected, bool(relative))
-        place = {"case": case, "line": line, "order": len(self.node.user_properties)}
-        self.node.user_properties.append(("measured", {**asdict(said), **place, **values}))
+        where = {"case": case, "line": sys._getframe(1).f_lineno}
+        self.node.user_properties.append(("measured", {**asdict(said), **where, **values}))
         assert values["deviation"] <= (relative or within), f"{model}: {what} {case}: {values}, expected within {said.limit}"
 
 
@@ -114,8 +116,8 @@ def worst(found: ArrayLike, expected: ArrayLike, relative: bool) -> dict[str, fl
     return {"found": float(values[k]), "expected": float(references[k]), "deviation": float(deviations[k])}
 
 
-def document(records: Iterable[dict[str, Any]]) -> str:
-    """The page: a table for each model, in the order of files and lines."""
+def document(records: Sequence[dict[str, Any]]) -> str:
+    """The page: a table for each model, in the order of files, lines, statements and cases."""
     lines = [HEAD]
     sections = {model: list(rows(record for record in records if record["model"] == model)) for model in MODELS}
     for model, section in sections.items():
@@ -129,31 +131,34 @@ def line(cells: Iterable[str]) -> str:
 
 
 def rows(records: Iterable[dict[str, Any]]) -> Iterator[list[str]]:
-    groups: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
-    for record in records:
-        groups.setdefault((record["test"], record["what"], record["case"]), []).append(record)
-    for group in sorted(groups.values(), key=place):
-        yield row(max(group, key=lambda record: record["deviation"]))
+    """A row for each case of each quantity, with the largest deviation."""
+    for _, case in groupby(sorted(records, key=place), place):
+        yield row(max(case, key=lambda record: record["deviation"]))
 
 
-def place(group: list[dict[str, Any]]) -> tuple[Any, ...]:
-    """Where in the tests a quantity is stated first."""
-    return min((record["test"].partition("::")[0], record["line"], record["order"], record["case"]) for record in group)
+def place(record: dict[str, Any]) -> tuple[str, int, str]:
+    """File and line of a statement, and its case, so that 2 comes before 10."""
+    case = re.sub(r"\d+", lambda number: number[0].zfill(9), record["case"])
+    return record["test"].partition("::")[0], record["line"], case
 
 
 def row(record: dict[str, Any]) -> list[str]:
     file, _, test = record["test"].partition("::")
-    deviation = record["deviation"]
-    relative = " rel." if record["limit"].endswith("rel.") else ""
     return [
-        f"{record['what']}: {record['case']}" if record["case"] else record["what"],
+        f"{record['what']} [{record['case']}]" if record["case"] else record["what"],
         record["unit"],
         *(f"{record[name]:.6g}" if record["expected"] else "" for name in ("expected", "found")),
-        ("0" if deviation == 0 else f"{deviation:.2e}" if deviation >= 1e-12 else "< 1e-12") + relative,
+        shown(record["deviation"]) + (" rel." if record["limit"].endswith("rel.") else ""),
         record["limit"],
         record["source"],
         f"[{test}](../tests/{file})",
     ]
+
+
+def shown(deviation: float) -> str:
+    if deviation >= 1e-12:
+        return f"{deviation:.2e}"
+    return "< 1e-12" if deviation else "0"
 
 
 class Writer:

@@ -22,6 +22,9 @@ block ArDroneGeometric "Landing on decks that move in waves: path command in sti
   end Deck;
 
   parameter Real engage_time(unit = "s", min = 0.01) = 1 "In which the motion of the deck is taken over, from the approach on";
+  parameter Real tilt_limit(unit = "deg", min = 1, max = 60) = 25;
+  parameter Real touchdown_tilt_limit(unit = "deg", min = 1, max = 60) = 13 "Just above the deck, so that it is not one foot that lands";
+  parameter Real flare_height(unit = "m") = 0.2 "Of the centre of mass above the deck: from there on down the limit for the touchdown holds";
   input Vehicle vehicle;
   input Deck target;
   input Real altitude_command(start = 2, unit = "m") "Of the centre of mass, for the pursuit";
@@ -41,6 +44,7 @@ protected
   discrete Real level(start = 0, fixed = true, unit = "m") "Altitude reference in still water";
   discrete Boolean near(start = false, fixed = true) "The deck is being approached, or was reached";
   Real heave(unit = "m") "Taken over";
+  Boolean flaring "About to touch the deck";
 equation
   heave = share*deck.heave;
 
@@ -87,6 +91,8 @@ equation
   tracking.acceleration_reference.y = share*deck.acceleration.y;
   tracking.acceleration_reference.z = share*deck.acceleration.z;
   tracking.yaw_reference = vtol.yaw_reference;
+  flaring = vtol.mode == Fleet.FlightMode.descend and vehicle.position.z - target.position.z < flare_height;
+  tracking.tilt_limit = if flaring then touchdown_tilt_limit else tilt_limit;
   tracking.motor_share = vtol.motor_share;
   tracking.reset = vtol.reset;
 

@@ -37,7 +37,7 @@ def engine(study: Study, workers: int | None, scheduler: str | None) -> Laborato
     if scheduler is None:
         from ..sweep.local import LocalEngine
 
-        return LocalEngine(study.order, workers or _processors())
+        return LocalEngine(study.order, workers or processors())
     if workers is not None:
         raise click.UsageError("--workers counts processes of this machine, a --scheduler has its own")
     from ..sweep.cluster import ClusterEngine
@@ -45,7 +45,7 @@ def engine(study: Study, workers: int | None, scheduler: str | None) -> Laborato
     return ClusterEngine(study, scheduler)
 
 
-def _processors() -> int:
+def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

@@ -25,13 +25,15 @@ _SHOWN = 20
 @click.argument("sweep")
 @click.option("--output-dir", type=click.Path(path_type=Path), help="Where results go; default: runs/NAME.")
 @click.option("--parquet", is_flag=True, help="Write table.parquet too (extra `parquet`).")
+@click.option("--replays", is_flag=True, help="Write the 3-D replay of one run of every cell of the maps, too.")
 @studies.options
-def command(sweep: str, output_dir: Path | None, parquet: bool, **where: Any) -> int:
+def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, **where: Any) -> int:
     """Run SWEEP, a JSON file or the name of a shipped sweep.
 
-    Every run has a child process of its own. Writes table.csv (one row per run), aggregates.csv, success.csv, failures.csv and
-    sweep.json to the output directory. A sweep that was interrupted or killed goes on where it was when it is called again. Exit
-    code 0: all runs were made; 1: some failed; 2: the sweep was refused; 130: interrupted, what was finished is written.
+    Every run has a child process of its own. Writes table.csv (one row per run), aggregates.csv, success.csv, failures.csv,
+    sweep.json, sweep.html and maps of success to the output directory. A sweep that was interrupted or killed goes on where it
+    was when it is called again. Exit code 0: all runs were made; 1: some failed; 2: the sweep was refused; 130: interrupted,
+    what was finished is written.
     """
     from ..results.files import prepare
     from ..results.parquet_files import require_parquet
@@ -44,10 +46,12 @@ def command(sweep: str, output_dir: Path | None, parquet: bool, **where: Any) ->
     folder = output_dir or Path("runs") / read.read.spec.name
     prepare(folder)
     with Ledger(folder, where.pop("retry_failed")) as ledger:
-        return _run(read, ledger, folder, parquet, **where)
+        return _run(read, ledger, folder, parquet, replays, **where)
 
 
-def _run(sweep: Sweep, ledger: Ledger, folder: Path, parquet: bool, workers: int | None, scheduler: str | None) -> int:
+def _run(
+    sweep: Sweep, ledger: Ledger, folder: Path, parquet: bool, replays: bool, workers: int | None, scheduler: str | None
+) -> int:
     from ..supervise import polite_ends
     from ..sweep.outcome import write
 
@@ -69,12 +73,28 @@ def _run(sweep: Sweep, ledger: Ledger, folder: Path, parquet: bool, workers: int
                 write(sweep, ledger, folder, parquet)
             raise
     summary = write(sweep, ledger, folder, parquet)
+    _draw(sweep, ledger, summary, folder, replays and not interrupted, workers)
     _print(sweep, summary)
     made = f"{summary.finished - done} made now in {studies.duration(time.monotonic() - began)}"
     click.echo(f"{summary.finished} of {len(sweep)} runs, {made}, {summary.failed} failed; table.csv and others in {folder}")
     if interrupted:
         raise KeyboardInterrupt
     return 1 if summary.failed else 0
+
+
+def _draw(sweep: Sweep, ledger: Ledger, summary: Summary, folder: Path, replays: bool, workers: int | None) -> None:
+    """Maps, replays of their cells, and the page."""
+    from ..sweep.maps import success_maps
+    from ..sweep.page import write_figures, write_page
+    from ..sweep.replays import write_replays
+
+    maps = success_maps(sweep, sweep.rows(ledger))
+    write_figures(maps, folder)
+    if replays:
+        runs = [cell.shown.number for each in maps for cell in each.cells.values() if cell.shown]
+        for run, cause in write_replays(sweep, runs, folder, workers or studies.processors()).items():
+            click.echo(f"no replay of run {run}: {cause}", err=True)
+    write_page(sweep, summary, maps, folder)
 
 
 def _print(sweep: Sweep, summary: Summary) -> None:

@@ -8,8 +8,8 @@ JSON, where "components" holds those of nested systems by their full names. The 
 - `bodies`: {"name", "title", "colour", "position": [x, y, z], "orientation": [w, x, y, z] or "attitude": [roll, pitch, yaw],
   "parts"}; position, orientation and attitude are names of signals, their negatives ("-name"), or numbers
 - `parts` of a body, and `fixed`: {"shape", "size", "position", "orientation": [x, y, z, w], "colour": [r, g, b] in 0 ... 1,
-  "opacity"}, all but the first two have defaults; a "box" has its edges as size, a "cylinder" (along z) radius and length, a "cone"
-  lower and upper radius and length, a "sphere" its radius, a "ring" radius and thickness
+  "opacity"}, all but the first two have defaults; a "box" has its edges as size, a "cylinder" (along z) radius and length, a
+  "cone" lower and upper radius and length, a "sphere" its radius, a "ring" radius and thickness
 - `water`, at z = 0: {"waves": [{"amplitude", "frequency", "number", "direction", "phase"}], "gain": signal or number}
 - `markers`: {"position", "radius", "label"}; `views`: {"name", "on": a body, "eye", "target"} in axes that turn with its yaw
 - `spans`: {"signal", "label", "colour"}, a Boolean; `plots`: lists of patterns of signals

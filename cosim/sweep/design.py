@@ -157,6 +157,11 @@ class Design:
             found.append(factor.grid[place])
         return found[::-1]
 
+    def labels(self, name: str) -> list[Any]:
+        """Labels of all levels of a factor that has some, or of the seeds."""
+        levels = self.seeds if name == "seed" else next(factor.grid for factor in self.factors if factor.name == name)
+        return [level.label for level in levels]
+
     def variants(self) -> Iterator[Mapping[str, Any]]:
         """Settings of every listed level alone: a text among them may name a file."""
         return (level.settings for factor in self.factors for level in factor.listed)

@@ -1,68 +1,107 @@
-"""Maps of success: shares of successes over two factors, in panels by two further ones."""
+"""Maps of success: shares of successes over two factors, in panels by up to two further ones."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
 
 from .aggregate import Interval, wilson
 from .design import Design
 from .schema import MapSpec
-from .sweep import Row
-
-#: labels of a cell's row of panels, column of panels, y and x; None where a map has no such factor
-Place = tuple[Any, Any, Any, Any]
+from .sweep import Row, Sweep
 
 
-@dataclass
+class Run(NamedTuple):
+    """What a map knows of a run; `value` is that of the KPI which ranks successes."""
+
+    number: int
+    passed: bool
+    value: float
+
+
+@dataclass(frozen=True)
 class Cell:
-    """Runs that share their place in a map, and one of them to show: `why` says which."""
+    """Runs that share their labels."""
 
-    name: str
     labels: Mapping[str, Any]
-    runs: int = 0
-    passed: int = 0
-    shown: int | None = None
-    why: str = ""
-    _values: list[tuple[float, int]] = field(default_factory=list, repr=False)
+    runs: Sequence[Run]
+    #: the KPI which ranks successes; empty: none does
+    kpi: str = ""
 
-    def add(self, row: Row, kpi: str | None) -> None:
-        self.runs += 1
-        self.passed += row.passed
-        if not row.passed and self.shown is None:
-            self.shown, self.why = row.run, "failed" if row.record.failure else "the first that is no success"
-        elif kpi is None or not math.isfinite(value := float(row.record.kpis.get(kpi, math.nan))):
-            return
-        else:
-            self._values.append((value, row.run))
-
-    def choose(self, kpi: str | None) -> None:
-        """Where all runs are successes, show the median one of a KPI."""
-        if self.shown is None and self._values:
-            self.shown, self.why = sorted(self._values)[(len(self._values) - 1) // 2][1], f"the median of {kpi}"
-        self._values.clear()
+    @property
+    def passed(self) -> int:
+        return sum(run.passed for run in self.runs)
 
     @property
     def share(self) -> float:
-        """NaN without runs."""
-        return self.passed / self.runs if self.runs else math.nan
+        """Of successes; NaN without runs."""
+        return self.passed / len(self.runs) if self.runs else math.nan
 
     @property
     def interval(self) -> Interval:
-        return wilson(self.passed, self.runs)
+        return wilson(self.passed, len(self.runs))
+
+    @cached_property
+    def shown(self) -> Run | None:
+        """The run to show: the first that is no success, else the median one."""
+        if lost := [run for run in self.runs if not run.passed]:
+            return lost[0]
+        ranked = sorted(self.runs, key=lambda run: (run.value, run.number))
+        return ranked[(len(ranked) - 1) // 2] if ranked else None
+
+    @property
+    def why(self) -> str:
+        """Why this run is shown."""
+        if self.passed < len(self.runs):
+            return "the first that is no success"
+        return f"the median of {self.kpi}" if self.kpi else "the middle one"
 
 
 @dataclass(frozen=True)
 class SuccessMap:
-    """A map with all its cells: those of `levels` x `levels` x ... in the order of the design, also where nothing was run."""
+    """A map with its cells; one is there for every combination of levels, also where nothing has been run."""
 
     name: str
     spec: MapSpec
     levels: Mapping[str, Sequence[Any]]
-    cells: Mapping[Place, Cell]
+    cells: Mapping[tuple[Any, ...], Cell]
 
-    def along(self, name: str | None) -> Sequence[Any]:
+    def along(self, factor: str | None) -> Sequence[Any]:
         """Labels along an axis; one None where the map has no such factor."""
-        return self.levels[name] if name is not None else [None]
+        return self.levels[factor] if factor is not None else [None]
+
+    def cell(self, row: Any, column: Any, y: Any, x: Any) -> Cell:
+        """By labels; None for what the map does not tell apart."""
+        return self.cells[tuple(label for label in (row, column, y, x) if label is not None)]
+
+    def title(self, factor: str) -> str:
+        return self.spec.titles.get(factor, factor)
+
+
+def success_maps(sweep: Sweep, rows: Iterable[Row]) -> list[SuccessMap]:
+    """The maps that a sweep asks for, of its finished runs."""
+    specs, kpi = sweep.read.spec.maps, ranking(sweep.criteria)
+    found: list[dict[tuple[Any, ...], list[Run]]] = [{} for _ in specs]
+    for row in rows:
+        run = Run(row.run, row.passed, float(row.record.kpis.get(kpi, math.nan)))
+        for spec, cells in zip(specs, found, strict=True):
+            cells.setdefault(tuple(row.point.labels[name] for name in spec.factors), []).append(run)
+    names = ["success_map" if len(specs) == 1 else f"success_map_{i + 1}" for i in range(len(specs))]
+    return [_map(*each, sweep.design, kpi) for each in zip(names, specs, found, strict=True)]
+
+
+def ranking(criteria: Iterable[Mapping[str, Any]]) -> str:
+    """The first KPI that has a limit; empty: none has."""
+    return next((check["kpi"] for check in criteria if "min" in check or "max" in check), "")
+
+
+def _map(name: str, spec: MapSpec, runs: Mapping[tuple[Any, ...], Sequence[Run]], design: Design, kpi: str) -> SuccessMap:
+    levels = {factor: design.labels(factor) for factor in spec.factors}
+    places: list[tuple[Any, ...]] = [()]
+    for factor in spec.factors:
+        places = [(*place, label) for place in places for label in levels[factor]]
+    cells = {place: Cell(dict(zip(spec.factors, place, strict=True)), runs.get(place, ()), kpi) for place in places}
+    return SuccessMap(name, spec, levels, cells)

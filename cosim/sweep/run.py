@@ -9,8 +9,9 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 from ..errors import ComponentError, CosimError, InputError, Problem
 from ..fmi import FmuFile
@@ -29,15 +30,23 @@ _OUTPUT = 2000
 Prepared = Mapping[Path, FmuFile]
 
 
-def supervised_run(order: Order, job: Job, prepared: Prepared) -> Record:
+class Replay(NamedTuple):
+    """The page that is to be made of a run."""
+
+    title: str
+    page: str
+
+
+def supervised_run(order: Order, job: Job, prepared: Prepared, replay: Replay | None = None) -> Record:
     """Run a job in a child process; what it prints goes to this process's standard error, which is a file.
 
-    Whatever the run does, a record comes of it.
+    Whatever the run does, a record comes of it. With `replay` its 3-D replay is written.
     """
+    work = _run if replay is None else partial(_replayed, replay)
     began = time.monotonic()
     os.ftruncate(2, 0)
     with tempfile.TemporaryFile("w+") as reply:
-        outcome = supervised(lambda: _reporting(reply, lambda: _run(order, job, prepared, reply)))
+        outcome = supervised(lambda: _reporting(reply, lambda: work(order, job, prepared, reply)))
         record = _record(order, job, outcome, reply)
     record = replace(record, seconds=round(time.monotonic() - began, 4))
     return replace(record, output=_last_output()) if record.failure else record
@@ -77,9 +86,7 @@ def _answer(reply: IO[str], value: Any) -> None:
 
 
 def _run(order: Order, job: Job, prepared: Prepared, reply: IO[str]) -> None:
-    if order.deadline:
-        signal.signal(signal.SIGALRM, signal.SIG_DFL)
-        signal.setitimer(signal.ITIMER_REAL, order.deadline)
+    _set_deadline(order)
     assembly = _assembled(order, job, prepared)
     with unfinished(Path(tempfile.gettempdir()) / "run"), simulation(assembly.system, assembly.settings) as outcome:
         if outcome.failure:
@@ -87,6 +94,26 @@ def _run(order: Order, job: Job, prepared: Prepared, reply: IO[str]) -> None:
         kpis = evaluate_kpis(Result(outcome.recording), assembly.kpis())
         _answer(reply, {"kpis": kpis})
         _leave()
+
+
+def _replayed(replay: Replay, order: Order, job: Job, prepared: Prepared, reply: IO[str]) -> None:
+    from ..api import executed
+    from ..report.replay import write_replay
+
+    _set_deadline(order)
+    with unfinished(Path(tempfile.gettempdir()) / "run"), executed(_assembled(order, job, prepared)) as execution:
+        result = execution.result
+        write_replay([replace(result, metadata={**result.metadata, "name": replay.title})], Path(replay.page))
+        if execution.failure:
+            raise execution.failure
+        _answer(reply, {"kpis": result.kpis})
+        _leave()
+
+
+def _set_deadline(order: Order) -> None:
+    if order.deadline:
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_REAL, order.deadline)
 
 
 def _assembled(order: Order, job: Job, prepared: Prepared) -> Assembly:

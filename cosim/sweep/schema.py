@@ -131,12 +131,13 @@ class SeedsSpec(Spec):
 
 
 class MapSpec(Spec):
-    """A map of success over two factors; panels side by side (`columns`) and below each other (`rows`) tell further ones apart."""
+    """A map of success over two factors; panels side by side (`columns`) and below each other (`rows`) are for further ones."""
 
     x: str
     y: str
     columns: str | None = None
     rows: str | None = None
+    titles: dict[str, str] = Field({}, description='factor -> how a reader calls it, such as "wind speed (m/s)"')
 
     @property
     def factors(self) -> list[str]:

@@ -29,7 +29,7 @@ from ..scenario.functions import function_problem, load_function
 from ..scenario.tree import Scenario
 from ..temporary import run_folder
 from .jobs import Job, Order
-from .run import Prepared, supervised_check, supervised_run
+from .run import Prepared, Replay, supervised_check, supervised_run
 
 #: what a run imports on its way
 _MODULES = ("fmpy.fmi1", "fmpy.fmi2", "fmpy.fmi3", "cosim.fmi.isolated.remote", "cosim.engine.native")
@@ -111,7 +111,8 @@ def _answer_all(client: socket.socket, order: Order, prepared: Prepared) -> None
 def _answer(request: dict[str, Any], order: Order, prepared: Prepared) -> str:
     job = Job(request["key"], request["settings"])
     if not request["check"]:
-        return supervised_run(order, job, prepared).to_json()
+        replay = Replay(**request["replay"]) if "replay" in request else None
+        return supervised_run(order, job, prepared, replay).to_json()
     try:
         found = supervised_check(order, job, prepared)
     except CosimError as error:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import plant_reference as reference
 import pytest
+from validation import Measured
 from worlds import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, Trial, quadcopter, vessel
 
 WEIGHT = reference.QUADCOPTER_MASS * reference.GRAVITY
@@ -29,25 +30,28 @@ def parked() -> Trial:
     return on_deck().step(200)
 
 
-def test_at_rest_the_contact_force_is_the_weight(parked: Trial) -> None:
-    assert parked["uav.contact.force"] == pytest.approx(WEIGHT, rel=1e-3)
+def test_at_rest_the_contact_force_is_the_weight(parked: Trial, measured: Measured) -> None:
+    force = parked["uav.contact.force"]
+    measured("Contact", "force of an AR.Drone at rest on a planar deck", force, WEIGHT, "N", "weight", relative=1e-3)
     assert parked["usv.contact.force"] == parked["uav.contact.force"]
 
 
-def test_thrust_reduces_the_contact_force() -> None:
+def test_thrust_reduces_the_contact_force(measured: Measured) -> None:
     trial = on_deck()
     trial["uav.rotor_speed"] = rotor_speed(0.3)
     trial.step(200)
-    assert trial["uav.contact.force"] == pytest.approx(0.7 * WEIGHT, rel=1e-3)
+    force = trial["uav.contact.force"]
+    measured("Contact", "the same with 30 % of thrust", force, 0.7 * WEIGHT, "N", "weight less thrust", relative=1e-3)
 
 
-def test_at_rest_the_height_is_that_of_the_feet(parked: Trial) -> None:
-    assert parked["uav.position.z"] == pytest.approx(DECK_TOP + REST_HEIGHT, abs=1e-4)
+def test_at_rest_the_height_is_that_of_the_feet(parked: Trial, measured: Measured) -> None:
+    height = parked["uav.position.z"]
+    measured("Contact", "its height", height, DECK_TOP + REST_HEIGHT, "m", "deck and feet", within=1e-4)
 
 
-def test_at_rest_velocities_read_zero(parked: Trial) -> None:
+def test_at_rest_velocities_read_zero(parked: Trial, measured: Measured) -> None:
     """The velocity at the end of a free step would be 0.05 m/s: what gravity does in half of it."""
-    assert np.abs(parked.vector("uav.velocity")).max() < 1e-5
+    measured("Contact", "its velocity", parked.vector("uav.velocity"), 0.0, "m/s", "rest", within=1e-5)
     assert np.abs(parked.vector("uav.rates", "pqr")).max() < 1e-4
 
 
@@ -81,14 +85,15 @@ def test_contact_force_is_the_mean_over_a_long_step() -> None:
     assert trial["uav.contact.force"] == pytest.approx(WEIGHT, rel=1e-3)
 
 
-def test_contact_conserves_momentum() -> None:
+def test_contact_conserves_momentum(measured: Measured) -> None:
     """A quadcopter slides onto a vessel at rest; in a few steps the air has hardly begun to act."""
     trial = on_deck(velocity_body=[1.0, 0.0, 0.0])
     trial["uav.rotor_speed"] = rotor_speed(0.3)
     trial.step(6)
     momentum = reference.QUADCOPTER_MASS * trial["uav.velocity.x"] + reference.VESSEL_MASS * trial["usv.velocity.x"]
     assert trial["usv.velocity.x"] > 0.02
-    assert momentum == pytest.approx(reference.QUADCOPTER_MASS * 1.0, rel=1e-5)
+    before = reference.QUADCOPTER_MASS * 1.0
+    measured("Contact", "momentum while sliding onto a planar vessel", momentum, before, "kg.m/s", "conservation", relative=1e-5)
 
 
 def test_friction_drags_the_vessel_along() -> None:
@@ -132,13 +137,14 @@ def test_take_off_from_the_deck() -> None:
     assert trial["uav.position.z"] - start == pytest.approx(height, abs=0.01)
 
 
-def test_two_pairs_do_not_notice_each_other() -> None:
+def test_two_pairs_do_not_notice_each_other(measured: Measured) -> None:
     """A distant second pair changes nothing, not even the last bit."""
     pair = {"uav": quadcopter([0.0, 0.0, 0.4]), "usv": vessel([0.0, 0.0])}
     distant = {"uav2": quadcopter([50.0, 0.0, 0.5]), "usv2": vessel([50.0, 0.0])}
     alone, together = Trial(pair).step(100), Trial(pair | distant).step(100)
     names = [variable.name for variable in alone.world.variables]
-    assert [together[name] for name in names] == [alone[name] for name in names]
+    differing = sum(together[name] != alone[name] for name in names)
+    measured("Fleets", "variables of a pair that a distant second pair changes", differing, 0, "1", "the pair alone")
     assert together["uav2.contact.vessel"]
 
 

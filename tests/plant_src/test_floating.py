@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from floating_reference import Catamaran
+from validation import Measured
 from worlds import Trial, vessel
 
 from plant_src.environment import sea
@@ -32,7 +33,7 @@ def afloat(**more: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("duration", [2.0, pytest.param(60.0, marks=pytest.mark.long)])
-def test_catamaran_in_waves_and_current_moves_as_its_equations_say(duration: float) -> None:
+def test_catamaran_in_waves_and_current_moves_as_its_equations_say(duration: float, measured: Measured) -> None:
     """Turning by the rudder, against an eighth-order method."""
     times = np.arange(1.0, duration + 1)
     reference = Catamaran(sea(WATERS), thrust=1.0, rudder=0.15, current=(0.2, -0.1), wind=(-3.0, 1.0, 0.0))
@@ -42,13 +43,31 @@ def test_catamaran_in_waves_and_current_moves_as_its_equations_say(duration: flo
     trial["usv.thrust"], trial["usv.rudder_angle"] = 1.0, 0.15
     found = np.array([trial.step(100).vector("usv.position") for _ in times])
     assert np.ptp(expected[:, 2]) > 0.01
-    assert np.linalg.norm(found - expected, axis=1).max() < 1e-5
+    error = np.linalg.norm(found - expected, axis=1)
+    measured(
+        "Strider, six degrees of freedom",
+        "place in waves, wind and current",
+        error,
+        0.0,
+        "m",
+        "DOP853",
+        within=1e-5,
+        case=f"{duration:g} s",
+    )
 
 
-def test_steady_speed_and_turning_are_those_in_the_plane() -> None:
+def test_steady_speed_and_turning_are_those_in_the_plane(measured: Measured) -> None:
     start = {"velocity_body": [1.2, 0.0, 0.0]}
     plane, space = (steady_turn(vehicle) for vehicle in (vessel([0.0, 0.0], **start), afloat(**start)))
-    assert space == pytest.approx(plane, rel=1e-4)
+    measured(
+        "Strider, six degrees of freedom",
+        "u, v and r of a steady turn",
+        space,
+        plane,
+        "m/s, rad/s",
+        "planar model",
+        relative=1e-4,
+    )
 
 
 def steady_turn(vehicle: dict[str, Any]) -> np.ndarray:
@@ -68,7 +87,7 @@ def steady_turn(vehicle: dict[str, Any]) -> np.ndarray:
     ],
 )
 def test_a_small_displacement_decays_as_a_damped_oscillation(
-    displacement: str, signal: str, stiffness: int, damping: float
+    displacement: str, signal: str, stiffness: int, damping: float, measured: Measured
 ) -> None:
     """x = e^(-z w t) (cos w_d t + z / sqrt(1 - z^2) sin w_d t); 1e-6 is too small for the nonlinear damping."""
     size, time, w = 1e-6, 0.3, p.NATURAL_FREQUENCIES[stiffness]
@@ -76,20 +95,34 @@ def test_a_small_displacement_decays_as_a_damped_oscillation(
     damped, root = w * np.sqrt(1 - damping**2) * time, np.sqrt(1 - damping**2)
     expected = size * np.exp(-damping * w * time) * (np.cos(damped) + damping / root * np.sin(damped))
     rest = p.CENTRE_OF_MASS_HEIGHT if stiffness == 0 else 0.0
-    assert trial[f"usv.{signal}"] - rest == pytest.approx(expected, abs=1e-3 * size)
+    found, case = trial[f"usv.{signal}"] - rest, displacement.partition(".")[2]
+    measured(
+        "Strider, six degrees of freedom",
+        "decay from 1e-6 after 0.3 s",
+        found,
+        expected,
+        "m, rad",
+        "closed form",
+        within=1e-9,
+        case=case,
+    )
 
 
 @pytest.mark.parametrize("model", [{"model": "strider"}, {"model": "strider", "motion": "6dof"}, {"model": "otter"}])
-def test_water_carries_a_vessel_along_sideways(model: dict[str, str]) -> None:
+def test_water_carries_a_vessel_along_sideways(model: dict[str, str], measured: Measured) -> None:
     trial = Trial({"usv": {**model, "position": [0.0, 0.0]}}, environment={"current": {"velocity": [0.0, 0.3]}})
     trial.step(3000)
-    assert trial["usv.velocity_body.v"] == pytest.approx(0.3 * np.cos(trial["usv.attitude.yaw"]), abs=1e-3)
+    found, expected, case = trial["usv.velocity_body.v"], 0.3 * np.cos(trial["usv.attitude.yaw"]), " ".join(model.values())
+    measured("Wind and current", "sway after 30 s in a current abeam", found, expected, "m/s", "drift", within=1e-3, case=case)
 
 
 @pytest.mark.parametrize("motion", ["planar", "6dof"])
-def test_wind_pushes_as_hard_as_the_same_speed_through_still_air(motion: str) -> None:
+def test_wind_pushes_as_hard_as_the_same_speed_through_still_air(motion: str, measured: Measured) -> None:
     """At rest in a wind of 4 m/s the thrust has to hold against the drag at 4 m/s, 0.1 kg/m times its square."""
     trial = Trial({"usv": vessel([0.0, 0.0], motion=motion)}, environment={"wind": {"velocity": [4.0, 0.0, 0.0]}})
     trial["usv.thrust"] = -0.1 * 4.0**2
     trial.step(200)
-    assert trial["usv.velocity.x"] == pytest.approx(0.0, abs=1e-9)
+    speed = trial["usv.velocity.x"]
+    measured(
+        "Wind and current", "speed of a held Strider in wind", speed, 0.0, "m/s", "balance of forces", within=1e-9, case=motion
+    )

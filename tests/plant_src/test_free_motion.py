@@ -8,6 +8,7 @@ import numpy as np
 import plant_reference as reference
 import pytest
 from plant_fmu import PlantFmu
+from validation import Measured
 from worlds import Trial, quadcopter, vessel
 
 STEP = 0.01
@@ -61,7 +62,7 @@ def voyage() -> np.ndarray:
     return reference.integrate(reference.vessel_rate, start, rudder_schedule())
 
 
-def test_quadcopter_flies_as_its_equations_say(flight: np.ndarray) -> None:
+def test_quadcopter_flies_as_its_equations_say(flight: np.ndarray, measured: Measured) -> None:
     trial = Trial({"uav": {"model": "ar_drone", **QUADCOPTER_START}})
     positions, rates = [], []
     for duration, inputs in rotor_schedule():
@@ -71,11 +72,12 @@ def test_quadcopter_flies_as_its_equations_say(flight: np.ndarray) -> None:
         trial.step(round(duration / STEP))
         positions.append(trial.vector("uav.position"))
         rates.append(trial.vector("uav.rates", "pqr"))
-    assert deviation(positions, flight[:, :3]) < 1e-6
-    assert deviation(rates, flight[:, 15:18] @ reference.FLIP) < 1e-6
+    error, turning = deviation(positions, flight[:, :3]), deviation(rates, flight[:, 15:18] @ reference.FLIP)
+    measured("AR.Drone 2.0", "place in 10 s of tilting flight, world", error, 0.0, "m", "DOP853", within=1e-6)
+    measured("AR.Drone 2.0", "rates in it, world", turning, 0.0, "rad/s", "DOP853", within=1e-6)
 
 
-def test_vessel_sails_as_its_equations_say(voyage: np.ndarray) -> None:
+def test_vessel_sails_as_its_equations_say(voyage: np.ndarray, measured: Measured) -> None:
     trial = Trial({"usv": {"model": "strider", **VESSEL_START}})
     positions = []
     for duration, inputs in rudder_schedule():
@@ -84,7 +86,8 @@ def test_vessel_sails_as_its_equations_say(voyage: np.ndarray) -> None:
         trial["usv.external_torque.z"] = inputs[7]
         trial.step(round(duration / STEP))
         positions.append(trial.vector("usv.position", "xy"))
-    assert deviation(positions, voyage[:, :2]) < 1e-6
+    error = deviation(positions, voyage[:, :2])
+    measured("Strider, planar", "place in 60 s of rudder steps and a gust, world", error, 0.0, "m", "DOP853", within=1e-6)
 
 
 def positions(fmu: PlantFmu, names: Sequence[str], axes: str, schedule: list[tuple[float, np.ndarray]]) -> Iterator[np.ndarray]:
@@ -105,15 +108,17 @@ def initial(start: dict[str, object], skip: str = "") -> dict[str, float]:
     return {f"initial.{name}": value for name, value in (named | {"yaw": start["yaw"]}).items() if name not in skip}
 
 
-def test_quadcopter_fmu_flies_as_its_equations_say(flight: np.ndarray) -> None:
+def test_quadcopter_fmu_flies_as_its_equations_say(flight: np.ndarray, measured: Measured) -> None:
     fmu = PlantFmu("ar_drone", initial(QUADCOPTER_START))
     names = [*(f"rotor_speed[{k}]" for k in (1, 2, 3, 4)), *LOADS]
-    assert deviation(list(positions(fmu, names, "xyz", rotor_schedule())), flight[:, :3]) < 1e-6
+    error = deviation(list(positions(fmu, names, "xyz", rotor_schedule())), flight[:, :3])
+    measured("AR.Drone 2.0", "place in 10 s of tilting flight, FMU", error, 0.0, "m", "DOP853", within=1e-6)
 
 
-def test_vessel_fmu_sails_as_its_equations_say(voyage: np.ndarray) -> None:
+def test_vessel_fmu_sails_as_its_equations_say(voyage: np.ndarray, measured: Measured) -> None:
     fmu = PlantFmu("strider", initial(VESSEL_START, skip="velocity_body.w rates.p rates.q"))
-    assert deviation(list(positions(fmu, ["thrust", "rudder_angle", *LOADS], "xy", rudder_schedule())), voyage[:, :2]) < 1e-6
+    error = deviation(list(positions(fmu, ["thrust", "rudder_angle", *LOADS], "xy", rudder_schedule())), voyage[:, :2])
+    measured("Strider, planar", "place in 60 s of rudder steps and a gust, FMU", error, 0.0, "m", "DOP853", within=1e-6)
 
 
 def test_fmu_makes_as_many_sub_steps_as_a_longer_step_needs() -> None:
@@ -144,13 +149,24 @@ def test_vessel_going_astern_is_pushed_to_the_other_side_by_its_rudder() -> None
     assert astern["usv.rates.r"] > 0.01
 
 
-def test_hover_thrust_carries_the_weight() -> None:
+def test_hover_thrust_carries_the_weight(measured: Measured) -> None:
     trial = Trial({"uav": quadcopter([0.0, 0.0, 5.0])})
     trial["uav.rotor_speed"] = [reference.HOVER_SPEED] * 4
     trial.step()
-    assert abs(trial["uav.velocity.z"]) < 1e-10  # m/s, of 0.1 m/s in free fall
+    speed = trial["uav.velocity.z"]  # of 0.1 m/s in free fall
+    measured("AR.Drone 2.0", "vertical speed after a step of hovering", speed, 0.0, "m/s", "thrust = weight", within=1e-10)
     throttle = reference.HOVER_SPEED / reference.MAX_ROTOR_SPEED
     assert throttle == pytest.approx(0.6588, abs=1e-4)  # of the fact sheet
+
+
+def test_tumbling_without_torque_keeps_the_energy(measured: Measured) -> None:
+    trial = Trial({"uav": quadcopter([0.0, 0.0, 1000.0], rates=[3.0, 0.5, -2.0])})
+    rates = trial.vector("uav.rates", "pqr")
+    before = reference.turning_energy(rates)
+    trial.step(1000)
+    after = reference.turning_energy(trial.vector("uav.rates", "pqr"))
+    assert np.abs(trial.vector("uav.rates", "pqr") - rates).max() > 0.1
+    measured("AR.Drone 2.0", "energy after 10 s of tumbling", after, before, "J", "conservation", relative=1e-6)
 
 
 def test_a_step_longer_than_10_ms_is_split() -> None:

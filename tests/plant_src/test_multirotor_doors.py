@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from plant_fmu import PlantFmu
+from validation import Measured
 
 import cosim
 from cosim import resources
@@ -70,7 +71,7 @@ def scenario(model: str, wind: dict[str, float]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("model", ROTORS)
-def test_world_and_fmus_of_both_versions_agree(model: str, tmp_path: Path) -> None:
+def test_world_and_fmus_of_both_versions_agree(model: str, tmp_path: Path, measured: Measured) -> None:
     wind = dict(zip(("wind.x", "wind.y", "wind.z"), WIND, strict=True))
     (file := tmp_path / "doors.json").write_text(json.dumps(scenario(model, wind)))
     result = cosim.run(file)
@@ -80,9 +81,19 @@ def test_world_and_fmus_of_both_versions_agree(model: str, tmp_path: Path) -> No
         alone.step(0.01, 100)
     for name in MOTION:
         two, three, world = (result[f"{component}.{name}"] for component in ("two", "three", "world.uav"))
-        assert np.array_equal(two, three)
-        assert world == pytest.approx(two, rel=1e-12, abs=1e-10)
         assert two[-1] == alone.get(name)[0]
+        measured("World and plant FMUs", "multirotor, FMI 3.0", three - two, 0.0, "m, 1, rad/s", "its FMI 2.0 FMU", case=model)
+        error = world - two
+        measured(
+            "World and plant FMUs",
+            "multirotor in wind, world",
+            error,
+            0.0,
+            "m, 1, rad/s",
+            "its FMI 2.0 FMU",
+            within=1e-10,
+            case=model,
+        )
     assert np.ptp(result["two.position.x"]) > 1
 
 

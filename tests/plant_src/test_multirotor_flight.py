@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from multirotor_reference import FLIP, VEHICLES, Held, Pilot, Vehicle, fly, start
 from plant_fmu import PlantFmu
+from validation import Measured
 
 STEP = 0.01
 
@@ -43,7 +44,7 @@ def up(orientation: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", VEHICLES)
-def test_flight_with_all_effects(name: str) -> None:
+def test_flight_with_all_effects(name: str, measured: Measured) -> None:
     vehicle, velocity, rates = VEHICLES[name], (1.0, 0.5, -0.2), (0.2, -0.1, 0.3)
     speed = vehicle.hover_speed
     expected = fly(vehicle, start([0, 0, 50], velocity, rates, speed, len(vehicle.rotors)), 100, pilot(vehicle))
@@ -56,6 +57,10 @@ def test_flight_with_all_effects(name: str) -> None:
         fmu.set(inputs(segment(k, *seen)))
         fmu.step(STEP, 10)
         found.append(np.concatenate([fmu.vector("position"), fmu.vector("rates", "pqr")]))
-    assert np.linalg.norm(np.array(found)[:, :3] - expected[:, :3], axis=1).max() < 1e-6
-    assert np.abs(np.array(found)[:, 3:] - expected[:, 15:18] @ FLIP).max() < 1e-6
+    error = np.linalg.norm(np.array(found)[:, :3] - expected[:, :3], axis=1)
+    turning = np.array(found)[:, 3:] - expected[:, 15:18] @ FLIP
+    measured(
+        "Crazyflie and survey hexacopter", "place in 10 s with all effects", error, 0.0, "m", "DOP853", within=1e-6, case=name
+    )
+    measured("Crazyflie and survey hexacopter", "rates in them", turning, 0.0, "rad/s", "DOP853", within=1e-6, case=name)
     assert np.ptp(expected[:, :3], axis=0).min() > 1  # it has gone somewhere in every direction

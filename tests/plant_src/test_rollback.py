@@ -8,10 +8,12 @@ from pathlib import Path
 
 import plant_reference as reference
 import pytest
+from validation import Measured
 from worlds import DECK_TOP, REST_HEIGHT, Trial, quadcopter, vessel
 
 from cosim.errors import ComponentError
 
+AGAIN = "40 steps from flight, touchdown and rest, repeated"
 ROOT = Path(__file__).parents[2]
 
 
@@ -51,7 +53,7 @@ def test_a_state_is_returned_to_from_where_bullet_takes_part_or_not(steps: int) 
 
 
 @pytest.mark.parametrize("steps", [0, 5, 17, 18, 19, 20, 60, 200])
-def test_a_saved_state_is_returned_to_bit_for_bit(steps: int) -> None:
+def test_a_saved_state_is_returned_to_bit_for_bit(steps: int, measured: Measured) -> None:
     trial = mission().step(steps)
     state, before = trial.world.get_state(), trial.bytes
     expected = [trial.step().bytes for _ in range(40)]
@@ -59,7 +61,8 @@ def test_a_saved_state_is_returned_to_bit_for_bit(steps: int) -> None:
         trial.world.set_state(state)
         trial.world.get_outputs()
         assert trial.bytes == before
-        assert [trial.step().bytes for _ in range(40)] == expected
+        differing = sum(trial.step().bytes != row for row in expected)
+        measured("Determinism and saved states", "steps that differ after a return, planar", differing, 0, "1", AGAIN)
     trial.world.free_state(state)
 
 
@@ -95,7 +98,7 @@ def test_the_step_size_may_change_around_a_saved_state() -> None:
 
 SCRIPT = """
 import hashlib, sys
-sys.path[:0] = [{root!r}, {here!r}]
+sys.path[:0] = {paths!r}
 from test_rollback import mission
 trial, digest = mission(), hashlib.sha256()
 for _ in range(300):
@@ -104,16 +107,18 @@ print(digest.hexdigest(), trial["uav.contact.vessel"])
 """
 
 
-def test_two_processes_compute_the_same_bytes() -> None:
-    script = SCRIPT.format(root=str(ROOT), here=str(Path(__file__).parent))
+def test_two_processes_compute_the_same_bytes(measured: Measured) -> None:
+    script = SCRIPT.format(paths=[str(ROOT), str(ROOT / "tests"), str(Path(__file__).parent)])
     outcomes = [
         subprocess.run(
             [sys.executable, "-c", script], capture_output=True, text=True, check=True, env={"PYTHONHASHSEED": seed}
         ).stdout
         for seed in ("1", "2")
     ]
-    assert outcomes[0] == outcomes[1]
-    assert outcomes[0].split()[-1] == "True"
+    digests, landed = zip(*(outcome.split() for outcome in outcomes), strict=True)
+    assert landed == ("True", "True")
+    others = len(set(digests)) - 1
+    measured("Determinism and saved states", "other SHA-256 of a landing, 2 processes", others, 0, "1", "other PYTHONHASHSEED")
 
 
 def test_worlds_in_one_process_do_not_disturb_each_other() -> None:

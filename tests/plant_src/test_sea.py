@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from validation import Measured
 
 from plant_src.environment import sea
 from plant_src.environment.spectrum import SIGNIFICANT_HEIGHTS, fully_developed_period, jonswap, pierson_moskowitz
@@ -30,20 +31,22 @@ def realisation(seed: int = 0, **waves):
     return sea({"seed": seed, "waves": waves})
 
 
-def test_pierson_moskowitz_has_its_significant_height():
-    assert 4 * math.sqrt(area(pierson_moskowitz, 2.5, 9.0)) == pytest.approx(2.5, rel=1e-6)
+def test_pierson_moskowitz_has_its_significant_height(measured: Measured):
+    height = 4 * math.sqrt(area(pierson_moskowitz, 2.5, 9.0))
+    measured("Waves", "4 sqrt(m0), ITTC-modified Pierson-Moskowitz", height, 2.5, "m", "Hs, quadrature", relative=1e-6)
 
 
 @pytest.mark.parametrize("gamma", [1.0, 2.0, 3.3, 5.0, 7.0])
-def test_jonswap_has_its_significant_height(gamma):
-    assert 4 * math.sqrt(area(jonswap, 2.5, 9.0, gamma)) == pytest.approx(2.5, rel=0.01)
+def test_jonswap_has_its_significant_height(gamma, measured: Measured):
+    height, case = 4 * math.sqrt(area(jonswap, 2.5, 9.0, gamma)), f"gamma {gamma:g}"
+    measured("Waves", "4 sqrt(m0), JONSWAP (DNV-RP-C205)", height, 2.5, "m", "Hs, quadrature", relative=0.01, case=case)
 
 
-def test_pierson_moskowitz_is_that_of_the_ittc():
+def test_pierson_moskowitz_is_that_of_the_ittc(measured: Measured):
     """S = A / w^5 exp(-B / w^4), A = 487 Hs^2 / T0^4, B = 1949 / T0^4."""
     w = np.linspace(0.6, 4.0, 50)
     ittc = 487 * 2.5**2 / 9.0**4 / w**5 * np.exp(-1949 / 9.0**4 / w**4)
-    assert pierson_moskowitz(w, 2.5, 9.0) == pytest.approx(ittc, rel=2e-3)
+    measured("Waves", "density from 0.6 to 4 rad/s", pierson_moskowitz(w, 2.5, 9.0), ittc, "m2.s", "ITTC formula", relative=2e-3)
 
 
 def test_jonswap_is_peaked_by_gamma():
@@ -53,20 +56,22 @@ def test_jonswap_is_peaked_by_gamma():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_amplitudes_hold_the_energy_between_the_cuts(seed):
+def test_amplitudes_hold_the_energy_between_the_cuts(seed, measured: Measured):
     """The fraction of a Pierson-Moskowitz sea below r times the peak frequency is exp(-5/4 / r^4)."""
     part = math.exp(-1.25 / 4**4) - math.exp(-1.25 / 0.5**4)
     waves = realisation(seed, **SWELL)
-    assert (waves.amplitude**2 / 2).sum() == pytest.approx(part * 2.0**2 / 16, rel=1e-5)
-    assert 4 * math.sqrt((waves.amplitude**2 / 2).sum()) == pytest.approx(2.0, rel=0.01)
+    m0 = (waves.amplitude**2 / 2).sum()
+    measured("Waves", "m0 of 64 components", m0, part * 2.0**2 / 16, "m2", "integral between the cuts", relative=1e-5)
+    measured("Waves", "4 sqrt(m0) of 64 components", 4 * math.sqrt(m0), 2.0, "m", "Hs", relative=0.01)
 
 
 @pytest.mark.parametrize("waves", [SWELL, {**SWELL, "spectrum": "jonswap", "spreading": 2}, CHOP])
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_half_an_hour_at_a_point_has_the_significant_height(waves, seed):
+def test_half_an_hour_at_a_point_has_the_significant_height(waves, seed, measured: Measured):
     components = realisation(seed, **waves)
     heights = np.array([components.elevation(12.0, -7.0, time) for time in HALF_HOUR])
-    assert 4 * heights.std() == pytest.approx(waves["significant_height"], rel=0.05)
+    found, expected = 4 * heights.std(), waves["significant_height"]
+    measured("Waves", "4 standard deviations of 30 min, 3 seas, 3 seeds", found, expected, "m", "Hs", relative=0.05)
 
 
 def test_the_energy_lies_where_the_spectrum_has_it():
@@ -79,18 +84,20 @@ def test_the_energy_lies_where_the_spectrum_has_it():
         assert abs((waves.frequency < ratio * peak).sum() * one - wanted) < 1.05 * one
 
 
-def test_dispersion_is_exact():
+def test_dispersion_is_exact(measured: Measured):
     waves = realisation(**SWELL)
-    assert np.array_equal(waves.wave_number, waves.frequency**2 / 9.81)
+    error = waves.wave_number - waves.frequency**2 / 9.81
+    measured("Waves", "wave numbers", error, 0.0, "rad/m", "dispersion in deep water")
 
 
-def test_elevation_is_the_sum_of_travelling_waves():
+def test_elevation_is_the_sum_of_travelling_waves(measured: Measured):
     waves = realisation(4, **SWELL, direction=0.7, spreading=4)
     x, y, t = 31.0, -12.0, 77.5
     wave_vector = waves.wave_number * np.exp(1j * waves.direction)
     phases = wave_vector.real * x + wave_vector.imag * y - waves.frequency * t + waves.phase
     expected = (waves.amplitude * np.exp(1j * phases)).sum().real
-    assert waves.elevation(x, y, t) == pytest.approx(expected, abs=1e-12)
+    error = waves.elevation(x, y, t) - expected
+    measured("Waves", "elevation at a place and time", error, 0.0, "m", "complex sum of components", within=1e-12)
 
 
 def test_long_crests_run_one_way():
@@ -101,10 +108,11 @@ def test_long_crests_run_one_way():
 
 
 @pytest.mark.parametrize("power", [1, 2, 10])
-def test_short_crests_spread_as_the_power_of_the_cosine(power):
+def test_short_crests_spread_as_the_power_of_the_cosine(power, measured: Measured):
     """E[cos^2 d] = (n + 1) / (n + 2) for the density cos^n d; bins of equal energy leave little to chance."""
     spread = realisation(**SWELL, direction=0.4, spreading=power).direction - 0.4
-    assert np.mean(np.cos(spread) ** 2) == pytest.approx((power + 1) / (power + 2), abs=0.01)
+    found, expected, case = np.mean(np.cos(spread) ** 2), (power + 1) / (power + 2), f"n = {power}"
+    measured("Waves", "mean squared cosine of the spreading", found, expected, "1", "integral of cos^n", within=0.01, case=case)
     assert np.abs(spread).max() < math.pi / 2
     assert np.mean(np.sin(spread)) == pytest.approx(0.0, abs=0.01)
 

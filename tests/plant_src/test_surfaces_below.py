@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from validation import Measured
 
 from plant_src.arguments import Platform
 from plant_src.catalogue import MODELS
@@ -38,7 +39,7 @@ def ray(point: np.ndarray, centre: np.ndarray, attitude: Rotation) -> float | No
     return float(centre[2] + s * forward[2] + t * left[2]) if inside else None
 
 
-def test_a_tilting_deck_is_where_a_ray_meets_it() -> None:
+def test_a_tilting_deck_is_where_a_ray_meets_it(measured: Measured) -> None:
     random, met = np.random.default_rng(1), 0
     for _ in range(300):
         centre = random.uniform([-3, -3, 0.1], [3, 3, 0.5])
@@ -47,7 +48,10 @@ def test_a_tilting_deck_is_where_a_ray_meets_it() -> None:
         below = Below([vessel(centre, attitude)], [], CALM)
         height = ray(point, centre, attitude)
         met += height is not None
-        assert below.distance(*point, 0.0, 1.0) == pytest.approx(point[2] - (height or 0.0), abs=1e-12)
+        error = below.distance(*point, 0.0, 1.0) - (point[2] - (height or 0.0))
+        measured(
+            "Wind and current", "height above a tilting deck, for ground effect", error, 0.0, "m", "ray and plane", within=1e-12
+        )
     assert 50 < met < 250
 
 

@@ -7,10 +7,12 @@ import math
 import numpy as np
 import pytest
 from scipy.signal import welch
+from validation import Measured
 
 from plant_src.environment.noise import GRID, Channel, Noise
 from plant_src.environment.wind import Gusts, Turbulence, Wind, deviations, scales
 
+DRYDEN = "Dryden, MIL-F-8785C"
 COUNT = 200_000
 FAST, SLOW = 0.02, 0.5  # time constants (s)
 
@@ -42,16 +44,18 @@ def test_noise_has_its_deviation(first_order, second_order):
 
 
 @pytest.mark.parametrize("lag", [1, 2, 4])
-def test_first_order_noise_is_discretised_exactly(first_order, lag):
+def test_first_order_noise_is_discretised_exactly(first_order, lag, measured: Measured):
     """exp(-t / T), also where the grid is as coarse as half a time constant: Euler's method would have 0.5 at the first lag."""
-    assert correlation(first_order[0], lag) == pytest.approx(math.exp(-lag * GRID / FAST), abs=0.01)
+    found, expected = correlation(first_order[0], lag), math.exp(-lag * GRID / FAST)
+    measured("Wind and current", "correlation of first-order noise", found, expected, "1", "exp(-t/T)", within=0.01)
 
 
 @pytest.mark.parametrize("lag", [1, 2, 4])
-def test_second_order_noise_is_discretised_exactly(second_order, lag):
+def test_second_order_noise_is_discretised_exactly(second_order, lag, measured: Measured):
     """The transform of (1 + 3 (T w)^2) / (1 + (T w)^2)^2 is (1 - t / (2 T)) exp(-t / T)."""
     t = lag * GRID / FAST
-    assert correlation(second_order[0], lag) == pytest.approx((1 - t / 2) * math.exp(-t), abs=0.01)
+    found, expected = correlation(second_order[0], lag), (1 - t / 2) * math.exp(-t)
+    measured("Wind and current", "correlation of transverse gusts", found, expected, "1", "(1 - t/2T) exp(-t/T)", within=0.01)
 
 
 def test_noise_goes_on_where_blocks_meet(first_order):
@@ -92,7 +96,7 @@ def gusts() -> tuple[Turbulence, np.ndarray]:
 
 
 @pytest.mark.parametrize(("axis", "transverse"), [(0, False), (1, True), (2, True)])
-def test_turbulence_has_drydens_spectrum(gusts, axis, transverse):
+def test_turbulence_has_drydens_spectrum(gusts, axis, transverse, measured: Measured):
     turbulence, values = gusts
     length = scales(6.096)[transverse and axis == 2]
     frequency, density = welch(values[axis], 1 / GRID, nperseg=8192)
@@ -100,15 +104,16 @@ def test_turbulence_has_drydens_spectrum(gusts, axis, transverse):
     expected = dryden(omega, turbulence.deviations[axis], length, 5.0, transverse)
     for low, high in ((0.15, 0.6), (0.6, 2.5), (2.5, 10.0), (10.0, 40.0)):
         band = (omega > low) & (omega < high)
-        assert (density[band] / (2 * math.pi)).mean() == pytest.approx(expected[band].mean(), rel=0.1)
+        found, wanted, case = (density[band] / (2 * math.pi)).mean(), expected[band].mean(), "uvw"[axis]
+        measured("Wind and current", "spectrum of gusts, 4 bands", found, wanted, "m2/s", DRYDEN, relative=0.1, case=case)
 
 
-def test_turbulence_has_drydens_deviations(gusts):
+def test_turbulence_has_drydens_deviations(gusts, measured: Measured):
     """At 20 ft in a wind of 5 m/s there: 0.1 W20, and that over (0.177 + 0.000823 h)^0.4 = 0.519."""
     _, values = gusts
-    assert values[2].std() == pytest.approx(0.5, rel=0.05)
-    assert values[0].std() == pytest.approx(0.5 / (0.177 + 0.000823 * 20) ** 0.4, rel=0.05)
-    assert values[1].std() == pytest.approx(0.5 / (0.177 + 0.000823 * 20) ** 0.4, rel=0.05)
+    level = 0.5 / (0.177 + 0.000823 * 20) ** 0.4
+    deviation = values.std(axis=1)
+    measured("Wind and current", "standard deviations of gusts", deviation, [level, level, 0.5], "m/s", DRYDEN, relative=0.05)
 
 
 def test_scales_are_those_of_the_standard():

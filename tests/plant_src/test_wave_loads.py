@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from floating_reference import felt
+from validation import Measured
 from worlds import Trial, vessel
 
 from plant_src.environment import sea
@@ -26,7 +27,7 @@ def swell(height: float, period: float, direction: float = 0.0) -> dict[str, Any
 
 @pytest.mark.parametrize("vehicle", VESSELS)
 @pytest.mark.parametrize("direction", [0.0, 1.2])
-def test_long_waves_carry_the_hull(vehicle: dict[str, Any], direction: float) -> None:
+def test_long_waves_carry_the_hull(vehicle: dict[str, Any], direction: float, measured: Measured) -> None:
     """It rises with the water and lies on its slopes: waves of 150 m and more."""
     trial = Trial({"usv": {**vehicle, "position": [0.0, 0.0]}}, environment=swell(0.5, 10.0, direction))
     calm = Trial({"usv": {**vehicle, "position": [0.0, 0.0]}})
@@ -38,7 +39,10 @@ def test_long_waves_carry_the_hull(vehicle: dict[str, Any], direction: float) ->
         heel.append([trial["usv.attitude.roll"], trial["usv.attitude.pitch"] - calm["usv.attitude.pitch"]])
     late = slice(100, None)  # after a start from rest in calm water
     assert np.ptp(water[late]) > 0.1
-    assert np.abs(np.array(rise) - water)[late].max() < 0.05 * np.ptp(water)
+    error, case = np.abs(np.array(rise) - water)[late].max() / np.ptp(water), vehicle["model"]
+    measured(
+        "Waves", "heave beside waves of 150 m, share of their height", error, 0.0, "1", "rides on them", within=0.05, case=case
+    )
     (wave,) = zip(*sea(swell(0.5, 10.0, direction)), strict=True)
     slope = wave[0] * wave[2]
     steepest = np.abs(heel[late]).max(axis=0)
@@ -60,7 +64,7 @@ def test_gain_scales_the_waves() -> None:
     assert half == pytest.approx(full / 2, abs=0.01 * np.abs(full).max())
 
 
-def test_the_hull_feels_what_linear_theory_says() -> None:
+def test_the_hull_feels_what_linear_theory_says(measured: Measured) -> None:
     """Against the functions of numpy: elevation, slopes, velocity, acceleration."""
     random, count = np.random.default_rng(1), 5
     frequency = random.uniform(1.0, 7.0, count)
@@ -75,7 +79,8 @@ def test_the_hull_feels_what_linear_theory_says() -> None:
     heading = ca.SX(np.cos(0.7)), ca.SX(np.sin(0.7))
     water = waves.water(ca.SX([3.0, -2.0]), heading, ca.SX(11.0), footprint, ca.SX(count), waves.table(footprint, *columns))
     for found, expected in zip(vars(water).values(), felt(components, 3.0, -2.0, 0.7, 11.0), strict=True):
-        assert ca.evalf(found).full().ravel() == pytest.approx(expected, rel=1e-11)
+        values = ca.evalf(found).full().ravel()
+        measured("Waves", "what the hull feels of them", values, expected, "m, 1, m/s, m/s2", "linear theory", relative=1e-11)
 
 
 def test_sine_and_cosine_are_those_of_numpy() -> None:

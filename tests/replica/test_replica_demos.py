@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from validation import Measured
 
 import cosim
 from cosim.results import Result
+
+REPLICA, AGAIN = "Replica of the published simulator", "independent re-simulation"
 
 
 @pytest.fixture(scope="module")
@@ -25,13 +28,15 @@ def distance(result: Result) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("waypoint", "time"), list(enumerate([5.5, 15.3, 22.5, 29.8, 36.3], start=1)))
-def test_the_box_is_sailed_in_time(box: Result, waypoint: int, time: float) -> None:
-    assert box.kpis[f"waypoints.time[{waypoint}]"] == pytest.approx(time, abs=0.2)
+def test_the_box_is_sailed_in_time(box: Result, waypoint: int, time: float, measured: Measured) -> None:
+    found, case = box.kpis[f"waypoints.time[{waypoint}]"], f"waypoint {waypoint}"
+    measured(REPLICA, "box pattern", found, time, "s", AGAIN, within=0.2, case=case)
 
 
 @pytest.mark.parametrize(("leg", "overshoot"), list(enumerate([0.94, 1.97, 1.01, 1.11, 1.59], start=1)))
-def test_the_box_is_left_as_far(box: Result, leg: int, overshoot: float) -> None:
-    assert box.kpis[f"overshoots.leg[{leg}]"] == pytest.approx(overshoot, abs=0.1)
+def test_the_box_is_left_as_far(box: Result, leg: int, overshoot: float, measured: Measured) -> None:
+    found, case = box.kpis[f"overshoots.leg[{leg}]"], f"leg {leg}"
+    measured(REPLICA, "overshoots of the box", found, overshoot, "m", AGAIN, within=0.1, case=case)
 
 
 def test_the_box_fits_the_same_frame(box: Result) -> None:
@@ -39,20 +44,23 @@ def test_the_box_fits_the_same_frame(box: Result) -> None:
     assert [x.min(), x.max(), y.min(), y.max()] == pytest.approx([-4.44, 5.30, -4.34, 4.22], abs=0.1)
 
 
-def test_the_vessel_keeps_its_speed(sweep: Result) -> None:
+def test_the_vessel_keeps_its_speed(sweep: Result, measured: Measured) -> None:
     straight = (sweep.time > 15) & (sweep.time < 20)
-    assert sweep["plant.usv.velocity.x"][straight].mean() == pytest.approx(0.9988, abs=1e-3)
+    speed = sweep["plant.usv.velocity.x"][straight].mean()
+    measured(REPLICA, "mean speed of the vessel on a sweep", speed, 0.9988, "m/s", AGAIN, within=1e-3)
 
 
-def test_the_vessel_turns_as_fast(box: Result) -> None:
-    assert np.abs(box["plant.usv.angular_velocity.z"]).max() == pytest.approx(1.28, rel=0.03)
+def test_the_vessel_turns_as_fast(box: Result, measured: Measured) -> None:
+    rate = np.abs(box["plant.usv.angular_velocity.z"]).max()
+    measured(REPLICA, "largest yaw rate in the box", rate, 1.28, "rad/s", AGAIN, relative=0.03)
 
 
-def test_the_approach_dips_and_ends_on_the_deck(box: Result) -> None:
-    assert box.kpis["touchdown.lowest"] == pytest.approx(0.854, abs=0.03)
-    assert box.kpis["touchdown.time"] == pytest.approx(13.06, abs=0.1)
-    assert box.kpis["touchdown.speed"] == pytest.approx(1.16, rel=0.2)
-    assert box.kpis["touchdown.error"] == pytest.approx(0.077, rel=0.2)
+def test_the_approach_dips_and_ends_on_the_deck(box: Result, measured: Measured) -> None:
+    lowest, time, speed, error = (box.kpis[f"touchdown.{name}"] for name in ("lowest", "time", "speed", "error"))
+    measured(REPLICA, "lowest height of the approach", lowest, 0.854, "m", AGAIN, within=0.03)
+    measured(REPLICA, "touchdown", time, 13.06, "s", AGAIN, within=0.1)
+    measured(REPLICA, "its speed", speed, 1.16, "m/s", AGAIN, relative=0.2)
+    measured(REPLICA, "its distance from the deck's centre", error, 0.077, "m", AGAIN, relative=0.2)
 
 
 def test_landing_is_commanded_half_a_second_earlier(box: Result) -> None:
@@ -72,8 +80,9 @@ def test_controllers_act_on_the_sample_before(box: Result) -> None:
 
 
 @pytest.mark.parametrize(("waypoint", "time"), list(enumerate([20.4, 41.3, 52.2], start=1)))
-def test_the_sweep_is_sailed_in_time(sweep: Result, waypoint: int, time: float) -> None:
-    assert sweep.kpis[f"waypoints.time[{waypoint}]"] == pytest.approx(time, abs=0.3)
+def test_the_sweep_is_sailed_in_time(sweep: Result, waypoint: int, time: float, measured: Measured) -> None:
+    found, case = sweep.kpis[f"waypoints.time[{waypoint}]"], f"waypoint {waypoint}"
+    measured(REPLICA, "sweep pattern", found, time, "s", AGAIN, within=0.3, case=case)
 
 
 @pytest.mark.parametrize(("leg", "overshoot"), list(enumerate([0.01, 1.65, 1.39], start=1)))

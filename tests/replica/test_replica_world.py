@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from validation import Measured
 
 from cosim.component import Ports
 from cosim.errors import ComponentError, InputError
 from plant_src.replica.world import World
 
 PLATFORM = {"size": [4.0, 4.0, 0.05], "position": [0.0, 0.0, 0.45]}
+REPLICA = "Replica of the published simulator"
 HALF = 0.005  # s, one of the two steps that the engine makes
 WEIGHT = 0.443892 * 9.81
 
@@ -84,10 +86,11 @@ def test_psi_is_clockwise(yaw: float) -> None:
     assert np.exp(1j * psi) == pytest.approx(np.exp(-1j * yaw))
 
 
-def test_it_falls_as_two_engine_steps_per_sample_make_it_fall() -> None:
+def test_it_falls_as_two_engine_steps_per_sample_make_it_fall(measured: Measured) -> None:
     trial = Trial({"position": [0, 0, 10]}).step(50)
     assert trial["uav.velocity.z"] == pytest.approx(-9.81 * 0.5)
-    assert trial["uav.position.z"] == pytest.approx(10 - 9.81 * HALF**2 * 100 * 101 / 2)
+    fall, expected = 10 - trial["uav.position.z"], 9.81 * HALF**2 * 100 * 101 / 2
+    measured(REPLICA, "free fall in two Euler steps per sample, 0.5 s", fall, expected, "m", "closed form", relative=1e-6)
 
 
 def test_the_published_point_is_not_the_centre_of_mass() -> None:
@@ -143,10 +146,14 @@ def test_a_tilted_rotor_pulls_sideways() -> None:
     assert trial["uav.velocity.x"] > 0.03
 
 
-def test_the_links_of_the_rig_move_with_the_hull() -> None:
+def test_the_links_of_the_rig_move_with_the_hull(measured: Measured) -> None:
     """4.31 kg in x, 4.21 kg in y."""
     trial = Trial({"position": [0, 0, 100]}).step(10, usv__water__x=1.0, usv__water__y=2.0)
-    np.testing.assert_allclose(trial.vector("usv.velocity"), [0.1 / 4.31, 0.2 / 4.21, 0], rtol=1e-9)
+    *level, climb = trial.vector("usv.velocity")
+    assert climb == 0
+    measured(
+        REPLICA, "speed of the hull with the links of its rig", level, [0.1 / 4.31, 0.2 / 4.21], "m/s", "F t / m", relative=1e-9
+    )
 
 
 def test_rudder_and_moment_turn_the_hull() -> None:
@@ -184,10 +191,11 @@ def test_it_rests_on_its_feet(support: str) -> None:
     assert np.abs(trial.vector("uav.velocity")).max() < 1e-3
 
 
-def test_landing_sideways_pushes_the_vessel() -> None:
+def test_landing_sideways_pushes_the_vessel(measured: Measured) -> None:
     trial = Trial({"position": [0, 0, 0.33], "velocity_body": [0.3, 0, 0]}, {"position": [0, 0]}).step(40)
     share = 0.443892 / (0.443892 + 4.31)
-    assert trial["usv.velocity.x"] == pytest.approx(0.3 * share, rel=0.02)
+    found, expected = trial["usv.velocity.x"], 0.3 * share
+    measured(REPLICA, "common speed after a sideways landing", found, expected, "m/s", "conservation", relative=0.02)
     assert trial["uav.velocity.x"] == pytest.approx(0.3 * share, rel=0.02)
 
 

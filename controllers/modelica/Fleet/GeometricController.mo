@@ -27,7 +27,6 @@ block GeometricController "Tracking of a path on SE(3): from position, velocity 
   parameter Real climb_P(unit = "1/s") = 8 "Acceleration per error of the vertical velocity";
   parameter Real position_I(unit = "1/s3") = 1.5 "Rate of the acceleration per position error";
   parameter Real speed_limit(unit = "m/s") = 2 "Of the horizontal speed that makes up for a position error";
-  parameter Real tilt_limit(unit = "deg", min = 1, max = 60) = 25;
   parameter Real trim_limit(unit = "m/s2") = 3 "Of the integrals";
   parameter Real attitude_P(unit = "1/s2") = 150 "Angular acceleration per attitude error";
   parameter Real attitude_D(unit = "1/s") = 20 "Angular acceleration per error of the rates";
@@ -44,6 +43,7 @@ block GeometricController "Tracking of a path on SE(3): from position, velocity 
   input Spatial.Position position_reference;
   input Spatial.Velocity velocity_reference;
   input Spatial.Acceleration acceleration_reference;
+  input Real tilt_limit(start = 25, unit = "deg");
   input Real yaw_reference(start = 0, unit = "rad") "Counter-clockwise from east";
   input Real motor_share(start = 0, unit = "1") "Share of the commanded rotor speeds; 0: motors stopped";
   input Boolean reset(start = false) "Holds the start state of the integrals";

@@ -15,10 +15,11 @@ def attitude(roll, pitch, yaw):
     return turn, (w, x, y, z)
 
 
-def test_pressures_of_the_standard_atmosphere():
+def test_pressures_of_the_standard_atmosphere(measured):
     """Table of ISO 2533 (1975): 0, 500, 1000 and 5000 m of geopotential altitude."""
     for altitude, pressure in ((0, 101325.0), (500, 95460.8), (1000, 89874.6), (5000, 54019.9)):
-        assert pressure_at(altitude) == pytest.approx(pressure, rel=2e-5)
+        case = f"{altitude} m"
+        measured("Sensors", "barometer", pressure_at(altitude), pressure, "Pa", "table of ISO 2533", relative=2e-5, case=case)
         assert altitude_at(pressure_at(altitude)) == pytest.approx(altitude, abs=1e-8)
 
 
@@ -40,11 +41,11 @@ def test_noise_and_drift_of_the_pressure():
 
 
 @pytest.mark.parametrize("angles", [(0, 0, 0), (0.3, 0, 1.0), (0, -0.4, -2.5), (0.5, 0.4, 3.0)])
-def test_the_field_is_that_of_the_earth_in_body_axes_and_tells_the_heading(angles):
+def test_the_field_is_that_of_the_earth_in_body_axes_and_tells_the_heading(angles, measured):
     turn, orientation = attitude(*angles)
     trial = SensorTrial(configured(Magnetometer("m"), noise=0.0), vehicle__orientation=orientation)
     assert np.allclose(trial.vector("field"), turn.inv().apply(FIELD), atol=1e-18)
-    assert trial["yaw"] == pytest.approx(angles[2], abs=1e-9)
+    measured("Sensors", "magnetometer: heading", trial["yaw"], angles[2], "rad", "rotated field", within=1e-9)
 
 
 def test_iron_distorts_the_field():

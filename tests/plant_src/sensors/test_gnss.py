@@ -22,11 +22,12 @@ def moving(trial, steps):
     return np.array(rows)
 
 
-def test_samples_come_at_the_rate_and_exactly_a_latency_late():
+def test_samples_come_at_the_rate_and_exactly_a_latency_late(measured):
     trial = SensorTrial(configured(Gnss("gnss"), **EXACT, rate=5.0, latency=0.13))
     now, position, time = moving(trial, 200).T
     newest = np.floor((now - 0.13) / 0.2 + 1e-9) * 0.2
-    assert np.allclose(position, np.maximum(newest, 0), atol=1e-12)
+    error = position - np.maximum(newest, 0)
+    measured("Sensors", "GNSS at 5 Hz, 0.13 s late: age of a fix", error, 0.0, "s", "floor of the time", within=1e-12)
     assert np.allclose(time, position, atol=1e-12)
 
 
@@ -42,22 +43,24 @@ def test_a_rate_that_is_no_part_of_the_step_rate_is_kept_on_average():
     assert len(np.unique(time)) == pytest.approx(3.0 * 30, abs=1)
 
 
-def test_white_noise_has_its_standard_deviations():
+def test_white_noise_has_its_standard_deviations(measured):
     parameters = {**EXACT, "horizontal_noise": 0.5, "vertical_noise": 2.0, "velocity_noise": 0.1}
     gnss = configured(Gnss("gnss", seed=2), **parameters, rate=100.0, latency=0.0)
     names = [*POSITION, *(f"velocity.{axis}" for axis in "xyz")]
     spread = SensorTrial(gnss).record(4000, names).std(axis=0)
-    assert spread == pytest.approx([0.5, 0.5, 2.0, 0.1, 0.1, 0.1], rel=0.06)
+    expected = [0.5, 0.5, 2.0, 0.1, 0.1, 0.1]
+    measured("Sensors", "GNSS noise, standard deviations", spread, expected, "m, m/s", "as set", relative=0.06)
 
 
-def test_the_drift_is_correlated_as_a_gauss_markov_process():
+def test_the_drift_is_correlated_as_a_gauss_markov_process(measured):
     parameters = {**EXACT, "horizontal_drift": 1.0, "vertical_drift": 1.0, "correlation_time": 2.0}
     gnss = configured(Gnss("gnss", seed=6), **parameters, rate=10.0, latency=0.0)
     drift = SensorTrial(gnss, step=0.1).record(15000, POSITION)
     assert drift.std() == pytest.approx(1.0, rel=0.05)
     for lag in (5, 20):
         correlation = np.mean(drift[lag:] * drift[:-lag]) / drift.var()
-        assert correlation == pytest.approx(np.exp(-lag * 0.1 / 2.0), abs=0.05)
+        expected, case = np.exp(-lag * 0.1 / 2.0), f"{lag * 0.1:g} s"
+        measured("Sensors", "GNSS drift, correlation", correlation, expected, "1", "exp(-t/T)", within=0.05, case=case)
 
 
 def test_the_first_fix_is_as_wrong_as_any():

@@ -10,6 +10,7 @@ from plant_src.sensors.imu import Imu
 
 AXES = [*(f"acceleration.{axis}" for axis in "xyz"), *(f"rates.{axis}" for axis in "pqr")]
 KINDS = ("gyroscope", "accelerometer")
+ALLAN = "theory of the Allan variance"
 EXACT = {f"{kind}__{what}": 0.0 for kind in KINDS for what in ("noise_density", "bias_walk", "turn_on_bias")}
 
 
@@ -17,18 +18,18 @@ def exact_imu(**parameters):
     return configured(Imu("imu"), **EXACT, **parameters)
 
 
-def test_at_rest_it_reads_one_g_upwards_in_any_attitude():
+def test_at_rest_it_reads_one_g_upwards_in_any_attitude(measured):
     attitude = quaternion((1, 2, 3), 0.7)
     trial = SensorTrial(exact_imu(), vehicle__orientation=attitude).step(3)
     upwards = Rotation.from_quat([*attitude[1:], attitude[0]]).inv().apply([0, 0, 9.81])
-    assert np.allclose(trial.vector("acceleration"), upwards, atol=1e-12)
+    measured("Sensors", "IMU at rest, tilted", trial.vector("acceleration"), upwards, "m/s2", "gravity", within=1e-12)
 
 
-def test_in_free_fall_it_reads_nothing():
+def test_in_free_fall_it_reads_nothing(measured):
     trial = SensorTrial(exact_imu(), vehicle__velocity=(1.0, 2.0, 3.0))
     for step in range(1, 5):
         trial.feed(vehicle__velocity=(1.0, 2.0, 3.0 - 9.81 * step * STEP)).step()
-        assert np.allclose(trial.vector("acceleration"), 0, atol=1e-12)
+        measured("Sensors", "IMU in free fall", trial.vector("acceleration"), 0.0, "m/s2", "weightlessness", within=1e-12)
 
 
 def test_a_turn_on_a_circle_shows_the_centripetal_acceleration():
@@ -64,7 +65,7 @@ def allan_deviation(values, count):
     return np.sqrt(np.mean(np.diff(means) ** 2) / 2)
 
 
-def test_white_noise_has_the_allan_deviation_of_its_density():
+def test_white_noise_has_the_allan_deviation_of_its_density(measured):
     density = 3e-3
     imu = configured(
         Imu("imu", seed=11), **{**EXACT, "gyroscope__noise_density": density, "accelerometer__noise_density": density}
@@ -72,15 +73,17 @@ def test_white_noise_has_the_allan_deviation_of_its_density():
     noise = SensorTrial(imu).record(20000, AXES) - (0, 0, 9.81, 0, 0, 0)
     for values in noise.T:
         for count in (1, 10, 50):
-            assert allan_deviation(values, count) == pytest.approx(density / np.sqrt(count * STEP), rel=0.12)
+            found, expected, case = allan_deviation(values, count), density / np.sqrt(count * STEP), f"{count * STEP:g} s"
+            measured("Sensors", "IMU noise, Allan deviation", found, expected, "m/s2, rad/s", ALLAN, relative=0.12, case=case)
 
 
-def test_the_wandering_bias_has_the_allan_deviation_of_a_random_walk():
+def test_the_wandering_bias_has_the_allan_deviation_of_a_random_walk(measured):
     walk = 2e-2
     imu = configured(Imu("imu", seed=3), **{**EXACT, "gyroscope__bias_walk": walk, "accelerometer__bias_walk": walk})
     bias = SensorTrial(imu).record(20000, AXES)
     found = [allan_deviation(values, 50) for values in bias.T]
-    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(walk * np.sqrt(50 * STEP / 3), rel=0.12)
+    found, expected = np.sqrt(np.mean(np.square(found))), walk * np.sqrt(50 * STEP / 3)
+    measured("Sensors", "IMU bias walk, Allan deviation", found, expected, "m/s2, rad/s", ALLAN, relative=0.12)
 
 
 def test_the_bias_at_turn_on_has_its_standard_deviation_over_many_devices():

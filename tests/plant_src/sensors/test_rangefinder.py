@@ -28,9 +28,10 @@ def sensor():
         component.free()
 
 
-def test_water_below_a_tilted_vehicle(sensor):
+def test_water_below_a_tilted_vehicle(sensor, measured):
     trial = sensor(inputs={"vehicle__position": (3, 4, 2.0), "vehicle__orientation": quaternion((1, 1, 0), 0.4)})
-    assert trial["distance"] == pytest.approx(2.0 / np.cos(0.4), rel=1e-12)
+    distance = trial["distance"]
+    measured("Sensors", "rangefinder, tilted above water", distance, 2.0 / np.cos(0.4), "m", "plane geometry", relative=1e-12)
 
 
 def test_a_platform_in_between(sensor):
@@ -47,7 +48,7 @@ def test_the_mounting_turns_with_the_vehicle(sensor):
     assert trial["distance"] == pytest.approx(-height / (turn.apply([1, 0, -1]) / np.sqrt(2))[2], rel=1e-12)
 
 
-def test_the_deck_of_a_heeling_vessel_where_it_is(sensor):
+def test_the_deck_of_a_heeling_vessel_where_it_is(sensor, measured):
     heel, point = 0.2, np.array([5.0, -3.0, 0.3])
     inputs = {
         "usv__deck__position": point,
@@ -58,7 +59,8 @@ def test_the_deck_of_a_heeling_vessel_where_it_is(sensor):
     turn = Rotation.from_rotvec([heel, 0, 0])
     normal = turn.apply([0, 0, 1])
     height = point[2] - (normal[0] * (5.1 - point[0]) + normal[1] * (-3.05 - point[1])) / normal[2]
-    assert trial["distance"] == pytest.approx(2.0 - height, abs=1e-6)
+    distance = trial["distance"]
+    measured("Sensors", "rangefinder above a heeling deck", distance, 2.0 - height, "m", "plane geometry", within=1e-6)
 
 
 def test_the_deck_moves_on_and_leaves_the_water(sensor):

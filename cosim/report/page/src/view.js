@@ -134,8 +134,7 @@ export class View {
   #moveWater(time) {
     if (!this.water) return;
     const gain = this.runs[0].has(this.water.gain) ? this.runs[0].value(this.water.gain, time) : 1;
-    const shades = this.own.map(({ position, reach }) => [position.x, position.y, Math.max(position.z, 0), 0.62 * reach]);
-    this.water.update(time, gain, this.cameras.controls.target, shades);
+    this.water.update(time, gain, this.cameras.controls.target, this.own);
   }
 
   #resize() {

@@ -38,7 +38,8 @@ void main() {
 const FRAGMENT = `
 uniform vec3 deep, shallow, horizon, ink, sun;
 uniform float shade;
-uniform vec4 shades[${MOST_SHADES}];
+uniform vec4 shades[${MOST_SHADES}]; // x, y, reach of the shadow, how dark it is
+uniform vec4 shaded; // a rectangle around all: the lowest x and y, the highest
 uniform int shadeCount;
 varying vec3 place;
 varying vec2 slope;
@@ -58,13 +59,15 @@ void main() {
   colour += 0.10 * glint * glint;
   vec2 width = fwidth(place.xy) + 0.003;
   colour = mix(colour, ink, 0.05 * lines(1.0, width) + 0.08 * lines(5.0, width));
-  float dark = 0.0;
-  for (int i = 0; i < shadeCount; i++) {
-    vec2 off = place.xy - shades[i].xy + sun.xy / sun.z * shades[i].z;
-    float depth = max(1.0 - dot(off, off) / (shades[i].w * shades[i].w), 0.0);
-    dark += depth * depth / (1.0 + 0.5 * shades[i].z);
+  if (all(greaterThan(place.xy, shaded.xy)) && all(lessThan(place.xy, shaded.zw))) {
+    float dark = 0.0;
+    for (int i = 0; i < shadeCount; i++) {
+      vec2 off = place.xy - shades[i].xy;
+      float depth = max(1.0 - dot(off, off) / (shades[i].z * shades[i].z), 0.0);
+      dark += depth * depth * shades[i].w;
+    }
+    colour *= 1.0 - shade * min(dark, 1.0);
   }
-  colour *= 1.0 - shade * min(dark, 1.0);
   gl_FragColor = vec4(mix(colour, horizon, haze), 1.0);
 }`;
 
@@ -95,7 +98,7 @@ export class Water {
       waves: { value: empty(MOST_WAVES) }, count: { value: 0 }, centre: { value: new Vector2() }, time: { value: 0 },
       deep: { value: new Color() }, shallow: { value: new Color() }, horizon: { value: new Color() }, ink: { value: new Color() },
       shade: { value: 0 }, sun: { value: new Vector3(-0.45, -0.6, 0.66).normalize() },
-      shades: { value: empty(MOST_SHADES) }, shadeCount: { value: 0 },
+      shades: { value: empty(MOST_SHADES) }, shaded: { value: new Vector4() }, shadeCount: { value: 0 },
     };
     const material = new ShaderMaterial({ uniforms: this.uniforms, vertexShader: VERTEX, fragmentShader: FRAGMENT });
     this.mesh = new Mesh(mesh(spec.waves.length ? CELLS.waves : CELLS.calm), material);
@@ -111,7 +114,7 @@ export class Water {
   }
 
   /** The elevation is gain * sum a cos(k (x cos d + y sin d) - w t + phase). */
-  update(time, gain, centre, places) {
+  update(time, gain, centre, bodies) {
     const list = this.uniforms.waves.value;
     this.waves.forEach((wave, i) => {
       const phase = (wave.phase - wave.frequency * time) % (2 * Math.PI);
@@ -120,8 +123,22 @@ export class Water {
     this.uniforms.count.value = gain ? Math.min(this.waves.length, MOST_WAVES) : 0;
     this.uniforms.time.value = time % 1000;
     this.uniforms.centre.value.copy(centre);
-    places.slice(0, MOST_SHADES).forEach((place, i) => this.uniforms.shades.value[i].set(...place));
-    this.uniforms.shadeCount.value = Math.min(places.length, MOST_SHADES);
+    this.#shade(bodies.slice(0, MOST_SHADES));
+  }
+
+  /** Shadows of bodies, softer the higher they are. */
+  #shade(bodies) {
+    const { shades, shaded, shadeCount, sun } = this.uniforms;
+    shaded.value.set(Infinity, Infinity, -Infinity, -Infinity);
+    shadeCount.value = bodies.length;
+    bodies.forEach(({ position, reach }, i) => {
+      const height = Math.max(position.z, 0);
+      const [x, y] = ["x", "y"].map((axis) => position[axis] - (sun.value[axis] / sun.value.z) * height);
+      const radius = 0.62 * reach * (1 + 0.15 * height);
+      shades.value[i].set(x, y, radius, 1 / (1 + 0.5 * height));
+      const box = shaded.value;
+      box.set(Math.min(box.x, x - radius), Math.min(box.y, y - radius), Math.max(box.z, x + radius), Math.max(box.w, y + radius));
+    });
   }
 
   /** Height of the water at a place (m). */

@@ -1,0 +1,42 @@
+"""Replays of single runs of a sweep: one page each, called after the key of its run, so that it is made once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+
+from .jobs import Job, Record
+from .local import LocalEngine
+from .shop import Shop
+from .sweep import Sweep
+
+FOLDER = "replays"
+
+
+def page_of(sweep: Sweep, run: int) -> str:
+    """Where the replay of a run is, in the folder of the sweep."""
+    return f"{FOLDER}/{sweep.keys[run]}.html"
+
+
+def write_replays(sweep: Sweep, runs: Iterable[int], folder: Path, workers: int) -> dict[int, str]:
+    """Run these runs again and write their replays where there is none; returns the cause for each that could not be written.
+
+    Everything is recorded that the scenario itself records, not only what the sweep needs.
+    """
+    pages = {run: folder / page_of(sweep, run) for run in dict.fromkeys(runs)}
+    missing = {run: page for run, page in pages.items() if not page.exists()}
+    (folder / FOLDER).mkdir(exist_ok=True)
+    with LocalEngine(sweep.study.order, workers) as engine, ThreadPoolExecutor(workers) as pool:
+        records = pool.map(partial(_write, sweep, engine.shop), missing, missing.values())
+        causes = {run: record.failure for run, record in zip(missing, records, strict=True)}
+    return {run: causes[run] for run, page in missing.items() if not page.exists()}
+
+
+def _write(sweep: Sweep, shop: Shop, run: int, page: Path) -> Record:
+    point = sweep.design[run]
+    job = sweep.study.job(point.settings)
+    settings = {name: value for name, value in job.settings.items() if not name.startswith("/record")}
+    labels = ", ".join(f"{name} {label}" for name, label in point.labels.items())
+    return shop.replay(Job(job.key, settings), f"{sweep.read.spec.name} run {run}: {labels}", page)
