@@ -33,9 +33,9 @@ class Pacer:
         self._warned = False
         self._start = 0
 
-    def start(self) -> None:
-        """The start time is now."""
-        self._start = time.monotonic_ns()
+    def start(self, n: int = 0) -> None:
+        """Communication point n is now."""
+        self._start = time.monotonic_ns() - n * self._numerator // self._denominator
 
     def wait(self, n: int) -> None:
         """Until communication point n is due. Raises LateError when it was due more than one step ago and late steps fail."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from . import log
-from .component import Component
+from .component import Component, Variable
 from .engine import MARKER_SIZE, Executor, Kind, Recorder, Termination, compile_plan, executor_kind
 from .errors import ComponentError, InputError, Problem
 from .journal import Phase, calling, current, waiting
@@ -29,6 +29,9 @@ from .unfinished import write_header
 
 #: called with (finished macro steps, all macro steps); observers only look
 Observer = Callable[[int, int], None]
+
+#: called with n before the step that starts at communication point n; it may take its time, and set variables as events do
+Control = Callable[[int], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +52,7 @@ class Settings:
 
     `finite`: a connected output that is not finite ends the run. `real_time`: simulated seconds per second on the wall, None for
     as fast as possible; `late` says what happens when a step is ready more than one step too late.
+    `control` steers the run from outside, step by step.
     `rows_file`: where the rows are kept while the run goes on; by default in memory, or in a temporary file when they are many.
     """
 
@@ -62,6 +66,7 @@ class Settings:
     finite: bool = True
     real_time: float | None = None
     late: Late = "warn"
+    control: Control | None = None
     rows_file: Path | None = None
 
 
@@ -161,7 +166,7 @@ def _run(executor: Executor, settings: Settings, observers: Sequence[Observer], 
         if journal:
             journal.enter(Phase.STEPPING, journal.deadlines.step)
         with contained(_together(executor.plan.system.components)), watch.measure("loop_seconds"):
-            _loop(executor, events, observers, pacer)
+            _loop(executor, events, observers, pacer, settings.control)
     except (Exception, KeyboardInterrupt) as error:
         failure = error
     finally:
@@ -178,14 +183,20 @@ def _together(names: Iterable[str]) -> str:
     return some[0] if len(some) == 1 else f"one of {', '.join(some[:8])}{' ...' if len(some) > 8 else ''}"
 
 
-def _loop(executor: Executor, events: Mapping[int, Sequence[Event]], observers: Sequence[Observer], pacer: Pacer | None) -> None:
+def _loop(
+    executor: Executor,
+    events: Mapping[int, Sequence[Event]],
+    observers: Sequence[Observer],
+    pacer: Pacer | None,
+    control: Control | None,
+) -> None:
     """From event to event and from look to look of the observers."""
     if pacer:
         pacer.start()
     components, count = executor.plan.system.components, executor.plan.grid.count
     looks = set(range(0, count, max(1, count // 100))) if observers else set()
     for stop in sorted({*(n for n in events if n < count), *looks, count}):
-        _advance(executor, stop, pacer)
+        _advance(executor, stop, pacer, control)
         for observe in observers:
             observe(executor.finished, count)
         if executor.termination:
@@ -194,17 +205,20 @@ def _loop(executor: Executor, events: Mapping[int, Sequence[Event]], observers: 
             _act(event, components)
 
 
-def _advance(executor: Executor, stop: int, pacer: Pacer | None) -> None:
+def _advance(executor: Executor, stop: int, pacer: Pacer | None, control: Control | None) -> None:
     """To communication point `stop`, or until a component asks to terminate."""
-    if pacer is None:
+    if pacer is None and control is None:
         executor.run(stop)
         return
     for n in range(executor.finished + 1, stop + 1):
+        if control:
+            control(n - 1)
         executor.run(n)
         if executor.termination:
             return
-        with waiting():
-            pacer.wait(n)
+        if pacer:
+            with waiting():
+                pacer.wait(n)
 
 
 def _act(event: Event, components: Mapping[str, Component]) -> None:
@@ -249,20 +263,30 @@ def _period_problems(system: System, grid: Grid) -> Iterator[Problem]:
             yield Problem(f"the duration {duration!r} s is no multiple of the period {float(period)!r} s", subject=subject)
 
 
+def adjustable(system: System) -> Iterator[tuple[str, Variable]]:
+    """Components and their variables that can be set while a run goes on."""
+    fed = {connection.target for connection in system.connections}
+    for name, component in system.components.items():
+        for variable in component.variables:
+            if not _obstacle(name, variable, fed):
+                yield name, variable
+
+
+def _obstacle(name: str, variable: Variable, fed: Set[Endpoint]) -> str:
+    """Why an event cannot set a variable; it can set tunable parameters and inputs that nothing feeds."""
+    if variable.causality == "input" and any(Endpoint(name, slot) in fed for slot in variable.slots):
+        return f"{name}.{variable.name} is fed by a connection, an event cannot set it"
+    if variable.causality != "input" and (variable.causality, variable.variability) != ("parameter", "tunable"):
+        return f"{name}.{variable.name} is neither a tunable parameter nor an input, an event cannot set it"
+    return ""
+
+
 def _event_problems(system: System, events: Iterable[Event]) -> list[Problem]:
-    """Events may set tunable parameters and inputs that nothing feeds."""
     fed = {connection.target for connection in system.connections}
     found = []
     for event in events:
         for name, values in event.values.items():
             variables = {variable.name: variable for variable in system.components[name].variables}
-            for variable_name in values:
-                variable = variables[variable_name]
-                if variable.causality == "input" and any(Endpoint(name, slot) in fed for slot in variable.slots):
-                    text = f"{name}.{variable_name} is fed by a connection, an event cannot set it"
-                elif variable.causality != "input" and (variable.causality, variable.variability) != ("parameter", "tunable"):
-                    text = f"{name}.{variable_name} is neither a tunable parameter nor an input, an event cannot set it"
-                else:
-                    continue
-                found.append(Problem(text, event.where))
+            texts = (_obstacle(name, variables[variable_name], fed) for variable_name in values)
+            found += [Problem(text, event.where) for text in texts if text]
     return found

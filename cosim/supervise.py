@@ -17,7 +17,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -72,8 +72,11 @@ def possible() -> bool:
         return False
 
 
-def supervised(entry: Callable[[], int]) -> Outcome:
-    """Run `entry` in a child process that keeps a journal (see `journal.current`); it returns an exit code and never raises."""
+def supervised(entry: Callable[[], int], beside: Callable[[Journal], AbstractContextManager[object]] = nullcontext) -> Outcome:
+    """Run `entry` in a child process that keeps a journal (see `journal.current`); it returns an exit code and never raises.
+
+    `beside` is what this process does meanwhile, from the birth of the child to its end.
+    """
     journal = Journal(mmap.mmap(-1, journals.SIZE))
     _adopt_orphans()
     with run_folder() as folder, polite_ends():
@@ -86,7 +89,8 @@ def supervised(entry: Callable[[], int]) -> Outcome:
             os.close(reader)
             _be_the_child(entry, journal, writer, folder, supervisor)
         os.close(writer)
-        return _Supervisor(child, journal, reader).watch()
+        with beside(journal):
+            return _Supervisor(child, journal, reader).watch()
 
 
 @contextmanager

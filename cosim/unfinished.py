@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from .journal import current
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from .engine import Executor
     from .recording import Recording
 
@@ -67,6 +69,20 @@ class Header:
         for (place, _), text in zip(self.texts, texts, strict=True):
             whole.insert(place, text)
         return whole
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """A row as a structured dtype."""
+        import numpy as np
+
+        return np.dtype(
+            {
+                "names": [column.name for column in self.columns],
+                "formats": [column.dtype for column in self.columns],
+                "offsets": [column.offset for column in self.columns],
+                "itemsize": self.row_size,
+            }
+        )
 
     def seconds(self, n: int) -> float:
         """Time of communication point n."""
@@ -192,15 +208,7 @@ def recover(folder: Path | None, rows: int) -> Recording:
     if folder is None or header is None:
         return Recording.empty()
     columns = header.columns
-    dtype = np.dtype(
-        {
-            "names": [column.name for column in columns],
-            "formats": [column.dtype for column in columns],
-            "offsets": [column.offset for column in columns],
-            "itemsize": header.row_size,
-        }
-    )
-    data = read_rows(folder / ROWS_FILE, dtype, rows)
+    data = read_rows(folder / ROWS_FILE, header.dtype, rows)
     time = np.array([header.seconds(row * header.every) for row in range(rows)], np.float64)
     numbers = [data[column.name].astype(bool) if column.boolean else data[column.name] for column in columns]
     reader = TextReader(folder, header)

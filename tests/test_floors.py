@@ -26,7 +26,7 @@ FLOORS = [
     {"kpi", "compare"},
     {"kpis"},
     {"api", "bench", "report"},
-    {"sweep"},
+    {"sweep", "live"},
     {"cli"},
     {"__main__", "pytest_plugin"},
 ]

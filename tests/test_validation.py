@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from validation import DOCUMENT, TESTS, Measured, Statement, Writer, document, statement
 
-FILE = "plant_src/test_sea.py"
+FILE = "plant_src/sensors/test_air_and_field.py"
 
 
 def stated(file: Path) -> Iterator[Statement]:

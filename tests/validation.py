@@ -4,7 +4,7 @@ A test asks for the fixture `measured` and states
 
     measured("Otter", "speed at 100/100 rad/s", found, expected, "m/s", "golden value of MSS `otter.m`", within=5e-6)
 
-which fails unless both agree. `pytest -m "" --validation FILE` runs the tests that do so and writes the document.
+which fails unless both agree. `pytest tests -m "" --validation FILE` runs the tests that do so and writes the document.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ HEAD = """# Validation
 Every model of the plant beside a reference that is independent of it, with the numbers that the tests measured. Written by
 
 ```text
-pytest -m "" --validation docs/validation.md
+pytest tests -m "" --validation docs/validation.md
 ```
 
 never by hand: a statement that is not met fails its test, and `tests/test_validation.py` fails where this page lists other

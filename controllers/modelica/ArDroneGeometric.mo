@@ -23,8 +23,8 @@ block ArDroneGeometric "Landing on decks that move in waves: path command in sti
 
   parameter Real engage_time(unit = "s", min = 0.01) = 1 "In which the motion of the deck is taken over, from the approach on";
   parameter Real tilt_limit(unit = "deg", min = 1, max = 60) = 25;
-  parameter Real touchdown_tilt_limit(unit = "deg", min = 1, max = 60) = 13 "Just above the deck, so that it is not one foot that lands";
-  parameter Real flare_height(unit = "m") = 0.2 "Of the centre of mass above the deck: from there on down the limit for the touchdown holds";
+  parameter Real touchdown_tilt_limit(unit = "deg", min = 1, max = 60) = 12 "Just above the deck, so that it is not one foot that lands";
+  parameter Real flare_height(unit = "m") = 0.16 "Of the centre of mass above the deck: from there on down the limit for the touchdown holds";
   input Vehicle vehicle;
   input Deck target;
   input Real altitude_command(start = 2, unit = "m") "Of the centre of mass, for the pursuit";

@@ -42,7 +42,7 @@ def markup(text: str) -> str:
 
 def render(template: str, **values: Any) -> str:
     """A page as text; all `values` are escaped but those that are marked as safe."""
-    return _environment().get_template(template).render(**_bundle(), **values)
+    return _environment().get_template(template).render(**{**_bundle(), **values})
 
 
 def embedded(data: Any) -> str:

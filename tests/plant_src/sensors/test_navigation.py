@@ -82,11 +82,11 @@ class Flight:
         return [*(np.linalg.norm(a - b) for a, b in pairs), (found.inv() * attitude).magnitude()]
 
 
-def test_exact_sensors_give_the_motion():
+def test_exact_sensors_give_the_motion(measured):
     position, velocity, attitude = Flight().fly(8)
-    assert position < 2e-3
-    assert velocity < 3e-3
-    assert attitude < 2e-3
+    measured("Sensors", "navigation, exact sensors: place", position, 0.0, "m", "motion in closed form", within=2e-3)
+    measured("Sensors", "navigation, exact sensors: velocity", velocity, 0.0, "m/s", "motion in closed form", within=3e-3)
+    measured("Sensors", "navigation, exact sensors: attitude", attitude, 0.0, "rad", "motion in closed form", within=2e-3)
 
 
 def test_the_latency_of_a_fix_does_not_matter():
