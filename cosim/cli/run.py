@@ -12,10 +12,12 @@ import click
 
 from ..errors import CosimError
 from ..journal import STEPS
-from . import report, strict, supervision
+from . import live, report, strict, supervision
 from .progress import progress_bar
 
 if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
     from ..api import Execution
     from ..kpi import CheckOutcome
     from ..results import Result
@@ -55,16 +57,21 @@ RESULTS = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run.json
 @click.option("--parquet", is_flag=True, help="Write result.parquet too (extra `parquet`).")
 @click.option("--mcap", is_flag=True, help="Write result.mcap too, for Foxglove and ROS 2 (extra `mcap`).")
 @click.option("--no-report", is_flag=True, help="Write no figures and no report.html.")
+@live.option
 @supervision.option
-def command(isolation: str, sandbox: str | None, **options: Any) -> int:
+def command(isolation: str, sandbox: str | None, view: bool, view_port: int, **options: Any) -> int:
     """Run SCENARIO, a JSON file or the name of a shipped scenario.
 
     Writes result.csv, kpis.json, run.json, figures and report.html to the output directory. Exit code 0: all is well;
     1: a component failed, the results until then are kept; 2: the scenario was refused; 3: a check was not met.
     """
+    if view:
+        live.require(isolation, sandbox, options["late"])
     if strict.wanted(sandbox):
         return strict.again(*_needed(**options))
     apart: dict[str, Any] = {"isolation": "fmu" if isolation == "fmu" else "none", "sandbox": bool(sandbox)}
+    if view:
+        return live.viewed(lambda link: _run(**options, **apart, link=link), isolation, _salvage, view_port)
     return supervision.protected(lambda: _run(**options, **apart), isolation, _salvage)
 
 
@@ -86,6 +93,7 @@ def _run(
     no_report: bool,
     parquet: bool,
     mcap: bool,
+    link: Connection | None = None,
     **conditions: Any,
 ) -> int:
     from ..api import executed, load
@@ -107,15 +115,18 @@ def _run(
     shown = output_dir or Path("runs") / assembly.spec.name
     try:
         _prepare(directory, [spec.name for spec in assembly.spec.figures])
+        control = live.control(assembly, link) if link else None
     except CosimError:
         assembly.free()  # from here on `executed` frees the components
         raise
     with (
         unfinished(directory / UNFINISHED, directory / "result.csv"),
         _progress(assembly) as observers,
-        executed(assembly, observers) as execution,
+        executed(live.controlled(assembly, control), observers) as execution,
     ):
         execution.result.metadata["warnings"] = warnings
+        if control:
+            execution.result.metadata["live_events"] = control.end()
         code = _finish(execution, assembly, directory, shown, no_report, began)
         if parquet:
             execution.result.to_parquet(directory / "result.parquet")

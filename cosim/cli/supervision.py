@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from shutil import rmtree
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from . import guarded
 from .strict import KINDS
 
 if TYPE_CHECKING:
+    from ..journal import Journal
     from ..recording import Recording
     from ..supervise import Outcome
 
@@ -38,8 +40,14 @@ def option(command: Callable[..., Any]) -> Callable[..., Any]:
     return _isolation(_sandbox(command))
 
 
-def protected(entry: Callable[[], int], isolation: str, salvage: Callable[[Outcome], None]) -> int:
-    """Run a command's work and return its exit code; when the child could not save its rows, `salvage` does.
+def protected(
+    entry: Callable[[], int],
+    isolation: str,
+    salvage: Callable[[Outcome], None],
+    beside: Callable[[Journal], AbstractContextManager[object]] = nullcontext,
+) -> int:
+    """Run a command's work and return its exit code; when the child could not save its rows, `salvage` does. `beside` is what
+    this process does while there is a child.
 
     Raises ComponentError for the component that was to blame, KeyboardInterrupt when the user ended the child.
     """
@@ -47,7 +55,7 @@ def protected(entry: Callable[[], int], isolation: str, salvage: Callable[[Outco
 
     if isolation == "none" or not possible():
         return entry()
-    outcome = supervised(lambda: guarded(entry))
+    outcome = supervised(lambda: guarded(entry), beside)
     if outcome.warning:
         click.echo(f"WARNING {outcome.warning}", err=True)
     folder = outcome.journal.folder

@@ -16,7 +16,7 @@ from typing import Any
 
 from ..component import Variable
 from ..errors import ComponentError, InputError, did_you_mean
-from ..journal import current, waiting
+from ..journal import calling, current, waiting
 from ..pacer import Pacer
 from ..scenario.names import assign
 from ..simulate import adjustable
@@ -49,8 +49,7 @@ class Control:
             "speed": self._set_speed,
             "set": self._set,
         }
-        #: what was set so far, as a scenario writes its events
-        self.events: list[dict[str, Any]] = []
+        self._events: list[dict[str, Any]] = []
 
     def __call__(self, n: int) -> None:
         """Before the step that starts at communication point n: keep pace, and obey what has come."""
@@ -67,9 +66,10 @@ class Control:
             self._obey(n)
         self._steps = max(0, self._steps - 1)
 
-    def end(self) -> None:
-        """The run is over; nobody listens any more."""
+    def end(self) -> list[dict[str, Any]]:
+        """The run is over, nobody listens any more; returns what was set, as a scenario writes its events."""
         self._send({"ended": True})
+        return self._events
 
     def _introduce(self) -> None:
         """Wait until the other side follows the rows: those of a short run would be gone before."""
@@ -147,17 +147,18 @@ class Control:
         name, variable = self._adjustable[full_name]
         try:
             for own, checked in assign(name, {variable.name: variable}, variable.name, value).items():
-                self._components[name].set(own, checked)
+                with calling(name, "set", "step", self._grid.seconds(n)):
+                    self._components[name].set(own, checked)
         except (ValueError, TypeError, OverflowError) as error:
             raise InputError(str(error)) from error
         self._note(n, full_name, value)
 
     def _note(self, n: int, name: str, value: Any) -> None:
         """Kept beside the rows too, so that it is known of a run that comes to a bad end."""
-        self.events.append({"time": self._written(n), "set": {name: value}})
+        self._events.append({"time": self._written(n), "set": {name: value}})
         journal = current()
         if journal and journal.folder:
-            write_metadata({**read_metadata(journal.folder), "live_events": self.events})
+            write_metadata({**read_metadata(journal.folder), "live_events": self._events})
 
     def _written(self, n: int) -> float | str:
         """Time of communication point n as a scenario has to write it to mean exactly that."""

@@ -36,7 +36,7 @@ class Session:
         self._about: dict[str, Any] = {}
         self._state: dict[str, Any] = {"version": 0, "paused": False, "speed": None, "time": 0.0, "ended": False}
         self.feed: Feed | None = None
-        #: when somebody last looked (s, monotonic), and whether everything was shown until the end
+        #: until when somebody looks (s, monotonic), and whether everything was shown until the end
         self.looked, self.complete = 0.0, False
         self._listener = Thread(target=self._listen, daemon=True)
 
@@ -48,6 +48,7 @@ class Session:
             while True:
                 self._hear(json.loads(self._link.recv_bytes()))
         except (EOFError, OSError, ValueError):
+            self._link.close()
             self.end()
 
     def _hear(self, message: dict[str, Any]) -> None:
@@ -57,7 +58,7 @@ class Session:
             self.feed = Feed(folder, header, about["rows"])
             self._about = about
             self._link.send_bytes(b"{}")
-        changes = {key: message[key] for key in ("paused", "speed", "time", "ended") if key in message}
+        changes: dict[str, Any] = {key: message[key] for key in ("paused", "speed", "time", "ended") if key in message}
         with self._changed:
             self._state = {**self._state, **changes, "version": self._state["version"] + 1}
             self._changed.notify_all()
@@ -85,7 +86,7 @@ class Session:
     def news(self, first: int, version: int) -> tuple[dict[str, Any], bytes]:
         """The state of the run and the rows from `first` on, when there are any or the state is not that of `version`; else
         after a while."""
-        until = time.monotonic() + PATIENCE
+        self.looked = until = time.monotonic() + PATIENCE
         while True:
             state, available = self._state, self._available()
             if available > first or state["version"] != version or time.monotonic() > until:
@@ -117,11 +118,13 @@ class Session:
 
     def _answer(self, number: int) -> dict[str, Any]:
         until = time.monotonic() + LONGEST_STEP
-        while not self._state["ended"] and time.monotonic() < until:
+        while time.monotonic() < until:
             try:
-                answer = self._answers.get(timeout=1.0)
+                answer = self._answers.get(timeout=0.2)
             except Empty:
+                if self._state["ended"]:
+                    return {"error": "the run has ended"}
                 continue
             if answer.pop("id") == number:
                 return answer
-        return {"error": "the run has ended" if self._state["ended"] else f"no answer within {LONGEST_STEP:g} s"}
+        return {"error": f"no answer within {LONGEST_STEP:g} s"}
