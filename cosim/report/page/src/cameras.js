@@ -12,11 +12,16 @@ export class Cameras {
     this.controls.maxPolarAngle = 0.496 * Math.PI;
     this.controls.minDistance = 0.5;
     this.controls.maxDistance = 400;
-    this.centre = box.getCenter(new Vector3());
-    this.size = box.getSize(new Vector3()).length();
+    this.cover(box);
     this.views = views;
     this.mode = "orbit";
     this.carried = new Vector3();
+  }
+
+  /** This box is everything, as far as it is known. */
+  cover(box) {
+    this.centre = box.getCenter(new Vector3());
+    this.size = box.getSize(new Vector3()).length();
   }
 
   /** Turn to a camera: "orbit", "chase", "top", or a view that is fixed to a body. `subject` is what is followed. */

@@ -37,8 +37,9 @@ export function connectTime(page, player) {
   page.speed.addEventListener("change", () => player.setSpeed(Number(page.speed.value)));
   page.root.addEventListener("keydown", (event) => key(event, player));
   page.root.tabIndex = -1;
-  const digits = player.last < 1000 ? 2 : 1;
   player.onReading(() => {
+    const digits = player.last < 1000 ? 2 : 1;
+    page.scrubber.max = player.last;
     page.play.innerHTML = player.playing ? PAUSE : PLAY;
     page.scrubber.value = player.time;
     page.clock.innerHTML = `<b>${player.time.toFixed(digits)}</b> / ${player.last.toFixed(digits)} s`;
@@ -67,7 +68,7 @@ function choice(parent, labels, choose) {
   return (value) => buttons.forEach((button) => button.setAttribute("aria-pressed", button.dataset.value === value));
 }
 
-export function connectView(page, view, scene) {
+export function connectView(page, view, scene, first) {
   const labels = { orbit: "Orbit", chase: "Chase", top: "Top", ...Object.fromEntries(scene.views.map(({ name }) => [name, name])) };
   const choose = (mode) => {
     view.choose(mode);
@@ -80,7 +81,7 @@ export function connectView(page, view, scene) {
     target.setAttribute("aria-pressed", pressed);
     view.show(target.dataset.layer, pressed);
   });
-  choose("orbit");
+  choose(first);
 }
 
 function chip(actor, follow) {
@@ -95,6 +96,7 @@ function chip(actor, follow) {
 /** Where Boolean signals hold, along the scrubber. */
 export function showSpans(page, run, spans) {
   const length = run.last - run.first || 1;
+  page.spans.replaceChildren();
   for (const { signal, label, colour } of spans.filter(({ signal }) => run.has(signal))) {
     for (const [first, last] of run.spans(signal)) {
       const mark = page.spans.appendChild(document.createElement("i"));

@@ -2,21 +2,26 @@
 import "uplot/dist/uPlot.min.css";
 import "./style.css";
 import { build, connectSignals, connectTime, connectView, showSpans } from "./controls.js";
+import { Live } from "./live.js";
 import { Player } from "./player.js";
 import { Plots } from "./plots.js";
 import { Run } from "./run.js";
+import { steer } from "./steering.js";
 import { onThemeChange, themeButtons } from "./theme.js";
 import { View } from "./view.js";
 
+const REDRAW = 500; // ms between drawings of what has grown
+
 async function start(root, data) {
-  const runs = await Promise.all(data.runs.map(Run.decoded));
+  const live = data.live && new Live(data.live);
+  const runs = live ? [await live.begin()] : await Promise.all(data.runs.map(Run.decoded));
   const player = new Player(runs[0].first, Math.max(...runs.map((run) => run.last)));
   const page = build(root);
   connectTime(page, player);
   const view = sceneView(page, data.scene, runs);
   if (view) {
     player.onChange(() => view.update(player.time));
-    connectView(page, view, data.scene);
+    connectView(page, view, data.scene, live ? "chase" : "orbit");
     showSpans(page, runs[0], data.scene.spans);
   }
   const plots = new Plots(page.plots, runs, player);
@@ -25,7 +30,23 @@ async function start(root, data) {
   onThemeChange(() => (view?.recolour(), plots.recolour()));
   player.tell();
   animate(player, view);
-  return { player, view, plots, runs };
+  if (live) watch(live, page, { player, view, plots, spans: data.scene.spans });
+  return { player, view, plots, runs, live };
+}
+
+/** Show what comes until the run has ended; then the page is a replay as any. */
+function watch(live, page, { player, view, plots, spans }) {
+  const show = steer(page, live);
+  let drawn = 0;
+  live.follow(() => {
+    player.grow(live.run.last);
+    show();
+    if (performance.now() - drawn < REDRAW && !live.state.complete) return;
+    drawn = performance.now();
+    plots.grow();
+    view?.grow();
+    if (view) showSpans(page, live.run, spans);
+  });
 }
 
 function sceneView(page, scene, runs) {

@@ -30,6 +30,14 @@ export class Player {
     this.tell();
   }
 
+  /** There is more to see, until `last`; who stands at the end stays there. */
+  grow(last) {
+    if (last === this.last) return;
+    if (this.time >= this.last) this.time = last;
+    this.last = last;
+    this.tell();
+  }
+
   toggle() {
     if (this.playing) {
       this.playing = false;

@@ -46,8 +46,6 @@ class Plot {
 
   #draw() {
     const series = this.#series();
-    const tables = this.runs.map((run) => [run.time, ...series.filter((s) => s.run === run).map((s) => run.values(s.name))]);
-    const data = tables.length === 1 ? tables[0] : uPlot.join(tables.filter((table) => table.length > 1));
     const sorted = this.runs.flatMap((run) => series.filter((s) => s.run === run)).map((s) => ({ ...s, spanGaps: true }));
     const unit = this.runs[0].units[this.signals[0]] ?? "";
     const options = {
@@ -57,11 +55,22 @@ class Plot {
       cursor: { drag: { x: false, y: false, setScale: false }, points: { show: false }, y: false, x: false },
     };
     this.chart?.destroy();
-    this.chart = new uPlot(options, data, this.element);
+    this.chart = new uPlot(options, this.#data(series), this.element);
     this.element.dataset.unit = unit;
     this.line = this.chart.over.appendChild(document.createElement("div"));
     this.line.className = "now";
     this.#scrub(this.chart.over);
+    this.update();
+  }
+
+  #data(series) {
+    const tables = this.runs.map((run) => [run.time, ...series.filter((s) => s.run === run).map((s) => run.values(s.name))]);
+    return tables.length === 1 ? tables[0] : uPlot.join(tables.filter((table) => table.length > 1));
+  }
+
+  /** The runs have more rows. */
+  grow() {
+    this.chart.setData(this.#data(this.#series()));
     this.update();
   }
 
@@ -128,6 +137,10 @@ export class Plots {
     plot.chart.destroy();
     plot.element.remove();
     this.list.splice(this.list.indexOf(plot), 1);
+  }
+
+  grow() {
+    this.list.forEach((plot) => plot.grow());
   }
 
   recolour() {

@@ -21,6 +21,7 @@ export class Trail {
   constructor(run, body, colour, isOther) {
     this.rows = spread(run, MOST_POINTS).filter((row) => run.position(body, row).toArray().every(Number.isFinite));
     const points = this.rows.map((row) => run.position(body, row));
+    if (points.length === 1) points.push(points[0]); // a line has two ends
     const thin = new LineBasicMaterial({ color: colour, transparent: true, opacity: 0.4, depthWrite: false });
     this.whole = new Line(new BufferGeometry().setFromPoints(points), thin);
     const dashes = isOther ? { dashed: true, dashSize: 0.12, gapSize: 0.1 } : {};
@@ -29,6 +30,10 @@ export class Trail {
     this.past.computeLineDistances();
     this.lines = [this.whole, this.past];
     for (const line of this.lines) line.frustumCulled = false;
+  }
+
+  dispose() {
+    for (const line of this.lines) line.geometry.dispose(), line.material.dispose();
   }
 
   /** Draw as past what lies before a row. */
@@ -55,6 +60,12 @@ export class Ghosts {
     });
     this.mesh.frustumCulled = false;
     this.mesh.visible = false;
+  }
+
+  dispose() {
+    this.mesh.geometry.dispose();
+    this.mesh.material.dispose();
+    this.mesh.dispose();
   }
 
   /** Show those of the past. */

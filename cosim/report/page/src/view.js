@@ -38,9 +38,7 @@ export class View {
     this.actors = runs.flatMap((run, i) => scene.bodies.filter((body) => run.knows(body)).map((body) => this.#actor(run, body, i > 0)));
     this.own = this.actors.filter((actor) => actor.run === runs[0]);
     this.subject = this.own[0];
-    const places = this.own.flatMap(({ run, body }) => Array.from({ length: 60 }, (_, i) => run.position(body, Math.floor((i * run.time.length) / 60))));
-    const known = places.filter((place) => place.toArray().every(Number.isFinite));
-    this.cameras = new Cameras(canvas, boxAround(known), Object.fromEntries(scene.views.map((view) => [view.name, view])));
+    this.cameras = new Cameras(canvas, this.#box(), Object.fromEntries(scene.views.map((view) => [view.name, view])));
     this.cameras.controls.addEventListener("change", () => this.request());
     this.recolour();
     new ResizeObserver(() => this.#resize()).observe(canvas.parentElement);
@@ -64,11 +62,36 @@ export class View {
   #actor(run, body, isOther) {
     const object = new Group().add(bodyOf(body.parts));
     if (isOther) this.#veil(object);
+    const reach = reachOf(body.parts);
+    this.scene.add(object);
+    return { run, body, object, ...this.#past(run, body, isOther), reach, get position() { return object.position; } };
+  }
+
+  #past(run, body, isOther) {
     const trail = new Trail(run, body, isOther ? OTHER : body.colour, isOther);
     const ghosts = isOther || !body.parts.some((part) => part.opacity === 1) ? null : new Ghosts(run, body);
-    this.scene.add(object, ...trail.lines, ...(ghosts ? [ghosts.mesh] : []));
-    const reach = reachOf(body.parts);
-    return { run, body, object, trail, ghosts, reach, get position() { return object.position; } };
+    this.scene.add(...trail.lines, ...(ghosts ? [ghosts.mesh] : []));
+    return { trail, ghosts };
+  }
+
+  #box() {
+    const places = this.own.flatMap(({ run, body }) => Array.from({ length: 60 }, (_, i) => run.position(body, Math.floor((i * run.time.length) / 60))));
+    return boxAround(places.filter((place) => place.toArray().every(Number.isFinite)));
+  }
+
+  /** The runs have more rows. */
+  grow() {
+    for (const actor of this.actors) {
+      const { run, body, trail, ghosts } = actor;
+      this.scene.remove(...trail.lines, ...(ghosts ? [ghosts.mesh] : []));
+      Object.assign(actor, this.#past(run, body, run !== this.runs[0]));
+      for (const line of actor.trail.lines) line.visible = trail.whole.visible;
+      if (ghosts) actor.ghosts.mesh.visible = ghosts.mesh.visible;
+      trail.dispose();
+      ghosts?.dispose();
+    }
+    this.cameras.cover(this.#box());
+    this.update(this.time);
   }
 
   /** The second run's bodies are tinted and translucent. */
