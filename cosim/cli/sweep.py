@@ -85,11 +85,10 @@ def _run(
 def _draw(sweep: Sweep, ledger: Ledger, summary: Summary, folder: Path, replays: bool, workers: int | None) -> None:
     """Maps, replays of their cells, and the page."""
     from ..sweep.maps import success_maps
-    from ..sweep.page import write_figures, write_page
+    from ..sweep.page import write_page
     from ..sweep.replays import write_replays
 
     maps = success_maps(sweep, sweep.rows(ledger))
-    write_figures(maps, folder)
     if replays:
         runs = [cell.shown.number for each in maps for cell in each.cells.values() if cell.shown]
         for run, cause in write_replays(sweep, runs, folder, workers or studies.processors()).items():

@@ -18,12 +18,13 @@ from .outcome import Summary, run_command
 from .replays import page_of
 from .sweep import Sweep
 
+PAGE = "sweep.html"
 #: so many different labels of a factor are listed
 _LISTED = 12
 
 
 def write_page(sweep: Sweep, summary: Summary, maps: Sequence[SuccessMap], folder: Path) -> None:
-    """Write sweep.html: success by the levels of factors, KPIs, maps, causes of failures, the design.
+    """Write every map as NAME.png and NAME.svg, and sweep.html: maps, success by levels, KPIs, causes of failures, the design.
 
     A click on a cell of a map leads to the replay of one of its runs where there is one, else to the command that shows it.
     """
@@ -38,22 +39,14 @@ def write_page(sweep: Sweep, summary: Summary, maps: Sequence[SuccessMap], folde
         design=list(_design(sweep)),
         criteria=[_limits(check) for check in sweep.criteria],
         maps=[_drawn(sweep, each, folder) for each in maps],
-        commands=[cell for cell in cells if cell["link"].startswith("#")],
-        replays=[cell for cell in cells if not cell["link"].startswith("#")],
+        commands=[cell for cell in cells if cell["link"].startswith(PAGE)],
+        replays=[cell for cell in cells if not cell["link"].startswith(PAGE)],
         kpis=list(overall.statistics()) if overall else [],
         version=__version__,
         file=sweep.read.document.file,
     )
-    with replacing(folder / "sweep.html") as temporary:
+    with replacing(folder / PAGE) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
-
-
-def write_figures(maps: Iterable[SuccessMap], folder: Path) -> None:
-    """Write every map as NAME.png and NAME.svg."""
-    for each in maps:
-        figure = draw_map(each)
-        for suffix in (".png", ".svg"):
-            save(figure, folder / f"{each.name}{suffix}")
 
 
 def _limits(check: Mapping[str, Any]) -> tuple[str, str]:
@@ -80,9 +73,12 @@ def _levels(factor: Factor) -> str:
 
 
 def _drawn(sweep: Sweep, map_: SuccessMap, folder: Path) -> dict[str, Any]:
-    """A map as SVG whose cells are links, and the width (in) that it was drawn for."""
+    """A map in its files; as SVG whose cells are links, and the width (in) that it was drawn for."""
     figure = draw_map(map_, lambda cell: _link(sweep, cell, folder))
+    save(figure, folder / f"{map_.name}.png")
     text = svg(figure)
+    with replacing(folder / f"{map_.name}.svg") as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
     return {"svg": markup(text[text.index("<svg") :]), "width": figure.get_figwidth()}
 
 
@@ -90,7 +86,7 @@ def _link(sweep: Sweep, cell: Cell, folder: Path) -> str:
     if cell.shown is None:
         return ""
     page = page_of(sweep, cell.shown.number)
-    return page if (folder / page).exists() else f"#run-{cell.shown.number}"
+    return page if (folder / page).exists() else f"{PAGE}#run-{cell.shown.number}"
 
 
 def _cells(sweep: Sweep, maps: Iterable[SuccessMap], folder: Path) -> Iterator[dict[str, Any]]:

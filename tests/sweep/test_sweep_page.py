@@ -66,13 +66,13 @@ def test_figures_lie_beside_the_table(results):
 
 def test_the_page_asks_nobody_for_anything(page):
     assert "script" not in page.tags
-    assert all(link.startswith(("#", "data:")) for link in page.links), page.links
+    assert all(link.startswith(("#", "sweep.html#", "data:")) for link in page.links), page.links
 
 
 def test_a_click_on_a_cell_leads_to_the_command_that_shows_a_run(lag, page):
-    clicks = [link for link in page.links if link.startswith("#run-")]
-    assert sorted(clicks) == ["#run-0", "#run-1", "#run-2", "#run-3"]
-    assert {click[1:] for click in clicks} <= page.identifiers
+    clicks = [link for link in page.links if link.startswith("sweep.html#run-")]
+    assert sorted(clicks) == [f"sweep.html#run-{run}" for run in range(4)]
+    assert {click.partition("#")[2] for click in clicks} <= page.identifiers
     assert f"cosim run {lag.folder / 'lag.json'} --set" in page.words
     assert re.search(r"Run 2, the first that is no success in\s+start = high,\s+T = quick", page.words)
 
@@ -100,7 +100,7 @@ def test_a_replay_shows_all_that_the_scenario_records(replayed, results):
 
 def test_a_run_that_crashes_has_its_command_and_is_named(replayed):
     page, done = replayed
-    assert {link for link in page.links if link.startswith("#run-")} == {"#run-1", "#run-3"}
+    assert {link for link in page.links if link.startswith("sweep.html#run-")} == {"sweep.html#run-1", "sweep.html#run-3"}
     assert "no replay of run 1: lag: fmi2DoStep failed" in done.err
 
 

@@ -30,7 +30,10 @@ async function start(root, data) {
   onThemeChange(() => (view?.recolour(), plots.recolour()));
   player.tell();
   animate(player, view);
-  if (live) watch(live, page, { player, view, plots, spans: data.scene.spans });
+  if (live) {
+    player.seek(player.last);
+    watch(live, page, { player, view, plots, spans: data.scene.spans });
+  }
   return { player, view, plots, runs, live };
 }
 

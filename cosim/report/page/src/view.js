@@ -26,7 +26,7 @@ function drawnBySoftware() {
 
 export class View {
   constructor(canvas, scene, runs) {
-    this.runs = runs;
+    Object.assign(this, { runs, time: runs[0].first });
     this.scene = new Scene();
     const software = drawnBySoftware();
     this.renderer = new WebGLRenderer({ canvas, antialias: !software });
