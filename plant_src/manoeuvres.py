@@ -54,10 +54,15 @@ class Track:
 
 
 def track(result: Result, vehicle: str, start: float, midships: Point = CENTRE_OF_MASS) -> Track:
-    """The motion of `vehicle` ("plant.usv") from `start` (s) on. Raises InputError for a start outside the result."""
+    """The motion of `vehicle` ("plant.usv") from `start` (s) on; not a number when the run ended before.
+
+    Raises InputError for a start before the first row.
+    """
     time = result.time
-    if not time.size or not time[0] <= start <= time[-1]:
+    if not time.size or start < time[0]:
         raise InputError(f"the manoeuvre starts at {start:g} s, where nothing was recorded")
+    if start > time[-1]:
+        return Track(*(np.full(1, math.nan, dtype) for dtype in (float, complex, float, float)))
     later = time > start
     place = result[f"{vehicle}.position.x"] + 1j * result[f"{vehicle}.position.y"] + _offset(result, vehicle, midships)
     place, heading = (
@@ -131,7 +136,7 @@ def turning_circle(
 def _last_turn(own: Track) -> tuple[float, float]:
     """Time (s) and length of track (m) of the last full turn, NaN when there is none."""
     turned = own.turned * math.copysign(1, own.turned[-1])
-    if turned[-1] < 2 * math.pi:
+    if not turned[-1] >= 2 * math.pi:
         return math.nan, math.nan
     begin = first_time(own.time, turned, turned[-1] - 2 * math.pi)
     return float(own.time[-1]) - begin, float(own.travelled[-1]) - own.at(own.travelled, begin).real

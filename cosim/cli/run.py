@@ -209,6 +209,8 @@ def _summary(result: Result, directory: Path, drawn: list[str], began: float) ->
     click.echo(f"{files} in {directory} ({time.perf_counter() - began:.1f} s in all)")
     if pace := result.metadata["real_time"]:
         click.echo(_pace(pace))
+    if events := result.metadata.get("live_events"):
+        click.echo(f"values were set {len(events)} times while it ran: run.json has them as events that repeat this run")
     if by := result.metadata["terminated_by"]:
         click.echo(f"{by['component']} asked to end the simulation at t = {by['time']:g} s")
 

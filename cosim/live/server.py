@@ -79,7 +79,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(refused.args[0], "text/plain", refused.args[0].phrase.encode())
 
     def _checked(self) -> str:
-        """The resource that is asked for by who sits here and knows the token; what changes anything is asked for by the page itself."""
+        """The resource that is asked for: by who sits here and knows the token; commands come from the page itself."""
         hosts, origins = (self.headers.get_all(name, []) for name in ("Host", "Origin"))
         if len(hosts) != 1 or hosts[0] not in self.server.hosts:
             raise Refused(HTTPStatus.FORBIDDEN)

@@ -54,12 +54,11 @@ class Session:
     def _hear(self, message: dict[str, Any]) -> None:
         folder = self._journal.folder
         if "about" in message and folder and (header := read_header(folder)):
-            about = message.pop("about")
-            self.feed = Feed(folder, header, about["rows"])
-            self._about = about
-            self._link.send_bytes(b"{}")
+            self.feed = Feed(folder, header, message["about"]["rows"])
+            self._link.send_bytes(b"{}")  # the first that the run hears; commands come after
         changes: dict[str, Any] = {key: message[key] for key in ("paused", "speed", "time", "ended") if key in message}
         with self._changed:
+            self._about = message.get("about", self._about)
             self._state = {**self._state, **changes, "version": self._state["version"] + 1}
             self._changed.notify_all()
         if "id" in message:
@@ -75,13 +74,16 @@ class Session:
 
     def about(self) -> dict[str, Any] | None:
         """What a page has to know before the first row, as soon as the run has come that far; None when it has ended before."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._about or self._state["ended"])
+        self._wait_for_the_beginning()
         if self.feed is None:
             return None
         adjustable = [{**each, "value": self._values.get(each["name"], each["value"])} for each in self._about["adjustable"]]
         layout = {"columns": self.feed.columns, "units": self.feed.units, "capacity": self.feed.capacity}
         return {**self._about, **layout, "adjustable": adjustable}
+
+    def _wait_for_the_beginning(self) -> None:
+        with self._changed:
+            self._changed.wait_for(lambda: self._about or self._state["ended"])
 
     def news(self, first: int, version: int) -> tuple[dict[str, Any], bytes]:
         """The state of the run and the rows from `first` on, when there are any or the state is not that of `version`; else
@@ -104,6 +106,7 @@ class Session:
 
     def command(self, message: Mapping[str, Any]) -> dict[str, Any]:
         """What the run answers to a command (see `control`)."""
+        self._wait_for_the_beginning()
         with self._one_at_a_time:
             self._commands += 1
             try:

@@ -21,7 +21,7 @@ from .server import ADDRESS, Server
 from .session import Session
 
 #: at the end a page that is open has so long to fetch the last rows (s)
-LAST_LOOK = 3.0
+LAST_LOOK = 2.0
 
 
 class Viewing:

@@ -88,6 +88,8 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
         yield "speed", f"{simulated / loop:.0f} × real time"
     yield "signals", str(len(result))
     yield "rows", str(len(result.time))
+    if events := result.metadata.get("live_events"):
+        yield "set by hand", f"{len(events)} times"
     if by := result.metadata.get("terminated_by"):
         yield "ended by", f"{by['component']} at {by['time']:g} s"
 

@@ -108,7 +108,8 @@ def _annotate(figure: Figure, grid: Any, map_: SuccessMap) -> None:
     figure.supylabel(map_.title(spec.y), fontsize=8, x=0.06 / figure.get_figwidth())
     if spec.columns:
         for axes, label in zip(grid[0], map_.along(spec.columns), strict=True):
-            axes.set_title(f"{map_.title(spec.columns)}: {_text(label)}", fontsize=7.5)
+            title = map_.title(spec.columns)
+            axes.set_title(f"{title}: {_text(label)}" if title else _text(label), fontsize=7.5)
     if spec.rows:
         for axes, label in zip(grid[:, -1], map_.along(spec.rows), strict=True):
             axes.text(1.02, 0.5, _text(label), transform=axes.transAxes, rotation=270, ha="left", va="center", weight="bold")

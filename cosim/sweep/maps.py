@@ -85,7 +85,7 @@ def success_maps(sweep: Sweep, rows: Iterable[Row]) -> list[SuccessMap]:
     """The maps that a sweep asks for, of its finished runs."""
     specs, kpi = sweep.read.spec.maps, ranking(sweep.criteria)
     found: list[dict[tuple[Any, ...], list[Run]]] = [{} for _ in specs]
-    for row in rows:
+    for row in rows if specs else ():
         run = Run(row.run, row.passed, float(row.record.kpis.get(kpi, math.nan)))
         for spec, cells in zip(specs, found, strict=True):
             cells.setdefault(tuple(row.point.labels[name] for name in spec.factors), []).append(run)

@@ -15,7 +15,7 @@ from .design import Factor
 from .map_figure import draw_map
 from .maps import Cell, SuccessMap
 from .outcome import Summary, run_command
-from .replays import page_of
+from .replays import page_of, settings_of
 from .sweep import Sweep
 
 PAGE = "sweep.html"
@@ -76,7 +76,7 @@ def _drawn(sweep: Sweep, map_: SuccessMap, folder: Path) -> dict[str, Any]:
     """A map in its files; as SVG whose cells are links, and the width (in) that it was drawn for."""
     figure = draw_map(map_, lambda cell: _link(sweep, cell, folder))
     save(figure, folder / f"{map_.name}.png")
-    text = svg(figure)
+    text = svg(figure).replace(' target="_blank"', "")
     with replacing(folder / f"{map_.name}.svg") as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
     return {"svg": markup(text[text.index("<svg") :]), "width": figure.get_figwidth()}
@@ -93,10 +93,5 @@ def _cells(sweep: Sweep, maps: Iterable[SuccessMap], folder: Path) -> Iterator[d
     """The run that each cell shows, once."""
     shown = {cell.shown.number: cell for map_ in maps for cell in map_.cells.values() if cell.shown is not None}
     for number, cell in sorted(shown.items()):
-        settings = sweep.study.job(sweep.design[number].settings).settings
-        yield {
-            "run": number,
-            "cell": cell,
-            "link": _link(sweep, cell, folder),
-            "command": run_command(sweep.read.scenario, settings),
-        }
+        command = run_command(sweep.read.scenario, settings_of(sweep, number))
+        yield {"run": number, "cell": cell, "link": _link(sweep, cell, folder), "command": command}

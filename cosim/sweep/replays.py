@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from .jobs import Job, Record
 from .local import LocalEngine
@@ -20,11 +21,14 @@ def page_of(sweep: Sweep, run: int) -> str:
     return f"{FOLDER}/{sweep.keys[run]}.html"
 
 
-def write_replays(sweep: Sweep, runs: Iterable[int], folder: Path, workers: int) -> dict[int, str]:
-    """Run these runs again and write their replays where there is none; returns the cause for each that could not be written.
+def settings_of(sweep: Sweep, run: int) -> dict[str, Any]:
+    """Settings that show a run: it records all that the scenario itself records, not only what the sweep needs."""
+    settings = sweep.study.job(sweep.design[run].settings).settings
+    return {name: value for name, value in settings.items() if not name.startswith("/record")}
 
-    Everything is recorded that the scenario itself records, not only what the sweep needs.
-    """
+
+def write_replays(sweep: Sweep, runs: Iterable[int], folder: Path, workers: int) -> dict[int, str]:
+    """Run these runs again and write their replays where there is none; returns the cause for each that could not be written."""
     pages = {run: folder / page_of(sweep, run) for run in dict.fromkeys(runs)}
     missing = {run: page for run, page in pages.items() if not page.exists()}
     (folder / FOLDER).mkdir(exist_ok=True)
@@ -35,8 +39,6 @@ def write_replays(sweep: Sweep, runs: Iterable[int], folder: Path, workers: int)
 
 
 def _write(sweep: Sweep, shop: Shop, run: int, page: Path) -> Record:
-    point = sweep.design[run]
-    job = sweep.study.job(point.settings)
-    settings = {name: value for name, value in job.settings.items() if not name.startswith("/record")}
-    labels = ", ".join(f"{name} {label}" for name, label in point.labels.items())
-    return shop.replay(Job(job.key, settings), f"{sweep.read.spec.name} run {run}: {labels}", page)
+    labels = ", ".join(f"{name} {label}" for name, label in sweep.design[run].labels.items())
+    job = Job(sweep.keys[run], settings_of(sweep, run))
+    return shop.replay(job, f"{sweep.read.spec.name} run {run}: {labels}", page)

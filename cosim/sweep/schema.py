@@ -137,7 +137,7 @@ class MapSpec(Spec):
     y: str
     columns: str | None = None
     rows: str | None = None
-    titles: dict[str, str] = Field({}, description='factor -> how a reader calls it, such as "wind speed (m/s)"')
+    titles: dict[str, str] = Field({}, description='factor -> how readers call it, such as "wind (m/s)"; empty: nothing is said')
 
     @property
     def factors(self) -> list[str]:
@@ -261,12 +261,18 @@ def _unique(what: str, names: Iterable[str]) -> None:
 
 def _mapped(map_: MapSpec, sweep: SweepSpec) -> None:
     """Raises ValueError when a factor of a map does not exist or has no levels."""
-    sampled = sweep.design.kind != "full_factorial"
-    known = [each.name for each in sweep.factors if not sampled or each.values is not None or each.levels is not None]
+    known = [each.name for each in sweep.factors if _has_labels(each, sweep.design.kind != "full_factorial")]
     known += ["seed"] if sweep.seeds else []
     for name in map_.factors:
         if name not in known:
             raise ValueError(f'"maps" names no factor with levels "{name}"{did_you_mean(name, known)}')
+
+
+def _has_labels(factor: FactorSpec, sampled: bool) -> bool:
+    """Whether a factor has levels that can stand at an axis."""
+    if factor.values is not None:
+        return not any(isinstance(value, list | dict) for value in factor.values)
+    return factor.levels is not None or not sampled
 
 
 def _set_once(factors: Sequence[FactorSpec], seeds: SeedsSpec | None) -> None:

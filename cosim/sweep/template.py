@@ -32,7 +32,7 @@ from .jobs import Job, Order
 from .run import Prepared, Replay, supervised_check, supervised_run
 
 #: what a run imports on its way
-_MODULES = ("fmpy.fmi1", "fmpy.fmi2", "fmpy.fmi3", "cosim.fmi.isolated.remote", "cosim.engine.native")
+_MODULES = ("fmpy.fmi1", "fmpy.fmi2", "fmpy.fmi3", "cosim.fmi.isolated.remote", "cosim.engine.native", "numpy.random")
 
 
 def serve(control: socket.socket) -> None:

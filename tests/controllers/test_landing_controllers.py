@@ -100,6 +100,24 @@ def test_in_the_place_of_the_cascaded_control_others_land_in_the_first_demo(tmp_
     assert kpis["descent.aborts"] == 0
 
 
+def touchdown_tilt(**parameters):
+    """Of the geometric control in short waves and gusts, on a fast vessel."""
+    sea = "/components/plant/arguments/environment"
+    weather = {
+        f"{sea}/waves/significant_height": 0.1,
+        f"{sea}/waves/peak_period": 1.79,
+        f"{sea}/wind/speed": 4.0,
+        f"{sea}/seed": 2,
+    }
+    flight = weather | {"usv.speed_command": 1.2} | {f"uav.{name}": value for name, value in parameters.items()}
+    return cosim.run(SCENARIOS / "landing_waves.json", flight, stop_time=13.0).kpis["touchdown.tilt"]
+
+
+def test_just_above_the_deck_it_rights_itself():
+    assert touchdown_tilt(flare_height=0.0) > 0.35
+    assert touchdown_tilt() < 0.25
+
+
 def standing_alone(document, folder, path):
     """The scenario in another folder, its files named in full, without figures and reference."""
     for spec in (*document["components"].values(), *document["kpis"]):

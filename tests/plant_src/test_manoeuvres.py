@@ -160,9 +160,14 @@ def test_a_vessel_that_coasts_has_stopped_at_a_speed():
     assert math.isnan(stopping(stopping_ship(), "usv", ORDER, LENGTH, speed=-9.0)["track_reach"])
 
 
-def test_an_order_outside_the_run_is_refused():
-    with pytest.raises(InputError, match="starts at 99 s, where nothing was recorded"):
-        turning_circle(circle(1), "usv", 99.0, LENGTH)
+def test_an_order_before_the_run_is_refused():
+    with pytest.raises(InputError, match="starts at -99 s, where nothing was recorded"):
+        turning_circle(circle(1), "usv", -99.0, LENGTH)
+
+
+@pytest.mark.parametrize("manoeuvre", [turning_circle, initial_turning, stopping])
+def test_after_an_order_that_never_came_nothing_was_reached(manoeuvre):
+    assert all(math.isnan(value) for value in manoeuvre(circle(1), "usv", 999.0, LENGTH).values())
 
 
 def test_the_strider_turns_on_the_circle_of_its_speed_and_rate(tmp_path):

@@ -109,6 +109,7 @@ def test_in_svg_every_cell_with_a_run_is_a_link(success_map):
     [
         ({"maps": [{"x": "sped", "y": "controller"}]}, ['"maps" names no factor with levels "sped"', 'did you mean "speed"?']),
         ({"maps": [{"x": "speed", "y": "speed"}]}, ["$.maps[0]", 'two axes of a map are called "speed"']),
+        ({"factors": [CONTROLLER, SPEED | {"values": [[1, 2]]}]}, ['"maps" names no factor with levels "speed"']),
         ({"maps": [{"x": "speed"}]}, ["$.maps[0]", '"y"']),
         (
             {

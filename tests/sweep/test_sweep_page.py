@@ -69,11 +69,12 @@ def test_the_page_asks_nobody_for_anything(page):
     assert all(link.startswith(("#", "sweep.html#", "data:")) for link in page.links), page.links
 
 
-def test_a_click_on_a_cell_leads_to_the_command_that_shows_a_run(lag, page):
+def test_a_click_on_a_cell_leads_to_the_command_that_shows_a_run_in_full(lag, page):
     clicks = [link for link in page.links if link.startswith("sweep.html#run-")]
     assert sorted(clicks) == [f"sweep.html#run-{run}" for run in range(4)]
     assert {click.partition("#")[2] for click in clicks} <= page.identifiers
     assert f"cosim run {lag.folder / 'lag.json'} --set" in page.words
+    assert "/record" not in page.words
     assert re.search(r"Run 2, the first that is no success in\s+start = high,\s+T = quick", page.words)
 
 
