@@ -8,7 +8,8 @@ from cosim.results import Result
 
 @pytest.fixture
 def run(tmp_path):
-    run = Watched(tmp_path, "free_flight", "--stop-time", "6", "--real-time", "0.5")
+    run = Watched(tmp_path, "free_flight", "--stop-time", "6", "--real-time", "0.2")
+    run.command("pause")  # until the page is there
     yield run
     run.process.kill()
     run.process.wait()
@@ -33,6 +34,7 @@ def waiting(page, condition):
 
 
 def test_a_run_is_watched_steered_and_replayed(run, page):
+    page.get_by_role("button", name="Resume", exact=True).click()
     waiting(page, "cosimReplay.player.time > cosimReplay.player.first && cosimReplay.live.run.rows > 20")
     page.get_by_role("button", name="Pause", exact=True).click()
     waiting(page, "document.querySelector('.state').textContent === 'Paused'")

@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -84,7 +85,7 @@ def test_what_was_set_stands_in_the_result_as_events_that_repeat_it(begun):
 
 def test_the_page_gets_the_rows_that_the_result_has(begun):
     columns = begun.page()["columns"]
-    begun.command("speed", factor=4.0)
+    begun.command("speed", factor=2.0)
     begun.command("resume")
     state, pieces = {"complete": False}, []
     while not state["complete"]:
@@ -98,12 +99,12 @@ def test_the_page_gets_the_rows_that_the_result_has(begun):
 
 
 def test_speed_is_that_of_the_clock(begun):
-    """0.5 s of the clock are 0.05 s of the run when it has a tenth of its speed, or less on a busy machine."""
-    begun.command("speed", factor=0.1)
+    """At a tenth of its speed a run is no further than a tenth of the time that has passed, on a busy machine not even there."""
+    began = time.monotonic()
     before = begun.command("resume")["time"]
-    with pytest.raises(subprocess.TimeoutExpired):
-        begun.process.wait(0.5)
-    assert begun.command("pause")["time"] - before <= 0.1
+    time.sleep(0.5)
+    moved = begun.command("pause")["time"] - before
+    assert 0 < moved <= 0.1 * (time.monotonic() - began) + 0.01
     assert begun.command("speed", factor=None)["speed"] is None
     begun.command("resume")
     assert begun.wait() in (0, 3)
