@@ -61,6 +61,11 @@ def bundle(scenario: Path, variants: Iterable[Mapping[str, Any]] = ({},)) -> Bun
     return Bundle(root, PurePosixPath(scenario.resolve().relative_to(root).as_posix()), files)
 
 
+def fmus(files: Iterable[str]) -> tuple[str, ...]:
+    """Those of some files that are FMUs."""
+    return tuple(sorted(path for path in files if path.endswith(".fmu")))
+
+
 def absolute_paths(scenario: Path, variants: Iterable[Mapping[str, Any]] = ({},)) -> list[Problem]:
     """Paths that mean nothing on another machine."""
     loaded = [load(scenario, _pointers(settings)) for settings in variants]

@@ -41,11 +41,15 @@ class Record:
 
 @dataclass(frozen=True)
 class Order:
-    """What all runs have in common: the scenario's file, the folder its messages are relative to, and a run's deadline (s)."""
+    """What all runs have in common: the scenario's file, the folder its messages are relative to, and a run's deadline (s).
+
+    `fmus` are the paths below that folder of all FMUs that some run uses.
+    """
 
     scenario: Path
     root: Path
     deadline: float | None = None
+    fmus: tuple[str, ...] = ()
 
 
 class Engine(Protocol):

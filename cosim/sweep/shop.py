@@ -19,6 +19,8 @@ from .jobs import Job, Order, Record
 ATTEMPTS = 3
 #: imports may take so long, and the end of all runs (s)
 _WARM_UP, _PATIENCE = 120.0, 5.0
+#: so many FMUs are unpacked in advance
+_MOST_WARM = 100
 #: one thread per process: many processes share the machine, and a process with threads cannot be forked
 _ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 #: a forked process touches all its memory for the first time: with large pages (glibc, Linux) that costs half as much
@@ -73,6 +75,7 @@ class _Template:
                 start_new_session=True,
             )
         request = {"scenario": str(order.scenario.resolve()), "root": str(order.root), "deadline": order.deadline, "cold": cold}
+        request["fmus"] = order.fmus[:_MOST_WARM]
         self._control.settimeout(_WARM_UP)
         with suppress(OSError):
             self._control.sendall(json.dumps(request).encode())

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from ..errors import InputError, Problem
 from ..scenario import load
-from .bundle import Bundle, bundle
+from .bundle import Bundle, bundle, fmus
 from .document import Read
 from .jobs import Engine, Job, Order, Record, key
 from .ledger import Ledger
@@ -43,7 +43,7 @@ class Study:
 
     @property
     def order(self) -> Order:
-        return Order(self.read.scenario, self.bundle.root, self.spec.deadline)
+        return Order(self.read.scenario, self.bundle.root, self.spec.deadline, fmus(self.bundle.files))
 
     def job(self, settings: Mapping[str, Any]) -> Job:
         """The run with these settings beside the common ones."""

@@ -38,7 +38,7 @@ _MODULES = ("fmpy.fmi1", "fmpy.fmi2", "fmpy.fmi3", "cosim.fmi.isolated.remote", 
 def serve(control: socket.socket) -> None:
     """Fork lanes until whoever started this process is gone."""
     request = json.loads(control.recv(1 << 16))
-    order = Order(Path(request["scenario"]), Path(request["root"]), request["deadline"])
+    order = Order(Path(request["scenario"]), Path(request["root"]), request["deadline"], tuple(request["fmus"]))
     with run_folder() as folder:
         tempfile.tempdir = os.environ["TMPDIR"] = folder
         for module in _MODULES:
@@ -59,16 +59,15 @@ def serve(control: socket.socket) -> None:
 
 
 def _warm(order: Order) -> Iterator[tuple[Path, FmuFile]]:
-    """Import and unpack what the scenario uses as it stands in its file; what is wrong with it, its runs will say."""
+    """Import what the scenario uses as it stands in its file, unpack all FMUs; what is wrong with them, the runs will say."""
     with suppress(CosimError):
-        scenario = load(order.scenario)
-        _import(scenario)
-        for path in {node.folder / fmu for node, name in scenario.root.leaves() if (fmu := node.spec.components[name].fmu)}:
-            with suppress(CosimError):
-                file = FmuFile(path)
-                if not file.description.only_once_per_process:
-                    file.acquire()
-                    yield path.resolve(), file
+        _import(load(order.scenario))
+    for path in order.fmus:
+        with suppress(CosimError):
+            file = FmuFile(order.root / path)
+            if not file.description.only_once_per_process:
+                file.acquire()
+                yield (order.root / path).resolve(), file
 
 
 def _import(scenario: Scenario) -> None:

@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from .bundle import identity
+from .bundle import fmus, identity
 from .jobs import Job, Order
 from .shop import Shop
 
@@ -85,7 +85,7 @@ def _shop(cargo: Cargo, worker: Any) -> Shop:
         place = (cargo.digest, cargo.deadline)
         if place not in _shops:
             root = _tree(cargo, worker)
-            _shops[place] = Shop(Order(root / cargo.scenario, root, cargo.deadline))
+            _shops[place] = Shop(Order(root / cargo.scenario, root, cargo.deadline, fmus(cargo.files)))
         return _shops[place]
 
 
