@@ -74,8 +74,8 @@ class _Template:
                 env={**_LARGE_PAGES, **os.environ, **_ONE_THREAD},
                 start_new_session=True,
             )
-        request = {"scenario": str(order.scenario.resolve()), "root": str(order.root), "deadline": order.deadline, "cold": cold}
-        request["fmus"] = order.fmus[:_MOST_WARM]
+        place = {"scenario": str(order.scenario.resolve()), "root": str(order.root), "fmus": order.fmus[:_MOST_WARM]}
+        request = {**place, "deadline": order.deadline, "cold": cold}
         self._control.settimeout(_WARM_UP)
         with suppress(OSError):
             self._control.sendall(json.dumps(request).encode())

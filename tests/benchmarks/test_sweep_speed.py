@@ -80,7 +80,7 @@ def test_overhead_of_a_run():
     scenario = find("demo1_box")
     files = prepared_files(scenario)
     times = {"bare, FMUs unpacked": [], "cosim.run": [], "a run of a sweep": []}
-    with LocalEngine(Order(scenario, scenario.parent), 1) as engine:
+    with LocalEngine(Order(scenario, scenario.parent, fmus=tuple(map(str, files))), 1) as engine:
         for number in range(RUNS):
             times["bare, FMUs unpacked"].append(milliseconds(bare, job(number), scenario, files))
             times["cosim.run"].append(milliseconds(cosim.run, scenario, job(number).settings))
