@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from .sea import Sea
@@ -51,13 +51,18 @@ class Below:
 
     def distance(self, x: float, y: float, z: float, time: float, wave_gain: float) -> float:
         """From a point in the world (m); zero below the water."""
+        solid = max((height for height in self._solids(x, y) if height <= z), default=None)
+        if solid is not None:  # it keeps the water away
+            return z - solid
         surface = wave_gain * self._elevation(x, y, time) if z < HIGH and self._elevation else 0.0
+        return max(z - surface, 0.0)
+
+    def _solids(self, x: float, y: float) -> Iterator[float]:
+        """Heights (m) of decks and platforms at a place."""
         for deck in self._decks:
-            height = deck.height(x, y)
-            if height is not None and surface < height <= z:
-                surface = height
+            if (height := deck.height(x, y)) is not None:
+                yield height
         for platform in self._platforms:
             (px, py, pz), (ex, ey, ez) = platform.position, platform.size
-            if abs(x - px) <= ex / 2 and abs(y - py) <= ey / 2 and surface < pz + ez / 2 <= z:
-                surface = pz + ez / 2
-        return max(z - surface, 0.0)
+            if abs(x - px) <= ex / 2 and abs(y - py) <= ey / 2:
+                yield pz + ez / 2
