@@ -70,9 +70,9 @@ def test_a_second_interrupt_does_not_ask(workplace):
 def test_the_end_of_the_terminal_is_no_loss(workplace):
     """What ends a process politely, such as a closed terminal or `timeout`, counts as an interrupt."""
     process = workplace.start("run", workplace.scenario(), *RUN)
-    assert workplace.reached("started")
+    before = until(lambda: rows(workplace))
     process.send_signal(signal.SIGTERM)
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 130, errors
-    assert until(lambda: rows(workplace) > 0, 1.0)
+    assert rows(workplace) > before > 0
     assert workplace.left() == []
