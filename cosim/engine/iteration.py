@@ -7,7 +7,7 @@ round where a stage before theirs gave it. The last round's inputs therefore bel
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from ..component import Component
 from ..errors import ComponentError
+from ..journal import calling
 from .layout import Dtype, Layout
 from .moves import Move
 from .plan import Loop
@@ -29,6 +30,7 @@ class Rounds:
 
     def __init__(self, loop: Loop, signals: Layout, phases: Sequence[Round], take: Callable[[Turn], bool]):
         self._loop, self._phases, self._take = loop, phases, take
+        self._components = loop.components
         outputs: dict[Dtype, dict[int, str]] = defaultdict(dict)
         for connection in loop.connections:
             slot = signals.places[connection.source]
@@ -42,11 +44,10 @@ class Rounds:
         Raises ComponentError when the outputs still change after the last round that is allowed.
         """
         with ExitStack() as stack:
-            states = [(component, self._state(component, stack)) for component in self._loop.components.values()]
+            states = {name: self._state(name, component, time, stack) for name, component in self._components.items()}
             for number in range(self._loop.iteration.limit):
                 if number:
-                    for component, state in states:
-                        component.set_state(state)
+                    self._return_to(states, time)
                 before = self._values()
                 if self._round(first=number == 0):
                     return True
@@ -55,10 +56,22 @@ class Rounds:
                     return False
         raise ComponentError(self._loop.name, "iteration", self._complaint(moved), time)
 
-    def _state(self, component: Component, stack: ExitStack) -> Any:
-        state = component.get_state()
-        stack.callback(component.free_state, state)
+    def _state(self, name: str, component: Component, time: float, stack: ExitStack) -> Any:
+        """The component's state, which is freed with the stack."""
+        with calling(name, "get_state", "step", time):
+            state = component.get_state()
+
+        def free() -> None:
+            with calling(name, "free_state", "step", time):
+                component.free_state(state)
+
+        stack.callback(free)
         return state
+
+    def _return_to(self, states: Mapping[str, Any], time: float) -> None:
+        for name, state in states.items():
+            with calling(name, "set_state", "step", time):
+                self._components[name].set_state(state)
 
     def _round(self, first: bool) -> bool:
         for moves, once, turns in self._phases:
