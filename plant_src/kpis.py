@@ -144,7 +144,7 @@ def touchdown(result: Result, vehicle: str, deck: str, mass: float) -> dict[str,
         "tilt": float(deck_frame.tilt(result, vehicle, deck)[row]),
         "deck_roll": float(result[f"{vessel}.attitude.roll"][row]),
         "deck_pitch": float(result[f"{vessel}.attitude.pitch"][row]),
-        "deck_heave": float(height[row] - height.mean()),
+        "deck_heave": float((height[row] - height).mean()),
         "peak_force": float(result[f"{vehicle}.contact.force"][row:].max()),
     }
 
