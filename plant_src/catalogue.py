@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim.component import Causality, Variable
 
-from .shadow import FloatingBody, FreeBody, PlanarChain, Shadow
+from .shadow import FloatingBody, FreeBody, PlanarBody, Shadow
 from .vehicles import multirotor_interface
 from .vehicles.airframe import Airframe
 from .vehicles.ar_drone import geometry as ar_drone
@@ -79,7 +79,7 @@ def _multirotor(airframe: Airframe, body: Body) -> Model:
 
 
 _STRIDER = Model(
-    "strider", strider_interface.VARIABLES, strider_interface.STATES, strider.BODY, PlanarChain, is_vessel=True, motion="planar"
+    "strider", strider_interface.VARIABLES, strider_interface.STATES, strider.BODY, PlanarBody, is_vessel=True, motion="planar"
 )
 
 MODELS = {

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import accumulate, groupby
-from operator import itemgetter
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,8 +11,7 @@ import numpy as np
 from .bullet import pybullet
 from .shadow import Shadow
 
-#: fields of Bullet's contact points
-_bodies, _normal_force = itemgetter(1, 2), itemgetter(9)
+_BODY_A, _BODY_B, _NORMAL_FORCE = 1, 2, 9  # fields of Bullet's contact points
 
 
 class _Published(NamedTuple):
@@ -55,11 +53,15 @@ class Contacts:
         Returns how many vehicles had some.
         """
         self.any = True
+        forces: dict[tuple[int, int], float] = {}
+        for point in pybullet.getContactPoints(physicsClientId=self._client):
+            pair = point[_BODY_A], point[_BODY_B]
+            forces[pair] = forces.get(pair, 0.0) + point[_NORMAL_FORCE]
         touching = set()
-        for (a, b), points in groupby(pybullet.getContactPoints(physicsClientId=self._client), _bodies):
-            if force := sum(map(_normal_force, points)) * share:
-                self._touch(a, b, force)
-                self._touch(b, a, force)
+        for (a, b), force in forces.items():
+            if force:
+                self._touch(a, b, force * share)
+                self._touch(b, a, force * share)
                 touching |= {a, b}
         return len(touching & self._published.keys())
 

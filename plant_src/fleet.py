@@ -53,7 +53,16 @@ class Fleet:
         self._impulses: Any = memory.whole["impulse"].data
         #: whether a vehicle may have left what it was near
         self._leaving = True
+        self._let_bullet_take_note()
         self._choose([True] * len(self.shadows))
+
+    def _let_bullet_take_note(self) -> None:
+        """A step in which nothing can meet: with the next one Bullet uses the inertia that it was given."""
+        for engaged in (False, True):
+            for shadow in self.shadows:
+                shadow.engage(engaged)
+            if not engaged:
+                pybullet.stepSimulation(self._client)
 
     def advance(self, share: float) -> None:
         """One step, which is this share of the component's. Raises UnsoundError; if before the step, nothing has moved."""

@@ -18,7 +18,7 @@ import math
 import struct
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from .vehicles.shapes import Body, Box
 if TYPE_CHECKING:
     from .arguments import Spawn
     from .catalogue import Model
+    from .environment.sea import Sea
 
 #: friction of every surface; Bullet multiplies those of the two bodies in contact
 FRICTION = 1.0
@@ -38,11 +39,14 @@ FRICTION = 1.0
 #: bodies that do not take part stand in a row from here on (m), where no vehicle can be
 PARKING, PARKING_SPACE = 2 * LARGEST_STATE, 100.0
 
+#: so far Bullet may lift or sink a planar vessel (m) before it is put back to its height
+LARGEST_HEAVE = 1e-9
+
 _MAX_VELOCITY = 1e6  # Bullet limits velocities silently, by default at 100 m/s and rad/s
 _vector = struct.Struct("3d").unpack_from
 _ANGULAR = struct.calcsize("3d")  # where the angular part of a motion begins
+_write_vector = struct.Struct("3d").pack_into
 _write_twist = struct.Struct("6d").pack_into
-_write_rates = struct.Struct("3d").pack_into
 
 Names = tuple[Sequence[str], Sequence[str]]  # of the arguments and of the results of a compiled function
 
@@ -138,6 +142,8 @@ class FreeBody(Shadow):
     """A vehicle that moves freely in space; its frame in Bullet has the principal axes of inertia."""
 
     PIECES: ClassVar[Mapping[str, int]] = {"twist": 6, "motion": 6, "torque": 3, "pose": 7}
+    #: Bullet takes half as long, but its saved states lack the inertia of such a body in world axes
+    IN_MAXIMAL_COORDINATES = False
     BEFORE: ClassVar[Names] = (
         ("state", "inputs", "surroundings", "constants", "step", "anchor", "leash"),
         ("start", "predicted", "twist", "motion", "torque", "pose", "path", "alarm"),
@@ -151,7 +157,8 @@ class FreeBody(Shadow):
         return Enclosure((-radius, -radius, -radius), (radius, radius, radius))
 
     def _create(self, body: Body) -> int:
-        number = pybullet.createMultiBody(body.mass, compound(body.boxes, self._client), -1, physicsClientId=self._client)
+        shape, maximal = compound(body.boxes, self._client), self.IN_MAXIMAL_COORDINATES
+        number = pybullet.createMultiBody(body.mass, shape, -1, useMaximalCoordinates=maximal, physicsClientId=self._client)
         set_dynamics(self._client, number, -1, body)
         self._torque = self._pieces["torque"].data
         return number
@@ -179,21 +186,31 @@ class FloatingBody(FreeBody):
     )
     AFTER = ((*FreeBody.AFTER[0], "previous"), (*FreeBody.AFTER[1], "carried"))
 
+    def surface(self, sea: Sea) -> Callable[[float], float]:
+        """Height of the water (m) above or below the vessel at a time (s)."""
+        place, height = np.zeros(3), np.zeros(1)
+        count = np.full(1, float(len(sea.phase)))
+        call = bound(load(self.model.name).shadow_surface, [place, count, sea.table()], [height])
+        where, found, here = place.data, height.data, self.outputs.data
 
-class PlanarChain(Shadow):
-    """A vessel in the horizontal plane: a chain of joints x, y and yaw with massless links, so that only the hull has inertia.
+        def elevation(time: float) -> float:
+            _write_vector(where, 0, here[0], here[1], time)
+            call()
+            return found[0]
 
-    The joints carry heave, roll and pitch; loads in these directions have no effect.
-    """
+        return elevation
 
-    PIECES = {"twist": 3, "motion": 3, "effort": 3, "pose": 6, "rates": 3}
+
+class PlanarBody(FreeBody):
+    """A vessel in the horizontal plane: it has no roll and no pitch, and what presses it down is carried by the water at once."""
+
+    PIECES = {**FreeBody.PIECES, "pressed": 3, "previous": 2}
+    IN_MAXIMAL_COORDINATES = True  # the inertia about the world's z axis is always the same
     BEFORE = (
-        ("state", "inputs", "surroundings", "constants", "step", "anchor", "leash", "rates"),
-        ("start", "predicted", "twist", "motion", "effort", "pose", "path", "alarm"),
+        (*FreeBody.BEFORE[0], "pressed"),
+        ("start", "predicted", "twist", "motion", "pose", "previous", "path", "alarm"),
     )
-    AFTER = (("start", "predicted", "twist", "motion", "constants", "step"), ("state", "impulse", "outputs", "rates"))
-    AT_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    _JOINTS = (0, 1, 2)
+    AFTER = ((*FreeBody.AFTER[0], "previous"), (*FreeBody.AFTER[1], "pressed"))
 
     @staticmethod
     def enclosure(body: Body) -> Enclosure:
@@ -203,52 +220,15 @@ class PlanarChain(Shadow):
         return Enclosure((-radius, -radius, low), (radius, radius, high))
 
     def _create(self, body: Body) -> int:
-        number = planar_chain(self._client, body)
-        for joint in self._JOINTS:
-            options = {"physicsClientId": self._client}
-            pybullet.setJointMotorControl2(number, joint, pybullet.VELOCITY_CONTROL, force=0, **options)
-            pybullet.changeDynamics(number, joint, jointDamping=0, **options)
-        for joint in (-1, *self._JOINTS[:2]):
-            set_dynamics(self._client, number, joint)
-        set_dynamics(self._client, number, self._JOINTS[2], body)
-        self._effort = self._pieces["effort"].data
-        return number
-
-    def _place(self, pose: Sequence[float]) -> None:
-        for joint in self._JOINTS:
-            pybullet.resetJointState(self.body, joint, pose[joint], pose[3 + joint], self._client)
+        self._previous: Any = self._pieces["previous"].data
+        never = 0.0  # Bullet's word for an infinite inertia
+        return super()._create(body._replace(inertia=(never, never, body.inertia[2])))
 
     def push(self) -> None:
-        pybullet.setJointMotorControlArray(
-            self.body, self._JOINTS, pybullet.TORQUE_CONTROL, forces=_vector(self._effort), physicsClientId=self._client
-        )
-
-    def measure(self) -> None:
-        x, y, yaw = pybullet.getJointStates(self.body, self._JOINTS, self._client)
-        _write_rates(self._motion, 0, x[1], y[1], yaw[1])
-
-
-def planar_chain(client: int, body: Body, link_mass: float = 0.0) -> int:
-    """A body at its height on joints for x, y and yaw, whose first two links have `link_mass` (kg)."""
-    origin, upright = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]
-    return pybullet.createMultiBody(
-        0,
-        -1,
-        -1,
-        [0.0, 0.0, body.height],
-        upright,
-        linkMasses=[link_mass, link_mass, body.mass],
-        linkCollisionShapeIndices=[-1, -1, compound(body.boxes, client)],
-        linkVisualShapeIndices=[-1] * 3,
-        linkPositions=[origin] * 3,
-        linkOrientations=[upright] * 3,
-        linkInertialFramePositions=[origin] * 3,
-        linkInertialFrameOrientations=[upright] * 3,
-        linkParentIndices=[0, 1, 2],
-        linkJointTypes=[pybullet.JOINT_PRISMATIC, pybullet.JOINT_PRISMATIC, pybullet.JOINT_REVOLUTE],
-        linkJointAxis=[[1, 0, 0], [0, 1, 0], [0, 0, 1]],
-        physicsClientId=client,
-    )
+        if abs(self._previous[1]) > LARGEST_HEAVE:
+            self._place(self._pieces["pose"].tolist())
+            self._previous[1] = 0.0
+        pybullet.resetBaseVelocity(self.body, _vector(self._twist), _vector(self._twist, _ANGULAR), self._client)
 
 
 def compound(boxes: Sequence[Box], client: int) -> int:
@@ -263,7 +243,7 @@ def compound(boxes: Sequence[Box], client: int) -> int:
 
 
 def set_dynamics(client: int, number: int, link: int, body: Body | None = None) -> None:
-    """No damping, the common friction, no restitution; mass and inertia of `body`."""
+    """No damping, no sleep, the common friction, no restitution; mass and inertia of `body`."""
     pybullet.changeDynamics(
         number,
         link,
@@ -272,6 +252,7 @@ def set_dynamics(client: int, number: int, link: int, body: Body | None = None) 
         linearDamping=0,
         angularDamping=0,
         maxJointVelocity=_MAX_VELOCITY,
+        activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
         physicsClientId=client,
     )
     if body:  # in two calls: setting the mass makes Bullet compute an inertia of its own

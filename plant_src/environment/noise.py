@@ -69,7 +69,11 @@ class Noise:
         if number + 1 == len(self._starts):
             self._starts.append(np.array([x1[:, -1:], x2[:, -1:]]))
         values = self._lead * x1[:, :-1] + (1 - self._lead) * x2[:, :-1]
-        self._number, self._values = number, list(zip(*values.tolist(), strict=True))
+        self._number, self._values = number, list(zip(*self._directed(values).tolist(), strict=True))
+
+    def _directed(self, values: np.ndarray) -> np.ndarray:
+        """What is given of the values of all channels, a row each."""
+        return values
 
 
 def _root(c11: np.ndarray, c12: np.ndarray, c22: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -48,6 +48,13 @@ class Sea(NamedTuple):
         """Height of the water (m) at a place in the world (m) and a time (s)."""
         return self.surface()(x, y, time)
 
+    def table(self) -> np.ndarray:
+        """Amplitude, wave number along x and y, frequency and phase of the components, a row each, with zeros for the rest."""
+        east, north = self.wave_number * np.cos(self.direction), self.wave_number * np.sin(self.direction)
+        rows = np.zeros((5, MOST_COMPONENTS))
+        rows[:, : len(self.phase)] = self.amplitude, east, north, self.frequency, self.phase
+        return rows
+
     def surface(self) -> Callable[[float, float, float], float]:
         """`elevation` for frequent use: with memory of its own it takes half the time."""
         east, north = self.wave_number * np.cos(self.direction), self.wave_number * np.sin(self.direction)

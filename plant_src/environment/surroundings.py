@@ -11,6 +11,7 @@ import numpy as np
 
 from cosim.component import Variable
 
+from ..shadow import FloatingBody
 from ..vehicles.interface import CURRENT, WAVE_GAIN, WIND, scalar
 from .current import Current
 from .noise import GRID
@@ -42,17 +43,17 @@ class Surroundings:
     def __init__(self, read: Arguments, shadows: Sequence[Shadow]):
         environment = read.environment
         self._blown = _with(shadows, "wind.x") if environment.wind else []
-        self._waved = _with(shadows, "wave_gain") if environment.waves else []
+        self._waved = [shadow for shadow in shadows if isinstance(shadow, FloatingBody)] if environment.waves else []
         self.input_variables, self.output_variables = _inputs(environment), _outputs(self._blown, self._waved)
         self.block = np.zeros(len(self.input_variables) + len(self.output_variables))
         self.inputs, self.outputs = np.split(self.block, [len(self.input_variables)])
         self.inputs[:] = [variable.start for variable in self.input_variables]
         #: vessels that the waves pass by
         self.unmoved = [s.name for s in shadows if environment.waves and s.model.is_vessel and s not in self._waved]
-        self._elevation, self._gain = read.sea.surface(), self._input("wave_gain") if environment.waves else np.ones(1).data
+        self._gain: Any = self._input("wave_gain") if environment.waves else np.ones(1).data
         self.updates = list(self._updates(read, shadows))
         first = 3 * len(self._blown)
-        self._floating = [(shadow.outputs.data, first + k) for k, shadow in enumerate(self._waved)]
+        self._floating = [(shadow.surface(read.sea), first + k) for k, shadow in enumerate(self._waved)]
         self._published: Any = self.outputs.data
 
     def _input(self, name: str) -> Any:
@@ -80,8 +81,8 @@ class Surroundings:
 
     def publish(self, time: float) -> None:
         """Write the outputs that follow from where the vehicles are now."""
-        for outputs, place in self._floating:
-            self._published[place] = self._gain[0] * self._elevation(outputs[0], outputs[1], time)
+        for elevation, place in self._floating:
+            self._published[place] = self._gain[0] * elevation(time)
 
 
 def _with(shadows: Sequence[Shadow], name: str) -> list[Shadow]:

@@ -19,6 +19,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from .noise import Channel, Noise
 
 FOOT = 0.3048
@@ -80,15 +82,15 @@ def logarithmic(roughness: float, reference_height: float) -> Height:
     return lambda z: math.log(max(z, roughness) / roughness) / whole
 
 
-class Gusts:
+class Gusts(Noise):
     """The turbulence that one vehicle meets, in the world frame."""
 
     def __init__(self, wind: Wind, turbulence: Turbulence, seed: int, vehicle: str):
         x, y, _ = wind.velocity
         direction = math.atan2(y, x)
         self._cos, self._sin = math.cos(direction), math.sin(direction)
-        self._noise = Noise(seed, f"wind/{vehicle}", turbulence.channels())
+        super().__init__(seed, f"wind/{vehicle}", turbulence.channels())
 
-    def __getitem__(self, index: int) -> tuple[float, float, float]:
-        u, v, w = self._noise[index]
-        return self._cos * u - self._sin * v, self._sin * u + self._cos * v, w
+    def _directed(self, values: np.ndarray) -> np.ndarray:
+        u, v, w = values
+        return np.array([self._cos * u - self._sin * v, self._sin * u + self._cos * v, w])

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arguments import Numbers
 from ..bullet import pybullet
-from ..shadow import compound, planar_chain, set_dynamics
+from ..shadow import compound, set_dynamics
 from ..vehicles.ar_drone import geometry as ar_drone
 from ..vehicles.ar_drone.parameters import AIRFRAME, CENTRE_OF_MASS, ROTOR_SENSES, ROTORS
 from ..vehicles.shapes import quaternion
@@ -81,7 +81,7 @@ class Vessel:
 
     def __init__(self, client: int, initial: Numbers):
         """`initial`: x, y, yaw, surge and sway velocity, yaw rate."""
-        self._client, self.body = client, planar_chain(client, strider.BODY, LINK_MASS)
+        self._client, self.body = client, _chain(client)
         velocity = (_about_z(initial[2])[:2, :2] @ np.array(initial[3:5])).tolist()
         for joint, rate in zip(self._JOINTS, (*velocity, initial[5]), strict=True):
             pybullet.setJointMotorControl2(self.body, joint, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client)
@@ -110,6 +110,29 @@ class Vessel:
     def _joints(self) -> tuple[Sequence[float], Sequence[float]]:
         states = pybullet.getJointStates(self.body, self._JOINTS, self._client)
         return [state[0] for state in states], [state[1] for state in states]
+
+
+def _chain(client: int) -> int:
+    """The hull at its height on joints for x, y and yaw."""
+    hull, origin, upright = strider.BODY, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]
+    return pybullet.createMultiBody(
+        0,
+        -1,
+        -1,
+        [0.0, 0.0, hull.height],
+        upright,
+        linkMasses=[LINK_MASS, LINK_MASS, hull.mass],
+        linkCollisionShapeIndices=[-1, -1, compound(hull.boxes, client)],
+        linkVisualShapeIndices=[-1] * 3,
+        linkPositions=[origin] * 3,
+        linkOrientations=[upright] * 3,
+        linkInertialFramePositions=[origin] * 3,
+        linkInertialFrameOrientations=[upright] * 3,
+        linkParentIndices=[0, 1, 2],
+        linkJointTypes=[pybullet.JOINT_PRISMATIC, pybullet.JOINT_PRISMATIC, pybullet.JOINT_REVOLUTE],
+        linkJointAxis=[[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+        physicsClientId=client,
+    )
 
 
 def attitude(to_world: np.ndarray) -> np.ndarray:

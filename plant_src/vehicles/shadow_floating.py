@@ -21,6 +21,7 @@ from .shadow_maps import LINEAR_ANGULAR, alarm, constants_of, contact, foreseen,
 from .shapes import Body
 from .vessel import Frame, Hull
 from .vessel_model import Vessel
+from .waves import surface
 
 
 class _Impulse(NamedTuple):
@@ -46,7 +47,7 @@ class FloatingBody:
 
     def functions(self) -> list[ca.Function]:
         """The functions to export."""
-        return [self._spawn(), self._before(), self._after()]
+        return [self._spawn(), self._before(), self._after(), surface()]
 
     def _spawn(self) -> ca.Function:
         parameters, constants = constants_of(self.model)

@@ -101,17 +101,20 @@ class FreeBody:
 
 
 @dataclass(frozen=True)
-class PlanarChain:
+class PlanarBody:
     """A vessel in the horizontal plane with the state (x, y, yaw, surge, sway, yaw rate).
 
-    In Bullet it is a chain of the joints x, y and yaw. `mass` (kg) and `moment` (kg m2, about z) are those of the hull, whose
-    centre of mass lies on the yaw axis, so that the joints are decoupled. A pose in Bullet's terms is (x, y, yaw) and their
-    rates, a motion the rates alone.
+    `mass` (kg) and `moment` (kg m2, about z) are those of the hull, whose centre of mass lies on the yaw axis at `height` (m).
+    Pose and motion in Bullet's terms are those of a free body. Bullet's body cannot roll and pitch, but it can heave. What
+    presses it down, `pressed` (vertical impulses of the last two steps, N s), is foreseen: Bullet is told to lift it by as much,
+    and when it finds the same again the body has kept its height. Of two unequal impulses the weaker one is foreseen, so that a
+    blow does not make it jump. The last number of `pressed` is how far it has moved up all the same (m).
     """
 
     model: ContinuousModel
     mass: float
     moment: float
+    height: float
     observe: Callable[[ca.SX], ca.SX]
 
     def functions(self) -> list[ca.Function]:
@@ -121,31 +124,34 @@ class PlanarChain:
     def _spawn(self) -> ca.Function:
         parameters, constants = constants_of(self.model)
         state = self.model.initial_state(constants)
-        rates = ca.vertcat(_turn(state[2]) @ state[3:5], state[5])
-        return ca.Function("shadow_spawn", [parameters], [constants, state, rates, rates, ca.vertcat(state[0:3], rates)])
+        motion = _level(_turn(state[2]) @ state[3:5], ca.SX(0), state[5])
+        return ca.Function("shadow_spawn", [parameters], [constants, state, motion, motion, self._pose(state)])
 
     def _before(self) -> ca.Function:
         arguments = symbols_before(self.model)
         state, end, step = arguments[0], foreseen(self.model, *arguments[:5]), arguments[4]
-        (rates,) = symbols(rates=3)
-        twist = (end[0:3] - state[0:3]) / step
-        effort = self._inertia() * (twist - rates) / step
+        (pressed,) = symbols(pressed=3)
+        rates = (end[0:3] - state[0:3]) / step
+        twist = _level(rates[0:2], _weaker(pressed[0], pressed[1]) / self.mass, rates[2])
         path = ca.vertcat(self.observe(state)[0:3], self.observe(end)[0:3])
-        pose = ca.vertcat(state[0:3], rates)
-        results = [state, end, twist, twist, effort, pose, path, alarm(end, path, arguments)]
-        return ca.Function("shadow_before", [*arguments, rates], results)
+        previous = ca.vertcat(pressed[0], pressed[2])
+        results = [state, end, twist, twist, self._pose(state), previous, path, alarm(end, path, arguments)]
+        return ca.Function("shadow_before", [*arguments, pressed], results)
 
     def _after(self) -> ca.Function:
-        start, predicted, twist, motion, _, step = arguments = symbols_after(self.model, 3)
+        start, predicted, twist, motion, _, step = arguments = symbols_after(self.model, 6)
+        (previous,) = symbols(previous=2)
         change = motion - twist
-        velocity = predicted[3:6] + ca.vertcat(_turn(predicted[2]).T @ change[0:2], change[2])
-        impulse = contact(ca.norm_2(self._inertia() * change))
-        pose = start[0:3] + motion * step
-        seen = ca.vertcat(pose, _turn(pose[2]).T @ motion[0:2], motion[2])
-        return _outcome(arguments, impulse, predicted, ca.vertcat(pose, velocity), self.observe, seen, motion)
+        velocity = predicted[3:6] + ca.vertcat(_turn(predicted[2]).T @ change[0:2], change[5])
+        impulse = contact(ca.norm_2(ca.vertcat(self.mass * change[0:3], self.moment * change[5])))
+        pose = start[0:3] + step * ca.vertcat(motion[0:2], motion[5])
+        seen = ca.vertcat(pose, _turn(pose[2]).T @ motion[0:2], motion[5])
+        pressed = ca.vertcat(-self.mass * change[2], previous[0], previous[1] + motion[2] * step)
+        return _outcome([*arguments, previous], impulse, predicted, ca.vertcat(pose, velocity), self.observe, seen, pressed)
 
-    def _inertia(self) -> ca.SX:
-        return ca.SX([self.mass, self.mass, self.moment])
+    def _pose(self, state: ca.SX) -> ca.SX:
+        q = kinematics.about_z(state[2])
+        return ca.vertcat(state[0:2], self.height, q[1:4], q[0])
 
 
 def constants_of(model: ContinuousModel) -> tuple[ca.SX, ca.SX]:
@@ -208,6 +214,16 @@ def alarm(end: ca.SX, path: ca.SX, arguments: list[ca.SX]) -> ca.SX:
 def contact(impulse: ca.SX) -> ca.SX:
     """The impulse (N s), zero where there is only rounding; not a number stays so."""
     return ca.if_else(impulse <= FREE_IMPULSE, 0, impulse)
+
+
+def _level(horizontal: ca.SX, vertical: ca.SX, yaw_rate: ca.SX) -> ca.SX:
+    """The motion of a body that neither rolls nor pitches: velocity and angular velocity."""
+    return ca.vertcat(horizontal, vertical, 0, 0, yaw_rate)
+
+
+def _weaker(a: ca.SX, b: ca.SX) -> ca.SX:
+    """The number that is nearer to zero; zero if they have different signs."""
+    return ca.if_else(a * b > 0, ca.if_else(ca.fabs(a) < ca.fabs(b), a, b), 0)
 
 
 def _turn(yaw: ca.SX) -> ca.SX:

@@ -15,7 +15,7 @@ from cosim.export.equations import ContinuousModel
 from . import kinematics
 from .interface import AFLOAT_STATES
 from .vessel import Hull, Named
-from .waves import SUM, Footprint, table
+from .waves import SUM, SURFACE, Footprint, table
 
 
 def named(vector: ca.SX, variables: Sequence[Variable]) -> dict[str, ca.SX]:
@@ -80,7 +80,7 @@ class Vessel:
             lambda x, u, c: ca.vertcat(self.at(c).observe(x), ca.SX.zeros(3)),
             normalised,
             constants=self.constants,
-            callees=[SUM],
+            callees=[SUM, SURFACE],
             **more,
         )
 

@@ -27,6 +27,7 @@ GRAVITY = 9.81  # m/s2
 _SLOWEST = 1e-9  # rad/s: a wave of frequency 0 is no wave, not a division by 0
 
 _COLUMNS = 6  # of the table: amplitude, kx, ky, frequency, phase, g / frequency
+_SURFACE_COLUMNS = 5  # of the water itself: the first five
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,23 @@ def _term() -> ca.Function:
     return ca.Function("wave", [common, row], [ca.vertcat(cosine, slopes, velocity, -(frequency**2) * cosine)])
 
 
-#: called by the equations; a loop in C
+def _undulation() -> ca.Function:
+    """One component of the free surface at (x, y, time): its row is amplitude, kx, ky, frequency and phase."""
+    place, row = ca.SX.sym("place", 3), ca.SX.sym("row", _SURFACE_COLUMNS)
+    amplitude, kx, ky, frequency, phase = ca.vertsplit(row)
+    angle = kx * place[0] + ky * place[1] - frequency * place[2] + phase
+    return ca.Function("undulation", [place, row], [amplitude * sine_and_cosine(angle)[1]])
+
+
+#: called by the equations; loops in C
 SUM = sum_over_rows("waves", _term(), COMPONENTS)
+SURFACE = sum_over_rows("surface", _undulation(), COMPONENTS)
+
+
+def surface() -> ca.Function:
+    """Place (x, y, time), number and table of components, column by column -> elevation of the water (m)."""
+    place, count, rows = ca.SX.sym("place", 3), ca.SX.sym("count"), ca.SX.sym("rows", COMPONENTS, _SURFACE_COLUMNS)
+    return ca.Function("shadow_surface", [place, count, ca.vec(rows)], [SURFACE(place, count, rows)])
 
 
 def water(place: ca.SX, heading: tuple[ca.SX, ca.SX], time: ca.SX, footprint: Footprint, count: ca.SX, sea: ca.SX) -> Water:

@@ -127,19 +127,15 @@ def raw(count: int, height: float) -> Callable[[], float]:
     world = World("plant", pairs(count, height))
     client, shadows = world._client, world._fleet.shadows
     pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP, physicsClientId=client)
-    free = [shadow.body for shadow in shadows if not shadow.model.is_vessel]
-    chains = [shadow.body for shadow in shadows if shadow.model.is_vessel]
-    weight = 9.81 * 0.443892 if height == FLYING else 0.0
+    weight = 9.81 * 0.443892 if height == LANDED else 0.0
+    upwards = {shadow.body: weight if shadow.model.is_vessel else -weight for shadow in shadows}
 
     def step() -> None:
-        for body in free:
+        for body, force in upwards.items():
             position, _ = pybullet.getBasePositionAndOrientation(body, client)
             pybullet.getBaseVelocity(body, client)
-            pybullet.applyExternalForce(body, -1, (0, 0, weight - 9.81 * 0.443892), position, pybullet.WORLD_FRAME, client)
+            pybullet.applyExternalForce(body, -1, (0, 0, force), position, pybullet.WORLD_FRAME, client)
             pybullet.applyExternalTorque(body, -1, (0, 0, 0), pybullet.WORLD_FRAME, client)
-        for body in chains:
-            pybullet.getJointStates(body, (0, 1, 2), client)
-            pybullet.setJointMotorControlArray(body, (0, 1, 2), pybullet.TORQUE_CONTROL, forces=(0, 0, 0), physicsClientId=client)
         pybullet.stepSimulation(client)
         pybullet.getContactPoints(physicsClientId=client)
 

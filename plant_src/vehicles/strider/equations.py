@@ -85,5 +85,5 @@ def block() -> Block:
         lambda state, inputs, parameters: rate(state, inputs),
         lambda state, inputs, parameters: ca.vertcat(observe(state), ca.SX.zeros(3)),
     )
-    shadow = shadow_maps.PlanarChain(model, p.MASS, p.INERTIA[2], observe)
+    shadow = shadow_maps.PlanarBody(model, p.MASS, p.INERTIA[2], p.CENTRE_OF_MASS_HEIGHT, observe)
     return as_block(model, shadow.functions())
