@@ -14,12 +14,11 @@ from .shadow import Shadow
 _BODY_A, _BODY_B, _NORMAL_FORCE = 1, 2, 9  # fields of Bullet's contact points
 
 
-class _Published(NamedTuple):
-    """Places of the contact variables of one vehicle."""
+class _Pair(NamedTuple):
+    """What contact between two bodies changes: forces in the outputs, and flags."""
 
-    force: int  # in the outputs
-    touching: int  # in the flags
-    vessel: int
+    forces: Sequence[int]
+    flags: Sequence[int]
 
 
 class Contacts:
@@ -34,41 +33,41 @@ class Contacts:
         self.any = False
         # memoryviews: setting an element of a numpy array takes twice as long
         self._outputs: Any = outputs.data
-        self._flags, self._no_flags = flags.reshape(-1).data, np.zeros(flags.size, flags.dtype).data
-        ends = accumulate(len(shadow.outputs) for shadow in shadows)
-        places = [_Published(end - 1, 2 * k, 2 * k + 1) for k, end in enumerate(ends)]
-        self._published = {shadow.body: place for shadow, place in zip(shadows, places, strict=True)}
+        self._flags: Any = flags.reshape(-1).data
+        self._no_flags, self._touching = np.zeros(flags.size, flags.dtype).data, flags[:, 0].data
+        self._forces = list(accumulate(len(shadow.outputs) for shadow in shadows))
+        self._numbers = {shadow.body: k for k, shadow in enumerate(shadows)}
         self._vessels = {shadow.body for shadow in shadows if shadow.model.is_vessel}
+        self._pairs: dict[tuple[int, int], _Pair] = {}
 
     def clear(self) -> None:
         """No contact."""
         self.any = False
         self._flags[:] = self._no_flags
-        for place in self._published.values():
-            self._outputs[place.force] = 0.0
+        for end in self._forces:
+            self._outputs[end - 1] = 0.0
 
     def add(self, share: float) -> int:
         """Add the contacts of the last step of Bullet, which is this share of the component's step.
 
-        Returns how many vehicles had some.
+        Returns how many vehicles have had some since `clear`.
         """
         self.any = True
         forces: dict[tuple[int, int], float] = {}
         for point in pybullet.getContactPoints(physicsClientId=self._client):
-            pair = point[_BODY_A], point[_BODY_B]
-            forces[pair] = forces.get(pair, 0.0) + point[_NORMAL_FORCE]
-        touching = set()
-        for (a, b), force in forces.items():
+            bodies = point[_BODY_A], point[_BODY_B]
+            forces[bodies] = forces.get(bodies, 0.0) + point[_NORMAL_FORCE]
+        for bodies, force in forces.items():
             if force:
-                self._touch(a, b, force * share)
-                self._touch(b, a, force * share)
-                touching |= {a, b}
-        return len(touching & self._published.keys())
+                pair = self._pairs.get(bodies) or self._pair(bodies)
+                for place in pair.forces:
+                    self._outputs[place] += force * share
+                for place in pair.flags:
+                    self._flags[place] = True
+        return sum(self._touching)
 
-    def _touch(self, body: int, other: int, force: float) -> None:
-        if body in self._published:  # no platform
-            place, touching, vessel = self._published[body]
-            self._outputs[place] += force
-            self._flags[touching] = True
-            if other in self._vessels:
-                self._flags[vessel] = True
+    def _pair(self, bodies: tuple[int, int]) -> _Pair:
+        numbers = [self._numbers[body] for body in bodies if body in self._numbers]  # platforms publish nothing
+        on_vessels = [self._numbers[a] for a, b in (bodies, bodies[::-1]) if a in self._numbers and b in self._vessels]
+        flags = [2 * number for number in numbers] + [2 * number + 1 for number in on_vessels]
+        return self._pairs.setdefault(bodies, _Pair([self._forces[number] - 1 for number in numbers], flags))
