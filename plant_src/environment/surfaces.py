@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from .sea import Sea
@@ -46,23 +47,26 @@ class Below:
     """Distances from the rotor planes of multirotors to the next surface straight below."""
 
     def __init__(self, vessels: Sequence[Shadow], platforms: Sequence[Platform], sea: Sea):
-        self._decks, self._platforms = [Deck(vessel) for vessel in vessels], platforms
+        self._decks = [Deck(vessel) for vessel in vessels]
+        self._platforms = [(platform.position, platform.size) for platform in platforms]
         self._elevation = sea.surface() if len(sea.amplitude) else None
 
     def distance(self, x: float, y: float, z: float, time: float, wave_gain: float) -> float:
         """From a point in the world (m); zero below the water."""
-        solid = max((height for height in self._solids(x, y) if height <= z), default=None)
-        if solid is not None:  # it keeps the water away
+        solid = self._solid(x, y, z)
+        if solid > -math.inf:  # it keeps the water away
             return z - solid
         surface = wave_gain * self._elevation(x, y, time) if z < HIGH and self._elevation else 0.0
         return max(z - surface, 0.0)
 
-    def _solids(self, x: float, y: float) -> Iterator[float]:
-        """Heights (m) of decks and platforms at a place."""
+    def _solid(self, x: float, y: float, z: float) -> float:
+        """Height (m) of the highest deck or platform at a place that is not above z."""
+        highest = -math.inf
         for deck in self._decks:
-            if (height := deck.height(x, y)) is not None:
-                yield height
-        for platform in self._platforms:
-            (px, py, pz), (ex, ey, ez) = platform.position, platform.size
-            if abs(x - px) <= ex / 2 and abs(y - py) <= ey / 2:
-                yield pz + ez / 2
+            height = deck.height(x, y)
+            if height is not None and highest < height <= z:
+                highest = height
+        for (px, py, pz), (ex, ey, ez) in self._platforms:
+            if highest < pz + ez / 2 <= z and abs(x - px) <= ex / 2 and abs(y - py) <= ey / 2:
+                highest = pz + ez / 2
+        return highest
