@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from .catalogue import VEHICLES, Model
 from .environment import CALM, Sea, realise, settings
 from .environment.settings import Environment
 from .reading import Keys, Numbers, Reader
+from .vehicles.shapes import Body
 
 #: prefix of the parameters that hold the waves, and of those that say where a vehicle starts
 WAVE, INITIAL = "wave.", "initial."
@@ -22,11 +23,12 @@ WAVE, INITIAL = "wave.", "initial."
 
 @dataclass(frozen=True)
 class Spawn:
-    """A vehicle to place: `parameters` holds the values of its model's parameters, in order."""
+    """A vehicle to place: `parameters` holds the values of its model's parameters, in order; `body` is its body in Bullet."""
 
     name: str
     model: Model
     parameters: Numbers
+    body: Body
 
     def parameter(self, name: str) -> float:
         """The value of a scalar parameter."""
@@ -83,9 +85,23 @@ class _Reader(Reader):
             if value and slot not in model.slots("parameter"):
                 key = slot.removeprefix(INITIAL)
                 self.complain((*path, key.partition(".")[0]), f"found {key} = {value}; a {model.name} does not move that way")
+        found = len(self.problems)
         given = self.parameters(model, initial, spec.get("parameters", {}), (*path, "parameters"))
         starts = zip(model.slots("parameter"), model.starts("parameter"), strict=True)
-        return Spawn(name, model, tuple((initial | given).get(slot, start) for slot, start in starts))
+        parameters = {slot: (initial | given).get(slot, start) for slot, start in starts}
+        sound = len(self.problems) == found
+        body = self.body(model, parameters, (*path, "parameters")) if sound else model.body
+        return Spawn(name, model, tuple(parameters.values()), body)
+
+    def body(self, model: Model, parameters: Mapping[str, float], path: Keys) -> Body:
+        try:
+            return model.body_with(parameters)
+        except InputError as error:
+            for problem in error.problems:
+                group, _, text = problem.message.partition(": ")
+                first = next(slot for slot in parameters if slot.partition(".")[0] == group)
+                self.complain((*path, first), text)
+        return model.body
 
     def model(self, spec: Mapping[str, Any], path: Keys) -> Model | None:
         name, path = spec.get("model"), (*path, "model")
@@ -139,4 +155,4 @@ def _in(sea: Sea, spawn: Spawn) -> Spawn:
     parameters[f"{WAVE}count"] = float(len(sea.amplitude))
     for name in ("amplitude", "frequency", "direction", "phase"):
         parameters |= {f"{WAVE}{name}[{k}]": value for k, value in enumerate(getattr(sea, name).tolist(), start=1)}
-    return Spawn(spawn.name, spawn.model, tuple(parameters.values()))
+    return replace(spawn, parameters=tuple(parameters.values()))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,13 +20,15 @@ from .vehicles.crazyflie.parameters import AIRFRAME as CRAZYFLIE
 from .vehicles.interface import AFLOAT_STATES, SURROUNDINGS
 from .vehicles.otter import geometry as otter
 from .vehicles.otter import interface as otter_interface
-from .vehicles.shapes import Body, Vector
+from .vehicles.shapes import Body, Box, Vector
 from .vehicles.strider import geometry as strider
 from .vehicles.strider import interface as strider_interface
 from .vehicles.strider_6dof import geometry as strider_6dof
 from .vehicles.strider_6dof import interface as strider_6dof_interface
 from .vehicles.survey_hexacopter import geometry as survey_hexacopter
 from .vehicles.survey_hexacopter.parameters import AIRFRAME as SURVEY_HEXACOPTER
+
+Boxes = Callable[[np.ndarray], tuple[Box, ...]]
 
 
 @dataclass(frozen=True)
@@ -47,8 +49,23 @@ class Model:
     vehicle: str = ""
     motion: str = "6dof"
     constants: int | None = None
-    #: centre of the rotors in the body frame (m), of a multirotor
-    rotor_plane: Vector | None = None
+    #: of a multirotor, which may have another mass and inertia, and its shapes for a rotation to the body frame
+    airframe: Airframe | None = None
+    boxes: Boxes | None = None
+
+    @property
+    def rotor_plane(self) -> Vector | None:
+        """Centre of the rotors in the body frame (m), of a multirotor."""
+        return self.airframe.rotor_plane if self.airframe else None
+
+    def body_with(self, parameters: Mapping[str, float]) -> Body:
+        """The body in Bullet of a vehicle with these parameters. Raises InputError when there is no such body."""
+        if self.airframe is None or self.boxes is None:
+            return self.body
+        inertia = np.zeros((3, 3))
+        for name, (i, j) in multirotor_interface.INERTIA.items():
+            inertia[i, j] = inertia[j, i] = parameters[name]
+        return replace(self.airframe, mass=parameters["mass"], inertia=inertia).body(self.boxes)
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
@@ -73,9 +90,12 @@ class Model:
         return np.concatenate([np.zeros(0), *(np.ravel(variable.start) for variable in self.reals(causality))]).tolist()
 
 
-def _multirotor(airframe: Airframe, body: Body) -> Model:
+def _multirotor(airframe: Airframe, boxes: Boxes) -> Model:
     variables, states = multirotor_interface.variables(airframe), multirotor_interface.states(airframe)
-    return Model(airframe.name, variables, states, body, FreeBody, rotor_plane=airframe.rotor_plane)
+    constants = multirotor_interface.constants(airframe)
+    return Model(
+        airframe.name, variables, states, airframe.body(boxes), FreeBody, constants=constants, airframe=airframe, boxes=boxes
+    )
 
 
 _STRIDER = Model(
@@ -85,9 +105,9 @@ _STRIDER = Model(
 MODELS = {
     model.name: model
     for model in (
-        _multirotor(AR_DRONE, ar_drone.BODY),
-        _multirotor(CRAZYFLIE, crazyflie.BODY),
-        _multirotor(SURVEY_HEXACOPTER, survey_hexacopter.BODY),
+        _multirotor(AR_DRONE, ar_drone.boxes),
+        _multirotor(CRAZYFLIE, crazyflie.boxes),
+        _multirotor(SURVEY_HEXACOPTER, survey_hexacopter.boxes),
         _STRIDER,
         Model(
             "strider_6dof",

@@ -44,7 +44,7 @@ class Fleet:
         ]
         self.inputs, self.outputs = memory.whole["inputs"], memory.whole["outputs"]
         self.contacts = Contacts(client, self.shadows, self.outputs, flags)
-        vehicles = [shadow.enclosure(shadow.model.body) for shadow in self.shadows]
+        vehicles = [shadow.enclosure(spawn.body) for shadow, spawn in zip(self.shadows, read.vehicles, strict=True)]
         platforms = [_enclosure(platform) for platform in read.platforms]
         self.clearance = Clearance(vehicles, platforms, *(memory.whole[name] for name in ("path", "anchor", "leash")))
         self._predict, self._correct = [shadow.predict for shadow in self.shadows], [shadow.correct for shadow in self.shadows]

@@ -49,6 +49,7 @@ _write_vector = struct.Struct("3d").pack_into
 _write_twist = struct.Struct("6d").pack_into
 
 Names = tuple[Sequence[str], Sequence[str]]  # of the arguments and of the results of a compiled function
+_BEFORE = ("state", "inputs", "surroundings", "constants", "step", "anchor", "leash")
 
 
 class UnsoundError(Exception):
@@ -65,7 +66,7 @@ class Shadow(ABC):
     """
 
     PIECES: ClassVar[Mapping[str, int]]  # name -> size
-    SPAWN: ClassVar[Sequence[str]] = ("constants", "predicted", "twist", "motion", "pose")  # results
+    SPAWN: ClassVar[Names] = (("parameters",), ("constants", "predicted", "twist", "motion", "pose"))
     BEFORE: ClassVar[Names]
     AFTER: ClassVar[Names]
     #: pose in Bullet of a body at rest in the origin
@@ -74,7 +75,8 @@ class Shadow(ABC):
     def __init__(self, client: int, spawn: Spawn, pieces: Mapping[str, np.ndarray]):
         self.name, self.model, self._client = spawn.name, spawn.model, client
         constants = spawn.model.constants if spawn.model.constants is not None else len(spawn.parameters)
-        self._pieces = pieces = {**pieces, "constants": np.zeros(constants)}
+        given = {"parameters": np.array(spawn.parameters), "axes": np.array(spawn.body.axes)}
+        self._pieces = pieces = {**pieces, **given, "constants": np.zeros(constants)}
         pieces["surroundings"][:] = [variable.start for variable in spawn.model.surroundings]
         self.inputs, self.outputs = pieces["inputs"], pieces["outputs"]
         self.surroundings = pieces["surroundings"]
@@ -84,9 +86,9 @@ class Shadow(ABC):
         self.predict = self._bound(library.shadow_before, self.BEFORE)
         #: take over what became of the step, and publish it
         self.correct = self._bound(library.shadow_after, self.AFTER)
-        bound(library.shadow_spawn, [np.array(spawn.parameters)], [pieces[name] for name in self.SPAWN])()
+        self._bound(library.shadow_spawn, self.SPAWN)()
         self.correct()
-        self.body = self._create(spawn.model.body)
+        self.body = self._create(spawn.body)
         self._place(pieces["pose"].tolist())
 
     @classmethod
@@ -144,8 +146,9 @@ class FreeBody(Shadow):
     PIECES: ClassVar[Mapping[str, int]] = {"twist": 6, "motion": 6, "torque": 3, "pose": 7}
     #: Bullet takes half as long, but its saved states lack the inertia of such a body in world axes
     IN_MAXIMAL_COORDINATES = False
+    SPAWN: ClassVar[Names] = (("parameters", "axes"), Shadow.SPAWN[1])
     BEFORE: ClassVar[Names] = (
-        ("state", "inputs", "surroundings", "constants", "step", "anchor", "leash"),
+        (*_BEFORE, "axes"),
         ("start", "predicted", "twist", "motion", "torque", "pose", "path", "alarm"),
     )
     AFTER: ClassVar[Names] = (("start", "predicted", "twist", "motion", "constants", "step"), ("state", "impulse", "outputs"))
@@ -180,8 +183,9 @@ class FloatingBody(FreeBody):
     """A vessel that moves freely in space; the contact impulse of a step is carried over to the next one."""
 
     PIECES = {**FreeBody.PIECES, "carried": 6, "previous": 6}
+    SPAWN = Shadow.SPAWN
     BEFORE = (
-        (*FreeBody.BEFORE[0], "carried"),
+        (*_BEFORE, "carried"),
         ("start", "predicted", "twist", "motion", "torque", "pose", "previous", "path", "alarm"),
     )
     AFTER = ((*FreeBody.AFTER[0], "previous"), (*FreeBody.AFTER[1], "carried"))
@@ -205,9 +209,10 @@ class PlanarBody(FreeBody):
     """A vessel in the horizontal plane: it has no roll and no pitch, and what presses it down is carried by the water at once."""
 
     PIECES = {**FreeBody.PIECES, "pressed": 3, "previous": 2}
+    SPAWN = Shadow.SPAWN
     IN_MAXIMAL_COORDINATES = True  # the inertia about the world's z axis is always the same
     BEFORE = (
-        (*FreeBody.BEFORE[0], "pressed"),
+        (*_BEFORE, "pressed"),
         ("start", "predicted", "twist", "motion", "pose", "previous", "path", "alarm"),
     )
     AFTER = ((*FreeBody.AFTER[0], "previous"), (*FreeBody.AFTER[1], "pressed"))

@@ -6,7 +6,7 @@ Body frame: x forward, y left, z up, origin at the centre of mass. SI units.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import permutations, product
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from cosim.errors import InputError, Problem
 
-from .shapes import Vector
+from .shapes import Body, Box, Vector, quaternion
 
 UP = (0.0, 0.0, 1.0)
 
@@ -117,6 +117,12 @@ class Airframe:
                 if np.linalg.det(turn) > 0 and np.trace(turn) > 0:
                     return moments[list(order)], turn
         raise AssertionError("one of the 24 frames of the principal axes is turned by less than 63 degrees")
+
+    def body(self, boxes: Callable[[np.ndarray], tuple[Box, ...]]) -> Body:
+        """What Bullet knows of it, in the principal-axis frame; `boxes` are made for the rotation (3, 3) to the body frame."""
+        moments, to_body = self.principal_axes()
+        x, y, z = moments.tolist()
+        return Body(self.mass, (x, y, z), boxes(to_body), axes=quaternion(to_body))
 
 
 def _bad_moments(moments: np.ndarray) -> Iterator[str]:

@@ -40,8 +40,8 @@ from .multirotor_interface import states, variables
 #: how many states belong to the rigid body; the rotor speeds come after them
 RIGID = 13
 
-#: how many parameters switch effects: the last ones
-EFFECTS = 9
+#: where the constants of the equations lie: parameters as in `multirotor_interface.py`, and the inverse of the inertia tensor
+MASS, INERTIA, ROTOR_SPEED, EFFECTS, INVERSE = 10, slice(11, 17), 17, slice(18, 27), slice(27, 36)
 
 
 class Acting(NamedTuple):
@@ -70,13 +70,29 @@ class Spinning(NamedTuple):
     rate: ca.SX
 
 
-def rigid_rate(airframe: Airframe, state: ca.SX, acting: Acting, force: ca.SX, torque: ca.SX) -> ca.SX:
+def constants(parameters: ca.SX) -> ca.SX:
+    """The parameters, and what follows from them once."""
+    return ca.vertcat(parameters, ca.vec(ca.inv(_symmetric(parameters[INERTIA]))))
+
+
+def rigid(constants: ca.SX) -> shadow_maps.Rigid:
+    """Mass and inertia."""
+    return shadow_maps.Rigid(constants[MASS], _symmetric(constants[INERTIA]), ca.reshape(constants[INVERSE], 3, 3))
+
+
+def _symmetric(elements: ca.SX) -> ca.SX:
+    """The tensor (3, 3) with the elements xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = ca.vertsplit(elements)
+    return ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
+
+
+def rigid_rate(body: shadow_maps.Rigid, gravity: float, state: ca.SX, acting: Acting, force: ca.SX, torque: ca.SX) -> ca.SX:
     """Time derivative of (position, orientation, world velocity, body rates) under loads in the body frame (N, N m)."""
     orientation, velocity, rates = state[3:7], state[7:10], state[10:13]
-    to_world, inertia = kinematics.matrix(orientation), ca.SX(airframe.inertia)
-    acceleration = (to_world @ force + acting.force) / airframe.mass - ca.vertcat(0, 0, airframe.gravity)
-    moment = torque + to_world.T @ acting.torque - ca.cross(rates, inertia @ rates)
-    return ca.vertcat(velocity, kinematics.rate(orientation, rates), acceleration, ca.inv(inertia) @ moment)
+    to_world = kinematics.matrix(orientation)
+    acceleration = (to_world @ force + acting.force) / body.mass - ca.vertcat(0, 0, gravity)
+    moment = torque + to_world.T @ acting.torque - ca.cross(rates, body.inertia @ rates)
+    return ca.vertcat(velocity, kinematics.rate(orientation, rates), acceleration, body.inverse @ moment)
 
 
 def rotor_loads(airframe: Airframe, speed: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -112,7 +128,7 @@ def gyroscopic_torque(airframe: Airframe, rates: ca.SX, rotors: Spinning, inerti
 
 @dataclass(frozen=True)
 class Equations:
-    """The equations of an airframe, for vectors in the order of `multirotor_interface.py`."""
+    """The equations of an airframe, for vectors in the order of `multirotor_interface.py`; `parameters` are its `constants`."""
 
     airframe: Airframe
 
@@ -125,14 +141,14 @@ class Equations:
         return ca.fmin(ca.fmax(inputs[: len(self.airframe.rotors)], 0), self.airframe.max_rotor_speed)
 
     def switched(self, parameters: ca.SX) -> Switched:
-        """The last parameters."""
-        return Switched(*ca.vertsplit(parameters[-EFFECTS:], [0, 1, 2, 5, 8, EFFECTS]))
+        """The parameters of the effects."""
+        return Switched(*ca.vertsplit(parameters[EFFECTS], [0, 1, 2, 5, 8, 9]))
 
     def initial_state(self, parameters: ca.SX) -> ca.SX:
         """The state from initial position, yaw, body velocity, rates and rotor speed."""
         orientation = kinematics.about_z(parameters[3])
         velocity = kinematics.matrix(orientation) @ parameters[4:7]
-        rotors = ca.repmat(parameters[10], len(self.airframe.rotors))
+        rotors = ca.repmat(parameters[ROTOR_SPEED], len(self.airframe.rotors))
         return ca.vertcat(parameters[0:3], orientation, velocity, parameters[7:10], rotors)
 
     def body_rate(self, state: ca.SX, rotors: Spinning, inputs: ca.SX, parameters: ca.SX) -> ca.SX:
@@ -141,7 +157,7 @@ class Equations:
         force, torque = rotor_loads(self.airframe, rotors.speed)
         more_force, more_torque = aerodynamic_loads(self.airframe, state, rotors.speed, acting, effects)
         more_torque += gyroscopic_torque(self.airframe, state[10:13], rotors, effects.rotor_inertia)
-        return rigid_rate(self.airframe, state, acting, force + more_force, torque + more_torque)
+        return rigid_rate(rigid(parameters), self.airframe.gravity, state, acting, force + more_force, torque + more_torque)
 
     def spinning(self, speed: ca.SX, inputs: ca.SX, parameters: ca.SX) -> Spinning:
         """Rotors at these speeds on the way to the commanded ones."""
@@ -153,11 +169,11 @@ class Equations:
         rotors = self.spinning(state[RIGID:], inputs, parameters)
         return ca.vertcat(self.body_rate(state[:RIGID], rotors, inputs, parameters), rotors.rate)
 
-    def plain_step(self, state: ca.SX, inputs: ca.SX, step: ca.SX) -> ca.SX:
+    def plain_step(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX) -> ca.SX:
         """The state after a step without any effect."""
-        acting, speed = self.acting(inputs), self.commanded(inputs)
+        acting, speed, body = self.acting(inputs), self.commanded(inputs), rigid(parameters)
         force, torque = rotor_loads(self.airframe, speed)
-        end = runge_kutta_4(lambda x: rigid_rate(self.airframe, x, acting, force, torque), state[:RIGID], step)
+        end = runge_kutta_4(lambda x: rigid_rate(body, self.airframe.gravity, x, acting, force, torque), state[:RIGID], step)
         return ca.vertcat(normalised(end), speed)
 
     def step(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX) -> ca.SX:
@@ -167,13 +183,13 @@ class Equations:
         share = ca.exp(-step / 2 / lag)  # of the way to go that is left after half a step; zero without a lag
         middle, end = (target + left * (start - target) for left in (share, share**2))
         stages = (self.spinning(speed, inputs, parameters) for speed in (start, middle, middle, end))
-        rigid = runge_kutta_4(lambda x: self.body_rate(x, next(stages), inputs, parameters), state[:RIGID], step)
-        return ca.vertcat(normalised(rigid), end)
+        moved = runge_kutta_4(lambda x: self.body_rate(x, next(stages), inputs, parameters), state[:RIGID], step)
+        return ca.vertcat(normalised(moved), end)
 
 
-def normalised(rigid: ca.SX) -> ca.SX:
+def normalised(state: ca.SX) -> ca.SX:
     """The states of the rigid body with a unit quaternion."""
-    return ca.vertcat(rigid[0:3], kinematics.normalised(rigid[3:7]), rigid[7:RIGID])
+    return ca.vertcat(state[0:3], kinematics.normalised(state[3:7]), state[7:RIGID])
 
 
 def observe(state: ca.SX) -> ca.SX:
@@ -197,12 +213,12 @@ class Multirotor(ContinuousModel):
 def free_step(airframe: Airframe) -> Callee:
     """The state after a step; the shorter code is run where no effect is switched on."""
     equations, count = Equations(airframe), len(airframe.rotors)
-    sizes = {"state": RIGID + count, "inputs": count + 10, "parameters": 11 + EFFECTS, "step": 1}
+    sizes = {"state": RIGID + count, "inputs": count + 10, "parameters": INVERSE.stop, "step": 1}
     state, inputs, parameters, step = arguments = [ca.SX.sym(name, size) for name, size in sizes.items()]
-    plain = ca.Function("plain_step", arguments, [equations.plain_step(state, inputs, step)])
+    plain = ca.Function("plain_step", arguments, [equations.plain_step(*arguments)])
     full = ca.Function("step_with_effects", arguments, [equations.step(state, inputs, parameters, step)])
     either = ca.Function("free_step", arguments, [full(*arguments)], {"never_inline": True})
-    return Callee(either, _EITHER % {"first": sizes["parameters"] - EFFECTS, "end": sizes["parameters"]}, [plain, full])
+    return Callee(either, _EITHER % {"first": EFFECTS.start, "end": EFFECTS.stop}, [plain, full])
 
 
 _EITHER = """{
@@ -227,8 +243,8 @@ def block(airframe: Airframe, description: str) -> Block:
         equations.initial_state,
         equations.rate,
         lambda state, inputs, parameters: ca.vertcat(observe(state), ca.SX.zeros(3)),
+        constants=constants,
         callees=[step],
         free_step=step.function,
     )
-    shadow = shadow_maps.FreeBody(model, airframe.mass, airframe.inertia, airframe.principal_axes()[1], observe)
-    return as_block(model, shadow.functions())
+    return as_block(model, shadow_maps.FreeBody(model, rigid, observe).functions())

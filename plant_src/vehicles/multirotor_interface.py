@@ -10,11 +10,24 @@ from cosim.units import parse
 from .airframe import Airframe
 from .interface import CONTACT, EXTERNAL_LOADS, GROUND_DISTANCE, MOTION, WIND, initial, scalar
 
+#: parameter -> its place in the inertia tensor, and by symmetry the one mirrored
+INERTIA = {f"inertia.{'xyz'[i]}{'xyz'[j]}": (i, j) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))}
+
 
 def variables(airframe: Airframe) -> tuple[Variable, ...]:
-    """Parameters, inputs and outputs; the start values of the effects' parameters are the airframe's."""
+    """Parameters, inputs and outputs; the start values of all but the initial ones are the airframe's."""
     start = initial("xyz", "uvw", "pqr")
-    return (*start, *_effects(airframe), _rotor_speed(airframe), *EXTERNAL_LOADS, *WIND, *GROUND_DISTANCE, *MOTION, *CONTACT)
+    return (
+        *start,
+        *_rigid_body(airframe),
+        *_effects(airframe),
+        _rotor_speed(airframe),
+        *EXTERNAL_LOADS,
+        *WIND,
+        *GROUND_DISTANCE,
+        *MOTION,
+        *CONTACT,
+    )
 
 
 def states(airframe: Airframe) -> tuple[str, ...]:
@@ -22,6 +35,20 @@ def states(airframe: Airframe) -> tuple[str, ...]:
     groups = {"position": "xyz", "orientation": "wxyz", "velocity": "xyz", "rates": "pqr"}
     rigid = [f"{group}.{axis}" for group, axes in groups.items() for axis in axes]
     return (*rigid, *(f"rotor_speed[{number}]" for number in range(1, len(airframe.rotors) + 1)))
+
+
+def constants(airframe: Airframe) -> int:
+    """How many numbers the equations are given: the parameters and the inverse of the inertia tensor."""
+    return 9 + sum(len(variable.slots) for variable in variables(airframe) if variable.causality == "parameter")
+
+
+def _rigid_body(airframe: Airframe) -> tuple[Variable, ...]:
+    """Mass and inertia, of which `airframe.Airframe` says what is possible."""
+    mass = scalar("mass", "kg", "with rotors and everything on board", "parameter", airframe.mass)
+    text = "inertia tensor about the centre of mass, body frame, rotors locked"
+    elements = {name: float(airframe.inertia[place]) for name, place in INERTIA.items()}
+    tensor = (scalar(name, "kg.m2", f"{text}: {name[-2:]}", "parameter", value) for name, value in elements.items())
+    return (mass, *tensor)
 
 
 def _rotor_speed(airframe: Airframe) -> Variable:

@@ -21,16 +21,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
-import numpy as np
 
 from cosim.export.equations import ContinuousModel
 
 from . import kinematics
 from .alarms import ADRIFT, LARGEST_STATE, UNSOUND
 from .interface import SURROUNDINGS
-from .shapes import quaternion
 
 #: at most 5 ms long, since the world makes steps of at most 10 ms
 SUB_STEPS = 2
@@ -42,19 +41,30 @@ LINEAR_ANGULAR = 6
 FREE_IMPULSE = 1e-12
 
 
+class Rigid(NamedTuple):
+    """Mass (kg), inertia about the centre of mass (3, 3; kg m2, body frame) and its inverse."""
+
+    mass: ca.SX
+    inertia: ca.SX
+    inverse: ca.SX
+
+    def in_world(self, orientation: ca.SX) -> ca.SX:
+        """The inertia in the axes of the world."""
+        to_world = kinematics.matrix(orientation)
+        return to_world @ self.inertia @ to_world.T
+
+
 @dataclass(frozen=True)
 class FreeBody:
     """A free rigid body with the state (position, orientation, world velocity, body rates), and more that contact leaves alone.
 
-    `mass` in kg; `inertia` (3, 3) in kg m2 about the centre of mass; `principal_axes` (3, 3) turns Bullet's body frame into the
-    vehicle's; `observe` gives the published variables of a state. A pose in Bullet's terms is (position, quaternion x y z w), a
-    motion (velocity, angular velocity), all in the world frame.
+    `rigid` gives its mass and inertia of the constants, `observe` the published variables of a state. A pose in Bullet's terms is
+    (position, quaternion x y z w), a motion (velocity, angular velocity), all in the world frame; `axes` is the orientation of
+    Bullet's body in the vehicle's frame (x, y, z, w).
     """
 
     model: ContinuousModel
-    mass: float
-    inertia: np.ndarray
-    principal_axes: np.ndarray
+    rigid: Callable[[ca.SX], Rigid]
     observe: Callable[[ca.SX], ca.SX]
 
     def functions(self) -> list[ca.Function]:
@@ -63,41 +73,34 @@ class FreeBody:
 
     def _spawn(self) -> ca.Function:
         parameters, constants = constants_of(self.model)
+        (axes,) = symbols(axes=4)
         state = self.model.initial_state(constants)
         motion = ca.vertcat(state[7:10], kinematics.matrix(state[3:7]) @ state[10:13])
-        return ca.Function("shadow_spawn", [parameters], [constants, state, motion, motion, self._pose(state)])
+        return ca.Function("shadow_spawn", [parameters, axes], [constants, state, motion, motion, _pose(state, axes)])
 
     def _before(self) -> ca.Function:
         arguments = symbols_before(self.model)
         state, end, step = arguments[0], foreseen(self.model, *arguments[:5]), arguments[4]
+        (axes,) = symbols(axes=4)
         linear = (end[0:3] - state[0:3]) / step
         angular = kinematics.rotation_vector(kinematics.product(end[3:7], kinematics.conjugate(state[3:7]))) / step
         # Bullet adds the gyroscopic torque of its body by itself: this one cancels it
-        torque = ca.cross(angular, self._inertia_in_world(state) @ angular)
+        torque = ca.cross(angular, self.rigid(arguments[3]).in_world(state[3:7]) @ angular)
         twist, path = ca.vertcat(linear, angular), ca.vertcat(state[0:3], end[0:3])
-        results = [state, end, twist, twist, torque, self._pose(state), path, alarm(end, path, arguments)]
-        return ca.Function("shadow_before", arguments, results)
+        results = [state, end, twist, twist, torque, _pose(state, axes), path, alarm(end, path, arguments)]
+        return ca.Function("shadow_before", [*arguments, axes], results)
 
     def _after(self) -> ca.Function:
-        start, predicted, twist, motion, _, step = arguments = symbols_after(self.model, 6)
+        start, predicted, twist, motion, constants, step = arguments = symbols_after(self.model, 6)
         linear, angular = ca.vertsplit(motion - twist, 3)
-        to_body = kinematics.matrix(predicted[3:7]).T
-        turned = ca.inv(ca.SX(self.inertia)) @ (to_body @ (self._inertia_in_world(start) @ angular))
+        rigid, to_body = self.rigid(constants), kinematics.matrix(predicted[3:7]).T
+        turned = rigid.inverse @ (to_body @ (rigid.in_world(start[3:7]) @ angular))
         velocity, others = predicted[7:13] + ca.vertcat(linear, turned), predicted[13:]
-        impulse = contact(self.mass * ca.norm_2(linear))
+        impulse = contact(rigid.mass * ca.norm_2(linear))
         orientation = kinematics.product(kinematics.turned_by(motion[3:6] * step), start[3:7])
         pose = ca.vertcat(start[0:3] + motion[0:3] * step, kinematics.normalised(orientation))
         seen = ca.vertcat(pose, motion[0:3], kinematics.matrix(orientation).T @ motion[3:6], others)
         return _outcome(arguments, impulse, predicted, ca.vertcat(pose, velocity, others), self.observe, seen)
-
-    def _pose(self, state: ca.SX) -> ca.SX:
-        x, y, z, w = quaternion(self.principal_axes)
-        turned = kinematics.product(state[3:7], ca.SX([w, x, y, z]))
-        return ca.vertcat(state[0:3], turned[1:4], turned[0])
-
-    def _inertia_in_world(self, state: ca.SX) -> ca.SX:
-        to_world = kinematics.matrix(state[3:7])
-        return to_world @ ca.SX(self.inertia) @ to_world.T
 
 
 @dataclass(frozen=True)
@@ -214,6 +217,12 @@ def alarm(end: ca.SX, path: ca.SX, arguments: list[ca.SX]) -> ca.SX:
 def contact(impulse: ca.SX) -> ca.SX:
     """The impulse (N s), zero where there is only rounding; not a number stays so."""
     return ca.if_else(impulse <= FREE_IMPULSE, 0, impulse)
+
+
+def _pose(state: ca.SX, axes: ca.SX) -> ca.SX:
+    """The pose of a free body in Bullet's terms."""
+    turned = kinematics.product(state[3:7], ca.vertcat(axes[3], axes[0:3]))
+    return ca.vertcat(state[0:3], turned[1:4], turned[0])
 
 
 def _level(horizontal: ca.SX, vertical: ca.SX, yaw_rate: ca.SX) -> ca.SX:

@@ -30,13 +30,15 @@ class Box(NamedTuple):
 class Body(NamedTuple):
     """A rigid body in a frame at its centre of mass: mass (kg), moments of inertia (kg m2) about the frame's axes, shapes.
 
-    `height` (m) is that of the centre of mass of a vessel that moves in the plane.
+    `height` (m) is that of the centre of mass of a vessel that moves in the plane; `axes` is the orientation of the frame in that
+    of the vehicle (x, y, z, w).
     """
 
     mass: float
     inertia: Vector
     boxes: tuple[Box, ...]
     height: float = 0.0
+    axes: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 
 def standing_box(to_body: np.ndarray, edges: tuple[float, float], bottom: float, top: float) -> Box:

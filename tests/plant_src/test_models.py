@@ -5,11 +5,13 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
+import casadi as ca
 import pytest
 from fmpy import read_model_description
 
 from cosim import resources
 from plant_src.catalogue import MODELS, VEHICLES
+from plant_src.vehicles import multirotor
 from plant_src.vehicles.interface import SURROUNDINGS
 
 ALL = pytest.mark.parametrize("name", MODELS)
@@ -34,7 +36,9 @@ def test_surroundings_come_last_among_the_inputs(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.constants is not None])
 def test_the_number_of_constants_is_that_of_the_equations(name: str) -> None:
-    assert equations(name).VESSEL.model().constant_symbols().numel() == MODELS[name].constants
+    model, module = MODELS[name], equations(name)
+    constants = multirotor.constants if model.airframe else module.VESSEL.constants
+    assert constants(ca.SX.sym("parameters", len(model.slots("parameter")))).numel() == model.constants
 
 
 def test_strider_moves_in_the_plane_unless_told_otherwise() -> None:

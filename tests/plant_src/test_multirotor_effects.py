@@ -10,7 +10,7 @@ from plant_fmu import PlantFmu
 from validation import Measured
 
 from plant_src.vehicles.crazyflie.parameters import AIRFRAME
-from plant_src.vehicles.multirotor import Equations
+from plant_src.vehicles.multirotor import Equations, constants
 
 CRAZYFLIE, HEXACOPTER = VEHICLES["crazyflie"], VEHICLES["survey_hexacopter"]
 IMAGES = "Sanchez-Cuevas et al. 2017"
@@ -212,7 +212,9 @@ def test_the_rate_of_the_state_is_the_derivative_of_a_step() -> None:
     random, moment = np.random.default_rng(5), 1e-6
     state = np.concatenate([random.standard_normal(3), [1, 0, 0, 0], random.standard_normal(6), 1500 + random.standard_normal(4)])
     inputs = np.concatenate([1600 + random.standard_normal(4), 0.01 * random.standard_normal(6), [1, 2, 3], [0.05]])
-    parameters = np.concatenate([np.zeros(11), [0.07, 5e-8, 1e-6, 2e-6, 1e-6, 0.01, 0.02, 0.03, 1.0]])
+    body = [AIRFRAME.mass, *np.diag(AIRFRAME.inertia), 0.0, 0.0, 0.0]
+    effects = [0.07, 5e-8, 1e-6, 2e-6, 1e-6, 0.01, 0.02, 0.03, 1.0]
+    parameters = constants(ca.DM([*np.zeros(10), *body, 0.0, *effects])).full().ravel()
     equations, symbols = Equations(AIRFRAME), [ca.SX.sym("", len(vector)) for vector in (state, inputs, parameters)]
     rate = ca.Function("rate", symbols, [equations.rate(*symbols)])(state, inputs, parameters)
     after = ca.Function("after", symbols, [equations.step(*symbols, ca.SX(moment))])(state, inputs, parameters)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..shapes import Body, Box, quaternion
+from ..shapes import Box, quaternion
 from .parameters import AIRFRAME, CENTRE_OF_MASS
 
 #: bottom of the motor cylinders, on which the vehicle stands, and top of the hull, from the origin of the model's frame (m)
@@ -16,15 +16,17 @@ FEET_HEIGHT, TOP_HEIGHT = -0.0566, 0.03
 EDGE = 0.228
 
 
-def _box() -> Box:
-    """One box: its corners are the feet at the ends of the arms, so it stands at a diagonal to the body axes."""
-    to_body = AIRFRAME.principal_axes()[1]
+def boxes(to_body: np.ndarray) -> tuple[Box, ...]:
+    """The shape in a frame that `to_body` (3, 3) turns into the body frame: one box, whose corners are the feet.
+
+    They are at the ends of the arms, so it stands at a diagonal to the body axes. Four spheres or a hull of the same size creep
+    more, and their contact cannot be restored bit for bit.
+    """
     centre = to_body.T @ (np.array([0.0, 0.0, (TOP_HEIGHT + FEET_HEIGHT) / 2]) - CENTRE_OF_MASS)
     half = math.sqrt(0.5)
     diagonal = np.array([[half, half, 0.0], [-half, half, 0.0], [0.0, 0.0, 1.0]])
     half_extents = (EDGE / 2, EDGE / 2, (TOP_HEIGHT - FEET_HEIGHT) / 2)
-    return Box(half_extents, tuple(centre.tolist()), quaternion(to_body.T @ diagonal))
+    return (Box(half_extents, tuple(centre.tolist()), quaternion(to_body.T @ diagonal)),)
 
 
-#: one box: four spheres or a hull of the same size creep more, and their contact cannot be restored bit for bit
-BODY = Body(AIRFRAME.mass, tuple(AIRFRAME.principal_axes()[0].tolist()), (_box(),))
+BODY = AIRFRAME.body(boxes)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ..shapes import Body, standing_box
+import numpy as np
+
+from ..shapes import Box, standing_box
 from .parameters import AIRFRAME
 
 #: distance of the motor mounts, on which it stands, along x and y: the rotors' [pybullet-drones] (m)
@@ -11,8 +13,10 @@ EDGE = 0.056
 #: bottom of the motor mounts and top of the battery from the centre of mass: 29 mm in all [bitcraze], the share below assumed (m)
 FEET_HEIGHT, TOP_HEIGHT = -0.012, 0.017
 
-BODY = Body(
-    AIRFRAME.mass,
-    tuple(AIRFRAME.principal_axes()[0].tolist()),
-    (standing_box(AIRFRAME.principal_axes()[1], (EDGE, EDGE), FEET_HEIGHT, TOP_HEIGHT),),
-)
+
+def boxes(to_body: np.ndarray) -> tuple[Box, ...]:
+    """The shapes in a frame that `to_body` (3, 3) turns into the body frame."""
+    return (standing_box(to_body, (EDGE, EDGE), FEET_HEIGHT, TOP_HEIGHT),)
+
+
+BODY = AIRFRAME.body(boxes)

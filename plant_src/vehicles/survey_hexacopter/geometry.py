@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ..shapes import Body, standing_box
+import numpy as np
+
+from ..shapes import Box, standing_box
 from .parameters import AIRFRAME
 
 #: distance of the landing skids' ends along x and y, assumed: the skids of this class of frame (m)
@@ -11,8 +13,10 @@ TRACK = (0.30, 0.36)
 #: bottom of the skids and top of the frame from the centre of mass, assumed (m)
 FEET_HEIGHT, TOP_HEIGHT = -0.22, 0.12
 
-BODY = Body(
-    AIRFRAME.mass,
-    tuple(AIRFRAME.principal_axes()[0].tolist()),
-    (standing_box(AIRFRAME.principal_axes()[1], TRACK, FEET_HEIGHT, TOP_HEIGHT),),
-)
+
+def boxes(to_body: np.ndarray) -> tuple[Box, ...]:
+    """The shapes in a frame that `to_body` (3, 3) turns into the body frame."""
+    return (standing_box(to_body, TRACK, FEET_HEIGHT, TOP_HEIGHT),)
+
+
+BODY = AIRFRAME.body(boxes)
