@@ -14,8 +14,11 @@ from .bullet import pybullet
 from .clearance import Clearance, Enclosure
 from .contacts import Contacts
 from .memory import Memory
-from .shadow import Shadow, UnsoundError
+from .shadow import PlanarBody, Shadow, UnsoundError
 from .vehicles.alarms import UNSOUND
+
+#: so often a step of Bullet is made again at most
+MOST_REPEATS = 10
 
 
 @dataclass(frozen=True)
@@ -94,11 +97,21 @@ class Fleet:
     def _choose(self, near: Sequence[bool]) -> None:
         """Make steps of Bullet ready, in which these vehicles take part."""
         self._near = near
-        engaged = [shadow for shadow, is_near in zip(self.shadows, near, strict=True) if is_near]
+        self._engaged = engaged = [shadow for shadow, is_near in zip(self.shadows, near, strict=True) if is_near]
         self._push, self._measure = [shadow.push for shadow in engaged], [shadow.measure for shadow in engaged]
+        self._held = [shadow.held for shadow in engaged if isinstance(shadow, PlanarBody)]
 
     def _collide(self) -> None:
         """One step of Bullet."""
+        self._step_bullet()
+        for repeats in range(MOST_REPEATS):
+            if all([held(repeats) for held in self._held]):
+                return
+            for shadow in self._engaged:
+                shadow.go_back()
+            self._step_bullet()
+
+    def _step_bullet(self) -> None:
         for push in self._push:
             push()
         pybullet.stepSimulation(self._client)

@@ -39,11 +39,13 @@ FRICTION = 1.0
 #: bodies that do not take part stand in a row from here on (m), where no vehicle can be
 PARKING, PARKING_SPACE = 2 * LARGEST_STATE, 100.0
 
-#: so far Bullet may lift or sink a planar vessel (m) before it is put back to its height
-LARGEST_HEAVE = 1e-9
+#: so fast a planar vessel may rise or sink in Bullet (m/s), and so far (m) before it is put back to its height
+SINKING, LARGEST_HEAVE = 1e-4, 1e-9
 
 _MAX_VELOCITY = 1e6  # Bullet limits velocities silently, by default at 100 m/s and rad/s
 _vector = struct.Struct("3d").unpack_from
+_LIFT = 2  # place of the vertical velocity in a motion
+_LEAST_SLOPE = 0.01  # of sinking over lift: M / (m + M) for a load of the mass m
 _ANGULAR = struct.calcsize("3d")  # where the angular part of a motion begins
 _write_vector = struct.Struct("3d").pack_into
 _write_twist = struct.Struct("6d").pack_into
@@ -80,7 +82,8 @@ class Shadow(ABC):
         pieces["surroundings"][:] = [variable.start for variable in spawn.model.surroundings]
         self.inputs, self.outputs = pieces["inputs"], pieces["outputs"]
         self.surroundings = pieces["surroundings"]
-        self._motion, self._twist = pieces["motion"].data, pieces["twist"].data
+        self._motion: Any = pieces["motion"].data
+        self._twist: Any = pieces["twist"].data
         library = load(spawn.model.name)
         #: where a free step leads
         self.predict = self._bound(library.shadow_before, self.BEFORE)
@@ -111,6 +114,10 @@ class Shadow(ABC):
     def measure(self) -> None:
         """Read the motion from Bullet."""
 
+    def go_back(self) -> None:
+        """Return the body in Bullet to where the step began."""
+        self._place(self._pieces["pose"].tolist())
+
     @staticmethod
     @abstractmethod
     def enclosure(body: Body) -> Enclosure:
@@ -126,8 +133,10 @@ class Shadow(ABC):
 
     def engage(self, engaged: bool) -> None:
         """Let Bullet take part in the motion, or not any more."""
-        parked = [PARKING + PARKING_SPACE * self.body, *self.AT_ORIGIN[1:]]
-        self._place(self._pieces["pose"].tolist() if engaged else parked)
+        if engaged:
+            self.go_back()
+        else:
+            self._place([PARKING + PARKING_SPACE * self.body, *self.AT_ORIGIN[1:]])
 
     def fault(self) -> str:
         """What keeps the vehicle from going on: an input that is not finite, or where the free step leads."""
@@ -206,7 +215,11 @@ class FloatingBody(FreeBody):
 
 
 class PlanarBody(FreeBody):
-    """A vessel in the horizontal plane: it has no roll and no pitch, and what presses it down is carried by the water at once."""
+    """A vessel in the horizontal plane: it has no roll and no pitch, and what presses on its deck does not move it.
+
+    Bullet can hold its height only by lifting it as much as the load lets it sink. The load foreseen is that of the steps before;
+    where Bullet finds another one, the step is made again with a better lift, found by the secant method.
+    """
 
     PIECES = {**FreeBody.PIECES, "pressed": 3, "previous": 2}
     SPAWN = Shadow.SPAWN
@@ -226,12 +239,24 @@ class PlanarBody(FreeBody):
 
     def _create(self, body: Body) -> int:
         self._previous: Any = self._pieces["previous"].data
+        #: lift and sinking (m/s) at the last attempt
+        self._tried = 0.0, 0.0
         never = 0.0  # Bullet's word for an infinite inertia
         return super()._create(body._replace(inertia=(never, never, body.inertia[2])))
 
+    def held(self, repeats: int) -> bool:
+        """Whether the step of Bullet can stay as it is after so many repeats; otherwise `push` has a better lift now."""
+        lift, sinking = self._twist[_LIFT], -self._motion[_LIFT]
+        (last_lift, last_sinking), self._tried = self._tried, (lift, sinking)
+        if not SINKING < abs(sinking) < math.inf:
+            return True
+        slope = (last_sinking - sinking) / (lift - last_lift) if repeats and lift != last_lift else 1.0
+        self._twist[_LIFT] = lift + sinking / min(max(slope, _LEAST_SLOPE), 1.0)
+        return False
+
     def push(self) -> None:
         if abs(self._previous[1]) > LARGEST_HEAVE:
-            self._place(self._pieces["pose"].tolist())
+            self.go_back()
             self._previous[1] = 0.0
         pybullet.resetBaseVelocity(self.body, _vector(self._twist), _vector(self._twist, _ANGULAR), self._client)
 
