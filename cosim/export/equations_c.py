@@ -60,17 +60,21 @@ _OPERATIONS = {
 }
 
 
+_SIGNATURE = "void {}(const double *const in[], double *const out[])"
+
+
 @dataclass(frozen=True)
 class Callee:
     """A function that expressions call, with its body in C.
 
     `function` says what it computes, with one result. `body` reads `in[i][j]`, writes `out[i][j]` and may call the functions
-    that it `needs`.
+    that it `needs`. `attributes` stand before its definition.
     """
 
     function: ca.Function
     body: str
     needs: Sequence[ca.Function] = ()
+    attributes: str = ""
 
     def __call__(self, *arguments: ca.SX) -> ca.SX:
         """The result, by a call that stays one in C."""
@@ -82,51 +86,18 @@ def called(function: ca.Function, *arguments: ca.SX) -> list[ca.SX]:
     return function.call(list(arguments), False, True)
 
 
-class _Places(NamedTuple):
+class Places(NamedTuple):
     """Where element j of argument i and of result i lie in C."""
 
     argument: Callable[[int, int], str]
     result: Callable[[int, int], str]
 
 
-_POINTERS = _Places(lambda i, j: f"in[{i}][{j}]", lambda i, j: f"out[{i}][{j}]")
-
-
-def sum_over_rows(name: str, term: ca.Function, rows: int) -> Callee:
-    """The sum of `term` over the rows of a table, in C a loop.
-
-    `term` maps (common, row) to a vector. The function of the result maps (common, count, table), with a table (rows, columns)
-    of which only the first `count` rows are used, to the sum of the terms. `rows` is a multiple of 8: so many terms are computed
-    side by side, which compilers make use of if the term is plain arithmetic, and added one after the other.
-    """
-    common, table = ca.SX.sym("common", term.size1_in(0)), ca.SX.sym("table", rows, term.size1_in(1))
-    count = ca.SX.sym("count")
-    terms = [ca.if_else(count > k, term(common, table[k, :].T), 0) for k in range(rows)]
-    total = ca.Function(name, [common, count, table], [sum(terms)])
-    places = _Places(lambda i, j: f"row[{rows * j} + k]" if i else f"common[{j}]", lambda i, j: f"value[{j}][k]")
-    statements = "".join(f"            {statement};\n" for statement in _Statements(_dense(term), places))
-    sizes = {"size": term.size1_out(0), "rows": rows, "common": term.size1_in(0)}
-    return Callee(total, _SUM % {**sizes, "statements": statements})
-
-
-_SUM = """{
-    double common[%(common)d], *const sum = out[0];
-    for (int i = 0; i < %(common)d; ++i) common[i] = in[0][i];
-    for (int i = 0; i < %(size)d; ++i) sum[i] = 0;
-    for (int first = 0; first < %(rows)d && first < in[1][0]; first += 8) {
-        const double *const row = in[2] + first;
-        double value[%(size)d][8];
-        for (int k = 0; k < 8; ++k) {
-%(statements)s        }
-        for (int k = 0; k < 8 && first + k < in[1][0]; ++k)
-            for (int i = 0; i < %(size)d; ++i) sum[i] += value[i][k];
-    }
-}
-"""
+_POINTERS = Places(lambda i, j: f"in[{i}][{j}]", lambda i, j: f"out[{i}][{j}]")
 
 
 def callees(functions: Iterable[ca.Function], known: Sequence[Callee] = ()) -> dict[str, str]:
-    """Name -> body of the functions that these call, each after those that it calls itself."""
+    """Name -> definition of the functions that these call, each after those that it calls itself."""
     given = {callee.function.name(): callee for callee in known}
     found: dict[str, str] = {}
     for function in functions:
@@ -134,9 +105,18 @@ def callees(functions: Iterable[ca.Function], known: Sequence[Callee] = ()) -> d
             callee = given.get(inner.name())
             found |= callees([inner] if callee is None else [], known)
             for needed in callee.needs if callee else ():
-                found |= callees([needed], known) | {needed.name(): c_function(needed)}
-            found[inner.name()] = callee.body if callee else c_function(inner)
+                found |= callees([needed], known) | {needed.name(): definition("static", needed)}
+            found[inner.name()] = _definition(callee) if callee else definition("static", inner)
     return found
+
+
+def _definition(callee: Callee) -> str:
+    return f"{callee.attributes}static {_SIGNATURE.format(callee.function.name())}\n{callee.body}"
+
+
+def definition(linkage: str, function: ca.Function) -> str:
+    """The function in C, after a word about its linkage. Raises ValueError as `c_function` does."""
+    return f"{linkage} {_SIGNATURE.format(function.name())}\n{c_function(function)}"
 
 
 def c_function(function: ca.Function) -> str:
@@ -145,23 +125,23 @@ def c_function(function: ca.Function) -> str:
     What it calls by `called` is called (`callees` has the bodies).
     Raises ValueError for an operation that has no counterpart in C.
     """
-    return "{\n" + "".join(f"    {statement};\n" for statement in _Statements(_dense(function))) + "}\n"
+    return "{\n" + "".join(f"    {statement};\n" for statement in Statements(dense(function))) + "}\n"
 
 
-def _dense(function: ca.Function) -> ca.Function:
+def dense(function: ca.Function) -> ca.Function:
     """The function without structural zeros and common subexpressions."""
     arguments = [ca.SX.sym(f"a{i}", function.size_in(i)) for i in range(function.n_in())]
     results = ca.cse([ca.densify(result) for result in function.call(arguments)])
     return ca.Function(function.name(), arguments, results)
 
 
-class _Statements:
+class Statements:
     """The statements of a function, each an assignment or a call.
 
     `_values` maps places in CasADi's work vector to the C expression that holds their present value.
     """
 
-    def __init__(self, function: ca.Function, places: _Places = _POINTERS):
+    def __init__(self, function: ca.Function, places: Places = _POINTERS):
         self._function, self._places = function, places
         self._values: dict[int, str] = {}
         self._called = {inner.name(): inner for inner in function.find_functions(0)}

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import zip_longest
 
 import casadi as ca
 
@@ -42,8 +43,9 @@ def exponential(x: ca.SX) -> ca.SX:
 
 
 def _series(coefficients: Sequence[float], x: ca.SX) -> ca.SX:
-    """A polynomial by Horner's rule, the lowest power first."""
-    result = ca.SX(coefficients[-1])
-    for coefficient in coefficients[-2::-1]:
-        result = result * x + coefficient
-    return result
+    """A polynomial, the lowest power first, in pairs (Estrin's scheme): they do not wait for each other."""
+    terms = [ca.SX(coefficient) for coefficient in coefficients]
+    while len(terms) > 1:
+        terms = [low + high * x for low, high in zip_longest(terms[::2], terms[1::2], fillvalue=ca.SX(0))]
+        x = x * x
+    return terms[0]
