@@ -24,11 +24,11 @@ def sum_over_rows(name: str, term: ca.Function, rows: int) -> Callee:
     return Callee(total, _SUM % {**sizes, "statements": statements}, attributes=_WIDE)
 
 
-#: compiled once for each width of registers; the processor it runs on chooses. The bits are the same: every row has the same
-#: operations in the same order, whatever is computed beside it
+#: compiled for each width of registers; the processor it runs on chooses. The bits are the same: every row has the same
+#: operations in the same order, whatever is computed beside it. Not for 512 bits: many processors run slower after these
 _WIDE = """#ifndef WIDE
 #if defined __x86_64__ && defined __GLIBC__ && !defined __clang__
-#define WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
+#define WIDE __attribute__((target_clones("avx2", "default")))
 #else
 #define WIDE
 #endif
