@@ -45,8 +45,9 @@ _OPERATIONS = {
     ca.OP_FLOOR: "floor({})",
     ca.OP_CEIL: "ceil({})",
     ca.OP_FMOD: "fmod({}, {})",
-    ca.OP_FMIN: "fmin({}, {})",
-    ca.OP_FMAX: "fmax({}, {})",
+    # not fmin and fmax: compilers call these, and they hide what is not a number
+    ca.OP_FMIN: "{0} < {1} ? {0} : {1}",
+    ca.OP_FMAX: "{0} > {1} ? {0} : {1}",
     ca.OP_SIGN: "(double)({0} > 0) - (double)({0} < 0)",
     ca.OP_COPYSIGN: "copysign({}, {})",
     ca.OP_LT: "{} < {}",
@@ -144,6 +145,7 @@ class Statements:
     def __init__(self, function: ca.Function, places: Places = _POINTERS):
         self._function, self._places = function, places
         self._values: dict[int, str] = {}
+        self._constants: dict[str, float] = {}
         self._called = {inner.name(): inner for inner in function.find_functions(0)}
         text = function.str(True).partition("Algorithm:\n")[2].splitlines() if self._called else []
         self._names = [line.partition(" = ")[2].partition("(")[0] for line in text]
@@ -155,6 +157,8 @@ class Statements:
                 yield from self._call(k)
             elif operation == ca.OP_INPUT:
                 self._read(k)
+            elif operation == ca.OP_CONST:
+                self._take(k)
             else:
                 yield self._assign(k, operation)
 
@@ -162,16 +166,25 @@ class Statements:
         argument, element = self._function.instruction_input(k)
         self._values[self._function.instruction_output(k)[0]] = self._places.argument(argument, element)
 
+    def _take(self, k: int) -> None:
+        value = self._function.instruction_constant(k)
+        self._values[self._function.instruction_output(k)[0]] = text = _literal(value)
+        self._constants[text] = value
+
     def _assign(self, k: int, operation: int) -> str:
         targets, operands = self._function.instruction_output(k), self._function.instruction_input(k)
+        values = [self._values[place] for place in operands]
         if operation == ca.OP_OUTPUT:
-            return f"{self._places.result(*targets)} = {self._values[operands[0]]}"
-        if operation == ca.OP_CONST:
-            value = _literal(self._function.instruction_constant(k))
-        else:
-            value = _operation(self._function, operation).format(*(self._values[place] for place in operands))
+            return f"{self._places.result(*targets)} = {values[0]}"
         self._values[targets[0]] = f"v{k}"
-        return f"const double v{k} = {value}"
+        return f"const double v{k} = {self._result(operation, values)}"
+
+    def _result(self, operation: int, operands: list[str]) -> str:
+        """The expression of an operation; dividing by a constant takes four times as long as multiplying by its inverse."""
+        divisor = self._constants.get(operands[-1]) if operation == ca.OP_DIV else None
+        if divisor and math.isfinite(1 / divisor):
+            return f"{operands[0]} * {_literal(1 / divisor)}"
+        return _operation(self._function, operation).format(*operands)
 
     def _call(self, k: int) -> Iterator[str]:
         """A call; arguments that lie side by side among those of this function are not copied."""

@@ -97,10 +97,14 @@ static const char *phase_name(Phase phase)
     }
 }
 
-static bool expect(Instance *instance, const char *function, int phases)
+static bool not_expected(Instance *instance, const char *function)
 {
-    if (instance->state.phase & phases) return true;
     return refuse(instance, function, "not allowed %s", phase_name(instance->state.phase));
+}
+
+static inline bool expect(Instance *instance, const char *function, int phases)
+{
+    return (instance->state.phase & phases) || not_expected(instance, function);
 }
 
 /* The outcome of a model function: NULL, or the reason why it failed. */
