@@ -19,10 +19,8 @@ import casadi as ca
 
 from ..component import Variable
 from .block import Block, BlockVariable
-from .equations_c import Callee, c_function, callees
+from .equations_c import Callee, callees, definition
 from .equations_glue import INCLUDES, glue
-
-_SIGNATURE = "void {}(const double *const in[], double *const out[])"
 
 
 @dataclass(frozen=True)
@@ -155,10 +153,9 @@ def _header(model: ContinuousModel) -> str:
 def _source(model: ContinuousModel, exported: Sequence[ca.Function]) -> str:
     """The text of model.c."""
     own = _functions(model)
-    called = callees([*own, *exported], model.callees)
-    functions = [f"static {_SIGNATURE.format(name)}\n{body}" for name, body in called.items()]
-    functions += [f"static {_SIGNATURE.format(f.name())}\n{c_function(f)}" for f in own]
-    functions += [f"MODEL_EXPORT {_SIGNATURE.format(f.name())}\n{c_function(f)}" for f in exported]
+    functions = [*callees([*own, *exported], model.callees).values()]
+    functions += [definition("static", function) for function in own]
+    functions += [definition("MODEL_EXPORT", function) for function in exported]
     return "\n".join([INCLUDES, *functions, glue(model)])
 
 

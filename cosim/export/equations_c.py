@@ -45,8 +45,9 @@ _OPERATIONS = {
     ca.OP_FLOOR: "floor({})",
     ca.OP_CEIL: "ceil({})",
     ca.OP_FMOD: "fmod({}, {})",
-    ca.OP_FMIN: "fmin({}, {})",
-    ca.OP_FMAX: "fmax({}, {})",
+    # not fmin and fmax: compilers call these, and they hide what is not a number
+    ca.OP_FMIN: "{0} < {1} ? {0} : {1}",
+    ca.OP_FMAX: "{0} > {1} ? {0} : {1}",
     ca.OP_SIGN: "(double)({0} > 0) - (double)({0} < 0)",
     ca.OP_COPYSIGN: "copysign({}, {})",
     ca.OP_LT: "{} < {}",
@@ -60,17 +61,21 @@ _OPERATIONS = {
 }
 
 
+_SIGNATURE = "void {}(const double *const in[], double *const out[])"
+
+
 @dataclass(frozen=True)
 class Callee:
     """A function that expressions call, with its body in C.
 
     `function` says what it computes, with one result. `body` reads `in[i][j]`, writes `out[i][j]` and may call the functions
-    that it `needs`.
+    that it `needs`. `attributes` stand before its definition.
     """
 
     function: ca.Function
     body: str
     needs: Sequence[ca.Function] = ()
+    attributes: str = ""
 
     def __call__(self, *arguments: ca.SX) -> ca.SX:
         """The result, by a call that stays one in C."""
@@ -82,51 +87,18 @@ def called(function: ca.Function, *arguments: ca.SX) -> list[ca.SX]:
     return function.call(list(arguments), False, True)
 
 
-class _Places(NamedTuple):
+class Places(NamedTuple):
     """Where element j of argument i and of result i lie in C."""
 
     argument: Callable[[int, int], str]
     result: Callable[[int, int], str]
 
 
-_POINTERS = _Places(lambda i, j: f"in[{i}][{j}]", lambda i, j: f"out[{i}][{j}]")
-
-
-def sum_over_rows(name: str, term: ca.Function, rows: int) -> Callee:
-    """The sum of `term` over the rows of a table, in C a loop.
-
-    `term` maps (common, row) to a vector. The function of the result maps (common, count, table), with a table (rows, columns)
-    of which only the first `count` rows are used, to the sum of the terms. `rows` is a multiple of 8: so many terms are computed
-    side by side, which compilers make use of if the term is plain arithmetic, and added one after the other.
-    """
-    common, table = ca.SX.sym("common", term.size1_in(0)), ca.SX.sym("table", rows, term.size1_in(1))
-    count = ca.SX.sym("count")
-    terms = [ca.if_else(count > k, term(common, table[k, :].T), 0) for k in range(rows)]
-    total = ca.Function(name, [common, count, table], [sum(terms)])
-    places = _Places(lambda i, j: f"row[{rows * j} + k]" if i else f"common[{j}]", lambda i, j: f"value[{j}][k]")
-    statements = "".join(f"            {statement};\n" for statement in _Statements(_dense(term), places))
-    sizes = {"size": term.size1_out(0), "rows": rows, "common": term.size1_in(0)}
-    return Callee(total, _SUM % {**sizes, "statements": statements})
-
-
-_SUM = """{
-    double common[%(common)d], *const sum = out[0];
-    for (int i = 0; i < %(common)d; ++i) common[i] = in[0][i];
-    for (int i = 0; i < %(size)d; ++i) sum[i] = 0;
-    for (int first = 0; first < %(rows)d && first < in[1][0]; first += 8) {
-        const double *const row = in[2] + first;
-        double value[%(size)d][8];
-        for (int k = 0; k < 8; ++k) {
-%(statements)s        }
-        for (int k = 0; k < 8 && first + k < in[1][0]; ++k)
-            for (int i = 0; i < %(size)d; ++i) sum[i] += value[i][k];
-    }
-}
-"""
+_POINTERS = Places(lambda i, j: f"in[{i}][{j}]", lambda i, j: f"out[{i}][{j}]")
 
 
 def callees(functions: Iterable[ca.Function], known: Sequence[Callee] = ()) -> dict[str, str]:
-    """Name -> body of the functions that these call, each after those that it calls itself."""
+    """Name -> definition of the functions that these call, each after those that it calls itself."""
     given = {callee.function.name(): callee for callee in known}
     found: dict[str, str] = {}
     for function in functions:
@@ -134,9 +106,18 @@ def callees(functions: Iterable[ca.Function], known: Sequence[Callee] = ()) -> d
             callee = given.get(inner.name())
             found |= callees([inner] if callee is None else [], known)
             for needed in callee.needs if callee else ():
-                found |= callees([needed], known) | {needed.name(): c_function(needed)}
-            found[inner.name()] = callee.body if callee else c_function(inner)
+                found |= callees([needed], known) | {needed.name(): definition("static", needed)}
+            found[inner.name()] = _definition(callee) if callee else definition("static", inner)
     return found
+
+
+def _definition(callee: Callee) -> str:
+    return f"{callee.attributes}static {_SIGNATURE.format(callee.function.name())}\n{callee.body}"
+
+
+def definition(linkage: str, function: ca.Function) -> str:
+    """The function in C, after a word about its linkage. Raises ValueError as `c_function` does."""
+    return f"{linkage} {_SIGNATURE.format(function.name())}\n{c_function(function)}"
 
 
 def c_function(function: ca.Function) -> str:
@@ -145,25 +126,26 @@ def c_function(function: ca.Function) -> str:
     What it calls by `called` is called (`callees` has the bodies).
     Raises ValueError for an operation that has no counterpart in C.
     """
-    return "{\n" + "".join(f"    {statement};\n" for statement in _Statements(_dense(function))) + "}\n"
+    return "{\n" + "".join(f"    {statement};\n" for statement in Statements(dense(function))) + "}\n"
 
 
-def _dense(function: ca.Function) -> ca.Function:
+def dense(function: ca.Function) -> ca.Function:
     """The function without structural zeros and common subexpressions."""
     arguments = [ca.SX.sym(f"a{i}", function.size_in(i)) for i in range(function.n_in())]
     results = ca.cse([ca.densify(result) for result in function.call(arguments)])
     return ca.Function(function.name(), arguments, results)
 
 
-class _Statements:
+class Statements:
     """The statements of a function, each an assignment or a call.
 
     `_values` maps places in CasADi's work vector to the C expression that holds their present value.
     """
 
-    def __init__(self, function: ca.Function, places: _Places = _POINTERS):
+    def __init__(self, function: ca.Function, places: Places = _POINTERS):
         self._function, self._places = function, places
         self._values: dict[int, str] = {}
+        self._constants: dict[str, float] = {}
         self._called = {inner.name(): inner for inner in function.find_functions(0)}
         text = function.str(True).partition("Algorithm:\n")[2].splitlines() if self._called else []
         self._names = [line.partition(" = ")[2].partition("(")[0] for line in text]
@@ -175,6 +157,8 @@ class _Statements:
                 yield from self._call(k)
             elif operation == ca.OP_INPUT:
                 self._read(k)
+            elif operation == ca.OP_CONST:
+                self._take(k)
             else:
                 yield self._assign(k, operation)
 
@@ -182,16 +166,25 @@ class _Statements:
         argument, element = self._function.instruction_input(k)
         self._values[self._function.instruction_output(k)[0]] = self._places.argument(argument, element)
 
+    def _take(self, k: int) -> None:
+        value = self._function.instruction_constant(k)
+        self._values[self._function.instruction_output(k)[0]] = text = _literal(value)
+        self._constants[text] = value
+
     def _assign(self, k: int, operation: int) -> str:
         targets, operands = self._function.instruction_output(k), self._function.instruction_input(k)
+        values = [self._values[place] for place in operands]
         if operation == ca.OP_OUTPUT:
-            return f"{self._places.result(*targets)} = {self._values[operands[0]]}"
-        if operation == ca.OP_CONST:
-            value = _literal(self._function.instruction_constant(k))
-        else:
-            value = _operation(self._function, operation).format(*(self._values[place] for place in operands))
+            return f"{self._places.result(*targets)} = {values[0]}"
         self._values[targets[0]] = f"v{k}"
-        return f"const double v{k} = {value}"
+        return f"const double v{k} = {self._result(operation, values)}"
+
+    def _result(self, operation: int, operands: list[str]) -> str:
+        """The expression of an operation; dividing by a constant takes four times as long as multiplying by its inverse."""
+        divisor = self._constants.get(operands[-1]) if operation == ca.OP_DIV else None
+        if divisor and math.isfinite(1 / divisor):
+            return f"{operands[0]} * {_literal(1 / divisor)}"
+        return _operation(self._function, operation).format(*operands)
 
     def _call(self, k: int) -> Iterator[str]:
         """A call; arguments that lie side by side among those of this function are not copied."""

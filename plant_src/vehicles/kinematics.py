@@ -18,7 +18,7 @@ def conjugate(q: ca.SX) -> ca.SX:
 
 def normalised(q: ca.SX) -> ca.SX:
     """The unit quaternion of the same direction."""
-    return q / ca.norm_2(q)
+    return q * (1 / ca.norm_2(q))
 
 
 def matrix(q: ca.SX) -> ca.SX:

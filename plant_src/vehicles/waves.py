@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from cosim.export.equations_c import sum_over_rows
+from cosim.export.equations_sum import sum_over_rows
 
 from .elementary import exponential, sine_and_cosine
 from .interface import COMPONENTS

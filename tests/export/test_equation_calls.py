@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,7 +14,8 @@ from test_equations import Compiled
 from cosim.component import Variable
 from cosim.export import equations
 from cosim.export.equations import ContinuousModel
-from cosim.export.equations_c import Callee, c_function, called, sum_over_rows
+from cosim.export.equations_c import Callee, c_function, called
+from cosim.export.equations_sum import sum_over_rows
 
 ROWS = 16
 
@@ -38,10 +40,10 @@ def model(rate: Callable[..., ca.SX], *parameters: Variable, **more: object) -> 
     )
 
 
-def waves() -> Callee:
+def waves(cosine: Callable[[ca.SX], ca.SX] = ca.cos) -> Callee:
     """Sum over rows (amplitude, frequency) of amplitude * cos(frequency * (x + 2 t)), and of amplitudes."""
     common, row = ca.SX.sym("common", 2), ca.SX.sym("row", 2)
-    term = ca.Function("term", [common, row], [ca.vertcat(row[0] * ca.cos(row[1] * (common[0] + 2 * common[1])), row[0])])
+    term = ca.Function("term", [common, row], [ca.vertcat(row[0] * cosine(row[1] * (common[0] + 2 * common[1])), row[0])])
     return sum_over_rows("waves", term, ROWS)
 
 
@@ -59,6 +61,23 @@ def test_a_sum_over_rows_counts_only_those_in_use(count: int, tmp_path: Path) ->
     found = compiled.call("probe", 2, [0.3, 0.2], [float(count)], [*amplitude, *frequency])
     used, speed = amplitude[:count], frequency[:count]
     assert found == pytest.approx([3 * (used * np.cos(0.7 * speed)).sum(), 3 * used.sum()], rel=1e-14)
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="its registers have these names")
+@pytest.mark.parametrize("count", [5, ROWS])
+def test_a_sum_has_the_same_bits_in_registers_of_every_width(count: int, tmp_path: Path) -> None:
+    """As one that chooses by itself; a fused multiplication and addition would be seen."""
+    callee, x, table = waves(lambda angle: 1 - angle**2 * (0.5 - 0.04 * angle**2)), ca.SX.sym("x", 2), ca.SX.sym("table", ROWS, 2)
+    probe = ca.Function("probe", [x, table], [callee(x, ca.SX(count), table)])
+    block = equations.block(model(lambda x, u, p: u, callees=[callee]), [probe])
+    known = {"sse2", "avx2", "avx512f"} & {*Path("/proc/cpuinfo").read_text().split()}
+    options = {name: [f'-DWIDE=__attribute__((target("{name}")))'] for name in known} | {"by itself": []}
+    found = []
+    for name, chosen in options.items():
+        (folder := tmp_path / name).mkdir()
+        compiled = Compiled(block, folder, *chosen)
+        found.append([compiled.call("probe", 2, [x, 0.2], [*numbers(2 * ROWS)]) for x in numbers(30)])
+    assert all(sums == found[0] for sums in found)
 
 
 def test_casadi_computes_the_same_sum() -> None:

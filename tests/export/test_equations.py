@@ -45,10 +45,10 @@ def oscillator() -> ContinuousModel:
 class Compiled:
     """A block's C code, compiled and called without FMI; the arrays are those of its `Model`."""
 
-    def __init__(self, block: Block, folder: Path):
+    def __init__(self, block: Block, folder: Path, *options: str):
         for name, text in block.files.items():
             (folder / name).write_text(text)
-        command = ["gcc", "-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Werror", "-fPIC", "-shared", f"-I{SHELL}"]
+        command = ["gcc", "-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Werror", "-fPIC", "-shared", f"-I{SHELL}", *options]
         subprocess.run([*command, "model.c", "-o", "model.so", "-lm"], cwd=folder, check=True)
         self.library = ctypes.CDLL(str(folder / "model.so"))
         for name in ("model_initialize", "model_step"):

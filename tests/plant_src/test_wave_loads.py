@@ -90,6 +90,19 @@ def test_sine_and_cosine_are_those_of_numpy() -> None:
     assert np.abs(cosine - np.cos(angles)).max() < 1e-13
 
 
+def test_the_sine_of_a_share_of_a_right_angle_is_that_of_numpy() -> None:
+    shares = np.random.default_rng(2).uniform(-1, 1, 5000)
+    (found,) = computed(lambda share: (elementary.sine_of_quarter(share),), shares)
+    assert np.abs(found - np.sin(np.pi / 2 * shares)).max() < 1e-15
+
+
+@pytest.mark.parametrize("x", [0.0, 1e-12, 0.2, 1.0, 5.0])
+def test_the_arctangent_is_that_of_numpy(x: float) -> None:
+    y = np.concatenate([[0.0, x, -x, 1e-300], np.random.default_rng(2).uniform(-2, 2, 5000)])
+    (found,) = computed(lambda y: (elementary.arctangent(y, ca.SX(x)),), y)
+    assert np.abs(found - np.arctan2(y, x)).max() < 1e-15
+
+
 def test_the_exponential_is_that_of_numpy() -> None:
     numbers = np.random.default_rng(2).uniform(-3, 3, 5000)
     (found,) = computed(lambda x: (elementary.exponential(x),), numbers)

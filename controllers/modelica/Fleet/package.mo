@@ -32,6 +32,6 @@ package Fleet "What the controllers of the quadcopter and the vessel share"
     input Real angle(unit = "rad");
     output Real wrapped(unit = "rad");
   algorithm
-    wrapped := atan2(sin(angle), cos(angle));
+    wrapped := if abs(angle) <= pi then angle else atan2(sin(angle), cos(angle));
   end wrap_angle;
 end Fleet;

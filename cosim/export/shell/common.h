@@ -1,8 +1,8 @@
 /* What the FMI 2.0 and 3.0 shells have in common: the life cycle, access to variables and the FMU state.
  *
- * A shell includes its FMI header, defines `Logger` (the type of the importer's callback) and includes this file, then defines
- * `report` (below) and the functions of its FMI version. All functions here return true when all is well; after `refuse` they
- * return false, which the shell turns into an error status.
+ * A shell includes its FMI header, defines `Logger` (the type of the importer's callback) and `ARRAYS` (whether variables may
+ * have several elements) and includes this file, then defines `report` (below) and the functions of its FMI version. All
+ * functions here return true when all is well; after `refuse` they return false, which the shell turns into an error status.
  */
 #include <float.h>
 #include <math.h>
@@ -65,6 +65,8 @@ typedef struct {
 
 #include "variables.h" /* generated: VARIABLES[] and TOKEN */
 
+#define VARIABLE_COUNT (sizeof VARIABLES / sizeof VARIABLES[0])
+
 /* ---- failures -------------------------------------------------------------------------------------------------------- */
 
 /* Hands a message to the importer as an error; defined by each shell. */
@@ -95,10 +97,14 @@ static const char *phase_name(Phase phase)
     }
 }
 
-static bool expect(Instance *instance, const char *function, int phases)
+static bool not_expected(Instance *instance, const char *function)
 {
-    if (instance->state.phase & phases) return true;
     return refuse(instance, function, "not allowed %s", phase_name(instance->state.phase));
+}
+
+static inline bool expect(Instance *instance, const char *function, int phases)
+{
+    return (instance->state.phase & phases) || not_expected(instance, function);
 }
 
 /* The outcome of a model function: NULL, or the reason why it failed. */
@@ -207,41 +213,64 @@ static bool terminate(Instance *instance, const char *function)
 
 /* ---- access to variables --------------------------------------------------------------------------------------------- */
 
-static const Variable *find(Instance *instance, const char *function, unsigned reference, Type type)
+/* What is refused is told by functions of its own: those that check are then so short that compilers put them into the loops. */
+static const Variable *not_found(Instance *instance, const char *function, unsigned reference, Type type)
 {
     static const char *const TYPES[] = {"Float64", "Int32", "Boolean", "Enumeration"};
-    const size_t count = sizeof VARIABLES / sizeof VARIABLES[0];
-    if (reference >= count) {
-        refuse(instance, function, "found value reference %u, expected less than %zu", reference, count);
-        return NULL;
-    }
-    const Variable *variable = &VARIABLES[reference];
-    if (variable->type == type) return variable;
-    refuse(instance, function, "%s is of type %s", variable->name, TYPES[variable->type]);
+    if (reference >= VARIABLE_COUNT)
+        refuse(instance, function, "found value reference %u, expected less than %zu", reference, VARIABLE_COUNT);
+    else
+        refuse(instance, function, "%s is of type %s", VARIABLES[reference].name, TYPES[VARIABLES[reference].type]);
     return NULL;
 }
 
-static bool writable(Instance *instance, const char *function, const Variable *variable)
+static inline const Variable *find(Instance *instance, const char *function, unsigned reference, Type type)
+{
+    if (reference < VARIABLE_COUNT && VARIABLES[reference].type == type) return &VARIABLES[reference];
+    return not_found(instance, function, reference, type);
+}
+
+static bool not_writable(Instance *instance, const char *function, const Variable *variable)
 {
     const char *name = variable->name, *when = phase_name(instance->state.phase);
     if (variable->role == READ_ONLY) return refuse(instance, function, "%s is neither parameter nor input", name);
-    if (variable->role == FIXED_PARAMETER && instance->state.phase == STEPPING)
-        return refuse(instance, function, "%s is a fixed parameter and cannot be set %s", name, when);
-    return true;
+    return refuse(instance, function, "%s is a fixed parameter and cannot be set %s", name, when);
 }
 
-static bool acceptable(Instance *instance, const char *function, const Variable *variable, double value)
+static inline bool writable(Instance *instance, const char *function, const Variable *variable)
+{
+    const Role role = variable->role;
+    if (role > FIXED_PARAMETER || (role == FIXED_PARAMETER && instance->state.phase != STEPPING)) return true;
+    return not_writable(instance, function, variable);
+}
+
+static bool not_acceptable(Instance *instance, const char *function, const Variable *variable, double value)
 {
     if (!isfinite(value)) return refuse(instance, function, "%s: found %g, expected a finite value", variable->name, value);
-    if (variable->literals == 0 || (value >= 1 && value <= variable->literals)) return true;
     return refuse(instance, function, "%s: found %g, expected 1 to %d", variable->name, value, variable->literals);
 }
 
-/* Whether the importer's array has (still) room for, or values of, a variable. */
-static bool fits(Instance *instance, const char *function, size_t expected, size_t found, bool complete)
+static inline bool acceptable(Instance *instance, const char *function, const Variable *variable, double value)
 {
-    if (complete ? found == expected : found >= expected) return true;
+    if (isfinite(value) && (variable->literals == 0 || (value >= 1 && value <= variable->literals))) return true;
+    return not_acceptable(instance, function, variable, value);
+}
+
+static bool not_fitting(Instance *instance, const char *function, size_t expected, size_t found, bool complete)
+{
     return refuse(instance, function, "found %zu values, expected %s%zu", found, complete ? "" : "at least ", expected);
+}
+
+static inline size_t elements(const Variable *variable)
+{
+    return ARRAYS ? variable->count : 1;
+}
+
+/* Whether the importer's array has (still) room for, or values of, a variable; scalars have one place each. */
+static inline bool fits(Instance *instance, const char *function, size_t expected, size_t found, bool complete)
+{
+    if (!ARRAYS || (complete ? found == expected : found >= expected)) return true;
+    return not_fitting(instance, function, expected, found, complete);
 }
 
 static bool after_writing(Instance *instance, bool parameters)
@@ -260,9 +289,9 @@ static bool after_writing(Instance *instance, bool parameters)
         if (!refresh(instance, function)) return false;                                                                     \
         for (size_t i = 0; i < count; ++i) {                                                                                \
             const Variable *variable = find(instance, function, references[i], TYPE);                                       \
-            if (!variable || !fits(instance, function, done + variable->count, value_count, false)) return false;           \
+            if (!variable || !fits(instance, function, done + elements(variable), value_count, false)) return false;        \
             const Inside *source = (const Inside *)((const char *)&instance->state + variable->offset);                     \
-            for (size_t k = 0; k < variable->count; ++k) values[done++] = source[k];                                        \
+            for (size_t k = 0; k < elements(variable); ++k) values[done++] = source[k];                                     \
         }                                                                                                                   \
         return fits(instance, function, done, value_count, true);                                                           \
     }                                                                                                                       \
@@ -276,9 +305,9 @@ static bool after_writing(Instance *instance, bool parameters)
         for (size_t i = 0; i < count; ++i) {                                                                                \
             const Variable *variable = find(instance, function, references[i], TYPE);                                       \
             if (!variable || !writable(instance, function, variable)) return false;                                         \
-            if (!fits(instance, function, done + variable->count, value_count, false)) return false;                        \
+            if (!fits(instance, function, done + elements(variable), value_count, false)) return false;                     \
             Inside *target = (Inside *)((char *)&instance->state + variable->offset);                                       \
-            for (size_t k = 0; k < variable->count; ++k, ++done) {                                                          \
+            for (size_t k = 0; k < elements(variable); ++k, ++done) {                                                       \
                 if (!acceptable(instance, function, variable, (double)values[done])) return false;                          \
                 target[k] = (Inside)values[done];                                                                           \
             }                                                                                                               \

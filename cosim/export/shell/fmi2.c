@@ -2,6 +2,7 @@
 #include "fmi2Functions.h"
 
 typedef fmi2CallbackLogger Logger;
+#define ARRAYS 0
 #include "common.h"
 
 /* Messages of FMI 2.0 are format strings with "%" directives and "#" references: both are doubled to stand for themselves. */

@@ -2,6 +2,7 @@
 #include "fmi3Functions.h"
 
 typedef fmi3LogMessageCallback Logger;
+#define ARRAYS 1
 #include "common.h"
 
 static void report(const Instance *instance, const char *message)

@@ -5,8 +5,6 @@ Equations 9, 12 and 13 of the paper; README.md has them in our notation.
 
 from __future__ import annotations
 
-import math
-
 import casadi as ca
 
 from cosim.export.block import Block
@@ -14,6 +12,7 @@ from cosim.export.equations import ContinuousModel
 from cosim.export.equations import block as as_block
 
 from .. import kinematics, shadow_maps
+from ..elementary import arctangent, sine_and_cosine, sine_of_quarter
 from . import parameters as p
 from .geometry import DECK_CENTRE
 from .interface import STATES, VARIABLES
@@ -24,7 +23,7 @@ def rate(state: ca.SX, inputs: ca.SX) -> ca.SX:
     yaw, u, v, r = ca.vertsplit(state[2:6])
     thrust, rudder_angle = inputs[0], inputs[1]
     external_force, external_torque, wind, current = inputs[2:5], inputs[5:8], inputs[8:11], inputs[11:13]
-    cos, sin = ca.cos(yaw), ca.sin(yaw)
+    sin, cos = sine_and_cosine(yaw)
     u_water, v_water = u - (cos * current[0] + sin * current[1]), v - (cos * current[1] - sin * current[0])
     u_air, v_air = u - (cos * wind[0] + sin * wind[1]), v - (cos * wind[1] - sin * wind[0])
     loads = hull_loads(v_water, r) + air_drag(u_air, v_air) + rudder_loads(u_water, v_water, r, rudder_angle)
@@ -49,10 +48,10 @@ def air_drag(u: ca.SX, v: ca.SX) -> ca.SX:
 def rudder_loads(u: ca.SX, v: ca.SX, r: ca.SX, rudder_angle: ca.SX) -> ca.SX:
     """X, Y (N) and N (N m) of the rudder; lift grows as a sine up to the stall angle. Going astern the lift changes its sign."""
     ahead = ca.sign(u)
-    inflow_angle = ca.atan2(ahead * (v - p.RUDDER_ARM * r), ca.fabs(u))
+    inflow_angle = arctangent(ahead * (v - p.RUDDER_ARM * r), ca.fabs(u))
     attack = ca.fmin(1, ca.fmax(-1, (rudder_angle - inflow_angle) / p.STALL_ANGLE))
     largest = p.WATER_DENSITY / 2 * p.RUDDER_MAX_LIFT_COEFFICIENT * p.RUDDER_AREA * ahead * u**2
-    lift = largest * ca.sin(math.pi / 2 * attack)
+    lift = largest * sine_of_quarter(attack)
     side_force = lift * ca.cos(rudder_angle)
     return ca.vertcat(-lift * ca.sin(rudder_angle), side_force, -p.RUDDER_ARM * side_force)
 
