@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from .. import log
-from ..component import Access, Call, Component, Ports, StepResult, Variable
+from ..component import GOOD, Access, Call, Component, Ports, StepResult, Variable
 from ..errors import ComponentError, InputError
 from ..journal import calling
 from ..process_state import contained
@@ -100,10 +100,14 @@ class FmuInstance(Component):
     def _open(self, folder: Path) -> Any:
         description = self.description
         try:
-            return self._slave(guid=description.token, modelIdentifier=description.identifier, unzipDirectory=str(folder))
+            fmu = self._slave(guid=description.token, modelIdentifier=description.identifier, unzipDirectory=str(folder))
         except Exception as error:
             reason = str(error).replace(f"{folder}/", "")
             raise InputError(f'the binary of "{self._file.path}" cannot be loaded: {reason}') from None
+        for function in fmu._functions.values():
+            if function.restype is ctypes.c_int:
+                function.errcheck = _not_negative
+        return fmu
 
     def call(self, function: str, *arguments: Any) -> Any:
         """Call one of FMPy's methods; a bad status becomes a ComponentError with the FMU's own last message."""
@@ -231,12 +235,21 @@ class FmuInstance(Component):
         for call in calls:
             with calling(self.name, call.name, self._kind, self._clock.value):
                 status = call.function(*call.arguments)
-            if status > WARNING:
+            if status not in GOOD:
                 return self.failed(call.name, status)
         return None
 
     def failed(self, name: str, status: int) -> StepResult:
         self.fail(name, status)
+
+
+def _not_negative(status: int, function: Any, _: Any) -> int:
+    """FMPy alone would take negative numbers for good statuses."""
+    from fmpy.fmi1 import FMICallException
+
+    if status < 0:
+        raise FMICallException(function.__name__, status)
+    return status
 
 
 def address(function: Any) -> int:

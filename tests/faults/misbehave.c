@@ -184,11 +184,11 @@ static int event(Lag *m) { m->event = 1; return OK; }
 static int terminate(Lag *m) { m->terminate = 1; return OK; }
 #define STATUS(NAME, VALUE) static int NAME(Lag *m) { say(VALUE, "status", "told to return " #NAME); return VALUE; }
 STATUS(warning, WARNING) STATUS(discard, DISCARD) STATUS(error, ERROR) STATUS(fatal, FATAL)
-STATUS(pending, PENDING) STATUS(undefined, 17)
+STATUS(pending, PENDING) STATUS(undefined, 17) STATUS(hundred, 100) STATUS(negative, -1)
 
 static const struct { const char *name; int (*act)(Lag *); } FAULTS[] = {
     {"warning", warning}, {"discard", discard}, {"error", error}, {"fatal", fatal}, {"pending", pending},
-    {"undefined", undefined}, {"nan", nan_}, {"infinity", infinity}, {"early", early}, {"event", event},
+    {"undefined", undefined}, {"hundred", hundred}, {"negative", negative}, {"nan", nan_}, {"infinity", infinity}, {"early", early}, {"event", event},
     {"stuck", stuck}, {"back", back}, {"beyond", beyond}, {"nowhere", nowhere}, {"spoil", spoil},
     {"terminate", terminate}, {"segv", segv}, {"bus", bus}, {"divide", divide}, {"illegal", illegal}, {"deep", deep},
     {"abort", abort_}, {"free_twice", free_twice}, {"exit_0", exit_0}, {"exit_3", exit_3}, {"exit_at_once", exit_at_once},

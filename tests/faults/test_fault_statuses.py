@@ -30,6 +30,10 @@ CASES = [
     Case("DoStep 6 fatal", "lag: {f}" + T5 + "status 4 (fatal): told to return fatal"),
     Case("DoStep 6 pending", "lag: {f}" + T5 + "status 5"),
     Case("DoStep 6 undefined", "lag: {f}" + T5 + "status 17 (not defined by FMI)"),
+    Case("DoStep 6 hundred", "lag: {f}" + T5 + "status 100 (not defined by FMI)"),
+    Case("DoStep 6 negative", "lag: {f}" + T5 + "status -1 (not defined by FMI)"),
+    Case("GetReal 9 negative", "lag: {f}" + T5 + "status -1 (not defined by FMI)"),
+    Case("EnterInitializationMode 1 negative", "lag: {f} failed at t = 0 s: status -1", rows=0),
     Case("DoStep @0.05 error", "lag: {f}" + T5 + "status 3 (error)"),
     Case("DoStep * discard", "lag: {f} failed at t = 0 s: status 2 (discard)", rows=1),
     Case("GetReal 9 error", "lag: {f}" + T5 + "status 3 (error)"),
@@ -62,6 +66,7 @@ def test_a_bad_return_stops_the_run_with_one_line_and_keeps_the_rows(fmus, runne
     [
         ("SetReal @0.075 error", T8 + "status 3 (error)"),
         ("DoStep @0.08 error", T8 + "status 3 (error)"),
+        ("DoStep @0.08 negative", T8 + "status -1 (not defined by FMI)"),
         ("GetReal @0.085 error", T8 + "status 3 (error)"),
         ("DoStep @0.08 round_up", T8 + "changed the floating-point mode"),
     ],
@@ -75,6 +80,13 @@ def test_nothing_is_overlooked_in_the_usual_turn_of_set_step_and_get(fmus, runne
     done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report")
     assert (done.code, len(done.rows)) == (1, 9), done.err
     assert f"lag: {function_name(version, order.split()[0])}{words}" in done.err
+
+
+@pytest.mark.parametrize("what", ["hundred", "negative"])
+def test_the_other_executor_takes_no_other_status_for_a_good_one(fmus, runner, tmp_path, version, what):
+    done = runner.run(tmp_path, fmus(version, f"DoStep 6 {what}"), executor="python")
+    assert (done.code, len(done.rows)) == (1, 6), done.err
+    assert "(not defined by FMI)" in done.err
 
 
 def test_the_rows_of_a_failed_run_are_those_of_a_good_one(fmus, runner, tmp_path, version):
