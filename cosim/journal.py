@@ -24,7 +24,7 @@ _TIME, _COMPONENT, _FUNCTION, _FOLDER, _LIVE, _TEXT = 64, 4096, 8192, 12288, 163
 
 class Phase(IntEnum):
     """What kind of thing is going on: nothing foreign, a call, the stepping loop, a call with all results written, the end,
-    or that the stepping loop waits for something that is no component."""
+    or that a call or the stepping loop waits for something that is no component."""
 
     QUIET, CALLING, STEPPING, LEAVING, DONE, WAITING = range(6)
 
@@ -167,7 +167,7 @@ def calling(component: str, function: str, kind: str, time: float = math.nan) ->
 
 @contextmanager
 def waiting() -> Iterator[None]:
-    """Within this block the stepping loop waits for something that is no component, as long as it takes."""
+    """Within this block something is done or waited for that is no component, as long as it takes."""
     journal = _current
     if journal is None:
         yield

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from typing import Any
 
 from ..component import Call, DoStep, StepResult
@@ -52,6 +53,10 @@ class Fmi2Instance(FmuInstance):
         if name == "fmi2DoStep" and status == DISCARD and self.call("getBooleanStatus", _TERMINATED):
             return StepResult(self.call("getRealStatus", _LAST_SUCCESSFUL_TIME), terminate_requested=True)
         self.fail(name, status)
+
+    def _texts(self, reference: int, count: int) -> Sequence[bytes | None]:
+        texts: Sequence[bytes | None] = self.call("getString", [reference])
+        return texts
 
     def get_state(self) -> Any:
         return self.call("getFMUstate")

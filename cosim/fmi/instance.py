@@ -63,6 +63,14 @@ class FmuInstance(Component):
     def _instantiate(self) -> None:
         raise NotImplementedError
 
+    def _texts(self, reference: int, count: int) -> Sequence[bytes | None]:
+        """The values of a string variable; None for null pointers."""
+        raise NotImplementedError
+
+    def _binaries(self, reference: int, count: int) -> list[bytes]:
+        """The values of a binary variable, which only FMI 3.0 knows."""
+        raise NotImplementedError
+
     #: the C function that makes an instance
     _instantiation: str
 
@@ -110,10 +118,13 @@ class FmuInstance(Component):
         return fmu
 
     def call(self, function: str, *arguments: Any) -> Any:
-        """Call one of FMPy's methods; a bad status becomes a ComponentError with the FMU's own last message."""
+        """Call one of FMPy's methods, or a C function by its whole name.
+
+        A bad status becomes a ComponentError with the FMU's own last message.
+        """
         from fmpy.fmi1 import FMICallException
 
-        name = self.prefix + function[0].upper() + function[1:]
+        name = function if function.startswith(self.prefix) else self.prefix + function[0].upper() + function[1:]
         with calling(self.name, name, self._kind, self._clock.value):
             try:
                 return getattr(self._fmu, function)(*arguments)
@@ -165,15 +176,21 @@ class FmuInstance(Component):
 
     def get(self, name: str) -> Any:
         variable = self._by_name[name]
-        reference = [self.description.references[name]]
-        count = (len(variable.slots),) if variable.shape else ()
-        values = self.call(f"get{self.accessors[variable.type]}", reference, *count)
-        values = [self._decode(value) for value in values]
+        reference, count = self.description.references[name], len(variable.slots)
+        values: Sequence[Any]
+        if variable.type == "String":
+            values = [self._text(name, text) for text in self._texts(reference, count)]
+        elif variable.type == "Binary":
+            values = self._binaries(reference, count)
+        else:
+            values = self.call(f"get{self.accessors[variable.type]}", [reference], *((count,) if variable.shape else ()))
         return values if variable.shape else values[0]
 
-    @staticmethod
-    def _decode(value: Any) -> Any:
-        return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+    def _text(self, name: str, text: bytes | None) -> str:
+        if text is None:
+            reason = f'the value of "{name}" is a null pointer, expected a text'
+            raise ComponentError(self.name, f"{self.prefix}GetString", reason, self._clock.value)
+        return text.decode("utf-8", "replace")
 
     # -- the hot path --------------------------------------------------------------------------------------------------
 
@@ -192,7 +209,8 @@ class FmuInstance(Component):
                 variables = list(run)
                 size = sum(len(variable.slots) for variable in variables)
                 if dtype.hasobject:
-                    calls += [Call(move, (v.name, array, place + i), verb) for i, v in enumerate(variables)]
+                    name = f"{self.prefix}{verb}{accessor}"
+                    calls += [Call(move, (v.name, array, place + i), name) for i, v in enumerate(variables)]
                 else:
                     calls.append(self._access(f"{self.prefix}{verb}{accessor}", variables, array[place : place + size]))
                 place += size

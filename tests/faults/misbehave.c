@@ -180,6 +180,9 @@ static int back(Lag *m) { return ends(m, -3); }
 static int beyond(Lag *m) { return ends(m, 2); }
 static int nowhere(Lag *m) { return ends(m, NAN); }
 static int spoil(Lag *m) { m->spoiled = 1; return OK; }
+static int speechless(Lag *m) { m->speechless = 1; return OK; }
+static int babble(Lag *m) { strcpy(m->text, "\xff\xfe"); return OK; }
+static int vast(Lag *m) { m->vast = 1; return OK; }
 static int event(Lag *m) { m->event = 1; return OK; }
 static int terminate(Lag *m) { m->terminate = 1; return OK; }
 #define STATUS(NAME, VALUE) static int NAME(Lag *m) { say(VALUE, "status", "told to return " #NAME); return VALUE; }
@@ -190,7 +193,7 @@ static const struct { const char *name; int (*act)(Lag *); } FAULTS[] = {
     {"warning", warning}, {"discard", discard}, {"error", error}, {"fatal", fatal}, {"pending", pending},
     {"undefined", undefined}, {"hundred", hundred}, {"negative", negative}, {"nan", nan_}, {"infinity", infinity}, {"early", early}, {"event", event},
     {"stuck", stuck}, {"back", back}, {"beyond", beyond}, {"nowhere", nowhere}, {"spoil", spoil},
-    {"terminate", terminate}, {"segv", segv}, {"bus", bus}, {"divide", divide}, {"illegal", illegal}, {"deep", deep},
+    {"terminate", terminate}, {"speechless", speechless}, {"babble", babble}, {"vast", vast}, {"segv", segv}, {"bus", bus}, {"divide", divide}, {"illegal", illegal}, {"deep", deep},
     {"abort", abort_}, {"free_twice", free_twice}, {"exit_0", exit_0}, {"exit_3", exit_3}, {"exit_at_once", exit_at_once},
     {"kill", kill_}, {"loop", loop}, {"sleep", sleep_}, {"read_stdin", read_stdin}, {"memory", memory},
     {"flood_stdout", flood_stdout}, {"flood_stderr", flood_stderr}, {"flood_log", flood_log}, {"open_files", open_files},

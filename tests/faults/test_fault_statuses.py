@@ -136,6 +136,27 @@ def test_a_changed_floating_point_mode_is_a_failure(fmus, runner, tmp_path, vers
     assert f"lag: fmi{version}DoStep failed at t = 0.05 s: changed the floating-point mode" in done.err
 
 
+AS_OUTPUT = 'causality="output" variability="discrete" initial="calculated"'
+SPEAKING = {
+    2: f'<ScalarVariable name="s" valueReference="1" {AS_OUTPUT}><String/></ScalarVariable></ModelVariables>',
+    3: f'<String name="s" valueReference="7" {AS_OUTPUT}/></ModelVariables>',
+}
+
+
+def test_a_text_that_is_a_null_pointer_is_a_failure(fmus, runner, tmp_path, version):
+    """It would crash the component that reads it."""
+    done = runner.run(tmp_path, fmus(version, "DoStep 3 speechless", changes={"</ModelVariables>": SPEAKING[version]}))
+    assert done.code == 1, done.err
+    assert f'lag: fmi{version}GetString failed at t = 0.02 s: the value of "s" is a null pointer, expected a text' in done.err
+
+
+def test_a_text_that_is_not_utf_8_is_read_as_far_as_it_can_be(fmus, runner, tmp_path, version):
+    fmu = fmus(version, "DoStep 3 babble", changes={"</ModelVariables>": SPEAKING[version]})
+    done = runner.cosim(tmp_path, "run", scenario(tmp_path, fmu), "--output-dir", "out", "--no-report")
+    assert done.code == 0, done.err
+    assert "\N{REPLACEMENT CHARACTER}" * 2 in (tmp_path / "out/result.csv").read_text(encoding="utf-8")
+
+
 def test_rows_of_an_earlier_run_do_not_pass_for_those_of_a_failed_one(fmus, runner, tmp_path, version):
     assert runner.run(tmp_path, fmus(version)).code == 0
     failed = runner.run(tmp_path, fmus(version, "EnterInitializationMode 1 error"))
