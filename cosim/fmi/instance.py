@@ -10,6 +10,7 @@ import ctypes
 from collections.abc import Mapping, Sequence
 from copy import copy
 from itertools import groupby
+from math import isnan, nan
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -117,10 +118,10 @@ class FmuInstance(Component):
                 function.errcheck = _not_negative
         return fmu
 
-    def call(self, function: str, *arguments: Any) -> Any:
+    def call(self, function: str, *arguments: Any, no_answer: int | None = None) -> Any:
         """Call one of FMPy's methods, or a C function by its whole name.
 
-        A bad status becomes a ComponentError with the FMU's own last message.
+        A bad status becomes a ComponentError with the FMU's own last message, but for the status that means `no_answer`: None.
         """
         from fmpy.fmi1 import FMICallException
 
@@ -129,14 +130,19 @@ class FmuInstance(Component):
             try:
                 return getattr(self._fmu, function)(*arguments)
             except FMICallException as error:
+                if error.status == no_answer:
+                    return None
                 self.fail(error.function, error.status)
 
-    def fail(self, function: str, status: int) -> NoReturn:
-        """Raise the error for a status. After fatal nothing of any instance of this FMU may be called (FMI 3.0 section 2.2.3)."""
+    def fail(self, function: str, status: int, more: str = "") -> NoReturn:
+        """Raise the error for a status; `more` is said at its end.
+
+        After fatal nothing of any instance of this FMU may be called (FMI 3.0 section 2.2.3).
+        """
         self._file.corrupt = self._file.corrupt or status == FATAL
         label = STATUS[status] if 0 <= status < len(STATUS) else "not defined by FMI"
-        reason = f"status {status} ({label})" + (f": {self._message}" if self._message else "")
-        raise ComponentError(self.name, function, reason, self._clock.value)
+        reason = f"status {status} ({label})" + (f": {self._message}" if self._message else "") + more
+        raise ComponentError(self.name, function, reason, None if isnan(self._clock.value) else self._clock.value)
 
     def log(self, status: int, text: bytes | None) -> None:
         """A message from the FMU: kept as the reason of a later failure, and passed on to the user."""
@@ -154,7 +160,7 @@ class FmuInstance(Component):
         self._kind = "step"
 
     def terminate(self) -> None:
-        self._kind = "end"
+        self._kind, self._clock = "end", ctypes.c_double(nan)  # the simulation is over: its time says nothing any more
         if not self._file.corrupt:
             self.call("terminate")
 
@@ -165,7 +171,8 @@ class FmuInstance(Component):
         self._alive = False
         if self._holds_folder:
             self._holds_folder = False
-            self._file.release()
+            with calling(self.name, "unloading the binary", "end"):
+                self._file.release()
 
     # -- access off the hot path ---------------------------------------------------------------------------------------
 

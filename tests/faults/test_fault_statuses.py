@@ -26,6 +26,7 @@ CASES = [
     Case("- 1 error", "", 0, COUNT + 1),
     Case("DoStep 6 warning", "WARNING lag: told to return warning", 0, COUNT + 1),
     Case("DoStep 6 discard", "lag: {f}" + T5 + "status 2 (discard): told to return discard"),
+    Case("DoStep 6 discard", "told to return discard; it says that it came to t = 0.05 s", versions=(2,)),
     Case("DoStep 6 error", "lag: {f}" + T5 + "status 3 (error): told to return error"),
     Case("DoStep 6 fatal", "lag: {f}" + T5 + "status 4 (fatal): told to return fatal"),
     Case("DoStep 6 pending", "lag: {f}" + T5 + "status 5"),
@@ -43,7 +44,7 @@ CASES = [
     Case("Instantiate 1 error", "lag: {f} failed: told to return error", rows=0),
     Case("EnterInitializationMode 1 error", "lag: {f} failed at t = 0 s: status 3 (error)", rows=0),
     Case("ExitInitializationMode 1 error", "lag: {f} failed at t = 0 s: status 3 (error)", rows=0),
-    Case("Terminate 1 error", "lag: {f} failed", rows=COUNT + 1),
+    Case("Terminate 1 error", "lag: {f} failed: status 3 (error)", rows=COUNT + 1),
     Case("DoStep 6 log_directives", "WARNING lag: %s%s%n%d%f 100%", 0, COUNT + 1),
     Case("DoStep 6 log_null", "WARNING lag:", 0, COUNT + 1),
     Case("DoStep 6 log_bytes", "WARNING lag: bad \N{REPLACEMENT CHARACTER}", 0, COUNT + 1),
@@ -87,6 +88,21 @@ def test_the_other_executor_takes_no_other_status_for_a_good_one(fmus, runner, t
     done = runner.run(tmp_path, fmus(version, f"DoStep 6 {what}"), executor="python")
     assert (done.code, len(done.rows)) == (1, 6), done.err
     assert "(not defined by FMI)" in done.err
+
+
+def test_an_fmu_that_does_not_say_how_far_a_discarded_step_came(fmus, runner, tmp_path):
+    fmu = fmus(2, "GetBooleanStatus 1 discard")
+    words = ("run", scenario(tmp_path, fmu), "--output-dir", "out", "--no-report", "--set", "lag.fault=DoStep 6 discard")
+    done = runner.cosim(tmp_path, *words)
+    assert (done.code, len(done.rows)) == (1, 6), done.err
+    assert "lag: fmi2DoStep" + T5 + "status 2 (discard): told to return discard; it says" in done.err
+
+
+def test_an_fmu_that_terminates_may_say_nothing_of_the_time(fmus, runner, tmp_path):
+    fmu = fmus(2, "GetRealStatus 1 discard")
+    words = ("run", scenario(tmp_path, fmu), "--output-dir", "out", "--no-report", "--set", "lag.fault=DoStep 6 terminate")
+    done = runner.cosim(tmp_path, *words)
+    assert (done.code, len(done.rows)) == (0, 7), done.err
 
 
 def test_the_rows_of_a_failed_run_are_those_of_a_good_one(fmus, runner, tmp_path, version):
