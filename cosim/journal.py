@@ -34,6 +34,11 @@ class Phase(IntEnum):
         return self in (Phase.STEPPING, Phase.WAITING)
 
 
+_PHASES = frozenset(Phase)
+#: no deadline is longer (ms)
+_LONGEST = 10**15
+
+
 @dataclass(frozen=True, slots=True)
 class Deadlines:
     """How long a call into a component may take, in s of wall time.
@@ -73,13 +78,27 @@ class Journal:
         self._integers[field] = value
 
     @property
+    def sound(self) -> bool:
+        """Whether this can be what cosim wrote: foreign code in the process can write anywhere."""
+        deadline, counts = self[DEADLINE], (self[STEPS], self[ROWS], self[CHANGES])
+        return self[PHASE] in _PHASES and self[SHOWING] in (0, 1) and -1 <= deadline <= _LONGEST and min(counts) >= 0
+
+    def contents(self) -> bytes:
+        """All that stands here."""
+        return bytes(self.memory[:])
+
+    def restore(self, contents: bytes) -> None:
+        """As it was when `contents` were taken."""
+        self.memory[:] = contents
+
+    @property
     def phase(self) -> Phase:
         return Phase(self[PHASE])
 
     def enter(self, phase: Phase, deadline: float = math.inf) -> None:
         """From now on this is going on, for at most `deadline` s at a time."""
         self[CHANGES] += 1  # first: whoever sees the new deadline sees that something has changed
-        self[DEADLINE] = -1 if math.isinf(deadline) else int(deadline * 1000)
+        self[DEADLINE] = -1 if math.isinf(deadline) else int(min(deadline * 1000, _LONGEST))
         self[PHASE] = phase
         while self[SHOWING]:
             clock.sleep(1e-4)
