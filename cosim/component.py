@@ -118,6 +118,10 @@ class Flags(NamedTuple):
     flags: int
 
 
+#: the FMI statuses OK and warning; whatever else an FMU returns is bad, numbers that are no status among them
+GOOD = (0, 1)
+
+
 class Call(NamedTuple):
     """A call made ready beforehand: a function that returns an FMI status (0 OK, 1 warning), and its arguments.
 

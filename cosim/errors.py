@@ -83,6 +83,16 @@ class CheckError(CosimError):
     exit_code = 3
 
 
+def one_of(names: Iterable[str]) -> str:
+    """Who a failure may be of, when it cannot be known: the name, or "one of a, b", of many not all.
+
+    >>> one_of(["uav"]), one_of(["uav", "usv"])
+    ('uav', 'one of uav, usv')
+    """
+    some = list(names)
+    return some[0] if len(some) == 1 else f"one of {', '.join(some[:8])}{' ...' if len(some) > 8 else ''}"
+
+
 def did_you_mean(name: str, valid: Iterable[str]) -> str:
     """The nearest valid name as the end of a message, or the list of valid names when it is short, or nothing.
 

@@ -24,7 +24,7 @@ _TIME, _COMPONENT, _FUNCTION, _FOLDER, _LIVE, _TEXT = 64, 4096, 8192, 12288, 163
 
 class Phase(IntEnum):
     """What kind of thing is going on: nothing foreign, a call, the stepping loop, a call with all results written, the end,
-    or that the stepping loop waits for something that is no component."""
+    or that a call or the stepping loop waits for something that is no component."""
 
     QUIET, CALLING, STEPPING, LEAVING, DONE, WAITING = range(6)
 
@@ -32,6 +32,11 @@ class Phase(IntEnum):
     def in_loop(self) -> bool:
         """Rows are being recorded."""
         return self in (Phase.STEPPING, Phase.WAITING)
+
+
+_PHASES = frozenset(Phase)
+#: no deadline is longer (ms)
+_LONGEST = 10**15
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,13 +78,27 @@ class Journal:
         self._integers[field] = value
 
     @property
+    def sound(self) -> bool:
+        """Whether this can be what cosim wrote: foreign code in the process can write anywhere."""
+        deadline, counts = self[DEADLINE], (self[STEPS], self[ROWS], self[CHANGES])
+        return self[PHASE] in _PHASES and self[SHOWING] in (0, 1) and -1 <= deadline <= _LONGEST and min(counts) >= 0
+
+    def contents(self) -> bytes:
+        """All that stands here."""
+        return bytes(self.memory[:])
+
+    def restore(self, contents: bytes) -> None:
+        """As it was when `contents` were taken."""
+        self.memory[:] = contents
+
+    @property
     def phase(self) -> Phase:
         return Phase(self[PHASE])
 
     def enter(self, phase: Phase, deadline: float = math.inf) -> None:
         """From now on this is going on, for at most `deadline` s at a time."""
         self[CHANGES] += 1  # first: whoever sees the new deadline sees that something has changed
-        self[DEADLINE] = -1 if math.isinf(deadline) else int(deadline * 1000)
+        self[DEADLINE] = -1 if math.isinf(deadline) else int(min(deadline * 1000, _LONGEST))
         self[PHASE] = phase
         while self[SHOWING]:
             clock.sleep(1e-4)
@@ -167,7 +186,7 @@ def calling(component: str, function: str, kind: str, time: float = math.nan) ->
 
 @contextmanager
 def waiting() -> Iterator[None]:
-    """Within this block the stepping loop waits for something that is no component, as long as it takes."""
+    """Within this block something is done or waited for that is no component, as long as it takes."""
     journal = _current
     if journal is None:
         yield

@@ -16,7 +16,7 @@ import numpy as np
 from . import log
 from .component import Component, Variable
 from .engine import MARKER_SIZE, Executor, Kind, Recorder, Termination, compile_plan, executor_kind
-from .errors import ComponentError, InputError, Problem
+from .errors import ComponentError, InputError, Problem, one_of
 from .journal import Phase, calling, current, waiting
 from .pacer import Late, Pacer
 from .process_state import contained
@@ -165,7 +165,7 @@ def _run(executor: Executor, settings: Settings, observers: Sequence[Observer], 
             write_header(journal.folder, executor)
         if journal:
             journal.enter(Phase.STEPPING, journal.deadlines.step)
-        with contained(_together(executor.plan.system.components)), watch.measure("loop_seconds"):
+        with contained(one_of(executor.plan.system.components)), watch.measure("loop_seconds"):
             _loop(executor, events, observers, pacer, settings.control)
     except (Exception, KeyboardInterrupt) as error:
         failure = error
@@ -176,11 +176,6 @@ def _run(executor: Executor, settings: Settings, observers: Sequence[Observer], 
     log.tell_what_was_cut()
     kept_up = pacer.statistics() if pacer else None
     return Run(recorder.recording(), watch.seconds, executor.finished, executor.termination, failure, kept_up)
-
-
-def _together(names: Iterable[str]) -> str:
-    some = list(names)
-    return some[0] if len(some) == 1 else f"one of {', '.join(some[:8])}{' ...' if len(some) > 8 else ''}"
 
 
 def _loop(

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from . import journal as journals
-from .errors import ComponentError
+from .errors import ComponentError, one_of
 from .journal import CALL, CHANGES, CODE, ROWS, STEPS, Journal, Phase
 from .live_csv import LiveCsv
 from .sandbox.process import detach, lower
@@ -163,6 +163,8 @@ class _Supervisor:
     _interrupted: float = 0.0
     _foreign_bytes: int = 0
     _hang: str = ""
+    #: what the journal said when it was looked at last
+    _last: bytes = b""
 
     def watch(self) -> Outcome:
         """Until the child has ended."""
@@ -197,8 +199,12 @@ class _Supervisor:
                 self._interrupt()
 
     def _look(self) -> None:
-        """End a child that takes longer than it may."""
+        """End a child that takes longer than it may, or whose journal was overwritten."""
         journal, now = self.journal, time.monotonic()
+        if not journal.sound:
+            os.kill(self.child, signal.SIGKILL)
+            return
+        self._last = journal.contents()
         deadline = journal.deadline  # before `seen`: a deadline that is newer than `seen` would be another call's
         seen = journal[CHANGES], journal[STEPS], journal[CALL]
         if seen != self._seen:
@@ -247,6 +253,9 @@ class _Supervisor:
         if (more := self._foreign_bytes - LARGEST_OUTPUT) > 0:
             sys.stderr.write(f"\n... components printed {more} bytes more\n")
         journal = self.journal
+        if not journal.sound:
+            journal.restore(self._last)
+            return Outcome(1, journal[ROWS], journal, self._suspicion("it wrote over memory of the process that is not its own"))
         code, rows, phase = journal[CODE], journal[ROWS], journal.phase
         if phase == Phase.DONE:
             return Outcome(code, rows, journal)
@@ -269,7 +278,13 @@ class _Supervisor:
             activity = journal.activity()
             moment = None if activity.time != activity.time else activity.time
             return ComponentError(activity.component, activity.function, reason, moment)
-        return ComponentError("cosim", "the run", f"{reason}, while no component was being called")
+        return self._suspicion(f"{reason}, while no component was being called")
+
+    def _suspicion(self, reason: str) -> ComponentError:
+        """The failure of a component that cannot be told from the others."""
+        header = read_header(self.journal.folder)
+        names = dict.fromkeys(component for component, _ in header.calls) if header else {}
+        return ComponentError(one_of(names) if names else "cosim", "the run", reason)
 
 
 def _children() -> list[int]:

@@ -23,8 +23,9 @@ static unsigned float_state(void) { return (unsigned)fegetround(); }
 static void set_float_state(unsigned state) { fesetround((int)state); }
 #endif
 
-enum { WARNING = 1, DISCARD = 2 };                      /* FMI statuses; OK is 0, everything above WARNING is bad */
-enum { FLOAT_STATE_CHANGED = -1, NOT_FINITE = -2 };     /* what is reported beside FMI statuses */
+enum { WARNING = 1, DISCARD = 2 };                      /* FMI statuses; OK is 0, everything else is bad */
+/* what is reported beside FMI statuses, and an exception of Python: no FMU can return these, whatever it returns */
+static const int64_t FLOAT_STATE_CHANGED = INT64_C(1) << 33, NOT_FINITE = INT64_C(1) << 34, RAISED = INT64_MIN;
 enum { TRIALS = 3 };                                    /* so often the duration of a doStep is measured */
 enum { LOOK = 50000000, OPERATION = 20 };               /* ns between two looks for signals; of an operation, about */
 
@@ -196,10 +197,12 @@ static bool all_finite(const Program *p) {
 static void enter_python(Program *p) { PyEval_RestoreThread(p->thread); }
 static void leave_python(Program *p) { p->thread = PyEval_SaveThread(); }
 
+static inline int is_bad(int64_t status) { return status != 0 && status != WARNING; }
+
 /* Tell Python; returns -1 with an exception set when the run has failed. */
-static int report(Program *p, int number, int status) {
+static int report(Program *p, int number, int64_t status) {
     enter_python(p);
-    PyObject *end = PyObject_CallFunction(p->on_status, "ii", number, status);
+    PyObject *end = PyObject_CallFunction(p->on_status, "iL", number, (long long)status);
     if (end && PyObject_IsTrue(end)) p->stop = 1;
     Py_XDECREF(end);
     leave_python(p);
@@ -229,11 +232,12 @@ static int step(const Operation *op, double time) {
     return status;
 }
 
-/* Returns a status, or -1 with an exception set. */
-static int call_python(Program *p, const Operation *op) {
+/* Returns a status, or RAISED. */
+static int64_t call_python(Program *p, const Operation *op) {
     enter_python(p);
     PyObject *result = PyObject_Call(op->python.callable, op->python.arguments, NULL);
-    int status = result ? (int)PyLong_AsLong(result) : -1;
+    int64_t status = result ? PyLong_AsLongLong(result) : RAISED;
+    if (PyErr_Occurred()) status = RAISED;
     Py_XDECREF(result);
     leave_python(p);
     return status;
@@ -252,7 +256,7 @@ static inline int look_at(const Operation *op) {
     return flags[0] | flags[1] | flags[2] ? DISCARD : 0;
 }
 
-static int call(Program *p, const Operation *op, double time) {
+static int64_t call(Program *p, const Operation *op, double time) {
     switch (op->kind) {
     case ACCESS2: return access2(op);
     case ACCESS3: return access3(op);
@@ -271,15 +275,15 @@ static int float_state_changed(Program *p, int number) {
 static int turn(Program *p, Operation *op, const Operation *end, double time) {
     for (; op < end; op++) {
         p->marker[0] = op->number;
-        int status = call(p, op, time);
-        if (op->kind == PYTHON && status < 0) return -1;
+        int64_t status = call(p, op, time);
+        if (status == RAISED) return -1;
         if (float_state() != p->float_state && float_state_changed(p, op->number) < 0) return -1;
-        if (status > WARNING) return report(p, op->number, status);
+        if (is_bad(status)) return report(p, op->number, status);
     }
     return 0;
 }
 
-static int bad(Program *p, int number, int status) {
+static int bad(Program *p, int number, int64_t status) {
     if (float_state() != p->float_state && float_state_changed(p, number) < 0) return -1;
     return report(p, number, status);
 }
@@ -291,21 +295,21 @@ static inline int usual_turn(Program *p, const UsualTurn *t, double time) {
     marker[0] = t->number;
     int status = two ? ((Access2 *)t->set)(t->instance, t->set_references, t->set_count, t->set_values)
                      : ((Access3 *)t->set)(t->instance, t->set_references, t->set_count, t->set_values, t->set_size);
-    if (status > WARNING) return bad(p, t->number, status);
+    if (is_bad(status)) return bad(p, t->number, status);
     marker[0] = t->number + 1;
     if (two) {
         status = ((Step2 *)t->step)(t->instance, time, t->step_size, 1);
     } else {
         bool *flags = t->memory->flags;
         status = ((Step3 *)t->step)(t->instance, time, t->step_size, true, flags, flags + 1, flags + 2, t->memory->reached);
-        if (status <= WARNING && (flags[0] | flags[1] | flags[2])) return bad(p, t->number + 2, DISCARD);
+        if (!is_bad(status) && (flags[0] | flags[1] | flags[2])) return bad(p, t->number + 2, DISCARD);
     }
-    if (status > WARNING) return bad(p, t->number + 1, status);
+    if (is_bad(status)) return bad(p, t->number + 1, status);
     const int last = t->number + (two ? 2 : 3);
     marker[0] = last;
     status = two ? ((Access2 *)t->get)(t->instance, t->get_references, t->get_count, t->get_values)
                  : ((Access3 *)t->get)(t->instance, t->get_references, t->get_count, t->get_values, t->get_size);
-    if (status > WARNING) return bad(p, last, status);
+    if (is_bad(status)) return bad(p, last, status);
     return float_state() == p->float_state ? 0 : float_state_changed(p, t->number + 1);
 }
 

@@ -12,7 +12,7 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 
-from ..component import Call, StepResult
+from ..component import GOOD, Call, StepResult
 from ..errors import ComponentError
 from ..journal import calling
 from .gathering import Gather
@@ -22,13 +22,13 @@ from .moves import DelayLine, Move, copy
 from .parallel import TRIALS, Crew, SideBySide, may_overlap, processors
 from .plan import Loop, Phase, Plan, Step
 from .recorder import Recorder
-from .turns import SHOWN, WARNING, Ending, Turn, float_state_changed, take
+from .turns import SHOWN, Ending, Turn, float_state_changed, take
 
 #: places in the marker: number of the present call, macro steps finished, rows recorded
 CALL, STEPS, ROWS, MARKER_SIZE = 0, 1, 2, 3
 
-#: status of a Python component's turn in a macro step after which the simulation ends
-_TERMINATION = 100
+#: status of a Python component's turn in a macro step after which the simulation ends; no FMU can return it
+_TERMINATION = 1 << 32
 
 _FLOATS = (np.dtype(np.float64), np.dtype(np.float32))
 
@@ -135,7 +135,7 @@ class Executor(ABC):
         """Take a turn from Python; returns whether the simulation is to end."""
         for number, call in enumerate(turn.calls, start=turn.first):
             self.marker[CALL] = number
-            if (status := call.function(*call.arguments)) > WARNING:
+            if (status := call.function(*call.arguments)) not in GOOD:
                 self._bad_status(turn, call, status)
                 break
         if float_state_changed():

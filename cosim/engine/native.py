@@ -22,7 +22,7 @@ except ImportError:  # installed without a compiler
 BATCH = 1 << 16
 
 #: what is reported beside FMI statuses, as in _native.c
-_FLOAT_STATE_CHANGED, _NOT_FINITE = -1, -2
+_FLOAT_STATE_CHANGED, _NOT_FINITE = 1 << 33, 1 << 34
 
 
 def available() -> bool:

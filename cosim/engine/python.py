@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from ..component import Call, DoStep
+from ..component import GOOD, Call, DoStep
 from .executor import CALL, ROWS, STEPS, Executor
 from .parallel import TRIALS
-from .turns import WARNING, Turn
+from .turns import Turn
 
 #: up to so many are faster added one by one than by numpy
 FEW_FLOATS = 16
@@ -67,7 +67,7 @@ class PythonExecutor(Executor):
                         continue
                     for function, arguments, number in calls:
                         marker[CALL] = number
-                        if (status := function(*arguments)) and status > WARNING:
+                        if (status := function(*arguments)) and status not in GOOD:
                             self._bad_status(turn, turn.calls[number - turn.first], status)
                             break
                     if one + little != one - little or not least + least:

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from ..component import Call
+from ..component import GOOD, Call
 from .plan import Step
 
 #: components or outputs shown in messages about several
 SHOWN = 8
-
-#: the highest FMI status that lets a simulation go on
-WARNING = 1
 
 
 class Turn(NamedTuple):
@@ -39,7 +36,7 @@ def take(turns: Sequence[Turn], n: int) -> list[Ending]:
 def _take(turn: Turn) -> Iterator[Ending]:
     for call in turn.calls:
         status = call.function(*call.arguments)
-        if status > WARNING:
+        if status not in GOOD:
             yield Ending(turn, call, status)
             break
     if float_state_changed():

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..journal import waiting
 from ..temporary import FMU, LockedFolder
 from .description import Description, describe
 from .preflight import LIMITS, Examination, Limits, examine, extract, open_file, refuse
@@ -63,7 +64,8 @@ class FmuFile:
             self.check_platform()
             folder = LockedFolder(FMU)
             try:
-                extract(self.path, self.examination, Path(folder.name), self.limits)
+                with waiting():  # a large archive takes its time, which is no fault of the component
+                    extract(self.path, self.examination, Path(folder.name), self.limits)
             except OSError as error:
                 folder.cleanup()
                 raise InputError(f'"{self.path}" cannot be extracted: {error.strerror or error}') from None

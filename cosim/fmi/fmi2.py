@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from typing import Any
 
 from ..component import Call, DoStep, StepResult
@@ -49,9 +50,19 @@ class Fmi2Instance(FmuInstance):
 
     def failed(self, name: str, status: int) -> StepResult:
         """Discard with `terminated` ends the simulation; every other bad status is a failure (FMI 2.0 section 4.2.1)."""
-        if name == "fmi2DoStep" and status == DISCARD and self.call("getBooleanStatus", _TERMINATED):
-            return StepResult(self.call("getRealStatus", _LAST_SUCCESSFUL_TIME), terminate_requested=True)
-        self.fail(name, status)
+        if name != "fmi2DoStep" or status != DISCARD:
+            self.fail(name, status)
+        message, start = self._message, self._clock.value
+        terminated = self.call("getBooleanStatus", _TERMINATED, no_answer=DISCARD)
+        reached = self.call("getRealStatus", _LAST_SUCCESSFUL_TIME, no_answer=DISCARD)
+        if terminated and (reached is None or reached >= start):
+            return StepResult(start if reached is None else reached, terminate_requested=True)
+        self._message = message
+        self.fail(name, status, "" if reached is None else f"; it says that it came to t = {reached:.12g} s")
+
+    def _texts(self, reference: int, count: int) -> Sequence[bytes | None]:
+        texts: Sequence[bytes | None] = self.call("getString", [reference])
+        return texts
 
     def get_state(self) -> Any:
         return self.call("getFMUstate")

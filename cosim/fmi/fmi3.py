@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from typing import Any
 
 from ..component import DTYPES, Call, DoStep, Flags, StepResult
 from ..errors import ComponentError
 from .instance import DISCARD, OK, POINTER, FmuInstance, address
+
+#: bytes of one binary value
+LARGEST_BINARY = 1 << 28
 
 _ENDED = "how fmi3DoStep ended"
 
@@ -59,6 +63,23 @@ class Fmi3Instance(FmuInstance):
         if not reached >= start:
             raise ComponentError(self.name, "fmi3DoStep", f"says that it ended at t = {reached!r} s", start)
         return StepResult(reached, self._flags[0], self._flags[1])
+
+    # FMPy's own methods fail on null pointers, on texts that are not UTF-8 and on sizes beyond all memory
+
+    def _texts(self, reference: int, count: int) -> Sequence[bytes | None]:
+        texts = (ctypes.c_char_p * count)()
+        self.call("fmi3GetString", self._handle, (ctypes.c_uint32 * 1)(reference), 1, texts, count)
+        return list(texts)
+
+    def _binaries(self, reference: int, count: int) -> list[bytes]:
+        sizes, places = (ctypes.c_size_t * count)(), (ctypes.POINTER(ctypes.c_uint8) * count)()
+        self.call("fmi3GetBinary", self._handle, (ctypes.c_uint32 * 1)(reference), 1, sizes, places, count)
+        for size, place in zip(sizes, places, strict=True):
+            if size > LARGEST_BINARY or (size and not place):
+                found = f"{size} bytes" if place else f"{size} bytes at a null pointer"
+                reason = f"found a binary of {found}, expected at most {LARGEST_BINARY} bytes"
+                raise ComponentError(self.name, "fmi3GetBinary", reason, self._clock.value)
+        return [ctypes.string_at(place, size) if size else b"" for size, place in zip(sizes, places, strict=True)]
 
     def get_state(self) -> Any:
         return self.call("getFMUState")

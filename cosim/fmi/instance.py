@@ -10,13 +10,14 @@ import ctypes
 from collections.abc import Mapping, Sequence
 from copy import copy
 from itertools import groupby
+from math import isnan, nan
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 
 from .. import log
-from ..component import Access, Call, Component, Ports, StepResult, Variable
+from ..component import GOOD, Access, Call, Component, Ports, StepResult, Variable
 from ..errors import ComponentError, InputError
 from ..journal import calling
 from ..process_state import contained
@@ -63,6 +64,14 @@ class FmuInstance(Component):
     def _instantiate(self) -> None:
         raise NotImplementedError
 
+    def _texts(self, reference: int, count: int) -> Sequence[bytes | None]:
+        """The values of a string variable; None for null pointers."""
+        raise NotImplementedError
+
+    def _binaries(self, reference: int, count: int) -> list[bytes]:
+        """The values of a binary variable, which only FMI 3.0 knows."""
+        raise NotImplementedError
+
     #: the C function that makes an instance
     _instantiation: str
 
@@ -100,28 +109,40 @@ class FmuInstance(Component):
     def _open(self, folder: Path) -> Any:
         description = self.description
         try:
-            return self._slave(guid=description.token, modelIdentifier=description.identifier, unzipDirectory=str(folder))
+            fmu = self._slave(guid=description.token, modelIdentifier=description.identifier, unzipDirectory=str(folder))
         except Exception as error:
             reason = str(error).replace(f"{folder}/", "")
             raise InputError(f'the binary of "{self._file.path}" cannot be loaded: {reason}') from None
+        for function in fmu._functions.values():
+            if function.restype is ctypes.c_int:
+                function.errcheck = _not_negative
+        return fmu
 
-    def call(self, function: str, *arguments: Any) -> Any:
-        """Call one of FMPy's methods; a bad status becomes a ComponentError with the FMU's own last message."""
+    def call(self, function: str, *arguments: Any, no_answer: int | None = None) -> Any:
+        """Call one of FMPy's methods, or a C function by its whole name.
+
+        A bad status becomes a ComponentError with the FMU's own last message, but for the status that means `no_answer`: None.
+        """
         from fmpy.fmi1 import FMICallException
 
-        name = self.prefix + function[0].upper() + function[1:]
+        name = function if function.startswith(self.prefix) else self.prefix + function[0].upper() + function[1:]
         with calling(self.name, name, self._kind, self._clock.value):
             try:
                 return getattr(self._fmu, function)(*arguments)
             except FMICallException as error:
+                if error.status == no_answer:
+                    return None
                 self.fail(error.function, error.status)
 
-    def fail(self, function: str, status: int) -> NoReturn:
-        """Raise the error for a status. After fatal nothing of any instance of this FMU may be called (FMI 3.0 section 2.2.3)."""
+    def fail(self, function: str, status: int, more: str = "") -> NoReturn:
+        """Raise the error for a status; `more` is said at its end.
+
+        After fatal nothing of any instance of this FMU may be called (FMI 3.0 section 2.2.3).
+        """
         self._file.corrupt = self._file.corrupt or status == FATAL
         label = STATUS[status] if 0 <= status < len(STATUS) else "not defined by FMI"
-        reason = f"status {status} ({label})" + (f": {self._message}" if self._message else "")
-        raise ComponentError(self.name, function, reason, self._clock.value)
+        reason = f"status {status} ({label})" + (f": {self._message}" if self._message else "") + more
+        raise ComponentError(self.name, function, reason, None if isnan(self._clock.value) else self._clock.value)
 
     def log(self, status: int, text: bytes | None) -> None:
         """A message from the FMU: kept as the reason of a later failure, and passed on to the user."""
@@ -139,7 +160,7 @@ class FmuInstance(Component):
         self._kind = "step"
 
     def terminate(self) -> None:
-        self._kind = "end"
+        self._kind, self._clock = "end", ctypes.c_double(nan)  # the simulation is over: its time says nothing any more
         if not self._file.corrupt:
             self.call("terminate")
 
@@ -150,7 +171,8 @@ class FmuInstance(Component):
         self._alive = False
         if self._holds_folder:
             self._holds_folder = False
-            self._file.release()
+            with calling(self.name, "unloading the binary", "end"):
+                self._file.release()
 
     # -- access off the hot path ---------------------------------------------------------------------------------------
 
@@ -161,15 +183,21 @@ class FmuInstance(Component):
 
     def get(self, name: str) -> Any:
         variable = self._by_name[name]
-        reference = [self.description.references[name]]
-        count = (len(variable.slots),) if variable.shape else ()
-        values = self.call(f"get{self.accessors[variable.type]}", reference, *count)
-        values = [self._decode(value) for value in values]
+        reference, count = self.description.references[name], len(variable.slots)
+        values: Sequence[Any]
+        if variable.type == "String":
+            values = [self._text(name, text) for text in self._texts(reference, count)]
+        elif variable.type == "Binary":
+            values = self._binaries(reference, count)
+        else:
+            values = self.call(f"get{self.accessors[variable.type]}", [reference], *((count,) if variable.shape else ()))
         return values if variable.shape else values[0]
 
-    @staticmethod
-    def _decode(value: Any) -> Any:
-        return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+    def _text(self, name: str, text: bytes | None) -> str:
+        if text is None:
+            reason = f'the value of "{name}" is a null pointer, expected a text'
+            raise ComponentError(self.name, f"{self.prefix}GetString", reason, self._clock.value)
+        return text.decode("utf-8", "replace")
 
     # -- the hot path --------------------------------------------------------------------------------------------------
 
@@ -188,7 +216,8 @@ class FmuInstance(Component):
                 variables = list(run)
                 size = sum(len(variable.slots) for variable in variables)
                 if dtype.hasobject:
-                    calls += [Call(move, (v.name, array, place + i), verb) for i, v in enumerate(variables)]
+                    name = f"{self.prefix}{verb}{accessor}"
+                    calls += [Call(move, (v.name, array, place + i), name) for i, v in enumerate(variables)]
                 else:
                     calls.append(self._access(f"{self.prefix}{verb}{accessor}", variables, array[place : place + size]))
                 place += size
@@ -231,12 +260,21 @@ class FmuInstance(Component):
         for call in calls:
             with calling(self.name, call.name, self._kind, self._clock.value):
                 status = call.function(*call.arguments)
-            if status > WARNING:
+            if status not in GOOD:
                 return self.failed(call.name, status)
         return None
 
     def failed(self, name: str, status: int) -> StepResult:
         self.fail(name, status)
+
+
+def _not_negative(status: int, function: Any, _: Any) -> int:
+    """FMPy alone would take negative numbers for good statuses."""
+    from fmpy.fmi1 import FMICallException
+
+    if status < 0:
+        raise FMICallException(function.__name__, status)
+    return status
 
 
 def address(function: Any) -> int:

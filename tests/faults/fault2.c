@@ -69,7 +69,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
 }
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String v[]) {
     ENTER("GetString", " ");
-    for (size_t k = 0; k < n; k++) v[k] = m->text;
+    for (size_t k = 0; k < n; k++) v[k] = m->speechless ? NULL : m->text;
     return (fmi2Status)status;
 }
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String v[]) {

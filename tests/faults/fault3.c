@@ -89,12 +89,20 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
 }
 fmi3Status fmi3GetString(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3String v[], size_t nv) {
     ENTER("GetString", " ");
-    for (size_t k = 0; k < n; k++) v[k] = m->text;
+    for (size_t k = 0; k < n; k++) v[k] = m->speechless ? NULL : m->text;
     return (fmi3Status)status;
 }
 fmi3Status fmi3SetString(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3String v[], size_t nv) {
     ENTER("SetString", "%s", v[0]);
     tell(m, v[0]);
+    return (fmi3Status)status;
+}
+fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n, size_t sizes[], fmi3Binary v[], size_t nv) {
+    ENTER("GetBinary", " ");
+    for (size_t k = 0; k < nv; k++) {
+        v[k] = (fmi3Binary)m->text;
+        sizes[k] = m->vast ? (size_t)-1 : strlen(m->text);
+    }
     return (fmi3Status)status;
 }
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean no_set_state, fmi3Boolean *event,
@@ -117,7 +125,7 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean 
 #define OTHER_TYPE(TYPE) REFUSED(Get##TYPE) REFUSED(Set##TYPE)
 NONE(InstantiateModelExchange) NONE(InstantiateScheduledExecution)
 OTHER_TYPE(Float32) OTHER_TYPE(Int8) OTHER_TYPE(UInt8) OTHER_TYPE(Int16) OTHER_TYPE(UInt16) OTHER_TYPE(Int32)
-OTHER_TYPE(UInt32) OTHER_TYPE(Int64) OTHER_TYPE(UInt64) OTHER_TYPE(Boolean) OTHER_TYPE(Binary) OTHER_TYPE(Clock)
+OTHER_TYPE(UInt32) OTHER_TYPE(Int64) OTHER_TYPE(UInt64) OTHER_TYPE(Boolean) OTHER_TYPE(Clock) REFUSED(SetBinary)
 REFUSED(EnterEventMode) REFUSED(GetFMUState) REFUSED(SetFMUState) REFUSED(FreeFMUState)
 REFUSED(GetNumberOfVariableDependencies) REFUSED(GetVariableDependencies) REFUSED(SerializedFMUStateSize)
 REFUSED(SerializeFMUState) REFUSED(DeserializeFMUState) REFUSED(GetDirectionalDerivative) REFUSED(GetAdjointDerivative)

@@ -49,6 +49,16 @@ static int illegal(Lag *m) { __builtin_trap(); }
 static int deep(Lag *m) { volatile char frame[4096]; frame[0] = 1; return deep(m) + frame[0]; }
 static int free_twice(Lag *m) { void *volatile p = malloc(64); free(p); free(p); return OK; }
 static int abort_(Lag *m) { abort(); }
+static int overwrite(Lag *m) { /* all memory that is shared with another process, when that has had time to look at it */
+    FILE *maps = fopen("/proc/self/maps", "r");
+    char line[PATH_MAX + 100], rights[5];
+    unsigned long begin, end;
+    usleep(300000);
+    while (maps && fgets(line, sizeof line, maps))
+        if (sscanf(line, "%lx-%lx %4s", &begin, &end, rights) == 3 && rights[1] == 'w' && rights[3] == 's')
+            memset((void *)begin, 0x7f, end - begin);
+    return OK;
+}
 
 /* -- ends and stands still -- */
 static int exit_0(Lag *m) { exit(0); }
@@ -180,18 +190,21 @@ static int back(Lag *m) { return ends(m, -3); }
 static int beyond(Lag *m) { return ends(m, 2); }
 static int nowhere(Lag *m) { return ends(m, NAN); }
 static int spoil(Lag *m) { m->spoiled = 1; return OK; }
+static int speechless(Lag *m) { m->speechless = 1; return OK; }
+static int babble(Lag *m) { strcpy(m->text, "\xff\xfe"); return OK; }
+static int vast(Lag *m) { m->vast = 1; return OK; }
 static int event(Lag *m) { m->event = 1; return OK; }
 static int terminate(Lag *m) { m->terminate = 1; return OK; }
 #define STATUS(NAME, VALUE) static int NAME(Lag *m) { say(VALUE, "status", "told to return " #NAME); return VALUE; }
 STATUS(warning, WARNING) STATUS(discard, DISCARD) STATUS(error, ERROR) STATUS(fatal, FATAL)
-STATUS(pending, PENDING) STATUS(undefined, 17)
+STATUS(pending, PENDING) STATUS(undefined, 17) STATUS(hundred, 100) STATUS(negative, -1)
 
 static const struct { const char *name; int (*act)(Lag *); } FAULTS[] = {
     {"warning", warning}, {"discard", discard}, {"error", error}, {"fatal", fatal}, {"pending", pending},
-    {"undefined", undefined}, {"nan", nan_}, {"infinity", infinity}, {"early", early}, {"event", event},
+    {"undefined", undefined}, {"hundred", hundred}, {"negative", negative}, {"nan", nan_}, {"infinity", infinity}, {"early", early}, {"event", event},
     {"stuck", stuck}, {"back", back}, {"beyond", beyond}, {"nowhere", nowhere}, {"spoil", spoil},
-    {"terminate", terminate}, {"segv", segv}, {"bus", bus}, {"divide", divide}, {"illegal", illegal}, {"deep", deep},
-    {"abort", abort_}, {"free_twice", free_twice}, {"exit_0", exit_0}, {"exit_3", exit_3}, {"exit_at_once", exit_at_once},
+    {"terminate", terminate}, {"speechless", speechless}, {"babble", babble}, {"vast", vast}, {"segv", segv}, {"bus", bus}, {"divide", divide}, {"illegal", illegal}, {"deep", deep},
+    {"abort", abort_}, {"overwrite", overwrite}, {"free_twice", free_twice}, {"exit_0", exit_0}, {"exit_3", exit_3}, {"exit_at_once", exit_at_once},
     {"kill", kill_}, {"loop", loop}, {"sleep", sleep_}, {"read_stdin", read_stdin}, {"memory", memory},
     {"flood_stdout", flood_stdout}, {"flood_stderr", flood_stderr}, {"flood_log", flood_log}, {"open_files", open_files},
     {"log_directives", log_directives}, {"log_null", log_null}, {"log_bytes", log_bytes}, {"log_long", log_long},

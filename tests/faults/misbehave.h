@@ -17,7 +17,7 @@ typedef struct {
 
 typedef struct {
     double x[REALS], time, reached, part; /* an early step ends after this part of it */
-    int event, terminate, early, spoiled;
+    int event, terminate, early, spoiled, speechless, vast; /* texts are null pointers, binaries larger than all memory */
     Fault fault;
     char name[64], text[96];
 } Lag;

@@ -76,7 +76,7 @@ CRASHES = table(
     Case("Terminate 1 exit_0", "{f}", code=0, rows=ALL),
     Case("FreeInstance 1 segv", "{f}", code=0, rows=ALL),
     Case("FreeInstance 1 exit_0", "{f}", code=0, rows=ALL),
-    Case("unload 1 segv", "lag", code=0, rows=ALL),
+    Case("unload 1 segv", "lag: unloading the binary failed: " + SIGNAL, code=0, rows=ALL),
 )
 
 
@@ -137,6 +137,17 @@ def test_another_thread_of_an_fmu_may_log(fmus, runner, tmp_path, version, execu
     done = runner.run(tmp_path, fmus(version, "DoStep 6 log_thread"), deadlines=DEADLINES, executor=executor)
     assert (done.code, len(done.rows)) == (0, ALL), done.err
     assert "INFO lag: from a thread" in done.err
+
+
+@pytest.mark.parametrize("isolation", ["run", "fmu"])
+def test_an_fmu_that_overwrites_what_the_supervisor_reads(fmus, runner, tmp_path, version, isolation):
+    """Where the child notes what it does; it would wait for ever, and nobody would know for what."""
+    file = scenario(tmp_path, fmus(version, "DoStep 6 overwrite"), deadlines={"step": 3.0})
+    done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", "--isolation", isolation, limit=20)
+    assert done.code == 1, done.err
+    assert "lag: " in done.err
+    assert (tmp_path / "out/result.csv").exists()
+    assert (done.temporaries, done.processes, done.changes) == ([], [], [])
 
 
 def test_an_fmu_that_takes_all_descriptors_costs_no_rows(fmus, runner, tmp_path, version):

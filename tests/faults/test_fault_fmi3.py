@@ -59,3 +59,12 @@ def test_one_element_that_is_no_number_is_named(fmus, runner, tmp_path, isolatio
     done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", "--isolation", isolation)
     assert (done.code, len(done.rows)) == (1, 6)
     assert "v[2]" in done.err and "0.05 s" in done.err
+
+
+BINARY = '<Binary name="b" valueReference="7" causality="output" initial="calculated"/></ModelVariables>'
+
+
+def test_a_binary_larger_than_all_memory_is_named(fmus, runner, tmp_path):
+    done = runner.run(tmp_path, fmus(3, "DoStep 3 vast", changes={"</ModelVariables>": BINARY}))
+    assert done.code == 1, done.err
+    assert "lag: fmi3GetBinary failed at t = 0.02 s: found a binary of 18446744073709551615 bytes" in done.err

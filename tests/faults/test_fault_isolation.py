@@ -130,10 +130,10 @@ def test_messages_are_cut_and_counted(fmus, runner, tmp_path, version):
     assert "messages of components were not shown" in done.err
 
 
-@pytest.mark.parametrize("what", ["exit_0", "error"])
-def test_the_other_executor_does_the_same(fmus, runner, tmp_path, version, what):
+@pytest.mark.parametrize(("what", "words"), [("exit_0", EXIT), ("error", "status 3"), ("negative", "status -1")])
+def test_the_other_executor_does_the_same(fmus, runner, tmp_path, version, what, words):
     done = run(runner, tmp_path, {"lag": fmus(version, f"DoStep 6 {what}")}, executor="python")
-    assert f"lag: fmi{version}DoStep failed at t = 0.05 s: {EXIT if what == 'exit_0' else 'status 3'}" in done.err
+    assert f"lag: fmi{version}DoStep failed at t = 0.05 s: {words}" in done.err
     assert (done.code, len(done.rows)) == (1, 6)
 
 

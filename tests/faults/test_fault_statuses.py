@@ -26,10 +26,15 @@ CASES = [
     Case("- 1 error", "", 0, COUNT + 1),
     Case("DoStep 6 warning", "WARNING lag: told to return warning", 0, COUNT + 1),
     Case("DoStep 6 discard", "lag: {f}" + T5 + "status 2 (discard): told to return discard"),
+    Case("DoStep 6 discard", "told to return discard; it says that it came to t = 0.05 s", versions=(2,)),
     Case("DoStep 6 error", "lag: {f}" + T5 + "status 3 (error): told to return error"),
     Case("DoStep 6 fatal", "lag: {f}" + T5 + "status 4 (fatal): told to return fatal"),
     Case("DoStep 6 pending", "lag: {f}" + T5 + "status 5"),
     Case("DoStep 6 undefined", "lag: {f}" + T5 + "status 17 (not defined by FMI)"),
+    Case("DoStep 6 hundred", "lag: {f}" + T5 + "status 100 (not defined by FMI)"),
+    Case("DoStep 6 negative", "lag: {f}" + T5 + "status -1 (not defined by FMI)"),
+    Case("GetReal 9 negative", "lag: {f}" + T5 + "status -1 (not defined by FMI)"),
+    Case("EnterInitializationMode 1 negative", "lag: {f} failed at t = 0 s: status -1", rows=0),
     Case("DoStep @0.05 error", "lag: {f}" + T5 + "status 3 (error)"),
     Case("DoStep * discard", "lag: {f} failed at t = 0 s: status 2 (discard)", rows=1),
     Case("GetReal 9 error", "lag: {f}" + T5 + "status 3 (error)"),
@@ -39,7 +44,7 @@ CASES = [
     Case("Instantiate 1 error", "lag: {f} failed: told to return error", rows=0),
     Case("EnterInitializationMode 1 error", "lag: {f} failed at t = 0 s: status 3 (error)", rows=0),
     Case("ExitInitializationMode 1 error", "lag: {f} failed at t = 0 s: status 3 (error)", rows=0),
-    Case("Terminate 1 error", "lag: {f} failed", rows=COUNT + 1),
+    Case("Terminate 1 error", "lag: {f} failed: status 3 (error)", rows=COUNT + 1),
     Case("DoStep 6 log_directives", "WARNING lag: %s%s%n%d%f 100%", 0, COUNT + 1),
     Case("DoStep 6 log_null", "WARNING lag:", 0, COUNT + 1),
     Case("DoStep 6 log_bytes", "WARNING lag: bad \N{REPLACEMENT CHARACTER}", 0, COUNT + 1),
@@ -62,6 +67,7 @@ def test_a_bad_return_stops_the_run_with_one_line_and_keeps_the_rows(fmus, runne
     [
         ("SetReal @0.075 error", T8 + "status 3 (error)"),
         ("DoStep @0.08 error", T8 + "status 3 (error)"),
+        ("DoStep @0.08 negative", T8 + "status -1 (not defined by FMI)"),
         ("GetReal @0.085 error", T8 + "status 3 (error)"),
         ("DoStep @0.08 round_up", T8 + "changed the floating-point mode"),
     ],
@@ -75,6 +81,28 @@ def test_nothing_is_overlooked_in_the_usual_turn_of_set_step_and_get(fmus, runne
     done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report")
     assert (done.code, len(done.rows)) == (1, 9), done.err
     assert f"lag: {function_name(version, order.split()[0])}{words}" in done.err
+
+
+@pytest.mark.parametrize("what", ["hundred", "negative"])
+def test_the_other_executor_takes_no_other_status_for_a_good_one(fmus, runner, tmp_path, version, what):
+    done = runner.run(tmp_path, fmus(version, f"DoStep 6 {what}"), executor="python")
+    assert (done.code, len(done.rows)) == (1, 6), done.err
+    assert "(not defined by FMI)" in done.err
+
+
+def test_an_fmu_that_does_not_say_how_far_a_discarded_step_came(fmus, runner, tmp_path):
+    fmu = fmus(2, "GetBooleanStatus 1 discard")
+    words = ("run", scenario(tmp_path, fmu), "--output-dir", "out", "--no-report", "--set", "lag.fault=DoStep 6 discard")
+    done = runner.cosim(tmp_path, *words)
+    assert (done.code, len(done.rows)) == (1, 6), done.err
+    assert "lag: fmi2DoStep" + T5 + "status 2 (discard): told to return discard; it says" in done.err
+
+
+def test_an_fmu_that_terminates_may_say_nothing_of_the_time(fmus, runner, tmp_path):
+    fmu = fmus(2, "GetRealStatus 1 discard")
+    words = ("run", scenario(tmp_path, fmu), "--output-dir", "out", "--no-report", "--set", "lag.fault=DoStep 6 terminate")
+    done = runner.cosim(tmp_path, *words)
+    assert (done.code, len(done.rows)) == (0, 7), done.err
 
 
 def test_the_rows_of_a_failed_run_are_those_of_a_good_one(fmus, runner, tmp_path, version):
@@ -122,6 +150,27 @@ def test_a_changed_floating_point_mode_is_a_failure(fmus, runner, tmp_path, vers
     done = runner.run(tmp_path, fmus(version, f"DoStep 6 {what}"))
     assert (done.code, len(done.rows)) == (1, 6)
     assert f"lag: fmi{version}DoStep failed at t = 0.05 s: changed the floating-point mode" in done.err
+
+
+AS_OUTPUT = 'causality="output" variability="discrete" initial="calculated"'
+SPEAKING = {
+    2: f'<ScalarVariable name="s" valueReference="1" {AS_OUTPUT}><String/></ScalarVariable></ModelVariables>',
+    3: f'<String name="s" valueReference="7" {AS_OUTPUT}/></ModelVariables>',
+}
+
+
+def test_a_text_that_is_a_null_pointer_is_a_failure(fmus, runner, tmp_path, version):
+    """It would crash the component that reads it."""
+    done = runner.run(tmp_path, fmus(version, "DoStep 3 speechless", changes={"</ModelVariables>": SPEAKING[version]}))
+    assert done.code == 1, done.err
+    assert f'lag: fmi{version}GetString failed at t = 0.02 s: the value of "s" is a null pointer, expected a text' in done.err
+
+
+def test_a_text_that_is_not_utf_8_is_read_as_far_as_it_can_be(fmus, runner, tmp_path, version):
+    fmu = fmus(version, "DoStep 3 babble", changes={"</ModelVariables>": SPEAKING[version]})
+    done = runner.cosim(tmp_path, "run", scenario(tmp_path, fmu), "--output-dir", "out", "--no-report")
+    assert done.code == 0, done.err
+    assert "\N{REPLACEMENT CHARACTER}" * 2 in (tmp_path / "out/result.csv").read_text(encoding="utf-8")
 
 
 def test_rows_of_an_earlier_run_do_not_pass_for_those_of_a_failed_one(fmus, runner, tmp_path, version):

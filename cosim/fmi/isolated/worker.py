@@ -16,10 +16,10 @@ from typing import Any
 
 from ... import journal as journals
 from ... import log
-from ...component import Call, DoStep, StepResult
+from ...component import GOOD, Call, DoStep, StepResult
 from ...errors import ComponentError, InputError
 from ...journal import CALL, Phase
-from ..instance import WARNING, FmuInstance
+from ..instance import FmuInstance
 from .block import Block, texts
 from .lines import DONE, TURN, decode, encode, read_line, write
 
@@ -112,13 +112,13 @@ class Worker:
         return [call.name for call in calls]
 
     def _turn(self) -> StepResult | None:
-        marker, warning, traps = self._block.marker, WARNING, _traps
+        marker, traps = self._block.marker, _traps
         # equal in the default rounding mode only, and the least denormal is no zero only if it is not flushed
         one, little, least = 1.0, 2.0**-54, 5e-324
         for number, function, arguments, steps, call in self._calls:
             marker[CALL] = number
             status = function(*arguments)
-            if status > warning:
+            if status and status not in GOOD:
                 return self._instance.failed(call.name, status)
             if one + little != one - little or not least + least or (steps and traps()):
                 raise ComponentError(self._instance.name, call.name, FLOAT_STATE, self._block.clock.value)
