@@ -86,12 +86,34 @@ def test_cameras_look_at_what_they_promise(opened):
     assert opened(f"{camera}.getWorldDirection({camera}.position.clone()).z") < -0.999
 
 
-def test_trails_grow_and_ghosts_appear_when_asked_for(opened):
-    past = "cosimReplay.view.actors[0].trail.past.geometry.instanceCount"
-    opened.seek(4.0)
-    early = opened(past)
+def test_trails_end_at_the_bodies_and_keep_to_their_paths(opened, flight):
+    for number, body in enumerate(BODIES):
+        trail = f"cosimReplay.view.actors[{number}].trail"
+        drawn = np.array(opened(f"{trail}.points.map((point) => point.toArray())"))
+        assert 10 < len(drawn) < 150
+        recorded = np.column_stack([flight[f"{body}.position.{axis}"] for axis in "xyz"])
+        assert np.linalg.norm(recorded - nearest(drawn, recorded), axis=1).max() < 0.01
+        lengths = []
+        for time in (4.0, 4.1, 8.0, 16.0):
+            opened.seek(time)
+            lengths.append(opened(f"{trail}.past.geometry.instanceCount"))
+            ends = f"{trail}.past.geometry.attributes.instanceEnd"
+            end = [opened(f"{ends}.get{axis}({lengths[-1] - 1})") for axis in "XYZ"]
+            assert end == pytest.approx(opened.body(number)[0], abs=1e-6)
+        assert lengths == sorted(lengths)
+        assert lengths[-1] == len(drawn) - 1
+
+
+def nearest(path, places):
+    """The points of a path of straight pieces that are nearest to some places."""
+    starts, steps = path[:-1], np.diff(path, axis=0)
+    along = np.einsum("psi,si->ps", places[:, None] - starts, steps) / np.maximum(np.sum(steps**2, axis=1), 1e-12)
+    feet = starts + np.clip(along, 0, 1)[..., None] * steps
+    return feet[np.arange(len(places)), np.argmin(np.linalg.norm(feet - places[:, None], axis=2), axis=1)]
+
+
+def test_ghosts_appear_when_asked_for(opened):
     opened.seek(8.0)
-    assert opened(past) == pytest.approx(2 * early, abs=2)
     opened.page.get_by_role("button", name="Ghosts").click()
     assert opened("cosimReplay.view.actors[0].ghosts.mesh.visible")
     assert opened("cosimReplay.view.actors[0].ghosts.mesh.count") == 9  # one a second

@@ -1,54 +1,59 @@
-// Bodies made of coloured parts: each becomes one geometry, so that it is one draw call.
+// Bodies made of coloured parts: those of one opacity become one geometry, so that they are one draw call.
 import {
   BoxGeometry, Color, CylinderGeometry, DoubleSide, Float32BufferAttribute, Group, Matrix4, Mesh, MeshLambertMaterial,
   Quaternion, SphereGeometry, TorusGeometry, Vector3,
 } from "three";
-import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
+import { mergeGeometries, mergeVertices } from "three/addons/utils/BufferGeometryUtils.js";
 import { RoundedBoxGeometry } from "three/addons/geometries/RoundedBoxGeometry.js";
+import { detailed } from "./quality.js";
 
 const UP = new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), Math.PI / 2); // a cylinder's axis from y to z
 
 const SHAPES = {
-  box: ([x, y, z]) => {
+  box: ([x, y, z], fine) => {
     const bevel = Math.min(0.12 * Math.min(x, y, z), 0.015);
-    return bevel > 5e-4 ? new RoundedBoxGeometry(x, y, z, 1, bevel) : new BoxGeometry(x, y, z);
+    return fine && bevel > 5e-4 ? new RoundedBoxGeometry(x, y, z, 1, bevel) : new BoxGeometry(x, y, z);
   },
-  cylinder: ([radius, length]) => new CylinderGeometry(radius, radius, length, radius > 0.05 ? 40 : 14).applyQuaternion(UP),
-  cone: ([low, high, length]) => new CylinderGeometry(high, low, length, 20).applyQuaternion(UP),
-  sphere: ([radius]) => new SphereGeometry(radius, 20, 14),
-  ring: ([radius, thickness]) => new TorusGeometry(radius, thickness, 8, 56),
+  cylinder: ([radius, length], fine) => {
+    const sides = radius > 0.05 ? (fine ? 40 : 24) : fine ? 14 : 7;
+    return new CylinderGeometry(radius, radius, length, sides).applyQuaternion(UP);
+  },
+  cone: ([low, high, length], fine) => new CylinderGeometry(high, low, length, fine ? 20 : 10).applyQuaternion(UP),
+  sphere: ([radius], fine) => new SphereGeometry(radius, ...(fine ? [20, 14] : [12, 8])),
+  ring: ([radius, thickness], fine) => new TorusGeometry(radius, thickness, ...(fine ? [8, 56] : [5, 32])),
 };
 
-/** One geometry with vertex colours of all parts; null where there are none. */
-export function geometryOf(parts) {
-  const pieces = parts.map((part) => {
-    const shape = SHAPES[part.shape](part.size);
-    const piece = shape.index ? shape.toNonIndexed() : shape;
+/** One geometry with vertex colours of all parts. */
+function geometryOf(parts, fine) {
+  return mergeGeometries(parts.map((part) => {
+    const shape = SHAPES[part.shape](part.size, fine).deleteAttribute("uv");
+    const piece = shape.index ? shape : mergeVertices(shape);
     const [x, y, z, w] = part.orientation;
     piece.applyMatrix4(new Matrix4().compose(new Vector3(...part.position), new Quaternion(x, y, z, w), new Vector3(1, 1, 1)));
-    piece.deleteAttribute("uv");
     const colour = new Color().setRGB(...part.colour);
     const colours = new Float32Array(piece.attributes.position.count * 3);
     for (let i = 0; i < colours.length; i += 3) colour.toArray(colours, i);
-    piece.setAttribute("color", new Float32BufferAttribute(colours, 3));
-    return piece;
-  });
-  return pieces.length ? mergeGeometries(pieces) : null;
+    return piece.setAttribute("color", new Float32BufferAttribute(colours, 3));
+  }));
 }
 
-/** A group of solid and of translucent parts. */
+function meshOf(parts, look) {
+  const material = new MeshLambertMaterial({ vertexColors: true, ...look });
+  return detailed(new Mesh(undefined, material), geometryOf(parts, true), geometryOf(parts, false));
+}
+
+/** A group of solid and of translucent parts; `solid` is the mesh of the former, if there are any. */
 export function bodyOf(parts) {
   const group = new Group();
-  const solid = geometryOf(parts.filter((part) => part.opacity === 1));
-  if (solid) {
-    const mesh = new Mesh(solid, new MeshLambertMaterial({ vertexColors: true }));
-    mesh.castShadow = mesh.receiveShadow = true;
-    group.add(mesh);
+  const opaque = parts.filter((part) => part.opacity === 1);
+  if (opaque.length) {
+    group.solid = meshOf(opaque, {});
+    group.solid.castShadow = group.solid.receiveShadow = true;
+    group.add(group.solid);
   }
   for (const opacity of new Set(parts.map((part) => part.opacity).filter((value) => value < 1))) {
-    const geometry = geometryOf(parts.filter((part) => part.opacity === opacity));
-    const material = new MeshLambertMaterial({ vertexColors: true, transparent: true, opacity, depthWrite: false, side: DoubleSide });
-    group.add(new Mesh(geometry, material));
+    const look = { transparent: true, opacity, depthWrite: false, side: DoubleSide, forceSinglePass: true };
+    group.add(meshOf(parts.filter((part) => part.opacity === opacity), look));
   }
   return group;
 }

@@ -37,10 +37,12 @@ export function connectTime(page, player) {
   page.speed.addEventListener("change", () => player.setSpeed(Number(page.speed.value)));
   page.root.addEventListener("keydown", (event) => key(event, player));
   page.root.tabIndex = -1;
+  let shown;
   player.onReading(() => {
     const digits = player.last < 1000 ? 2 : 1;
     page.scrubber.max = player.last;
-    page.play.innerHTML = player.playing ? PAUSE : PLAY;
+    const sign = player.playing ? PAUSE : PLAY;
+    if (sign !== shown) page.play.innerHTML = shown = sign;
     page.scrubber.value = player.time;
     page.clock.innerHTML = `<b>${player.time.toFixed(digits)}</b> / ${player.last.toFixed(digits)} s`;
     page.scrubber.style.setProperty("--done", `${(100 * (player.time - player.first)) / (player.last - player.first || 1)}%`);

@@ -69,7 +69,7 @@ function animate(player, view) {
   let former;
   const frame = (now) => {
     player.advance(former === undefined ? 0 : (now - former) / 1000);
-    view?.draw(player.playing ? now - former : 0);
+    view?.draw(now, player.playing ? now - former : 0);
     former = now;
     requestAnimationFrame(frame);
   };

@@ -1,5 +1,6 @@
-// Waypoints: a ring of acceptance on the water and a number above it.
+// Waypoints: rings of acceptance on the water, all of them one draw call, and numbers above them.
 import { CanvasTexture, DoubleSide, Group, Mesh, MeshBasicMaterial, RingGeometry, Sprite, SpriteMaterial } from "three";
+import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 
 function label(text) {
   const canvas = document.createElement("canvas");
@@ -20,15 +21,19 @@ function label(text) {
   return sprite;
 }
 
-export function markerOf({ position: [x, y, z], radius, label: text }) {
-  const group = new Group();
-  group.position.set(x, y, z);
+function ring({ position: [x, y, z], radius }) {
   const width = Math.max(0.035, 0.05 * radius);
-  const material = new MeshBasicMaterial({ color: "#ffb020", transparent: true, opacity: 0.9, side: DoubleSide });
-  const ring = new Mesh(new RingGeometry(radius - width, radius, 64), material);
-  ring.position.z = 0.02;
-  const sign = label(text);
-  sign.position.z = 0.4;
-  group.add(ring, sign);
-  return group;
+  return new RingGeometry(radius - width, radius, 64).translate(x, y, z + 0.02);
+}
+
+function sign({ position: [x, y, z], label: text }) {
+  const sprite = label(text);
+  sprite.position.set(x, y, z + 0.4);
+  return sprite;
+}
+
+export function markersOf(places) {
+  if (!places.length) return new Group();
+  const material = new MeshBasicMaterial({ color: "#ffb020", transparent: true, opacity: 0.9, side: DoubleSide, forceSinglePass: true });
+  return new Group().add(new Mesh(mergeGeometries(places.map(ring)), material), ...places.map(sign));
 }

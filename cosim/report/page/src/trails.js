@@ -1,12 +1,15 @@
 // What a body leaves behind: its path, brighter where it has been, and ghosts of where it was.
-import { BufferGeometry, InstancedMesh, Line, LineBasicMaterial, Matrix4, MeshLambertMaterial, Vector3 } from "three";
+import { Box3, BufferGeometry, InstancedMesh, Line, LineBasicMaterial, Matrix4, MeshLambertMaterial, Vector3 } from "three";
 import { Line2 } from "three/addons/lines/Line2.js";
 import { LineGeometry } from "three/addons/lines/LineGeometry.js";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
-import { geometryOf } from "./bodies.js";
+import { detailed } from "./quality.js";
+import { simplified } from "./simplified.js";
 
-const MOST_POINTS = 500;
+const MOST_POINTS = 2000; // of which those are drawn that a path needs
 const MOST_GHOSTS = 24;
+const FLAT = 1 / 2500; // of a path's extent: so far may what is drawn lie beside it
+const QUAD = [2, 4, 3, 4, 5, 3]; // a piece of a thick line without the caps at its ends, which nobody sees
 const ONE = new Vector3(1, 1, 1);
 
 /** Rows of a run, at most `count` and evenly spaced, the last among them. */
@@ -19,14 +22,18 @@ function spread(run, count) {
 
 export class Trail {
   constructor(run, body, colour, isOther) {
-    this.rows = spread(run, MOST_POINTS).filter((row) => run.position(body, row).toArray().every(Number.isFinite));
-    const points = this.rows.map((row) => run.position(body, row));
-    if (points.length === 1) points.push(points[0]); // a line has two ends
+    const rows = spread(run, MOST_POINTS).filter((row) => run.position(body, row).toArray().every(Number.isFinite));
+    const places = rows.map((row) => run.position(body, row));
+    const kept = simplified(places, FLAT * new Box3().setFromPoints(places).getSize(new Vector3()).length());
+    this.rows = kept.map((i) => rows[i]);
+    this.points = kept.map((i) => places[i]);
+    if (this.points.length === 1) this.points.push(this.points[0]); // a line has two ends
     const thin = new LineBasicMaterial({ color: colour, transparent: true, opacity: 0.4, depthWrite: false });
-    this.whole = new Line(new BufferGeometry().setFromPoints(points), thin);
+    this.whole = new Line(new BufferGeometry().setFromPoints(this.points), thin);
     const dashes = isOther ? { dashed: true, dashSize: 0.12, gapSize: 0.1 } : {};
     const thick = new LineMaterial({ color: colour, linewidth: isOther ? 1.8 : 2.6, transparent: true, depthWrite: false, ...dashes });
-    this.past = new Line2(new LineGeometry().setPositions(points.flatMap((point) => point.toArray())), thick);
+    this.past = new Line2(new LineGeometry().setPositions(this.points.flatMap((point) => point.toArray())), thick);
+    this.past.geometry.setIndex(QUAD);
     this.past.computeLineDistances();
     this.lines = [this.whole, this.past];
     for (const line of this.lines) line.frustumCulled = false;
@@ -36,24 +43,29 @@ export class Trail {
     for (const line of this.lines) line.geometry.dispose(), line.material.dispose();
   }
 
-  /** Draw as past what lies before a row. */
-  update(row) {
+  /** Draw as past what lies before a row, to where the body is. */
+  update(row, position) {
     let count = 0;
-    while (count < this.rows.length - 1 && this.rows[count + 1] <= row) count++;
-    this.past.geometry.instanceCount = count;
-    this.past.visible = this.whole.visible && count > 0;
+    while (count < this.rows.length - 2 && this.rows[count + 1] <= row) count++;
+    const { geometry } = this.past;
+    const ends = geometry.attributes.instanceEnd;
+    ends.setXYZ(geometry.instanceCount - 1, ...this.points[geometry.instanceCount]);
+    ends.setXYZ(count, ...position);
+    ends.data.needsUpdate = true;
+    geometry.instanceCount = count + 1;
+    this.past.visible = this.whole.visible && row > this.rows[0];
   }
 }
 
 export class Ghosts {
-  constructor(run, body) {
+  constructor(run, body, solid) {
     const duration = run.last - run.first;
     this.interval = [0.5, 1, 2, 5, 10, 20, 60, 300, 1800].find((step) => duration / step <= MOST_GHOSTS) ?? duration / MOST_GHOSTS;
     this.first = run.first;
     const moments = Array.from({ length: Math.floor(duration / this.interval + 1e-6) + 1 }, (_, i) => run.first + i * this.interval);
     const material = new MeshLambertMaterial({ vertexColors: true, transparent: true, opacity: 0.26, depthWrite: false });
-    const geometry = geometryOf(body.parts.filter((part) => part.opacity === 1));
-    this.mesh = new InstancedMesh(geometry, material, moments.length);
+    const { fine, coarse } = solid.userData;
+    this.mesh = detailed(new InstancedMesh(undefined, material, moments.length), fine, coarse);
     moments.forEach((moment, i) => {
       const { position, orientation } = run.pose(body, moment);
       this.mesh.setMatrixAt(i, new Matrix4().compose(position, orientation, ONE));
@@ -63,7 +75,6 @@ export class Ghosts {
   }
 
   dispose() {
-    this.mesh.geometry.dispose();
     this.mesh.material.dispose();
     this.mesh.dispose();
   }

@@ -5,35 +5,37 @@ import {
 } from "three";
 import { bodyOf, reachOf } from "./bodies.js";
 import { boxAround, Cameras } from "./cameras.js";
-import { markerOf } from "./markers.js";
+import { markersOf } from "./markers.js";
+import { drawnBySoftware, FINEST, Quality, setDetail } from "./quality.js";
 import { theme } from "./theme.js";
 import { Ghosts, Trail } from "./trails.js";
 import { Water } from "./water.js";
 
-const SLOW = 42; // ms between frames from which on the picture is made coarser
-const COARSEST = 0.5; // pixels of the picture per pixel of the page
+const REST = 350; // ms without a change until the picture is made as fine as can be
 const SUN = new Vector3(-0.45, -0.6, 0.66).normalize();
 const OTHER = "#c2185b";
 
 ColorManagement.enabled = false; // colours are mixed as they are shown: powers for each pixel take a processor long
 
-/** Whether the processor has to draw, because there is no graphics card to do it. */
-function drawnBySoftware() {
-  const gl = document.createElement("canvas").getContext("webgl2");
-  const about = gl?.getExtension("WEBGL_debug_renderer_info");
-  return about ? /swiftshader|llvmpipe|software|basic render/i.test(gl.getParameter(about.UNMASKED_RENDERER_WEBGL)) : false;
+/** A renderer, and whether the processor has to do its work. What lies behind its canvas is never seen, nor mixed with it. */
+function rendererOn(canvas) {
+  const software = drawnBySoftware(document.createElement("canvas").getContext("webgl2"));
+  const context = canvas.getContext("webgl2", { alpha: false, antialias: !software });
+  const renderer = new WebGLRenderer({ canvas, context });
+  renderer.outputColorSpace = LinearSRGBColorSpace;
+  renderer.shadowMap.enabled = true;
+  renderer.shadowMap.autoUpdate = false;
+  renderer.shadowMap.type = software ? BasicShadowMap : PCFShadowMap;
+  return { renderer, software };
 }
 
 export class View {
   constructor(canvas, scene, runs) {
     Object.assign(this, { runs, time: runs[0].first });
     this.scene = new Scene();
-    const software = drawnBySoftware();
-    this.renderer = new WebGLRenderer({ canvas, antialias: !software });
-    this.renderer.outputColorSpace = LinearSRGBColorSpace;
-    this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.type = software ? BasicShadowMap : PCFShadowMap;
-    this.ratio = software ? 0.8 : Math.min(devicePixelRatio, 1.5);
+    const { renderer, software } = rendererOn(canvas);
+    const most = software ? Infinity : devicePixelRatio; // smaller pixels smooth edges, which a graphics card can do for less
+    Object.assign(this, { renderer, quality: new Quality(software), most, shown: null, frames: 0, changed: 0 });
     this.#surroundings(scene);
     this.actors = runs.flatMap((run, i) => scene.bodies.filter((body) => run.knows(body)).map((body) => this.#actor(run, body, i > 0)));
     this.own = this.actors.filter((actor) => actor.run === runs[0]);
@@ -55,21 +57,23 @@ export class View {
     this.around = new HemisphereLight("#ffffff", "#8fb0b8", 1.5);
     this.scene.add(this.light, this.light.target, this.around);
     this.water = scene.water && new Water(scene.water);
-    if (this.water) this.scene.add(this.water.mesh);
-    this.scene.add(bodyOf(scene.fixed), ...scene.markers.map(markerOf));
+    if (this.water) this.scene.add(this.water.object);
+    this.scene.add(bodyOf(scene.fixed), markersOf(scene.markers));
   }
 
   #actor(run, body, isOther) {
-    const object = new Group().add(bodyOf(body.parts));
+    const parts = bodyOf(body.parts);
+    const object = new Group().add(parts);
     if (isOther) this.#veil(object);
     const reach = reachOf(body.parts);
     this.scene.add(object);
-    return { run, body, object, ...this.#past(run, body, isOther), reach, get position() { return object.position; } };
+    const actor = { run, body, object, solid: parts.solid, isOther, reach, get position() { return object.position; } };
+    return Object.assign(actor, this.#past(actor));
   }
 
-  #past(run, body, isOther) {
+  #past({ run, body, solid, isOther }) {
     const trail = new Trail(run, body, isOther ? OTHER : body.colour, isOther);
-    const ghosts = isOther || !body.parts.some((part) => part.opacity === 1) ? null : new Ghosts(run, body);
+    const ghosts = isOther || !solid ? null : new Ghosts(run, body, solid);
     this.scene.add(...trail.lines, ...(ghosts ? [ghosts.mesh] : []));
     return { trail, ghosts };
   }
@@ -82,14 +86,15 @@ export class View {
   /** The runs have more rows. */
   grow() {
     for (const actor of this.actors) {
-      const { run, body, trail, ghosts } = actor;
+      const { trail, ghosts } = actor;
       this.scene.remove(...trail.lines, ...(ghosts ? [ghosts.mesh] : []));
-      Object.assign(actor, this.#past(run, body, run !== this.runs[0]));
+      Object.assign(actor, this.#past(actor));
       for (const line of actor.trail.lines) line.visible = trail.whole.visible;
       if (ghosts) actor.ghosts.mesh.visible = ghosts.mesh.visible;
       trail.dispose();
       ghosts?.dispose();
     }
+    setDetail(this.scene, Boolean(this.shown?.coarse));
     this.cameras.cover(this.#box());
     this.update(this.time);
   }
@@ -138,7 +143,7 @@ export class View {
       const { position, orientation } = run.pose(body, time);
       object.position.copy(position);
       object.quaternion.copy(orientation);
-      trail.update(run.place(time).row);
+      trail.update(run.place(time).row, position);
       ghosts?.update(time);
     }
     this.light.target.position.copy(this.subject.position);
@@ -163,7 +168,6 @@ export class View {
   #resize() {
     const { clientWidth: width, clientHeight: height } = this.renderer.domElement.parentElement;
     if (!width || !height) return;
-    this.renderer.setPixelRatio(this.ratio);
     this.renderer.setSize(width, height, false);
     this.cameras.resize(width, height);
     this.request();
@@ -173,20 +177,31 @@ export class View {
     this.stale = true;
   }
 
-  /** Draw if anything has changed; `elapsed` (ms) since the frame before. */
-  draw(elapsed) {
-    if (!this.stale) return;
-    this.stale = false;
-    this.renderer.render(this.scene, this.cameras.camera);
-    this.#adapt(elapsed);
+  /** Draw at the moment `now` (ms) if anything has changed; `elapsed` (ms) since the frame before if the replay is playing. */
+  draw(now, elapsed) {
+    if (this.stale) {
+      this.stale = false;
+      this.changed = now;
+      if (elapsed) this.quality.took(elapsed);
+      this.#render(this.quality.moving);
+    } else if (this.shown !== FINEST && now - this.changed > REST) {
+      this.#render(FINEST);
+    }
   }
 
-  /** Fewer pixels where frames take too long, as without a graphics card. */
-  #adapt(elapsed) {
-    this.pace = elapsed > 0 && elapsed < 1000 ? 0.9 * (this.pace ?? 16) + 0.1 * elapsed : this.pace;
-    if (this.pace < SLOW || this.ratio <= COARSEST) return;
-    this.ratio = Math.max(COARSEST, 0.8 * this.ratio);
-    this.pace = 16;
-    this.#resize();
+  #render(how) {
+    if (this.shown !== how) this.#turn(how);
+    else this.renderer.shadowMap.needsUpdate = this.frames % how.shadows === 0;
+    this.frames += 1;
+    this.renderer.render(this.scene, this.cameras.camera);
+  }
+
+  /** From now on draw like this. */
+  #turn(how) {
+    this.shown = how;
+    this.renderer.setPixelRatio(Math.min(this.most, how.ratio));
+    this.renderer.shadowMap.needsUpdate = true;
+    setDetail(this.scene, how.coarse);
+    this.water?.light(how.coarse);
   }
 }
