@@ -7,8 +7,10 @@ from typing import Any
 
 from ..component import DTYPES, Call, DoStep, Flags, StepResult
 from ..errors import ComponentError
-from .instance import DISCARD, OK, POINTER, FmuInstance, address
+from .functions import POINTER, address
+from .instance import DISCARD, OK, FmuInstance
 
+_TRUE = ctypes.c_bool.from_param(True)
 _ENDED = "how fmi3DoStep ended"
 
 
@@ -39,7 +41,7 @@ class Fmi3Instance(FmuInstance):
         self._flags, self._reached = (ctypes.c_bool * 3)(), ctypes.c_double()
         flags, reached = ctypes.addressof(self._flags), ctypes.addressof(self._reached)
         results = [POINTER(flags + i * ctypes.sizeof(ctypes.c_bool)) for i in range(3)]
-        arguments = (POINTER(self._handle), self._clock, step_size, ctypes.c_bool.from_param(True), *results, POINTER(reached))
+        arguments = (self._instance, self._clock, step_size, _TRUE, *results, POINTER(reached))
         native = DoStep(3, address(self._do_step), self._handle, seconds, flags, reached)
         kept = (self._flags, self._reached)
         return [Call(self._do_step, arguments, "fmi3DoStep", native, kept), Call(self._ended, (), _ENDED, Flags(flags), kept)]
