@@ -80,13 +80,12 @@ class PythonExecutor(Executor):
                 for move in moves:
                     move()
                 for calls in turns if divisors is None else _due(turns, divisors, finished - 1):
-                    for number, function, arguments in calls:
-                        marker[CALL] = number
+                    for marker[CALL], function, arguments in calls:
                         if (status := function(*arguments)) > WARNING:
-                            self._bad_status(*self._turn_of(number), status)
+                            self._bad_status(*self._turn_of(marker[CALL]), status)
                             break
                     if one + little != one - little or not least + least:
-                        self._float_state_changed(*self._turn_of(number))
+                        self._float_state_changed(*self._turn_of(calls[-1][0]))
             for high_bytes in exponents:
                 if 0x7F in (found := high_bytes()) or 0xFF in found:
                     self._check_finite()

@@ -38,7 +38,9 @@ class Fmi3Instance(FmuInstance):
         self.call("enterInitializationMode", None, start_time, stop_time)
 
     def _step_calls(self, step_size: Any, seconds: float) -> list[Call]:
-        self._flags, self._reached = (ctypes.c_bool * 3)(), ctypes.c_double()
+        # three flags and a byte, so that one look is enough
+        self._flags, self._reached = (ctypes.c_bool * 4)(), ctypes.c_double()
+        self._all_flags = ctypes.c_uint32.from_buffer(self._flags)
         flags, reached = ctypes.addressof(self._flags), ctypes.addressof(self._reached)
         results = [POINTER(flags + i * ctypes.sizeof(ctypes.c_bool)) for i in range(3)]
         arguments = (self._instance, self._clock, step_size, _TRUE, *results, POINTER(reached))
@@ -48,7 +50,7 @@ class Fmi3Instance(FmuInstance):
 
     def _ended(self) -> int:
         """Discard stands for a step that is to be looked at: it met an event, asks to terminate or ended early."""
-        return DISCARD if any(self._flags) else OK
+        return DISCARD if self._all_flags.value else OK
 
     def failed(self, name: str, status: int) -> StepResult:
         if name == _ENDED:
