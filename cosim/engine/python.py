@@ -18,8 +18,8 @@ from .parallel import TRIALS
 from .plan import Phase
 from .turns import WARNING, Turn
 
-#: the bytes of up to so many are copied faster one by one than by numpy
-FEW_FLOATS = 16
+#: from so many on it is numpy that picks bytes out of floats faster
+MANY_FLOATS = 256
 
 #: the number that goes into the marker, the function and its arguments
 NumberedCall = tuple[int, Callable[..., int], tuple[Any, ...]]
@@ -86,8 +86,8 @@ class PythonExecutor(Executor):
                             break
                     if one + little != one - little or not least + least:
                         self._float_state_changed(*self._turn_of(calls[-1][0]))
-            for high_bytes in exponents:
-                if 0x7F in (found := high_bytes()) or 0xFF in found:
+            for contents, high in exponents:
+                if 0x7F in (found := contents()[high]) or 0xFF in found:
                     self._check_finite()
             if every == 1 or finished % every == 0:
                 for keep in keepers:
@@ -104,11 +104,11 @@ def _due(turns: Iterable[Sequence[NumberedCall]], divisors: Iterable[int], n: in
     return compress(turns, [n % divisor == 0 for divisor in divisors])
 
 
-def _exponents(floats: np.ndarray) -> Callable[[], bytes]:
-    """Returns the bytes with the sign and the upper seven bits of each exponent.
+def _exponents(floats: np.ndarray) -> tuple[Callable[[], bytes], slice]:
+    """Returns bytes, and where among them the sign and the upper seven bits of each exponent lie.
 
-    0x7F and 0xFF are among them when one of the floats is not finite, and when one is so large that looking closer does no harm.
+    0x7F or 0xFF is there when one of the floats is not finite, and when one is so large that looking closer does no harm.
     """
-    last = floats.itemsize - 1 if sys.byteorder == "little" else 0
-    chosen = floats.view(np.uint8)[last :: floats.itemsize]
-    return (chosen.data if len(floats) <= FEW_FLOATS else chosen).tobytes
+    every = slice(floats.itemsize - 1 if sys.byteorder == "little" else 0, None, floats.itemsize)
+    memory = floats.view(np.uint8)
+    return (memory.data.tobytes, every) if len(floats) < MANY_FLOATS else (memory[every].tobytes, slice(None))
