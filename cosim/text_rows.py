@@ -26,12 +26,8 @@ class SavingRecorder(Recorder):
         self._cells = [(name, plan.signals.arrays[s.dtype], s.offset) for name, s in slots.items() if s.dtype.hasobject]
         self._saved: dict[str, Any] = dict.fromkeys((name for name, _, _ in self._cells), "")
         self._file = (folder / TEXTS_FILE).open("wb", buffering=0)
-
-    def record(self, n: int) -> None:
-        row = self.rows
-        super().record(n)
-        if self._cells and self.rows > row:
-            self._save(row)
+        if self._cells:
+            self._text_keepers.append(self._save)
 
     def _save(self, row: int) -> None:
         """In one write without a buffer, which nothing that kills this process can take back."""

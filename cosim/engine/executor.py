@@ -27,6 +27,9 @@ from .turns import SHOWN, Ending, Turn, float_state_changed, take
 #: places in the marker: number of the present call, macro steps finished, rows recorded
 CALL, STEPS, ROWS, MARKER_SIZE = 0, 1, 2, 3
 
+#: macro steps at most that are made without looking up
+BATCH = 1 << 16
+
 #: status of a Python component's turn in a macro step after which the simulation ends; no FMU can return it
 _TERMINATION = 1 << 32
 
@@ -240,8 +243,22 @@ class Executor(ABC):
             self._check_finite()  # more likely the cause than what failed upon it
             raise
 
+    def _run(self, end: int) -> None:
+        while self.finished < end and not self.termination:
+            first = self.finished
+            last = min(end, first + self._batch(first), self.recorder.full_after(first))
+            try:
+                self._steps(first, last)
+            finally:
+                self.recorder.advance(int(self.marker[ROWS]))
+
+    def _batch(self, first: int) -> int:
+        """Macro steps at most that are made without looking up."""
+        return BATCH
+
     @abstractmethod
-    def _run(self, end: int) -> None: ...
+    def _steps(self, first: int, end: int) -> None:
+        """The macro steps from `first` to `end`, fewer if a component asks to terminate; there is room for their rows."""
 
     @abstractmethod
     def _measured(self) -> dict[int, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,24 @@ from .gathering import Gather
 
 Move = Callable[[], object]
 
-#: up to so many values are faster assigned one by one than by numpy
+#: up to so many values, or runs of neighbours, are faster copied one by one than by numpy
 FEW = 4
+
+
+def pieces(gather: Gather) -> list[tuple[memoryview, memoryview]] | None:
+    """(target, source) for every run of neighbours; None when they are many or when there is more to do than to copy them."""
+    if gather.delay or gather.factor is not None or gather.source.dtype != gather.target.dtype or gather.source.dtype.hasobject:
+        return None
+    to, from_ = gather.target_indices, gather.source_indices
+    breaks = np.flatnonzero((np.diff(to) != 1) | (np.diff(from_) != 1)) + 1
+    runs = [slice(begin, end) for begin, end in pairwise([0, *breaks.tolist(), len(to)])]
+    if len(runs) > FEW:
+        return None
+    return [(_part(gather.target, to[run]), _part(gather.source, from_[run])) for run in runs]
+
+
+def _part(array: np.ndarray, neighbours: np.ndarray) -> memoryview:
+    return array[neighbours[0] : neighbours[-1] + 1].data
 
 
 def copy(gather: Gather) -> Move:

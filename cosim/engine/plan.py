@@ -160,7 +160,7 @@ def _inputs(system: System, connections: Iterable[Connection]) -> Layout:
     for name in wanted:
         if system.components[name].binds_everything:
             wanted[name] = {v.name: v for v in system.components[name].variables if v.causality == "input"}
-    return lay_out({name: list(variables.values()) for name, variables in wanted.items()})
+    return lay_out({name: _by_type(list(variables.values())) for name, variables in wanted.items()})
 
 
 def _signals(system: System, recorded: Iterable[Endpoint]) -> Layout:
@@ -170,11 +170,19 @@ def _signals(system: System, recorded: Iterable[Endpoint]) -> Layout:
         read[endpoint.component].add(system.place(endpoint).variable.name)
     return lay_out(
         {
-            name: [
-                variable
-                for variable in system.components[name].variables
-                if variable.name in names or (system.components[name].binds_everything and variable.causality == "output")
-            ]
+            name: _by_type(
+                [
+                    variable
+                    for variable in system.components[name].variables
+                    if variable.name in names or (system.components[name].binds_everything and variable.causality == "output")
+                ]
+            )
             for name, names in read.items()
         }
     )
+
+
+def _by_type(variables: Sequence[Variable]) -> list[Variable]:
+    """Those of one type next to each other, so that one call sets or gets them all; enumerations go with integers."""
+    types = [f"Int{8 * v.dtype.itemsize}" if v.type == "Enumeration" else v.type for v in variables]
+    return [variable for kind in dict.fromkeys(types) for variable, type_ in zip(variables, types, strict=True) if type_ == kind]

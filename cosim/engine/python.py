@@ -2,21 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import compress
 from math import inf
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..component import GOOD, Call, DoStep
 from .executor import CALL, ROWS, STEPS, Executor
+from .moves import Move, pieces
 from .parallel import TRIALS
+from .plan import Phase
 from .turns import Turn
 
-#: up to so many are faster added one by one than by numpy
-FEW_FLOATS = 16
+#: from so many on it is numpy that picks bytes out of floats faster
+MANY_FLOATS = 256
+
+#: the number that goes into the marker, the function and its arguments
+NumberedCall = tuple[int, Callable[..., int], tuple[Any, ...]]
+
+
+class _Phase(NamedTuple):
+    """What moves, the calls of each turn, and the divisors of the turns if not all of them are taken in every step."""
+
+    copies: Sequence[tuple[memoryview, memoryview]]
+    moves: Sequence[Move]
+    turns: Sequence[Sequence[NumberedCall]]
+    divisors: Sequence[int] | None
 
 
 class PythonExecutor(Executor):
@@ -27,17 +42,19 @@ class PythonExecutor(Executor):
         self._shortest: dict[int, float] = {}
 
     def _prepare(self) -> None:
-        self._phases = [
-            ([self._move(gather) for gather in phase.gathers], [self._numbered(turn) for turn in turns])
-            for phase, turns in zip(self.plan.phases, self._stages, strict=True)
-        ]
-        self._spoiled = [_spoiled(floats) for floats in self.watched]
+        self._phases = [self._phase(phase, turns) for phase, turns in zip(self.plan.phases, self._stages, strict=True)]
+        self._exponents = [_exponents(floats) for floats in self.watched]
 
-    def _numbered(self, turn: Turn) -> tuple[int, list[tuple[Any, Any, int]], Turn]:
+    def _phase(self, phase: Phase, turns: Sequence[Turn]) -> _Phase:
+        divisors = [turn.step.divisor for turn in turns]
+        copies = [piece for gather in phase.gathers for piece in pieces(gather) or ()]
+        moves = [self._move(gather) for gather in phase.gathers if pieces(gather) is None]
+        return _Phase(copies, moves, [self._numbered(turn) for turn in turns], divisors if any(d > 1 for d in divisors) else None)
+
+    def _numbered(self, turn: Turn) -> list[NumberedCall]:
         measure = self._joint and self.finished < TRIALS
         functions = [self._timed(c, turn.first) if measure and isinstance(c.native, DoStep) else c.function for c in turn.calls]
-        calls = [(f, c.arguments, turn.first + i) for i, (f, c) in enumerate(zip(functions, turn.calls, strict=True))]
-        return turn.step.divisor, calls, turn
+        return [(turn.first + i, f, c.arguments) for i, (f, c) in enumerate(zip(functions, turn.calls, strict=True))]
 
     def _timed(self, call: Call, first: int) -> Callable[..., int]:
         def timed(*arguments: Any) -> int:
@@ -51,40 +68,47 @@ class PythonExecutor(Executor):
     def _measured(self) -> dict[int, float]:
         return self._shortest
 
-    def _run(self, end: int) -> None:
-        grid, phases, record, clock = self.plan.grid, self._phases, self.recorder.record, self._clock
-        origin, stride, denominator = grid.integers.values()
-        marker, recorder, checks = self.marker.data, self.recorder, self._spoiled
+    def _steps(self, first: int, end: int) -> None:
+        clock, marker, phases, exponents = self._clock, self.marker.data, self._phases, self._exponents
+        keepers, row, every = self.recorder.keepers, self.recorder.rows, self.recorder.every
         # equal in the default rounding mode only, and the least denormal is no zero only if it is not flushed
         one, little, least = 1.0, 2.0**-54, 5e-324
-        for n in range(self.finished, end):
-            clock.value = (origin + n * stride) / denominator
-            for moves, turns in phases:
+        for finished, clock.value in enumerate(self.plan.grid.times(range(first, end)).tolist(), first + 1):
+            for copies, moves, turns, divisors in phases:
+                for target, source in copies:
+                    target[:] = source
                 for move in moves:
                     move()
-                for divisor, calls, turn in turns:
-                    if divisor != 1 and n % divisor:
-                        continue
-                    for function, arguments, number in calls:
-                        marker[CALL] = number
+                for calls in turns if divisors is None else _due(turns, divisors, finished - 1):
+                    for marker[CALL], function, arguments in calls:
                         if (status := function(*arguments)) and status not in GOOD:
-                            self._bad_status(turn, turn.calls[number - turn.first], status)
+                            self._bad_status(*self._turn_of(marker[CALL]), status)
                             break
                     if one + little != one - little or not least + least:
-                        self._float_state_changed(turn, turn.calls[-1])
-            for spoiled in checks:
-                if spoiled():
+                        self._float_state_changed(*self._turn_of(calls[-1][0]))
+            for contents, high in exponents:
+                if 0x7F in (found := contents()[high]) or 0xFF in found:
                     self._check_finite()
-            record(n + 1)
-            marker[ROWS], marker[STEPS] = recorder.rows, n + 1
+            if every == 1 or finished % every == 0:
+                for keep in keepers:
+                    keep(row)
+                row += 1
+                marker[ROWS] = row
+            marker[STEPS] = finished
             if self.termination:
                 return
 
 
-def _spoiled(floats: np.ndarray) -> Callable[[], float]:
-    """Zero when all are finite, otherwise NaN; it may be NaN too when their sum is not finite."""
-    if len(floats) <= FEW_FLOATS:
-        view = floats.data
-        return lambda: sum(view) * 0.0
-    zeros: Any = np.zeros_like(floats)
-    return partial(floats.dot, zeros)  # type: ignore[return-value]
+def _due(turns: Iterable[Sequence[NumberedCall]], divisors: Iterable[int], n: int) -> Iterator[Sequence[NumberedCall]]:
+    """The turns that are taken in the step from communication point n."""
+    return compress(turns, [n % divisor == 0 for divisor in divisors])
+
+
+def _exponents(floats: np.ndarray) -> tuple[Callable[[], bytes], slice]:
+    """Returns bytes, and where among them the sign and the upper seven bits of each exponent lie.
+
+    0x7F or 0xFF is there when one of the floats is not finite, and when one is so large that looking closer does no harm.
+    """
+    every = slice(floats.itemsize - 1 if sys.byteorder == "little" else 0, None, floats.itemsize)
+    memory = floats.view(np.uint8)
+    return (memory.data.tobytes, every) if len(floats) < MANY_FLOATS else (memory[every].tobytes, slice(None))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +15,9 @@ from .layout import Slot
 from .moves import FEW
 from .plan import Plan
 from .rows import filled, rows_for
+
+#: puts the present values into a row, given its number
+Keeper = Callable[[int], object]
 
 
 class Piece(NamedTuple):
@@ -48,7 +50,9 @@ class Recorder:
         #: rows recorded so far
         self.rows = 0
         self._texts = {name: _Texts(plan.signals.arrays[slot.dtype], slot.offset) for name, slot in self._texts_of().items()}
-        self._keeps: Sequence[Callable[[int], object]] = ()
+        #: what keeps a row's texts, and what keeps a row of the present chunk
+        self._text_keepers: list[Keeper] = [texts.keep for texts in self._texts.values()]
+        self.keepers: Sequence[Keeper] = ()
         #: rows that still fit into the present chunk, and the chunk's memory
         self.room, self.chunk = 0, np.zeros(0, np.uint8)
 
@@ -87,9 +91,10 @@ class Recorder:
         self.room, self.chunk = len(chunk), chunk.view(np.uint8) if chunk.dtype.itemsize else np.zeros(0, np.uint8)
         size, first = self.store.dtype.itemsize, self.rows
         if self.whole:
-            self._keeps = [partial(_copy, self.chunk.data, self._plan.signals.block.data, size, first)]
+            keepers = [_block_keeper(self.chunk.data, self._plan.signals.block.data, size, first)]
         else:
-            self._keeps = [_keep(self.chunk, size, piece, first) for piece in self.pieces]
+            keepers = [_piece_keeper(self.chunk, size, piece, first) for piece in self.pieces]
+        self.keepers = keepers + self._text_keepers
 
     def record(self, n: int) -> None:
         """Keep the present values as those of communication point n, if it is one to be recorded."""
@@ -98,11 +103,16 @@ class Recorder:
         if not self.room:
             self.extend()
         row = self.rows
-        for keep in self._keeps:
+        for keep in self.keepers:
             keep(row)
-        for text in self._texts.values():
-            text.keep(row)
-        self.rows, self.room = row + 1, self.room - 1
+        self.rows = row + 1
+        self.room -= 1
+
+    def full_after(self, n: int) -> int:
+        """The last communication point after n whose row fits into the present chunk; a new chunk, when it is full now."""
+        if not self.room:
+            self.extend()
+        return n - n % self.every + (self.room + 1) * self.every - 1
 
     def advance(self, rows: int) -> None:
         """Rows until this number were put into the chunk by someone else."""
@@ -147,28 +157,31 @@ def _order(slot: Slot) -> tuple[int, str, int]:
     return -slot.dtype.itemsize, slot.dtype.str, slot.offset
 
 
-def _copy(chunk: memoryview, block: memoryview, size: int, first: int, row: int) -> None:
-    begin = (row - first) * size
-    chunk[begin : begin + size] = block
+def _block_keeper(chunk: memoryview, block: memoryview, size: int, first: int) -> Keeper:
+    """Puts the whole block into a row of the chunk whose first row is `first`."""
+
+    def keep(row: int) -> None:
+        begin = (row - first) * size
+        chunk[begin : begin + size] = block
+
+    return keep
 
 
-def _keep(chunk: np.ndarray, size: int, piece: Piece, first: int) -> Callable[[int], object]:
-    """The function that puts a piece into a row of the chunk whose first row is `first`."""
+def _piece_keeper(chunk: np.ndarray, size: int, piece: Piece, first: int) -> Keeper:
+    """Puts a piece into a row of the chunk whose first row is `first`."""
     source, indices, position = piece
     shape, strides = (len(chunk) // size, len(indices)), (size, source.itemsize)
     cells = np.ndarray(shape, source.dtype, chunk.data, position, strides)
-    if len(indices) <= FEW:
-        return partial(_assign, cells.data, source.data, list(enumerate(indices.tolist())), first)
-    return partial(_choose, cells, source, indices, first)
+    columns = [(column.data, source.data, index) for column, index in zip(cells.T, indices[:FEW].tolist(), strict=False)]
 
+    def keep_each(row: int) -> None:
+        for column, values, index in columns:
+            column[row - first] = values[index]
 
-def _choose(cells: np.ndarray, source: np.ndarray, indices: np.ndarray, first: int, row: int) -> None:
-    source.take(indices, None, cells[row - first], "clip")
+    def keep_all(row: int) -> None:
+        source.take(indices, None, cells[row - first], "clip")
 
-
-def _assign(cells: memoryview, source: memoryview, places: Sequence[tuple[int, int]], first: int, row: int) -> None:
-    for i, j in places:
-        cells[row - first, i] = source[j]
+    return keep_each if len(columns) == len(indices) else keep_all
 
 
 class _Texts:

@@ -8,8 +8,11 @@ from typing import Any
 
 from ..component import Call, DoStep, StepResult
 from ..errors import ComponentError
-from .instance import DISCARD, POINTER, FmuInstance, address
+from .functions import address
+from .instance import DISCARD, FmuInstance
 
+#: fmi2True
+_TRUE = ctypes.c_int.from_param(1)
 _LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3
 
 
@@ -44,7 +47,7 @@ class Fmi2Instance(FmuInstance):
         self.call("enterInitializationMode")
 
     def _step_calls(self, step_size: Any, seconds: float) -> list[Call]:
-        arguments = (POINTER(self._handle), self._clock, step_size, ctypes.c_int.from_param(1))
+        arguments = (self._instance, self._clock, step_size, _TRUE)
         native = DoStep(2, address(self._do_step), self._handle, seconds)
         return [Call(self._do_step, arguments, "fmi2DoStep", native)]
 

@@ -8,11 +8,13 @@ from typing import Any
 
 from ..component import DTYPES, Call, DoStep, Flags, StepResult
 from ..errors import ComponentError
-from .instance import DISCARD, OK, POINTER, FmuInstance, address
+from .functions import POINTER, address
+from .instance import DISCARD, OK, FmuInstance
 
 #: bytes of one binary value
 LARGEST_BINARY = 1 << 28
 
+_TRUE = ctypes.c_bool.from_param(True)
 _ENDED = "how fmi3DoStep ended"
 
 
@@ -40,17 +42,19 @@ class Fmi3Instance(FmuInstance):
         self.call("enterInitializationMode", None, start_time, stop_time)
 
     def _step_calls(self, step_size: Any, seconds: float) -> list[Call]:
-        self._flags, self._reached = (ctypes.c_bool * 3)(), ctypes.c_double()
+        # three flags and a byte, so that one look is enough
+        self._flags, self._reached = (ctypes.c_bool * 4)(), ctypes.c_double()
+        self._all_flags = ctypes.c_uint32.from_buffer(self._flags)
         flags, reached = ctypes.addressof(self._flags), ctypes.addressof(self._reached)
         results = [POINTER(flags + i * ctypes.sizeof(ctypes.c_bool)) for i in range(3)]
-        arguments = (POINTER(self._handle), self._clock, step_size, ctypes.c_bool.from_param(True), *results, POINTER(reached))
+        arguments = (self._instance, self._clock, step_size, _TRUE, *results, POINTER(reached))
         native = DoStep(3, address(self._do_step), self._handle, seconds, flags, reached)
         kept = (self._flags, self._reached)
         return [Call(self._do_step, arguments, "fmi3DoStep", native, kept), Call(self._ended, (), _ENDED, Flags(flags), kept)]
 
     def _ended(self) -> int:
         """Discard stands for a step that is to be looked at: it met an event, asks to terminate or ended early."""
-        return DISCARD if any(self._flags) else OK
+        return DISCARD if self._all_flags.value else OK
 
     def failed(self, name: str, status: int) -> StepResult:
         if name == _ENDED:

@@ -22,12 +22,10 @@ from ..errors import ComponentError, InputError
 from ..journal import calling
 from ..process_state import contained
 from .file import FmuFile
+from .functions import DOUBLE, POINTER, SIZE, Functions, address
 
 STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
-
-#: arguments made beforehand that ctypes passes on as they are: half the price of a call goes into converting others
-POINTER, SIZE = ctypes.c_void_p.from_param, ctypes.c_size_t.from_param
 
 
 class FmuInstance(Component):
@@ -91,10 +89,8 @@ class FmuInstance(Component):
             self._instantiate()
         self._alive = True
         self._handle: int = self._fmu.component
-        self._library = ctypes.PyDLL(None, handle=self._fmu.dll._handle)
-        # doStep may take long: it is called without holding the interpreter lock
-        self._do_step = ctypes.CDLL(None, handle=self._fmu.dll._handle)[f"{self.prefix}DoStep"]
-        self._do_step.restype = ctypes.c_int
+        self._do_step = self._fmu.functions[f"{self.prefix}DoStep"]
+        self._instance = POINTER(self._handle)
         self._clock, self._step_size = ctypes.c_double(), ctypes.c_double()
         self._steps = self._step_calls(self._step_size, 0.0)
 
@@ -102,6 +98,7 @@ class FmuInstance(Component):
         """FMPy's object for this instance: a copy of one that is made once for all instances, which takes milliseconds."""
         if self._file.library is None:
             self._file.library = self._open(folder)
+            self._file.library.functions = Functions(self._file.library.dll)
         fmu = copy(self._file.library)
         fmu.instanceName = self.name
         return fmu
@@ -233,10 +230,9 @@ class FmuInstance(Component):
 
     def _access(self, function: str, variables: Sequence[Variable], values: np.ndarray) -> Call:
         references = (ctypes.c_uint32 * len(variables))(*(self.description.references[v.name] for v in variables))
-        bound = self._library[function]
-        bound.restype = ctypes.c_int
+        bound = self._fmu.functions[function]
         pointers = (self._handle, ctypes.addressof(references), values.ctypes.data)
-        arguments = (*map(POINTER, pointers[:2]), SIZE(len(variables)), POINTER(pointers[2]))
+        arguments: tuple[Any, ...] = (self._instance, POINTER(pointers[1]), SIZE(len(variables)), POINTER(pointers[2]))
         if self.major > 2:
             arguments += (SIZE(len(values)),)
         native = Access(self.major, address(bound), *pointers[:2], len(variables), pointers[2], len(values))
@@ -244,7 +240,7 @@ class FmuInstance(Component):
 
     def turn(self, clock: ctypes.c_double, step_size: float) -> Sequence[Call]:
         self._clock = clock
-        return [*self._sets, *self._step_calls(ctypes.c_double.from_param(step_size), step_size), *self._gets]
+        return [*self._sets, *self._step_calls(DOUBLE(step_size), step_size), *self._gets]
 
     def set_inputs(self) -> None:
         self._make(self._sets)
@@ -275,8 +271,3 @@ def _not_negative(status: int, function: Any, _: Any) -> int:
     if status < 0:
         raise FMICallException(function.__name__, status)
     return status
-
-
-def address(function: Any) -> int:
-    """Where a C function lies."""
-    return ctypes.cast(function, ctypes.c_void_p).value or 0

@@ -150,6 +150,28 @@ def test_a_value_that_is_not_finite_is_blamed_on_its_source(kind):
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)
+@pytest.mark.parametrize("copies", [1, 300])
+@pytest.mark.parametrize(("type_", "largest"), [("Float64", np.finfo(np.float64).max), ("Float32", np.finfo(np.float32).max)])
+def test_the_largest_floats_are_finite_and_the_next_ones_are_not(kind, copies, type_, largest):
+    def built(last):
+        def step(values, t, h):
+            values.update(dict.fromkeys(values, -float(largest)) | {f"y{copies - 1}": last if t > 0.045 else 0.0})
+
+        names = [f"y{i}" for i in range(copies)]
+        a = Fake([Variable(name, type_, "output") for name in names], step)
+        b = Fake([Variable(name, type_, "input", start=0.0) for name in names], lambda values, t, h: None)
+        wires = [Connection(Endpoint("a", name), Endpoint("b", name)) for name in names]
+        return System({"a": a, "b": b}, wires, [("a", "b")])
+
+    settings = Settings(exact(0), exact(0.1), exact(0.01), executor=kind)
+    assert simulate(built(float(largest)), settings).failure is None
+    for last in (float("inf"), -float("inf"), float("nan")):
+        y = f"y{copies - 1}"
+        blamed = f'a: do_step failed at t = 0.05 s: the output "{y}" is {last}, and b.{y} reads it'
+        assert str(simulate(built(last), settings).failure) == blamed
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
 def test_values_that_nobody_reads_may_be_anything(kind):
     source = Fake([Variable("y", causality="output")], lambda v, t, h: v.update(y=float("inf")))
     outcome = simulate(System({"a": source}, (), (("a",),)), Settings(exact(0), exact(1), exact(0.1), {"a.y": end("a.y")}))

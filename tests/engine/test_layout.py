@@ -1,0 +1,35 @@
+"""Where values lie, so that as few calls as possible move them."""
+
+import numpy as np
+import pytest
+from fakes import Fake
+from helpers import end, system
+
+from cosim.component import Variable
+from cosim.engine import compile_plan
+from cosim.timing import Grid, exact
+
+INT = np.dtype(np.int32)
+
+VARIABLES = {
+    "n": Variable("n", "Int32", "output"),
+    "flag": Variable("flag", "Boolean", "output", dtype=INT),
+    "x": Variable("x", "Float64", "output"),
+    "mode": Variable("mode", "Enumeration", "output", dtype=INT),
+    "m": Variable("m", "Int32", "output"),
+    "other": Variable("other", "Boolean", "output", dtype=INT),
+}
+
+
+@pytest.mark.parametrize(
+    ("chosen", "order"),
+    [
+        (VARIABLES, ["n", "mode", "m", "flag", "other", "x"]),
+        (["flag", "x", "mode", "m"], ["flag", "x", "mode", "m"]),
+    ],
+)
+def test_variables_that_one_fmi_call_can_get_lie_together(chosen, order):
+    component = Fake([VARIABLES[name] for name in chosen], lambda values, t, h: None)
+    grid = Grid.of(exact(0), exact(1), exact(1))
+    plan = compile_plan(system({"a": component}), grid, [end(f"a.{name}") for name in chosen])
+    assert [variable.name for variable in plan.signals.ports["a"].variables] == order
