@@ -18,7 +18,7 @@ BLOCKS = {"guidance": "WaypointGuidance", "speed": "SpeedController", "heading":
 
 #: a heading controller of somebody else: proportional, damped by the measured yaw rate
 RATE_DAMPED = """
-from math import atan2, cos, sin
+from math import atan2, cos, pi, sin
 from types import SimpleNamespace
 
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
@@ -35,7 +35,7 @@ class RateDamped(Fmi2Slave):
 
     def do_step(self, time, step_size):
         error = self.vehicle.attitude.yaw - self.heading_reference
-        rudder = 1.5 * atan2(sin(error), cos(error)) + 0.8 * self.vehicle.rates.r
+        rudder = 1.5 * (error if abs(error) <= pi else atan2(sin(error), cos(error))) + 0.8 * self.vehicle.rates.r
         self.rudder_angle = max(-0.6, min(0.6, rudder))
         return True
 """

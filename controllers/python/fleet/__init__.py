@@ -38,7 +38,7 @@ def limit(value: float, lower: float, upper: float) -> float:
 
 def wrap_angle(angle: float) -> float:
     """The same angle (rad) between -pi and pi."""
-    return math.atan2(math.sin(angle), math.cos(angle))
+    return angle if abs(angle) <= math.pi else math.atan2(math.sin(angle), math.cos(angle))
 
 
 def length(x: float, y: float) -> float:
