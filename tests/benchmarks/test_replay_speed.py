@@ -18,7 +18,7 @@ WINDOW = {"width": 1280, "height": 720}
 ROUNDS = 3
 SECONDS = 2
 #: generous: less is no film any more, even on a machine that has other work
-LEAST = 5
+LEAST = 3
 MOMENTS = """(seconds) => new Promise((done) => {
   const moments = [], end = performance.now() + 1000 * seconds;
   const frame = (now) => (moments.push(now), now < end ? requestAnimationFrame(frame) : done(moments));
