@@ -53,7 +53,9 @@ def test_what_was_too_much_is_not_tried_again(opened):
 
 def drawn(opened):
     """How many frames have been drawn, and the triangles and the pixels of the last one."""
-    return opened("(({frames, renderer}) => [frames, renderer.info.render.triangles, renderer.domElement.width])(cosimReplay.view)")
+    return opened(
+        "(({frames, renderer}) => [frames, renderer.info.render.triangles, renderer.domElement.width])(cosimReplay.view)"
+    )
 
 
 def test_a_moving_picture_is_coarse_and_one_at_rest_fine(opened):

@@ -8,7 +8,7 @@ import { simplified } from "./simplified.js";
 
 const MOST_POINTS = 2000; // of which those are drawn that a path needs
 const MOST_GHOSTS = 24;
-const FLAT = 1 / 2500; // of a path's extent: so far may what is drawn lie beside it
+const FLAT = 1 / 6000; // of a path's extent: so far may what is drawn lie beside it
 const QUAD = [2, 4, 3, 4, 5, 3]; // a piece of a thick line without the caps at its ends, which nobody sees
 const ONE = new Vector3(1, 1, 1);
 

@@ -8,7 +8,7 @@ import { FINE, MOST_WAVES, SHADE, WATER } from "./water_shaders.js";
 
 const MOST_SHADES = 16;
 const REACH = 600; // m
-const CELLS = { calm: [64, 32], waves: [160, 72] }; // along each side, fine and coarse
+const CELLS = { calm: [64, 32], waves: [160, 60] }; // along each side, fine and coarse
 
 /** A square mesh that is fine in its middle. */
 function mesh(count) {

@@ -13,14 +13,15 @@ vec2 ripple(vec2 at, vec2 number, float angle) {
   return 0.013 * normalize(number) * cos(dot(number, at) + angle);
 }
 vec3 surface(vec2 at, out vec2 slope) {
+  float fade = 1.0 - smoothstep(${FINE}.0, ${2 * FINE}.0, distance(at, centre));
+  int felt = fade > 0.0 ? count : 0;
   float height = 0.0;
   slope = ripple(at, vec2(1.7, 0.8), 1.1 * time) + ripple(at, vec2(-0.9, 2.1), -1.4 * time) + ripple(at, vec2(2.3, -1.9), 1.8 * time);
-  for (int i = 0; i < count; i++) {
+  for (int i = 0; i < felt; i++) {
     float angle = dot(waves[i].yz, at) + waves[i].w;
     height += waves[i].x * cos(angle);
     slope += waves[i].x * sin(angle) * waves[i].yz;
   }
-  float fade = 1.0 - smoothstep(${FINE}.0, ${2 * FINE}.0, distance(at, centre));
   slope *= fade;
   return vec3(at, height * fade);
 }
