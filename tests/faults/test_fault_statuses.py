@@ -105,6 +105,10 @@ def test_an_fmu_that_terminates_may_say_nothing_of_the_time(fmus, runner, tmp_pa
     assert (done.code, len(done.rows)) == (0, 7), done.err
 
 
+def test_a_deadline_may_be_longer_than_can_be_counted(fmus, runner, tmp_path, version):
+    assert runner.run(tmp_path, fmus(version), deadlines={"step": 1e300}).code == 0
+
+
 def test_the_rows_of_a_failed_run_are_those_of_a_good_one(fmus, runner, tmp_path, version):
     done = runner.run(tmp_path, fmus(version, "DoStep 6 error"))
     assert [row["lag.y"] for row in done.rows] == [lag_output(n) for n in range(6)]

@@ -68,6 +68,7 @@ def test_wrong_arguments_are_refused_before_the_call(arguments, message):
     ("returned", "message"),
     [
         (0.5, 'KPI "bad": .* failed: returned float, expected a mapping from names to numbers'),
+        ({"value": 10**400}, 'KPI "bad": .* failed: "value" is larger than any double'),
         ({"value": "high"}, 'KPI "bad": .* failed: "value" is str, expected a number or Boolean'),
         ({"value": np.array([1.0, 2.0])}, '"value" is ndarray, expected a number'),
         ({"value": None}, '"value" is NoneType, expected a number'),
