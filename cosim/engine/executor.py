@@ -12,6 +12,7 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 
+from .. import float_mode
 from ..component import GOOD, Call, StepResult
 from ..errors import ComponentError
 from ..journal import calling
@@ -22,7 +23,7 @@ from .moves import DelayLine, Move, copy
 from .parallel import TRIALS, Crew, SideBySide, may_overlap, processors
 from .plan import Loop, Phase, Plan, Step
 from .recorder import Recorder
-from .turns import SHOWN, Ending, Turn, float_state_changed, take
+from .turns import SHOWN, Ending, Turn, take
 
 #: places in the marker: number of the present call, macro steps finished, rows recorded
 CALL, STEPS, ROWS, MARKER_SIZE = 0, 1, 2, 3
@@ -138,7 +139,7 @@ class Executor(ABC):
             if (status := call.function(*call.arguments)) not in GOOD:
                 self._bad_status(turn, call, status)
                 break
-        if float_state_changed():
+        if float_mode.changed():
             self._float_state_changed(turn, turn.calls[-1])
         return self.termination is not None
 
@@ -202,8 +203,7 @@ class Executor(ABC):
             raise ComponentError(step.name, "do_step", f"{reached}; staged stepping needs whole steps", time)
 
     def _float_state_changed(self, turn: Turn, call: Call) -> NoReturn:
-        reason = "changed the floating-point mode (rounding, flush to zero or traps) and did not restore it"
-        raise ComponentError(turn.step.name, call.name, reason, self._clock.value)
+        raise ComponentError(turn.step.name, call.name, float_mode.REASON, self._clock.value)
 
     def _check_finite(self, function: str = "do_step") -> None:
         """Raises ComponentError when an output that feeds something is not finite."""
