@@ -19,7 +19,7 @@ from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
-from .errors import ComponentError, InputError, Problem, did_you_mean
+from .errors import ComponentError, InputError, Problem, did_you_mean, told
 from .results import Result
 from .units import product
 
@@ -60,7 +60,7 @@ class Evaluation(NamedTuple):
         except InputError as error:
             raise InputError([Problem(str(problem), f'{kind} "{self.name}"') for problem in error.problems]) from error
         except (Exception, SystemExit) as error:
-            raise self.failure(kind, f"{type(error).__name__}: {error}") from error
+            raise self.failure(kind, told(error)) from error
 
     def failure(self, kind: str, reason: str) -> ComponentError:
         """The error that says this function is at fault."""

@@ -18,7 +18,7 @@ from pythonfmu.variables import Boolean, Integer, Real, ScalarVariable, String
 
 from . import log
 from .component import Component, Ports, Variable
-from .errors import ComponentError, InputError, Problem, did_you_mean
+from .errors import ComponentError, InputError, Problem, did_you_mean, told
 from .paths import is_file, real
 from .units import parse
 
@@ -105,9 +105,7 @@ class PythonSlave(Component):
         try:
             return call(*arguments)
         except (Exception, SystemExit) as error:
-            place = inspect.trace()[-1]
-            reason = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
-            raise ComponentError(self._name, function, reason, self._time) from error
+            raise ComponentError(self._name, function, told(error), self._time) from error
         finally:
             if self._slave.log_queue:
                 self._forward_log()
@@ -172,7 +170,7 @@ def _construct(kind: Callable[..., Any], reference: str, *positional: Any, **nam
     except InputError:
         raise
     except (Exception, SystemExit) as error:
-        raise InputError(f"{reference} cannot be constructed: {type(error).__name__}: {error}") from error
+        raise InputError(f"{reference} cannot be constructed: {told(error)}") from error
 
 
 def load_object(reference: str, folder: Path) -> Any:

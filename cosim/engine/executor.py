@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import float_mode
 from ..component import GOOD, Call, StepResult
-from ..errors import ComponentError
+from ..errors import ComponentError, CosimError, told
 from ..journal import calling
 from .gathering import Gather
 from .initialization import propagate, take_start_values
@@ -163,11 +163,16 @@ class Executor(ABC):
 
     def _python_turn(self, step: Step) -> int:
         component = step.component
-        component.set_inputs()
-        result = component.do_step(self._clock.value, step.step_size)
-        if result is not None:
-            self._ended_early(step, result)
-        component.get_outputs()
+        try:  # as `blamed`, which costs as much as some components take for a step
+            component.set_inputs()
+            result = component.do_step(self._clock.value, step.step_size)
+            if result is not None:
+                self._ended_early(step, result)
+            component.get_outputs()
+        except CosimError:
+            raise
+        except (Exception, SystemExit) as error:
+            raise ComponentError(step.name, "do_step", told(error), self._clock.value) from error
         return _TERMINATION if self.termination else 0
 
     @property
@@ -198,7 +203,7 @@ class Executor(ABC):
         time = self._clock.value
         if result.terminate_requested:
             self.termination = self.termination or Termination(step.name, result.time_reached)
-        elif result.time_reached < time + step.step_size:
+        elif not result.time_reached >= time + step.step_size:
             reached = f"reached only t = {result.time_reached!r} s of {time + step.step_size!r} s"
             raise ComponentError(step.name, "do_step", f"{reached}; staged stepping needs whole steps", time)
 

@@ -42,7 +42,9 @@ def test_a_failing_kpi_is_named():
     def ratio(result):
         return {"ratio": 1 / 0}
 
-    with pytest.raises(ComponentError, match=r'^KPI "speed": ratio failed: ZeroDivisionError: division by zero$'):
+    with pytest.raises(
+        ComponentError, match=r'^KPI "speed": ratio failed: ZeroDivisionError: division by zero \(test_kpi_evaluation.py:\d+\)$'
+    ):
         evaluate_kpis(RESULT, [("speed", ratio, {})])
 
 
