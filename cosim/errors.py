@@ -11,9 +11,14 @@ CosimError
 from __future__ import annotations
 
 import difflib
+import traceback
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
+
+#: characters of an exception's text that are shown
+_LONGEST_TEXT = 2000
 
 
 class CosimError(Exception):
@@ -36,7 +41,12 @@ class Problem:
 
     def __str__(self) -> str:
         text = f"{self.where}: {self.message}" if self.where else self.message
-        return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
+        return _printable(text)
+
+
+def _printable(text: str) -> str:
+    """One line; what cannot be printed, as what would control a terminal, is escaped."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
 
 
 class InputError(CosimError):
@@ -62,7 +72,7 @@ class ComponentError(CosimError):
 
     def __str__(self) -> str:
         when = "" if self.time is None else f" at t = {self.time:.12g} s"
-        return f"{self.component}: {self.function} failed{when}: {self.reason}"
+        return _printable(f"{self.component}: {self.function} failed{when}: {self.reason}")
 
 
 class LateError(CosimError):
@@ -81,6 +91,18 @@ class CheckError(CosimError):
     """A result does not meet a check, a reference or a manifest."""
 
     exit_code = 3
+
+
+def told(error: BaseException) -> str:
+    """An exception of other people's code in one line: its kind, its text, and where it was raised."""
+    try:
+        text = str(error)
+    except Exception:
+        text = "(its text cannot be made)"
+    text = text if len(text) <= _LONGEST_TEXT else f"{text[:_LONGEST_TEXT]} ... and {len(text) - _LONGEST_TEXT} characters more"
+    places = traceback.extract_tb(error.__traceback__)
+    where = f" ({Path(places[-1].filename).name}:{places[-1].lineno})" if places else ""
+    return f"{type(error).__name__}: {text}{where}"
 
 
 def one_of(names: Iterable[str]) -> str:

@@ -16,6 +16,8 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from .errors import ComponentError, CosimError, told
+
 #: bytes of a journal; its fields: int64 until 64, the time as double, then two texts
 SIZE = 5 * 4096
 CALL, STEPS, ROWS, PHASE, CHANGES, DEADLINE, CODE, SHOWING = range(8)
@@ -169,19 +171,35 @@ def current() -> Journal | None:
 
 @contextmanager
 def calling(component: str, function: str, kind: str, time: float = math.nan) -> Iterator[None]:
-    """Within this block a function of a component is called, outside the stepping loop; `kind` names its deadline."""
+    """Within this block a function of a component is called, outside the stepping loop; `kind` names its deadline.
+
+    Raises ComponentError for whatever is raised there.
+    """
     journal = _current
     if journal is None:
-        yield
+        with blamed(component, function, time):
+            yield
         return
     phase, deadline, before = journal.phase, journal.deadline, journal.activity()
     journal.note(component, function, time)
     journal.enter(Phase.LEAVING if phase == Phase.LEAVING else Phase.CALLING, getattr(journal.deadlines, kind))
     try:
-        yield
+        with blamed(component, function, time):
+            yield
     finally:
         journal.note(before.component, before.function, before.time)
         journal.enter(phase, deadline)
+
+
+@contextmanager
+def blamed(component: str, function: str, time: float = math.nan) -> Iterator[None]:
+    """What is raised in this block is a failure of the component: a ComponentError, unless it is an error of cosim already."""
+    try:
+        yield
+    except CosimError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise ComponentError(component, function, told(error), None if math.isnan(time) else time) from error
 
 
 @contextmanager

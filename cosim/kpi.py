@@ -12,13 +12,14 @@ import inspect
 import math
 import operator
 import re
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
-from .errors import ComponentError, InputError, Problem, did_you_mean
+from .errors import ComponentError, InputError, Problem, did_you_mean, told
 from .results import Result
 from .units import product
 
@@ -58,8 +59,8 @@ class Evaluation(NamedTuple):
             return self.function(result, **self.arguments)
         except InputError as error:
             raise InputError([Problem(str(problem), f'{kind} "{self.name}"') for problem in error.problems]) from error
-        except Exception as error:
-            raise self.failure(kind, f"{type(error).__name__}: {error}") from error
+        except (Exception, SystemExit) as error:
+            raise self.failure(kind, told(error)) from error
 
     def failure(self, kind: str, reason: str) -> ComponentError:
         """The error that says this function is at fault."""
@@ -105,6 +106,8 @@ def evaluate_kpis(result: Result, kpis: Iterable[tuple[str, Callable[..., Any], 
 
 def _number(evaluation: Evaluation, key: str, value: Any) -> Number:
     number = value.item() if isinstance(value, np.generic) else value
+    if isinstance(number, int) and abs(number) > sys.float_info.max:
+        raise evaluation.failure("KPI", f'"{key}" is larger than any double')
     if not isinstance(number, Number):
         raise evaluation.failure("KPI", f'"{key}" is {type(value).__name__}, expected a number or Boolean')
     return number

@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from . import log
+from . import float_mode, log
 from .journal import Phase, current
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGSEGV, signal.SIGFPE, signal.SIGABRT, signal.SIGPIPE, signal.SIGCHLD)
@@ -24,25 +24,29 @@ _POINTER = ctypes.sizeof(ctypes.c_void_p)
 
 @dataclass(frozen=True)
 class ProcessState:
-    """Working directory, file mode mask, locale of the C library, environment and signal handlers of a process."""
+    """Working directory, file mode mask, locale of the C library, environment, signal handlers and floating-point mode."""
 
     directory: str
     mask: int
     locale: bytes
     environment: dict[bytes, bytes]
     handlers: dict[int, bytes]
+    floats: float_mode.Environment
 
     @classmethod
     def now(cls) -> ProcessState:
         mask = os.umask(0)
         os.umask(mask)
-        return cls(str(Path.cwd()), mask, _locale(), _environment(), {number: _handler(number) for number in _SIGNALS})
+        handlers: dict[int, bytes] = {number: _handler(number) for number in _SIGNALS}
+        return cls(str(Path.cwd()), mask, _locale(), _environment(), handlers, float_mode.Environment())
 
     def restore(self) -> list[str]:
         """Bring everything back to this state; says what had been changed."""
         return list(self._restored())
 
     def _restored(self) -> Iterator[str]:
+        if self.floats.restore():
+            yield "the floating-point mode"
         if _directory() != self.directory:
             os.chdir(self.directory)
             yield "the working directory"

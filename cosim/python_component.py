@@ -18,8 +18,8 @@ from pythonfmu.variables import Boolean, Integer, Real, ScalarVariable, String
 
 from . import log
 from .component import Component, Ports, Variable
-from .errors import ComponentError, InputError, Problem, did_you_mean
-from .resources import is_file
+from .errors import ComponentError, InputError, Problem, did_you_mean, told
+from .paths import is_file, real
 from .units import parse
 
 _TYPES = {Real: "Float64", Integer: "Int32", Boolean: "Boolean", String: "String"}
@@ -105,9 +105,7 @@ class PythonSlave(Component):
         try:
             return call(*arguments)
         except (Exception, SystemExit) as error:
-            place = inspect.trace()[-1]
-            reason = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
-            raise ComponentError(self._name, function, reason, self._time) from error
+            raise ComponentError(self._name, function, told(error), self._time) from error
         finally:
             if self._slave.log_queue:
                 self._forward_log()
@@ -171,8 +169,8 @@ def _construct(kind: Callable[..., Any], reference: str, *positional: Any, **nam
         return kind(*positional, **named)
     except InputError:
         raise
-    except Exception as error:
-        raise InputError(f"{reference} cannot be constructed: {type(error).__name__}: {error}") from error
+    except (Exception, SystemExit) as error:
+        raise InputError(f"{reference} cannot be constructed: {told(error)}") from error
 
 
 def load_object(reference: str, folder: Path) -> Any:
@@ -180,7 +178,7 @@ def load_object(reference: str, folder: Path) -> Any:
     file, separator, name = reference.rpartition(":")
     if not separator or not file.endswith(".py") or not name.isidentifier():
         raise InputError(f'expected "file.py:name", found "{reference}"')
-    path = (folder / file).resolve()
+    path = real(folder / file)
     if not is_file(path):
         raise InputError(f'file "{file}" does not exist')
     module = _import(path)
@@ -215,5 +213,5 @@ def _import(path: Path) -> ModuleType:
     name = ".".join((unique, *path.relative_to(root).with_suffix("").parts))
     try:
         return importlib.import_module(name)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InputError(f'"{path.name}" cannot be imported: {type(error).__name__}: {error}') from error

@@ -17,8 +17,3 @@ def cache_directory() -> Path:
     """The per-user folder for things that can be made again (XDG_CACHE_HOME/cosim, else ~/.cache/cosim)."""
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path.home() / ".cache") / "cosim"
-
-
-def is_file(path: Path) -> bool:
-    """Whether there is such a file; no for names that no file can have, where `Path.is_file` raises."""
-    return os.path.isfile(path)  # noqa: PTH113

@@ -15,6 +15,7 @@ import numpy as np
 
 from .component import Component, Ports, Variable
 from .errors import InputError, Problem, did_you_mean
+from .paths import open_text
 
 Interpolation = Literal["linear", "hold"]
 
@@ -82,7 +83,7 @@ def read_table(path: Path, columns: Sequence[str], interpolation: Interpolation,
     Raises InputError for a missing file or column, for cells that are no finite numbers and for time that does not increase.
     """
     try:
-        with path.open(newline="") as file:
+        with open_text(path, encoding="utf-8-sig", newline="") as file:
             header, *rows = list(csv.reader(file))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "no header row"

@@ -12,8 +12,9 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 
+from .. import float_mode
 from ..component import GOOD, Call, StepResult
-from ..errors import ComponentError
+from ..errors import ComponentError, CosimError, told
 from ..journal import calling
 from .gathering import Gather
 from .initialization import propagate, take_start_values
@@ -22,7 +23,7 @@ from .moves import DelayLine, Move, copy
 from .parallel import TRIALS, Crew, SideBySide, may_overlap, processors
 from .plan import Loop, Phase, Plan, Step
 from .recorder import Recorder
-from .turns import SHOWN, Ending, Turn, float_state_changed, take
+from .turns import SHOWN, Ending, Turn, take
 
 #: places in the marker: number of the present call, macro steps finished, rows recorded
 CALL, STEPS, ROWS, MARKER_SIZE = 0, 1, 2, 3
@@ -141,7 +142,7 @@ class Executor(ABC):
             if (status := call.function(*call.arguments)) not in GOOD:
                 self._bad_status(turn, call, status)
                 break
-        if float_state_changed():
+        if float_mode.changed():
             self._float_state_changed(turn, turn.calls[-1])
         return self.termination is not None
 
@@ -165,11 +166,16 @@ class Executor(ABC):
 
     def _python_turn(self, step: Step) -> int:
         component = step.component
-        component.set_inputs()
-        result = component.do_step(self._clock.value, step.step_size)
-        if result is not None:
-            self._ended_early(step, result)
-        component.get_outputs()
+        try:  # as `blamed`, which costs as much as some components take for a step
+            component.set_inputs()
+            result = component.do_step(self._clock.value, step.step_size)
+            if result is not None:
+                self._ended_early(step, result)
+            component.get_outputs()
+        except CosimError:
+            raise
+        except (Exception, SystemExit) as error:
+            raise ComponentError(step.name, "do_step", told(error), self._clock.value) from error
         return _TERMINATION if self.termination else 0
 
     @property
@@ -200,13 +206,12 @@ class Executor(ABC):
         time = self._clock.value
         if result.terminate_requested:
             self.termination = self.termination or Termination(step.name, result.time_reached)
-        elif result.time_reached < time + step.step_size:
+        elif not result.time_reached >= time + step.step_size:
             reached = f"reached only t = {result.time_reached!r} s of {time + step.step_size!r} s"
             raise ComponentError(step.name, "do_step", f"{reached}; staged stepping needs whole steps", time)
 
     def _float_state_changed(self, turn: Turn, call: Call) -> NoReturn:
-        reason = "changed the floating-point mode (rounding, flush to zero or traps) and did not restore it"
-        raise ComponentError(turn.step.name, call.name, reason, self._clock.value)
+        raise ComponentError(turn.step.name, call.name, float_mode.REASON, self._clock.value)
 
     def _check_finite(self, function: str = "do_step") -> None:
         """Raises ComponentError when an output that feeds something is not finite."""

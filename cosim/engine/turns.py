@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from .. import float_mode
 from ..component import GOOD, Call
 from .plan import Step
 
@@ -39,11 +40,5 @@ def _take(turn: Turn) -> Iterator[Ending]:
         if status not in GOOD:
             yield Ending(turn, call, status)
             break
-    if float_state_changed():
+    if float_mode.changed():
         yield Ending(turn, turn.calls[-1], None)
-
-
-def float_state_changed() -> bool:
-    """Equal in the default rounding mode only, and the least denormal is no zero only if it is not flushed."""
-    one, little, least = 1.0, 2.0**-54, 5e-324
-    return one + little != one - little or not least + least

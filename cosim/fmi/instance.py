@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from .. import log
+from .. import float_mode, log
 from ..component import GOOD, Access, Call, Component, Ports, StepResult, Variable
 from ..errors import ComponentError, InputError
 from ..journal import calling
@@ -125,11 +125,17 @@ class FmuInstance(Component):
         name = function if function.startswith(self.prefix) else self.prefix + function[0].upper() + function[1:]
         with calling(self.name, name, self._kind, self._clock.value):
             try:
-                return getattr(self._fmu, function)(*arguments)
+                result = getattr(self._fmu, function)(*arguments)
             except FMICallException as error:
                 if error.status == no_answer:
                     return None
                 self.fail(error.function, error.status)
+        self._look_at_float_mode(name)
+        return result
+
+    def _look_at_float_mode(self, function: str) -> None:
+        if float_mode.changed() or float_mode.traps():
+            raise ComponentError(self.name, function, float_mode.REASON, self._clock.value)
 
     def fail(self, function: str, status: int, more: str = "") -> NoReturn:
         """Raise the error for a status; `more` is said at its end.
@@ -258,6 +264,7 @@ class FmuInstance(Component):
                 status = call.function(*call.arguments)
             if status not in GOOD:
                 return self.failed(call.name, status)
+            self._look_at_float_mode(call.name)
         return None
 
     def failed(self, name: str, status: int) -> StepResult:

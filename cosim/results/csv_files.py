@@ -12,6 +12,7 @@ import numpy as np
 import pydantic_core
 
 from ..errors import InputError, Problem
+from ..paths import open_text
 from ..recording import Recording
 from .files import pieces, replacing
 
@@ -48,7 +49,7 @@ def read_csv(path: str | Path) -> Recording:
     """
     path = Path(path)
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
+        with open_text(path, encoding="utf-8-sig", newline="") as file:
             header, *rows = csv.reader(file)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from error

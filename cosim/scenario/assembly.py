@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from os.path import relpath
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from ..component import Component
 from ..errors import InputError
 from ..fmi import FmuFile
+from ..journal import blamed
 from ..python_component import package_files
 from ..simulate import Settings
 from ..stopwatch import Stopwatch
@@ -78,8 +81,7 @@ class Assembly:
         return self.spec.inputs[int(name.rpartition(".")[2])].file
 
     def free(self) -> None:
-        for component in self.system.components.values():
-            component.free()
+        _free(self.system.components)
 
 
 def assemble(
@@ -113,7 +115,14 @@ def _assembled(loaded: Scenario, assembler: Assembler, watch: Stopwatch) -> Asse
         if assembler.problems:
             raise InputError(dict.fromkeys(assembler.problems))
     except BaseException:
-        for component in assembler.components.values():
-            component.free()
+        _free(assembler.components)
         raise
     return Assembly(loaded.root, loaded.spec, assembler.system, assembler.settings, assembler.workshop, watch.seconds)
+
+
+def _free(components: Mapping[str, Component]) -> None:
+    """Free all of them, even when one fails to be freed."""
+    with ExitStack() as stack:
+        for name, component in components.items():
+            stack.enter_context(blamed(name, "free"))
+            stack.callback(component.free)

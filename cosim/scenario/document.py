@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, Problem
+from ..paths import open_text
 
 Path_ = tuple["str | int", ...]
 _SPACE = re.compile(r"[ \t\r\n]*")
@@ -71,7 +72,8 @@ def _step(key: str | int) -> str:
 def read_document(file: Path) -> Document:
     """Read a JSON file. Raises InputError when there is no such file or when it is not JSON at all."""
     try:
-        text = file.read_text(encoding="utf-8")
+        with open_text(file, encoding="utf-8") as opened:
+            text = opened.read()
     except OSError as error:
         raise InputError(f'cannot read "{file}": {error.strerror}') from None
     except UnicodeDecodeError as error:

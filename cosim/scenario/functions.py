@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import did_you_mean
+from ..paths import is_file
 from ..python_component import load_object
-from ..resources import is_file
 from .schema import CallSpec
 
 

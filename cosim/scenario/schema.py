@@ -128,7 +128,7 @@ class ConnectionSpec(Spec):
 
     source: str = Field(alias="from")
     target: str = Field(alias="to")
-    delay: int = Field(0, ge=0, description="macro steps; until then the initial output arrives")
+    delay: int = Field(0, ge=0, le=1_000_000, description="macro steps; until then the initial output arrives")
 
 
 class IterationSpec(Spec):

@@ -53,5 +53,8 @@ def _signals(components: Mapping[str, Component], causalities: Sequence[str]) ->
 def _matching(pattern: str, names: Heads) -> list[str]:
     if "*" not in pattern:
         return [name for name in names.starting(pattern)[:1] if name == pattern]
-    matches = re.compile(".*".join(map(re.escape, pattern.split("*")))).fullmatch
+    first, *middle, last = map(re.escape, pattern.split("*"))
+    # each part where it stands first, for good: no pattern takes longer than its length times that of the name
+    parts = "".join(f"(?>.*?{part})" for part in middle if part)
+    matches = re.compile(f"{first}{parts}.*{last}").fullmatch
     return [name for name in names.starting(pattern.partition("*")[0]) if matches(name)]

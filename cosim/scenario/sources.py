@@ -8,7 +8,7 @@ from pathlib import Path
 from ..component import Component
 from ..errors import InputError
 from ..fmi import FmuFile, Isolation, instantiate
-from ..resources import is_file
+from ..paths import is_file, real
 from .schema import ComponentSpec
 from .tree import Node
 
@@ -58,11 +58,11 @@ class Workshop:
         return load_component(spec.python, folder, name, spec.arguments)
 
     def _instance(self, path: Path, spec: ComponentSpec, name: str) -> Component:
-        file = self.fmus.get(path.resolve())
+        file = self.fmus.get(real(path))
         alone = file is not None and file.description.only_once_per_process
         if file is None or alone:  # a library that was loaded before would be the same one in a worker
-            file = self._prepared.get(path.resolve()) if file is None else None
-            file = self.fmus[path.resolve()] = file or FmuFile(path)
+            file = self._prepared.get(real(path)) if file is None else None
+            file = self.fmus[real(path)] = file or FmuFile(path)
         apart = self._apart or spec.isolation is not None or alone
         return instantiate(file, name, isolation=self._isolation if apart else None)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from .. import resources
+from .. import paths, resources
 from ..errors import InputError, Problem, did_you_mean
 from ..python_component import package_files
 from .document import Document, read_document
@@ -91,7 +91,7 @@ def find(scenario: str | Path) -> Path:
     """A path as it is, or the file of a shipped scenario given by its name."""
     path = Path(scenario)
     shipped = resources.root() / "scenarios"
-    if path.suffix == ".json" or resources.is_file(path):
+    if path.suffix == ".json" or paths.is_file(path):
         return path
     names = sorted(file.stem for file in shipped.glob("*.json"))
     if str(scenario) not in names:

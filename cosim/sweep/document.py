@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 
 from pydantic import ValidationError
 
-from .. import resources
+from .. import paths, resources
 from ..errors import InputError, Problem, did_you_mean
 from ..scenario.document import Document, read_document
 from ..scenario.tree import find
@@ -32,7 +32,7 @@ class Read(Generic[S]):
     def scenario(self) -> Path:
         """The scenario's file."""
         near = self.document.file.parent / self.spec.scenario
-        return near if resources.is_file(near) else find(self.spec.scenario)
+        return near if paths.is_file(near) else find(self.spec.scenario)
 
     def located(self, problems: Iterable[Problem]) -> list[Problem]:
         """Problems with a run's settings, at the place in this file that makes the setting."""
@@ -77,7 +77,7 @@ def read(file: str | Path, kind: type[S]) -> Read[S]:
 
 def _find(file: str | Path) -> Path:
     path = Path(file)
-    if path.suffix == ".json" or resources.is_file(path):
+    if path.suffix == ".json" or paths.is_file(path):
         return path
     names = sorted(each.stem for each in (resources.root() / _FOLDER).glob("*.json"))
     if str(file) not in names:

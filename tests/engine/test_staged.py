@@ -1,6 +1,7 @@
 """What one macro step does: who reads what, in which order."""
 
 import itertools
+import re
 
 import numpy as np
 import pytest
@@ -157,3 +158,41 @@ def test_a_step_that_ends_early_is_an_error_that_says_how_far_it_came():
     short = Fake(outputs("y"), lambda values, t, h: StepResult(t + h / 2))
     with pytest.raises(ComponentError, match=r"a: do_step failed at t = 0 s: reached only t = 0\.5 s of 1\.0 s"):
         run(system({"a": short}), 1, 1)
+
+
+def test_a_step_that_ends_at_no_time_is_an_error():
+    from cosim.component import StepResult
+
+    lost = Fake(outputs("y"), lambda values, t, h: StepResult(float("nan")))
+    with pytest.raises(ComponentError, match="a: do_step failed at t = 0 s: reached only t = nan s"):
+        run(system({"a": lost}), 1, 1)
+
+
+class Unspeakable(Exception):
+    def __str__(self):
+        raise RuntimeError
+
+
+FAILURES = {
+    "ValueError": (ValueError("too\x1b[31m steep"), r"ValueError: too\\x1b\[31m steep \(test_staged.py:"),
+    "SystemExit": (SystemExit(0), "SystemExit: 0"),
+    "text of no characters": (ValueError("\ud800"), r"ValueError: \\ud800"),
+    "endless text": (ValueError("x" * 10**6), "x ... and 998000 characters more"),
+    "no text": (Unspeakable(), "Unspeakable: "),
+}
+
+
+@pytest.mark.parametrize("name", FAILURES)
+@pytest.mark.parametrize("method", ["do_step", "bind", "exit_initialization_mode", "terminate", "free"])
+def test_what_a_component_raises_is_its_own_failure(method, name):
+    error, words = FAILURES[name]
+    failing = counter()
+
+    def fail(*arguments):
+        raise error
+
+    setattr(failing, method, fail)
+    with pytest.raises(ComponentError) as failure:
+        run(system({"a": counter(), "b": failing}), 1, 1)
+    assert str(failure.value).startswith(f"b: {method} failed")
+    assert re.search(words, str(failure.value))

@@ -105,6 +105,10 @@ def test_an_fmu_that_terminates_may_say_nothing_of_the_time(fmus, runner, tmp_pa
     assert (done.code, len(done.rows)) == (0, 7), done.err
 
 
+def test_a_deadline_may_be_longer_than_can_be_counted(fmus, runner, tmp_path, version):
+    assert runner.run(tmp_path, fmus(version), deadlines={"step": 1e300}).code == 0
+
+
 def test_the_rows_of_a_failed_run_are_those_of_a_good_one(fmus, runner, tmp_path, version):
     done = runner.run(tmp_path, fmus(version, "DoStep 6 error"))
     assert [row["lag.y"] for row in done.rows] == [lag_output(n) for n in range(6)]
@@ -171,6 +175,24 @@ def test_a_text_that_is_not_utf_8_is_read_as_far_as_it_can_be(fmus, runner, tmp_
     done = runner.cosim(tmp_path, "run", scenario(tmp_path, fmu), "--output-dir", "out", "--no-report")
     assert done.code == 0, done.err
     assert "\N{REPLACEMENT CHARACTER}" * 2 in (tmp_path / "out/result.csv").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("isolation", ["none", "run", "fmu"])
+@pytest.mark.parametrize("order", ["load 1 flush_to_zero", "Instantiate 1 round_up", "Instantiate 1 fp_traps"])
+def test_a_floating_point_mode_that_comes_with_the_binary_is_changed_back(fmus, runner, tmp_path, version, order, isolation):
+    """Code compiled for fast mathematics does that; the other components and cosim itself would compute in this mode."""
+    file = scenario(tmp_path, fmus(version, order))
+    done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", "--isolation", isolation)
+    assert done.code == 0, done.err
+    assert "WARNING lag: changed the floating-point mode of the process; it was changed back" in done.err
+    assert [row["lag.y"] for row in done.rows] == [lag_output(n) for n in range(COUNT + 1)]
+
+
+@pytest.mark.parametrize("executor", ["python", "native"])
+def test_a_floating_point_mode_changed_in_initialization_is_a_failure(fmus, runner, tmp_path, version, executor):
+    done = runner.run(tmp_path, fmus(version, "EnterInitializationMode 1 round_up"), executor=executor)
+    assert done.code == 1, done.err
+    assert f"lag: fmi{version}EnterInitializationMode failed at t = 0 s: changed the floating-point mode" in done.err
 
 
 def test_rows_of_an_earlier_run_do_not_pass_for_those_of_a_failed_one(fmus, runner, tmp_path, version):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import os
 import re
 import time
 from collections.abc import Callable
@@ -83,6 +84,9 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "recording off the grid": (put("record/interval", 0.7), "$.record.interval: recording interval 0.7 s is no multiple"),
     # sources
     "missing FMU": (put("components/f/fmu", "prob.fmu"), '$.components.f: FMU "'),
+    "a circle of links as FMU": (put("components/f/fmu", "circle.fmu"), "Too many levels of symbolic links"),
+    "a circle of links as Python file": (put("components/a/python", "circle.py:A"), 'file "circle.py" does not exist'),
+    "a module that exits": (put("components/a/python", "leaves.py:A"), '"leaves.py" cannot be imported: SystemExit: 0'),
     "a folder as FMU": (put("components/f/fmu", "."), "is a folder, expected a regular file"),
     "a text as FMU": (put("components/f/fmu", "profile.csv"), "is no FMU"),
     "missing Python file": (put("components/a/python", "block.py:Gain"), 'file "block.py" does not exist'),
@@ -106,12 +110,15 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "connected twice": (add("connections", {"from": "a.y", "to": "f.u"}), "input f.u is connected twice"),
     "unknown port": (put("connections/0/to", "inner.z"), 'nested system "inner" has no input port "z"'),
     "prefix without an output": (put("connections/1/from", "b.shop"), 'no output "shop"; valid: ship.position.x'),
+    "a delay without end": (put("connections/1/delay", 10**12), "delay: expected less than or equal to 1000000"),
     "negative delay": (put("connections/1/delay", -1), "$.connections[1].delay: expected greater than or equal to 0"),
     "a component in no stage": (drop("algorithm/stages/2"), 'component "f" is in no stage, so it would never step'),
     "a component in two stages": (add("algorithm/stages", ["a"]), '"a"'),
     "unknown algorithm": (put("algorithm/kind", "jacoby"), "$.algorithm.kind: expected 'staged'"),
     # what is done with the result
     "nothing to record": (put("record/signals", ["a.z"]), 'no output matches "a.z"; did you mean "a.y"?'),
+    "a pipe as profile": (put("inputs/0/file", "pipe"), 'pipe": Not a regular file'),
+    "a pattern to hang on": (put("record/signals", ["*" + "a*" * 2000 + "q"]), 'no output matches "*a*a'),
     "missing profile": (put("inputs/0/file", "profil.csv"), "$.inputs[0]: "),
     "unknown column": (put("inputs/0/to", {"xx": ["a.u"]}), '"xx"'),
     "missing function": (put("kpis/0/python", "kpis.py:lost"), 'defines no function "lost"; did you mean "last"?'),
@@ -119,6 +126,7 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "check of no KPI": (put("checks/0/kpi", "ende.value"), 'no KPI "ende.value"; did you mean "end"?'),
     "check that cannot be met": (put("checks/0/min", 11), 'expected "min" to be at most "max"'),
     "a nested system in itself": (put("components/inner/system", "scenario.json"), "contains itself"),
+    "a device as nested system": (put("components/inner/system", "/dev/zero"), 'cannot read "/dev/zero": Not a regular file'),
     "missing nested system": (put("components/inner/system", "iner.json"), "No such file or directory"),
 }
 
@@ -128,6 +136,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory, probes: dict[int, Path]) ->
     folder = furnish(tmp_path_factory.mktemp("bad"), probes[2])
     (folder / "inner.json").write_text(json.dumps(INNER))
     (folder / "scenario.json").write_text(TEXT)
+    (folder / "leaves.py").write_text("raise SystemExit(0)")
+    os.mkfifo(folder / "pipe")
+    for circle in ("circle.fmu", "circle.py"):
+        (folder / circle).symlink_to(circle)
     cosim.load(folder / "scenario.json").free()  # what is imported later is no time of the scenarios
     return folder
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import logging
 import os
@@ -14,8 +13,8 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
+from ... import float_mode, log
 from ... import journal as journals
-from ... import log
 from ...component import GOOD, Call, DoStep, StepResult
 from ...errors import ComponentError, InputError
 from ...journal import CALL, Phase
@@ -24,8 +23,6 @@ from .block import Block, texts
 from .lines import DONE, TURN, decode, encode, read_line, write
 
 _LONGEST_MESSAGE = 1 << 20
-
-FLOAT_STATE = "changed the floating-point mode (rounding, flush to zero or traps) and did not restore it"
 
 
 class Worker:
@@ -112,7 +109,7 @@ class Worker:
         return [call.name for call in calls]
 
     def _turn(self) -> StepResult | None:
-        marker, traps = self._block.marker, _traps
+        marker, traps = self._block.marker, float_mode.traps
         # equal in the default rounding mode only, and the least denormal is no zero only if it is not flushed
         one, little, least = 1.0, 2.0**-54, 5e-324
         for number, function, arguments, steps, call in self._calls:
@@ -121,7 +118,7 @@ class Worker:
             if status and status not in GOOD:
                 return self._instance.failed(call.name, status)
             if one + little != one - little or not least + least or (steps and traps()):
-                raise ComponentError(self._instance.name, call.name, FLOAT_STATE, self._block.clock.value)
+                raise ComponentError(self._instance.name, call.name, float_mode.REASON, self._block.clock.value)
         return None
 
     # -- states stay here ----------------------------------------------------------------------------------------------
@@ -147,15 +144,3 @@ class _Voice(logging.Handler):
     def say(self, line: bytes) -> None:
         with self._lock:
             write(self._writer, line)
-
-
-def _find_traps() -> Callable[[], int]:
-    """Which floating-point exceptions end the process, as the C library tells; 0 where it does not."""
-    try:
-        traps: Callable[[], int] = ctypes.PyDLL(None).fegetexcept
-    except AttributeError:
-        return lambda: 0
-    return traps
-
-
-_traps = _find_traps()
