@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ..component import Component, Variable
+from ..component import Causality, Component, Variable
 from ..system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System, members
 from ..timing import Grid
 from .gathering import Gather, Gathering
@@ -73,8 +73,8 @@ class Plan:
 def compile_plan(system: System, grid: Grid, recorded: Iterable[Endpoint] = ()) -> Plan:
     """Lay out the arrays and order the work. The system must have no problems, its periods must fit the grid."""
     phases = list(_phases(system))
-    inputs = _inputs(system, [connection for phase in phases for connection in _read(phase)])
-    signals = _signals(system, recorded)
+    connections = [connection for phase in phases for connection in _read(phase)]
+    inputs, signals = _inputs(system, connections), _signals(system, connections, recorded)
     gathering = Gathering(system, inputs, signals)
 
     def phase_of(raw: _RawPhase) -> Phase:
@@ -153,33 +153,26 @@ def _run(
 
 def _inputs(system: System, connections: Iterable[Connection]) -> Layout:
     """Inputs in the order in which they are gathered, so that what is gathered together lies together."""
+    return _lay_out(system, (connection.target for connection in connections), "input")
+
+
+def _signals(system: System, connections: Iterable[Connection], recorded: Iterable[Endpoint]) -> Layout:
+    """Every output that something reads, in the order in which they are read first."""
+    return _lay_out(system, (*(connection.source for connection in connections), *recorded), "output")
+
+
+def _lay_out(system: System, endpoints: Iterable[Endpoint], causality: Causality) -> Layout:
     wanted: dict[str, dict[str, Variable]] = {name: {} for name in members(system.stages)}
-    for connection in connections:
-        variable = system.place(connection.target).variable
-        wanted[connection.target.component].setdefault(variable.name, variable)
-    for name in wanted:
-        if system.components[name].binds_everything:
-            wanted[name] = {v.name: v for v in system.components[name].variables if v.causality == "input"}
-    return lay_out({name: _by_type(list(variables.values())) for name, variables in wanted.items()})
+    for endpoint in endpoints:
+        variable = system.place(endpoint).variable
+        wanted[endpoint.component][variable.name] = variable
+    return lay_out({name: _chosen(system.components[name], found, causality) for name, found in wanted.items()})
 
 
-def _signals(system: System, recorded: Iterable[Endpoint]) -> Layout:
-    """Every output that something reads."""
-    read: dict[str, set[str]] = {name: set() for name in members(system.stages)}
-    for endpoint in (*(c.source for c in system.connections), *recorded):
-        read[endpoint.component].add(system.place(endpoint).variable.name)
-    return lay_out(
-        {
-            name: _by_type(
-                [
-                    variable
-                    for variable in system.components[name].variables
-                    if variable.name in names or (system.components[name].binds_everything and variable.causality == "output")
-                ]
-            )
-            for name, names in read.items()
-        }
-    )
+def _chosen(component: Component, wanted: Mapping[str, Variable], causality: Causality) -> Sequence[Variable]:
+    if not component.binds_everything:
+        return _by_type(list(wanted.values()))
+    return [variable for variable in component.variables if variable.causality == causality or variable.name in wanted]
 
 
 def _by_type(variables: Sequence[Variable]) -> list[Variable]:

@@ -26,12 +26,22 @@ NumberedCall = tuple[int, Callable[..., int], tuple[Any, ...]]
 
 
 class _Phase(NamedTuple):
-    """What moves, the calls of each turn, and the divisors of the turns if not all of them are taken in every step."""
+    """What moves, and the calls of each turn."""
 
     copies: Sequence[tuple[memoryview, memoryview]]
     moves: Sequence[Move]
-    turns: Sequence[Sequence[NumberedCall]]
-    divisors: Sequence[int] | None
+    turns: Iterable[Sequence[NumberedCall]]
+
+
+class _Due:
+    """Those of the turns that are taken in the present macro step, for turns that are not all taken in every one."""
+
+    def __init__(self, turns: Sequence[Sequence[NumberedCall]], divisors: Sequence[int], marker: memoryview):
+        self._turns, self._divisors, self._marker = turns, divisors, marker
+
+    def __iter__(self) -> Iterator[Sequence[NumberedCall]]:
+        n = self._marker[STEPS]
+        return compress(self._turns, [n % divisor == 0 for divisor in self._divisors])
 
 
 class PythonExecutor(Executor):
@@ -49,7 +59,8 @@ class PythonExecutor(Executor):
         divisors = [turn.step.divisor for turn in turns]
         copies = [piece for gather in phase.gathers for piece in pieces(gather) or ()]
         moves = [self._move(gather) for gather in phase.gathers if pieces(gather) is None]
-        return _Phase(copies, moves, [self._numbered(turn) for turn in turns], divisors if any(d > 1 for d in divisors) else None)
+        calls = [self._numbered(turn) for turn in turns]
+        return _Phase(copies, moves, calls if set(divisors) <= {1} else _Due(calls, divisors, self.marker.data))
 
     def _numbered(self, turn: Turn) -> list[NumberedCall]:
         measure = self._joint and self.finished < TRIALS
@@ -73,13 +84,15 @@ class PythonExecutor(Executor):
         keepers, row, every = self.recorder.keepers, self.recorder.rows, self.recorder.every
         # equal in the default rounding mode only, and the least denormal is no zero only if it is not flushed
         one, little, least = 1.0, 2.0**-54, 5e-324
-        for finished, clock.value in enumerate(self.plan.grid.times(range(first, end)).tolist(), first + 1):
-            for copies, moves, turns, divisors in phases:
+        origin, stride, denominator = self.plan.grid.integers.values()
+        for n in range(first, end):
+            clock.value = (origin + n * stride) / denominator
+            for copies, moves, turns in phases:
                 for target, source in copies:
                     target[:] = source
                 for move in moves:
                     move()
-                for calls in turns if divisors is None else _due(turns, divisors, finished - 1):
+                for calls in turns:
                     for marker[CALL], function, arguments in calls:
                         if (status := function(*arguments)) and status not in GOOD:
                             self._bad_status(*self._turn_of(marker[CALL]), status)
@@ -89,19 +102,14 @@ class PythonExecutor(Executor):
             for contents, high in exponents:
                 if 0x7F in (found := contents()[high]) or 0xFF in found:
                     self._check_finite()
-            if every == 1 or finished % every == 0:
+            if every == 1 or (n + 1) % every == 0:
                 for keep in keepers:
                     keep(row)
                 row += 1
                 marker[ROWS] = row
-            marker[STEPS] = finished
+            marker[STEPS] = n + 1
             if self.termination:
                 return
-
-
-def _due(turns: Iterable[Sequence[NumberedCall]], divisors: Iterable[int], n: int) -> Iterator[Sequence[NumberedCall]]:
-    """The turns that are taken in the step from communication point n."""
-    return compress(turns, [n % divisor == 0 for divisor in divisors])
 
 
 def _exponents(floats: np.ndarray) -> tuple[Callable[[], bytes], slice]:
