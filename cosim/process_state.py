@@ -17,6 +17,9 @@ from typing import Any
 from . import float_mode, log
 from .journal import Phase, current
 
+if sys.platform != "win32":
+    import resource
+
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGSEGV, signal.SIGFPE, signal.SIGABRT, signal.SIGPIPE, signal.SIGCHLD)
 _SIGACTION_SIZE = 512  # more than any platform's struct sigaction, which begins with the handler
 _POINTER = ctypes.sizeof(ctypes.c_void_p)
@@ -24,7 +27,7 @@ _POINTER = ctypes.sizeof(ctypes.c_void_p)
 
 @dataclass(frozen=True)
 class ProcessState:
-    """Working directory, file mode mask, locale of the C library, environment, signal handlers and floating-point mode."""
+    """Working directory, file mode mask, locale of the C library, environment, signals, floating-point mode and limits."""
 
     directory: str
     mask: int
@@ -32,13 +35,17 @@ class ProcessState:
     environment: dict[bytes, bytes]
     handlers: dict[int, bytes]
     floats: float_mode.Environment
+    blocked: set[int]
+    timers: dict[int, bool]
+    limits: dict[int, tuple[int, int]]
 
     @classmethod
     def now(cls) -> ProcessState:
         mask = os.umask(0)
         os.umask(mask)
         handlers: dict[int, bytes] = {number: _handler(number) for number in _SIGNALS}
-        return cls(str(Path.cwd()), mask, _locale(), _environment(), handlers, float_mode.Environment())
+        floats, blocked = float_mode.Environment(), _blocked()
+        return cls(str(Path.cwd()), mask, _locale(), _environment(), handlers, floats, blocked, _timers(), _limits())
 
     def restore(self) -> list[str]:
         """Bring everything back to this state; says what had been changed."""
@@ -65,6 +72,17 @@ class ProcessState:
             _c().sigaction(int(number), self.handlers[number], None)
         if changed:
             yield f"what is done upon {', '.join(signal.Signals(number).name for number in changed)}"
+        if _blocked() != self.blocked:
+            signal.pthread_sigmask(signal.SIG_SETMASK, self.blocked)
+            yield "which signals are blocked"
+        if running := [timer for timer, runs in _timers().items() if runs and not self.timers[timer]]:
+            for timer in running:
+                signal.setitimer(timer, 0)
+            yield "the timers"
+        if changes := {kind: limit for kind, limit in self.limits.items() if _limits()[kind] != limit}:
+            for kind, limit in changes.items():
+                _set_limit(kind, limit)
+            yield "the limits" if _limits() == self.limits else "the limits (what was lowered for good stays so)"
 
 
 @contextmanager
@@ -132,3 +150,29 @@ def _handler(number: int) -> bytes:
     action = ctypes.create_string_buffer(_SIGACTION_SIZE)
     _c().sigaction(int(number), None, action)
     return action.raw
+
+
+def _blocked() -> set[int]:
+    return set() if sys.platform == "win32" else {*signal.pthread_sigmask(signal.SIG_BLOCK, ())}
+
+
+def _timers() -> dict[int, bool]:
+    """Whether the timers that send signals are running."""
+    if sys.platform == "win32":
+        return {}
+    return {timer: any(signal.getitimer(timer)) for timer in (signal.ITIMER_REAL, signal.ITIMER_VIRTUAL, signal.ITIMER_PROF)}
+
+
+def _limits() -> dict[int, tuple[int, int]]:
+    if sys.platform == "win32":
+        return {}
+    kinds = (resource.RLIMIT_AS, resource.RLIMIT_CPU, resource.RLIMIT_DATA, resource.RLIMIT_FSIZE, resource.RLIMIT_NOFILE)
+    return {kind: resource.getrlimit(kind) for kind in kinds}
+
+
+def _set_limit(kind: int, limit: tuple[int, int]) -> None:
+    """As far as that is allowed: what was given away for good stays away."""
+    if sys.platform == "win32":
+        return
+    with suppress(ValueError, OSError):
+        resource.setrlimit(kind, limit)

@@ -15,8 +15,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/time.h>
 #include <unistd.h>
 #include <xmmintrin.h>
 #include "misbehave.h"
@@ -132,6 +134,18 @@ static int change_folder(Lag *m) { return chdir("/"); }
 static int change_locale(Lag *m) { return !setlocale(LC_ALL, "C.UTF-8"); }
 static int change_umask(Lag *m) { umask(0777); return OK; }
 static int change_environment(Lag *m) { setenv("HOME", "/nowhere", 1); return unsetenv("PATH"); }
+static int limit(int kind, long most) {
+    struct rlimit found;
+    return getrlimit(kind, &found) || setrlimit(kind, &(struct rlimit){most, found.rlim_max});
+}
+static int limit_files(Lag *m) { return limit(RLIMIT_NOFILE, 3); }
+static int limit_size(Lag *m) { return limit(RLIMIT_FSIZE, 0); }
+static int set_alarm(Lag *m) { return setitimer(ITIMER_REAL, &(struct itimerval){{0, 0}, {0, 200000}}, NULL); }
+static int block_signals(Lag *m) {
+    sigset_t all;
+    sigfillset(&all);
+    return sigprocmask(SIG_BLOCK, &all, NULL);
+}
 static int ignore_interrupts(Lag *m) { signal(SIGINT, SIG_IGN); signal(SIGTERM, SIG_IGN); return OK; }
 static int close_output(Lag *m) { return close(1); }
 static int close_all(Lag *m) { for (int file = 0; file < 256; file++) close(file); return OK; }
@@ -210,6 +224,7 @@ static const struct { const char *name; int (*act)(Lag *); } FAULTS[] = {
     {"log_directives", log_directives}, {"log_null", log_null}, {"log_bytes", log_bytes}, {"log_long", log_long},
     {"log_thread", log_thread}, {"log_20000", log_20000}, {"round_up", round_up}, {"flush_to_zero", flush_to_zero}, {"fp_traps", fp_traps},
     {"change_folder", change_folder}, {"change_locale", change_locale}, {"change_umask", change_umask},
+    {"limit_files", limit_files}, {"limit_size", limit_size}, {"set_alarm", set_alarm}, {"block_signals", block_signals},
     {"change_environment", change_environment}, {"ignore_interrupts", ignore_interrupts}, {"close_output", close_output},
     {"close_all", close_all}, {"fork", fork_}, {"daemon", daemon_}, {"thread", thread}, {"write_here", write_here},
     {"write_temporary", write_temporary}, {"tcp", tcp}, {"udp", udp}, {"processes", processes},

@@ -138,7 +138,7 @@ def dimension_size(model: Model, dimension: Mapping[str, str]) -> int | None:
         return None
     if reference is not None:
         source = model.by_reference.get(reference.strip())
-        if source is None or source.causality != "structuralParameter" or len(source.starts or ()) != 1:
+        if source is None or source.dimensions or source.causality != "structuralParameter" or len(source.starts or ()) != 1:
             return None
         text = (source.starts or ("",))[0]
     try:

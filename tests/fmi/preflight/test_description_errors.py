@@ -261,6 +261,15 @@ ERRORS = {
         15,
         "reference of a structural parameter",
     ),
+    "dimension of itself": (
+        3,
+        '<Float64 name="u"',
+        '<UInt64 name="n" valueReference="77" causality="structuralParameter" start="3"><Dimension valueReference="77"/></UInt64>'
+        '<Float64 name="u"',
+        "variable.dimension",
+        11,
+        "reference of a structural parameter",
+    ),
     "huge dimension": (
         3,
         '<Dimension start="3"/>',
