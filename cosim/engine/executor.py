@@ -28,9 +28,6 @@ from .turns import SHOWN, Ending, Turn, take
 #: places in the marker: number of the present call, macro steps finished, rows recorded
 CALL, STEPS, ROWS, MARKER_SIZE = 0, 1, 2, 3
 
-#: macro steps at most that are made without looking up
-BATCH = 1 << 16
-
 #: status of a Python component's turn in a macro step after which the simulation ends; no FMU can return it
 _TERMINATION = 1 << 32
 
@@ -250,20 +247,14 @@ class Executor(ABC):
 
     def _run(self, end: int) -> None:
         while self.finished < end and not self.termination:
-            first = self.finished
-            last = min(end, first + self._batch(first), self.recorder.full_after(first))
             try:
-                self._steps(first, last)
+                self._steps(self.finished, min(end, self.recorder.full_after(self.finished)))
             finally:
                 self.recorder.advance(int(self.marker[ROWS]))
 
-    def _batch(self, first: int) -> int:
-        """Macro steps at most that are made without looking up."""
-        return BATCH
-
     @abstractmethod
     def _steps(self, first: int, end: int) -> None:
-        """The macro steps from `first` to `end`, fewer if a component asks to terminate; there is room for their rows."""
+        """Macro steps from `first` on, until `end` at most, for whose rows there is room."""
 
     @abstractmethod
     def _measured(self) -> dict[int, float]:

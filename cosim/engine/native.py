@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..component import Access, Call, DoStep, Flags
-from .executor import BATCH, ROWS, Executor
+from .executor import ROWS, Executor
 from .gathering import Gather
 from .parallel import TRIALS
 from .turns import Turn
@@ -17,6 +17,9 @@ try:
     from . import _native
 except ImportError:  # installed without a compiler
     _native = None  # type: ignore[assignment]
+
+#: macro steps per call at most, but for the first call, which measures the steps of the components
+BATCH = 1 << 16
 
 #: what is reported beside FMI statuses, as in _native.c
 _FLOAT_STATE_CHANGED, _NOT_FINITE = 1 << 33, 1 << 34
@@ -100,16 +103,16 @@ class NativeExecutor(Executor):
 
     # -- running -------------------------------------------------------------------------------------------------------
 
+    def _steps(self, first: int, end: int) -> None:
+        grid = self.plan.grid
+        formula = grid.formula(end)
+        count = min(end - first, self._batch(first)) if formula else 1
+        self._program.row(self.recorder.chunk.ctypes.data + self.recorder.used)
+        self._program.run(first, count, *(formula or (grid.seconds(first), 0.0, 1.0)))
+
     def _batch(self, first: int) -> int:
         """The first call of a program is short: it measures steps, and the next one packs the turns."""
-        if not self.plan.grid.formula(self.plan.grid.count):
-            return 1
         return BATCH if first >= self._prepared + TRIALS else TRIALS
-
-    def _steps(self, first: int, end: int) -> None:
-        formula = self.plan.grid.formula(end) or (self.plan.grid.seconds(first), 0.0, 1.0)
-        self._program.row(self.recorder.chunk.ctypes.data + self.recorder.used)
-        self._program.run(first, end - first, *formula)
 
     def _measured(self) -> dict[int, float]:
         return {self._turn_of(number)[0].first: nanoseconds * 1e-9 for number, nanoseconds in self._program.durations()}
