@@ -79,7 +79,9 @@ def test_a_failing_figure_is_named():
     def broken(result):
         raise ValueError("no such thing")
 
-    with pytest.raises(ComponentError, match=r'^figure "paths": broken failed: ValueError: no such thing$'):
+    with pytest.raises(
+        ComponentError, match=r'^figure "paths": broken failed: ValueError: no such thing \(test_figure_files.py:[0-9]+\)$'
+    ):
         draw(RESULT, "paths", broken, {})
 
 
