@@ -19,7 +19,7 @@ from helpers import end, run, system
 from cosim.component import Ports, Variable
 from cosim.fmi import FmuFile, Isolation, instantiate
 from cosim.fmi.isolated.block import Block
-from cosim.fmi.isolated.lines import DONE, TURN, decode, encode, read_line, write
+from cosim.fmi.isolated.lines import DONE, TURN, Vigil, decode, encode, read_line, write
 from cosim.fmi.isolated.process import Lost, Process
 from cosim.journal import CHANGES
 from cosim.simulate import Settings, simulate
@@ -41,7 +41,8 @@ def worker():
 
     def start(answer: Callable[[bytes], bytes], shared: Block | None = None) -> Process:
         def serve(commands: int, answers: int) -> None:
-            while line := read_line(commands):
+            vigil = Vigil([commands])
+            while line := read_line(commands, vigil):
                 write(answers, answer(line))
 
         started.append(Process("w", (shared or block()).journal, serve))

@@ -15,7 +15,7 @@ from typing import NoReturn
 from ... import log
 from ...journal import CALL, CHANGES, Journal, waiting
 from ...supervise import LARGEST_OUTPUT, LOOK, ending
-from .lines import DONE, PIECE, decode, write
+from .lines import DONE, PIECE, Vigil, decode, write
 
 #: so long (ms) a wait is a usual one, which the supervisor of the run looks after, too
 _USUAL_WAIT = 20
@@ -49,10 +49,7 @@ class Process:
             os.close(descriptor)
         os.set_blocking(self._output, False)
         self._died = os.pidfd_open(self._pid) if hasattr(os, "pidfd_open") else -1
-        self._poll = select.poll()
-        for descriptor in (self._reader, self._output, self._died):
-            if descriptor >= 0:
-                self._poll.register(descriptor, select.POLLIN)
+        self._vigil = Vigil(descriptor for descriptor in (self._reader, self._output, self._died) if descriptor >= 0)
         self._opened = [d for d in (self._writer, self._reader, self._output, self._died) if d >= 0]
         self._usual = [(self._reader, select.POLLIN)]
         self._rest, self._printed = b"", 0
@@ -61,7 +58,7 @@ class Process:
         """Send a command and wait for its answer, for at most `deadline` s. Raises Lost, also when the worker has died."""
         try:
             write(self._writer, line)
-            if self._poll.poll(_USUAL_WAIT) == self._usual:
+            if self._vigil.wait(_USUAL_WAIT) == self._usual:
                 data = os.read(self._reader, PIECE)
                 if data == DONE and not self._rest:
                     return DONE
@@ -81,7 +78,7 @@ class Process:
                 seen, since = now, time.monotonic()
             elif time.monotonic() - since > deadline:
                 raise Lost(f"did not return within {deadline:g} s")
-            self._receive({descriptor for descriptor, _ in self._poll.poll(min(LOOK, deadline) * 1000)})
+            self._receive({descriptor for descriptor, _ in self._vigil.wait(min(LOOK, deadline) * 1000)})
 
     def _progress(self) -> tuple[int, int]:
         return self._journal[CHANGES], self._journal[CALL]
@@ -128,7 +125,7 @@ class Process:
                 if room > 0:
                     sys.stderr.write(data[:room].decode("utf-8", "replace"))
                     sys.stderr.flush()
-            self._poll.unregister(self._output)  # the worker has closed it
+            self._vigil.forget(self._output)  # the worker has closed it
 
     def _reaped(self, patience: float) -> int | None:
         """The status of the process when it has ended within `patience` s. Its children end with it."""

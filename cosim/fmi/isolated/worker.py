@@ -20,7 +20,7 @@ from ...errors import ComponentError, InputError
 from ...journal import CALL, Phase
 from ..instance import FmuInstance
 from .block import Block, texts
-from .lines import DONE, TURN, decode, encode, read_line, write
+from .lines import DONE, TURN, Vigil, decode, encode, read_line, write
 
 _LONGEST_MESSAGE = 1 << 20
 
@@ -62,7 +62,8 @@ class Worker:
         voice = _Voice(answers)
         speaker = logging.getLogger("cosim.component")
         speaker.handlers, speaker.propagate, speaker.level = [voice], False, logging.INFO
-        while line := read_line(commands):
+        vigil = Vigil([commands])
+        while line := read_line(commands, vigil):
             voice.say(self._answer(line))
 
     def _answer(self, line: bytes) -> bytes:
