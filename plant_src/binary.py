@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import sys
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -25,17 +25,36 @@ def load(model: str) -> ctypes.PyDLL:
 
     Raises InputError when the FMU or its binary for this platform is missing.
     """
+    return ctypes.PyDLL(str(library(model)))
+
+
+def library(model: str) -> Path:
+    """Where that library has been unpacked to."""
     fmu = resources.root() / "fmus" / f"{model}.fmu"
+    try:
+        changed = fmu.stat().st_mtime_ns
+    except OSError as error:
+        raise _unreadable(model, fmu, error) from None
+    path = _library(model, fmu, changed)
+    return path if path.exists() else _library.__wrapped__(model, fmu, changed)
+
+
+@cache
+def _library(model: str, fmu: Path, _changed: int) -> Path:
     folder, ending = _PLATFORMS.get(sys.platform, (sys.platform, ".so"))
     member = f"binaries/{folder}/{model}{ending}"
     try:
         with ZipFile(fmu) as archive:
             content = archive.read(member)
     except (OSError, BadZipFile) as error:
-        raise InputError(f'the equations of the vehicle model "{model}" cannot be read from "{fmu}": {error}') from None
+        raise _unreadable(model, fmu, error) from None
     except KeyError:
         raise InputError(f'"{fmu}" has no "{member}"; build it on this platform with `cosim build`') from None
-    return ctypes.PyDLL(str(_unpacked(content, f"{model}{ending}")))
+    return _unpacked(content, f"{model}{ending}")
+
+
+def _unreadable(model: str, fmu: Path, error: Exception) -> InputError:
+    return InputError(f'the equations of the vehicle model "{model}" cannot be read from "{fmu}": {error}')
 
 
 def _unpacked(content: bytes, name: str) -> Path:

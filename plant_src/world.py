@@ -16,7 +16,9 @@ from cosim.errors import ComponentError, InputError, Problem, did_you_mean
 
 from . import arguments
 from .arguments import Arguments, Platform
-from .bullet import pybullet
+from .binary import library
+from .bullet import connect, keep_in_stock, pybullet
+from .catalogue import MODELS
 from .environment.surroundings import Surroundings
 from .fleet import Fleet, Snapshot
 from .scene import replay
@@ -69,7 +71,7 @@ class World(Component):
         self._flags = np.zeros((len(read.vehicles), 2), _FLAG)
         self._flags_data = self._flags.reshape(-1).data
         self._bound_inputs: dict[str, np.ndarray] = {}
-        self._client = pybullet.connect(pybullet.DIRECT)
+        self._client = connect()
         try:
             self._populate(read)
         except BaseException:
@@ -77,6 +79,13 @@ class World(Component):
             raise
         self._places = {variable.name: (variable, values) for variable, values in self._lay_out()}
         self.variables = [variable for variable, _ in self._places.values()]
+
+    @staticmethod
+    def warm() -> None:
+        """The equations of all vehicles and a client of Bullet are made ready."""
+        for model in MODELS:
+            library(model)
+        keep_in_stock()
 
     @staticmethod
     def scene(name: str, scenario: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """The warm process that all runs of a sweep on one machine are forked from: `python -m cosim.sweep.template DESCRIPTOR`.
 
-It has imported everything, read the scenario once and unpacked its FMUs, and has never loaded a binary, connected to a physics
-engine or started a thread. For every descriptor it is sent it forks a lane: a process that answers one job after the other,
-each with a child process of its own.
+It has imported everything, read the scenario once, unpacked its FMUs and let classes of components prepare what they can (by a
+function `warm`, where they have one); it has never loaded a binary or started a thread. For every descriptor it is sent it forks
+a lane: a process that answers one job after the other, each with a child process of its own.
 """
 
 from __future__ import annotations
@@ -72,8 +72,9 @@ def _warm(order: Order) -> Iterator[tuple[Path, FmuFile]]:
 
 def _import(scenario: Scenario) -> None:
     for node, name in scenario.root.leaves():
-        if reference := node.spec.components[name].python:
-            load_object(reference, node.folder)
+        reference = node.spec.components[name].python
+        if reference and (warm := getattr(load_object(reference, node.folder), "warm", None)):
+            warm()
     for kpi in (*scenario.spec.kpis, *scenario.spec.figures):
         function_problem(kpi, scenario.root.folder)
     for kpi in scenario.spec.kpis:
