@@ -119,10 +119,10 @@ class Fleet:
             measure()
 
     def _find_contacts(self, share: float) -> None:
-        impulses, touching = self._impulses.tolist(), 0
-        if total := sum(impulses):
+        touching = 0
+        if total := sum(self._impulses):
             if math.isnan(total):
-                culprit = next(shadow for shadow, value in zip(self.shadows, impulses, strict=True) if math.isnan(value))
+                culprit = next(shadow for shadow, value in zip(self.shadows, self._impulses, strict=True) if math.isnan(value))
                 raise UnsoundError(f"{culprit.name}: the contact forces are not finite")
             touching = self.contacts.add(share)
         self._leaving = touching < len(self._push)

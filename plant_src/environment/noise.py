@@ -20,7 +20,8 @@ from .seeds import generator
 #: a value holds so long (s)
 GRID = 0.01
 
-_BLOCK = 256  # values that are computed together
+#: values that are computed together
+BLOCK = 256
 
 
 @dataclass(frozen=True)
@@ -53,15 +54,19 @@ class Noise:
         self._number, self._values = -1, [()]
 
     def __getitem__(self, index: int) -> tuple[float, ...]:
-        number, place = divmod(index, _BLOCK)
+        number, place = divmod(index, BLOCK)
+        return self.block(number)[place]
+
+    def block(self, number: int) -> Sequence[tuple[float, ...]]:
+        """The values from the place `number` times BLOCK on, BLOCK of them."""
         if number != self._number:
             for missing in range(len(self._starts) - 1, number):
                 self._compute(missing)
             self._compute(number)
-        return self._values[place]
+        return self._values
 
     def _compute(self, number: int) -> None:
-        white = generator(self._seed, self._name, str(number)).standard_normal((2, len(self._a), _BLOCK))
+        white = generator(self._seed, self._name, str(number)).standard_normal((2, len(self._a), BLOCK))
         n1, n2 = _correlated(self._root, white)
         start1, start2 = self._starts[number]
         x1 = _recursion(self._a, start1, n1)

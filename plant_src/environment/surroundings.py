@@ -14,7 +14,7 @@ from cosim.component import Variable
 from ..shadow import FloatingBody
 from ..vehicles.interface import CURRENT, WAVE_GAIN, WIND, scalar
 from .current import Current
-from .noise import GRID
+from .noise import BLOCK, GRID
 from .settings import Environment
 from .surfaces import Below
 from .wind import Gusts, Wind
@@ -124,21 +124,23 @@ class _Air:
     def __init__(self, wind: Wind, seed: int, mean: Any, vehicles: Sequence[Shadow], published: Any):
         self._profile, self._mean, self._published = wind.profile, mean, published
         turbulence = wind.turbulence
-        gusts = [Gusts(wind, turbulence, seed, shadow.name) if turbulence else None for shadow in vehicles]
+        self._gusts = [Gusts(wind, turbulence, seed, shadow.name) for shadow in vehicles] if turbulence else []
         self._vehicles = [
-            (_slot(shadow, "wind.x"), 3 * _NUMBER * k, shadow.outputs[2:].data, gust)
-            for k, (shadow, gust) in enumerate(zip(vehicles, gusts, strict=True))
+            (_slot(shadow, "wind.x"), 3 * _NUMBER * k, shadow.outputs[2:].data) for k, shadow in enumerate(vehicles)
         ]
+        #: the gusts of all vehicles in the present block of noise
+        self._number = -1
+        self._block: Sequence[Sequence[tuple[float, ...]]] = [[(0.0, 0.0, 0.0)] * len(vehicles)] * BLOCK
 
     def update(self, time: float) -> None:
         mean_x, mean_y, mean_z = _read_vector(self._mean)
-        index, profile, published = int(time / GRID + _ROUNDING), self._profile, self._published
-        for slot, offset, height, gusts in self._vehicles:
+        number, place = divmod(int(time / GRID + _ROUNDING), BLOCK)
+        if number != self._number and self._gusts:
+            self._number, self._block = number, list(zip(*(gusts.block(number) for gusts in self._gusts), strict=True))
+        profile, published = self._profile, self._published
+        for (slot, offset, height), (gust_x, gust_y, gust_z) in zip(self._vehicles, self._block[place], strict=True):
             share = profile(height[0]) if profile else 1.0
-            x, y, z = share * mean_x, share * mean_y, share * mean_z
-            if gusts:
-                gust_x, gust_y, gust_z = gusts[index]
-                x, y, z = x + gust_x, y + gust_y, z + gust_z
+            x, y, z = share * mean_x + gust_x, share * mean_y + gust_y, share * mean_z + gust_z
             _write_vector(slot, 0, x, y, z)
             _write_vector(published, offset, x, y, z)
 
