@@ -35,12 +35,13 @@ def library(model: str) -> Path:
         changed = fmu.stat().st_mtime_ns
     except OSError as error:
         raise _unreadable(model, fmu, error) from None
-    path = _library(model, fmu, changed)
-    return path if path.exists() else _library.__wrapped__(model, fmu, changed)
+    place = resources.cache_directory() / "plant"
+    path = _library(model, fmu, changed, place)
+    return path if path.exists() else _library.__wrapped__(model, fmu, changed, place)
 
 
 @cache
-def _library(model: str, fmu: Path, _changed: int) -> Path:
+def _library(model: str, fmu: Path, _changed: int, place: Path) -> Path:
     folder, ending = _PLATFORMS.get(sys.platform, (sys.platform, ".so"))
     member = f"binaries/{folder}/{model}{ending}"
     try:
@@ -50,16 +51,16 @@ def _library(model: str, fmu: Path, _changed: int) -> Path:
         raise _unreadable(model, fmu, error) from None
     except KeyError:
         raise InputError(f'"{fmu}" has no "{member}"; build it on this platform with `cosim build`') from None
-    return _unpacked(content, f"{model}{ending}")
+    return _unpacked(content, place, f"{model}{ending}")
 
 
 def _unreadable(model: str, fmu: Path, error: Exception) -> InputError:
     return InputError(f'the equations of the vehicle model "{model}" cannot be read from "{fmu}": {error}')
 
 
-def _unpacked(content: bytes, name: str) -> Path:
+def _unpacked(content: bytes, place: Path, name: str) -> Path:
     """A file with this content in the per-user cache; its path depends on the content, so it never changes under a user."""
-    path = resources.cache_directory() / "plant" / f"{sha256(content).hexdigest()[:20]}-{name}"
+    path = place / f"{sha256(content).hexdigest()[:20]}-{name}"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         with NamedTemporaryFile(dir=path.parent, delete=False) as file:
