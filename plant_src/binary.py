@@ -75,7 +75,7 @@ def bound(function: Callable[..., None], arguments: Sequence[np.ndarray], result
     kept = (*arguments, *results)
     if not all(array.dtype == np.float64 and array.flags.c_contiguous for array in kept):
         raise TypeError("arrays of compiled functions are contiguous and of type float64")
-    pointers = [(ctypes.c_void_p * len(arrays))(*(array.ctypes.data for array in arrays)) for arrays in (arguments, results)]
-    call = partial(function, *pointers)
+    tables = [(ctypes.c_void_p * len(arrays))(*(array.ctypes.data for array in arrays)) for arrays in (arguments, results)]
+    call = partial(function, *map(ctypes.byref, tables))
     call.arrays = kept  # type: ignore[attr-defined]  # they must live as long as the pointers
     return call

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,6 +20,10 @@ from .vehicles.alarms import UNSOUND
 
 #: so often a step of Bullet is made again at most
 MOST_REPEATS = 10
+
+_vector = struct.Struct("3d").unpack_from
+_ANGULAR = struct.calcsize("3d")  # where the angular part of a motion begins
+_write_motion = struct.Struct("6d").pack_into
 
 
 @dataclass(frozen=True)
@@ -73,11 +78,11 @@ class Fleet:
             predict()
         if self._leaving or any(self._alarms):
             self._look_around()
-        if self._push:
+        if self._engaged:
             self._collide()
         for correct in self._correct:
             correct()
-        if self._push:
+        if self._engaged:
             self._find_contacts(share)
 
     def _look_around(self) -> None:
@@ -98,25 +103,32 @@ class Fleet:
         """Make steps of Bullet ready, in which these vehicles take part."""
         self._near = near
         self._engaged = engaged = [shadow for shadow, is_near in zip(self.shadows, near, strict=True) if is_near]
-        self._push, self._measure = [shadow.push for shadow in engaged], [shadow.measure for shadow in engaged]
-        self._held = [shadow.held for shadow in engaged if isinstance(shadow, PlanarBody)]
+        self._told = [(shadow.body, shadow.twist, shadow.torque) for shadow in engaged]
+        self._asked = [(shadow.body, shadow.motion) for shadow in engaged]
+        self._planar = [shadow for shadow in engaged if isinstance(shadow, PlanarBody)]
 
     def _collide(self) -> None:
         """One step of Bullet."""
+        for vessel in self._planar:
+            vessel.keep_height()
         self._step_bullet()
         for repeats in range(MOST_REPEATS):
-            if all([held(repeats) for held in self._held]):
+            if all([vessel.held(repeats) for vessel in self._planar]):
                 return
             for shadow in self._engaged:
                 shadow.go_back()
             self._step_bullet()
 
     def _step_bullet(self) -> None:
-        for push in self._push:
-            push()
-        pybullet.stepSimulation(self._client)
-        for measure in self._measure:
-            measure()
+        client = self._client
+        for body, twist, torque in self._told:
+            pybullet.resetBaseVelocity(body, _vector(twist), _vector(twist, _ANGULAR), client)
+            if torque is not None:
+                pybullet.applyExternalTorque(body, -1, _vector(torque), pybullet.WORLD_FRAME, client)
+        pybullet.stepSimulation(client)
+        for body, motion in self._asked:
+            linear, angular = pybullet.getBaseVelocity(body, client)
+            _write_motion(motion, 0, *linear, *angular)
 
     def _find_contacts(self, share: float) -> None:
         touching = 0
@@ -125,7 +137,7 @@ class Fleet:
                 culprit = next(shadow for shadow, value in zip(self.shadows, self._impulses, strict=True) if math.isnan(value))
                 raise UnsoundError(f"{culprit.name}: the contact forces are not finite")
             touching = self.contacts.add(share)
-        self._leaving = touching < len(self._push)
+        self._leaving = touching < len(self._engaged)
 
     # -- state ---------------------------------------------------------------------------------------------------------
 

@@ -8,15 +8,14 @@ changed motion leads. Gravity is part of the equations and zero in Bullet.
 Where nothing can be in the way there is nothing to ask, because what Bullet would answer is known: Bullet takes part only for
 vehicles that are near something (`clearance.py`). The bodies of the others are parked meanwhile.
 
-A step of the world is `predict` for every vehicle, then for those near something `push`, one step of Bullet and `measure`,
-and at last `correct` for every vehicle.
+A step of the world is `predict` for every vehicle, then one step of Bullet for those near something, and at last `correct` for
+every vehicle.
 """
 
 from __future__ import annotations
 
 import math
 import struct
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -37,18 +36,15 @@ if TYPE_CHECKING:
 FRICTION = 1.0
 
 #: bodies that do not take part stand in a row from here on (m), where no vehicle can be
-PARKING, PARKING_SPACE = 2 * LARGEST_STATE, 100.0
+PARKING, PARKING_SPACE, UPRIGHT = 2 * LARGEST_STATE, 100.0, (0.0, 0.0, 0.0, 1.0)
 
 #: so fast a planar vessel may rise or sink in Bullet (m/s), and so far (m) before it is put back to its height
 SINKING, LARGEST_HEAVE = 1e-4, 1e-9
 
 _MAX_VELOCITY = 1e6  # Bullet limits velocities silently, by default at 100 m/s and rad/s
-_vector = struct.Struct("3d").unpack_from
 _LIFT = 2  # place of the vertical velocity in a motion
 _LEAST_SLOPE = 0.01  # of sinking over lift: M / (m + M) for a load of the mass m
-_ANGULAR = struct.calcsize("3d")  # where the angular part of a motion begins
 _write_vector = struct.Struct("3d").pack_into
-_write_twist = struct.Struct("6d").pack_into
 
 Names = tuple[Sequence[str], Sequence[str]]  # of the arguments and of the results of a compiled function
 _BEFORE = ("state", "inputs", "surroundings", "constants", "step", "anchor", "leash")
@@ -58,21 +54,21 @@ class UnsoundError(Exception):
     """A vehicle cannot go on: an input or its motion is not finite; the text names the variable."""
 
 
-class Shadow(ABC):
+class Shadow:
     """One vehicle: its body in Bullet and its compiled equations (`vehicles/shadow_maps.py`).
 
     `pieces` are its numbers by name, as many as `sizes` says, and "step" (s), which all vehicles share. `inputs` and `outputs`
     hold the real variables of the model in order; the outputs after the published motion are left to others, and the piece
-    "surroundings" is the environment's. `predict`
-    foresees the "motion" that Bullet would measure, and `measure` replaces it by what Bullet made of it.
+    "surroundings" is the environment's. `predict` foresees the `motion` that Bullet would measure and leaves what to tell Bullet,
+    `twist` and `torque`; Bullet's motion takes the place of the one foreseen.
     """
 
-    PIECES: ClassVar[Mapping[str, int]]  # name -> size
+    PIECES: ClassVar[Mapping[str, int]] = {"twist": 6, "motion": 6, "torque": 3, "pose": 7}  # name -> size
     SPAWN: ClassVar[Names] = (("parameters",), ("constants", "predicted", "twist", "motion", "pose"))
     BEFORE: ClassVar[Names]
-    AFTER: ClassVar[Names]
-    #: pose in Bullet of a body at rest in the origin
-    AT_ORIGIN: ClassVar[Sequence[float]]
+    AFTER: ClassVar[Names] = (("start", "predicted", "twist", "motion", "constants", "step"), ("state", "impulse", "outputs"))
+    #: Bullet takes half as long, but its saved states lack the inertia of such a body in world axes
+    IN_MAXIMAL_COORDINATES = False
 
     def __init__(self, client: int, spawn: Spawn, pieces: Mapping[str, np.ndarray]):
         self.name, self.model, self._client = spawn.name, spawn.model, client
@@ -82,8 +78,10 @@ class Shadow(ABC):
         pieces["surroundings"][:] = [variable.start for variable in spawn.model.surroundings]
         self.inputs, self.outputs = pieces["inputs"], pieces["outputs"]
         self.surroundings = pieces["surroundings"]
-        self._motion: Any = pieces["motion"].data
-        self._twist: Any = pieces["twist"].data
+        # memoryviews: numpy takes longer for so few numbers
+        self.motion: Any = pieces["motion"].data
+        self.twist: Any = pieces["twist"].data
+        self.torque: Any = pieces["torque"].data if "torque" in self.BEFORE[1] else None
         library = load(spawn.model.name)
         #: where a free step leads
         self.predict = self._bound(library.shadow_before, self.BEFORE)
@@ -92,7 +90,7 @@ class Shadow(ABC):
         self._bound(library.shadow_spawn, self.SPAWN)()
         self.correct()
         self.body = self._create(spawn.body)
-        self._place(pieces["pose"].tolist())
+        self.go_back()
 
     @classmethod
     def sizes(cls, model: Model) -> dict[str, int]:
@@ -106,37 +104,31 @@ class Shadow(ABC):
         arguments, results = ([self._pieces[name] for name in side] for side in names)
         return bound(function, arguments, results)
 
-    @abstractmethod
-    def push(self) -> None:
-        """Give Bullet the mean motion of the step."""
+    def _create(self, body: Body) -> int:
+        """Make the body in Bullet; returns its number."""
+        shape, maximal = compound(body.boxes, self._client), self.IN_MAXIMAL_COORDINATES
+        number = pybullet.createMultiBody(body.mass, shape, -1, useMaximalCoordinates=maximal, physicsClientId=self._client)
+        set_dynamics(self._client, number, -1, body)
+        return int(number)
 
-    @abstractmethod
-    def measure(self) -> None:
-        """Read the motion from Bullet."""
+    @staticmethod
+    def enclosure(body: Body) -> Enclosure:
+        """What holds the body in every attitude it can take."""
+        radius = float(max(np.linalg.norm(box.corners(), axis=1).max() for box in body.boxes))
+        return Enclosure((-radius, -radius, -radius), (radius, radius, radius))
 
     def go_back(self) -> None:
         """Return the body in Bullet to where the step began."""
-        self._place(self._pieces["pose"].tolist())
-
-    @staticmethod
-    @abstractmethod
-    def enclosure(body: Body) -> Enclosure:
-        """What holds the body in every attitude it can take."""
-
-    @abstractmethod
-    def _create(self, body: Body) -> int:
-        """Make the body in Bullet; returns its number."""
-
-    @abstractmethod
-    def _place(self, pose: Sequence[float]) -> None:
-        """Set the body in Bullet to a pose in Bullet's terms."""
+        pose = self._pieces["pose"].tolist()
+        pybullet.resetBasePositionAndOrientation(self.body, pose[0:3], pose[3:7], self._client)
 
     def engage(self, engaged: bool) -> None:
         """Let Bullet take part in the motion, or not any more."""
         if engaged:
             self.go_back()
         else:
-            self._place([PARKING + PARKING_SPACE * self.body, *self.AT_ORIGIN[1:]])
+            parked = [PARKING + PARKING_SPACE * self.body, 0.0, 0.0]
+            pybullet.resetBasePositionAndOrientation(self.body, parked, UPRIGHT, self._client)
 
     def fault(self) -> str:
         """What keeps the vehicle from going on: an input that is not finite, or where the free step leads."""
@@ -152,52 +144,22 @@ class Shadow(ABC):
 class FreeBody(Shadow):
     """A vehicle that moves freely in space; its frame in Bullet has the principal axes of inertia."""
 
-    PIECES: ClassVar[Mapping[str, int]] = {"twist": 6, "motion": 6, "torque": 3, "pose": 7}
-    #: Bullet takes half as long, but its saved states lack the inertia of such a body in world axes
-    IN_MAXIMAL_COORDINATES = False
     SPAWN: ClassVar[Names] = (("parameters", "axes"), Shadow.SPAWN[1])
     BEFORE: ClassVar[Names] = (
         (*_BEFORE, "axes"),
         ("start", "predicted", "twist", "motion", "torque", "pose", "path", "alarm"),
     )
-    AFTER: ClassVar[Names] = (("start", "predicted", "twist", "motion", "constants", "step"), ("state", "impulse", "outputs"))
-    AT_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-
-    @staticmethod
-    def enclosure(body: Body) -> Enclosure:
-        radius = float(max(np.linalg.norm(box.corners(), axis=1).max() for box in body.boxes))
-        return Enclosure((-radius, -radius, -radius), (radius, radius, radius))
-
-    def _create(self, body: Body) -> int:
-        shape, maximal = compound(body.boxes, self._client), self.IN_MAXIMAL_COORDINATES
-        number = pybullet.createMultiBody(body.mass, shape, -1, useMaximalCoordinates=maximal, physicsClientId=self._client)
-        set_dynamics(self._client, number, -1, body)
-        self._torque = self._pieces["torque"].data
-        return number
-
-    def _place(self, pose: Sequence[float]) -> None:
-        pybullet.resetBasePositionAndOrientation(self.body, pose[0:3], pose[3:7], self._client)
-
-    def push(self) -> None:
-        body, client = self.body, self._client
-        pybullet.resetBaseVelocity(body, _vector(self._twist), _vector(self._twist, _ANGULAR), client)
-        pybullet.applyExternalTorque(body, -1, _vector(self._torque), pybullet.WORLD_FRAME, client)
-
-    def measure(self) -> None:
-        linear, angular = pybullet.getBaseVelocity(self.body, self._client)
-        _write_twist(self._motion, 0, *linear, *angular)
 
 
-class FloatingBody(FreeBody):
+class FloatingBody(Shadow):
     """A vessel that moves freely in space; the contact impulse of a step is carried over to the next one."""
 
-    PIECES = {**FreeBody.PIECES, "carried": 6, "previous": 6}
-    SPAWN = Shadow.SPAWN
+    PIECES = {**Shadow.PIECES, "carried": 6, "previous": 6}
     BEFORE = (
         (*_BEFORE, "carried"),
         ("start", "predicted", "twist", "motion", "torque", "pose", "previous", "path", "alarm"),
     )
-    AFTER = ((*FreeBody.AFTER[0], "previous"), (*FreeBody.AFTER[1], "carried"))
+    AFTER = ((*Shadow.AFTER[0], "previous"), (*Shadow.AFTER[1], "carried"))
 
     def surface(self, sea: Sea) -> Callable[[float], float]:
         """Height of the water (m) above or below the vessel at a time (s)."""
@@ -214,21 +176,20 @@ class FloatingBody(FreeBody):
         return elevation
 
 
-class PlanarBody(FreeBody):
+class PlanarBody(Shadow):
     """A vessel in the horizontal plane: it has no roll and no pitch, and what presses on its deck does not move it.
 
     Bullet can hold its height only by lifting it as much as the load lets it sink. The load foreseen is that of the steps before;
     where Bullet finds another one, the step is made again with a better lift, found by the secant method.
     """
 
-    PIECES = {**FreeBody.PIECES, "pressed": 3, "previous": 2}
-    SPAWN = Shadow.SPAWN
+    PIECES = {**Shadow.PIECES, "pressed": 3, "previous": 2}
     IN_MAXIMAL_COORDINATES = True  # the inertia about the world's z axis is always the same
     BEFORE = (
         (*_BEFORE, "pressed"),
         ("start", "predicted", "twist", "motion", "pose", "previous", "path", "alarm"),
     )
-    AFTER = ((*FreeBody.AFTER[0], "previous"), (*FreeBody.AFTER[1], "pressed"))
+    AFTER = ((*Shadow.AFTER[0], "previous"), (*Shadow.AFTER[1], "pressed"))
 
     @staticmethod
     def enclosure(body: Body) -> Enclosure:
@@ -245,20 +206,20 @@ class PlanarBody(FreeBody):
         return super()._create(body._replace(inertia=(never, never, body.inertia[2])))
 
     def held(self, repeats: int) -> bool:
-        """Whether the step of Bullet can stay as it is after so many repeats; otherwise `push` has a better lift now."""
-        lift, sinking = self._twist[_LIFT], -self._motion[_LIFT]
+        """Whether the step of Bullet can stay as it is after so many repeats; otherwise the twist has a better lift now."""
+        lift, sinking = self.twist[_LIFT], -self.motion[_LIFT]
         (last_lift, last_sinking), self._tried = self._tried, (lift, sinking)
         if not SINKING < abs(sinking) < math.inf:
             return True
         slope = (last_sinking - sinking) / (lift - last_lift) if repeats and lift != last_lift else 1.0
-        self._twist[_LIFT] = lift + sinking / min(max(slope, _LEAST_SLOPE), 1.0)
+        self.twist[_LIFT] = lift + sinking / min(max(slope, _LEAST_SLOPE), 1.0)
         return False
 
-    def push(self) -> None:
+    def keep_height(self) -> None:
+        """Before a step: undo what small heaves of the steps before have come to."""
         if abs(self._previous[1]) > LARGEST_HEAVE:
             self.go_back()
             self._previous[1] = 0.0
-        pybullet.resetBaseVelocity(self.body, _vector(self._twist), _vector(self._twist, _ANGULAR), self._client)
 
 
 def compound(boxes: Sequence[Box], client: int) -> int:
