@@ -151,6 +151,8 @@ def load_component(reference: str, folder: Path, instance_name: str, arguments: 
     """
     kind = load_object(reference, folder)
     if inspect.isclass(kind) and issubclass(kind, Fmi2Slave):
+        if "instance_name" in arguments:
+            raise InputError(f'{reference} gets its "instance_name" from the scenario; it is no argument')
         return PythonSlave(_construct(kind, reference, instance_name=instance_name, **arguments), instance_name)
     made = _construct(kind, reference, instance_name, **arguments)
     expected = (name for name in {**Component.__annotations__, **vars(Component)} if not name.startswith("_"))
@@ -160,7 +162,7 @@ def load_component(reference: str, folder: Path, instance_name: str, arguments: 
     return made
 
 
-def _construct(kind: Callable[..., Any], reference: str, *positional: Any, **named: Any) -> Any:
+def _construct(kind: Callable[..., Any], reference: str, /, *positional: Any, **named: Any) -> Any:
     try:
         inspect.signature(kind).bind(*positional, **named)
     except TypeError as error:

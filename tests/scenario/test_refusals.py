@@ -165,6 +165,15 @@ def test_units_of_different_quantities_are_refused(folder):
     )
 
 
+def test_arguments_may_have_the_names_of_what_loads_them(folder):
+    cosim.load(folder.scenario({"a": folder.block("Gain", arguments={"kind": 1, "reference": "x"})})).free()
+
+
+def test_the_name_of_an_instance_is_no_argument(folder):
+    (line,) = refused(folder, {"a": folder.block("Gain", arguments={"instance_name": "b"})})
+    assert 'Gain gets its "instance_name" from the scenario' in line
+
+
 def test_problems_of_a_python_component_stand_at_its_arguments(folder):
     world = str(resources.root() / "plant_src/world.py:World")
     vehicles = {"uav": {"model": "ar_dron", "position": [0, 0, 1]}, "usv": {"model": "strider", "position": [0]}}
