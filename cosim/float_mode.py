@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+import platform
+import struct
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
 
 REASON = "changed the floating-point mode (rounding, flush to zero or traps) and did not restore it"
 
+#: 1 and a number that makes no difference to it when rounding to nearest; the least denormal, which is no zero only if it is not
+#: flushed (as a literal it could be flushed already while it is read)
+PROBE = 1.0, 2.0**-54, float(struct.unpack("=d", (1).to_bytes(8, sys.byteorder))[0])
+
 _ENVIRONMENT_SIZE = 512  # more than any platform's fenv_t
+_MXCSR, _MXCSR_DEFAULT = 28, 0x1F80  # place in Linux's fenv_t of x86-64, and what a process starts with
 
 
 def changed() -> bool:
     """Whether it rounds in another way than usual or flushes small numbers to zero."""
-    # equal in the default rounding mode only, and the least denormal is no zero only if it is not flushed
-    one, little, least = 1.0, 2.0**-54, 5e-324
+    one, little, least = PROBE
     return one + little != one - little or not least + least
 
 
@@ -41,5 +50,39 @@ class Environment:
         """Bring it back; returns whether it had been changed."""
         if not changed() and traps() == self._traps:
             return False
-        ctypes.PyDLL(None).fesetenv(self._state)
+        self.bring_back()
         return True
+
+    def bring_back(self) -> None:
+        ctypes.PyDLL(None).fesetenv(self._state)
+
+
+@contextmanager
+def usual() -> Iterator[None]:
+    """While the block lasts, the mode that a process starts with, whatever the caller's is.
+
+    Some libraries change it for good as soon as they are imported; results must not depend on that.
+    """
+    if not changed() and not traps():
+        yield
+        return
+    callers = Environment()
+    ctypes.PyDLL(None).fesetenv(_default())
+    try:
+        yield
+    finally:
+        callers.bring_back()
+
+
+def _default() -> Any:
+    """FE_DFL_ENV of <fenv.h>; on x86 that alone would leave small numbers flushed to zero."""
+    if sys.platform == "darwin":
+        return ctypes.c_void_p(ctypes.addressof(ctypes.c_char.in_dll(ctypes.PyDLL(None), "_FE_DFL_ENV")))
+    environment = ctypes.c_void_p(-1)
+    if platform.machine() != "x86_64":
+        return environment
+    ctypes.PyDLL(None).fesetenv(environment)
+    state = ctypes.create_string_buffer(_ENVIRONMENT_SIZE)
+    ctypes.PyDLL(None).fegetenv(state)
+    struct.pack_into("I", state, _MXCSR, _MXCSR_DEFAULT)
+    return state

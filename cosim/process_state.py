@@ -79,9 +79,10 @@ class ProcessState:
             for timer in running:
                 signal.setitimer(timer, 0)
             yield "the timers"
-        if changes := {kind: limit for kind, limit in self.limits.items() if _limits()[kind] != limit}:
-            for kind, limit in changes.items():
-                _set_limit(kind, limit)
+        if (limits := _limits()) != self.limits:
+            for kind, limit in self.limits.items():
+                if limits[kind] != limit:
+                    _set_limit(kind, limit)
             yield "the limits" if _limits() == self.limits else "the limits (what was lowered for good stays so)"
 
 

@@ -17,6 +17,7 @@ from . import log
 from .component import Component, Variable
 from .engine import MARKER_SIZE, Executor, Kind, Recorder, Termination, compile_plan, executor_kind
 from .errors import ComponentError, InputError, Problem, one_of
+from .float_mode import usual
 from .journal import Phase, calling, current, waiting
 from .pacer import Late, Pacer
 from .process_state import contained
@@ -115,7 +116,7 @@ def simulation(system: System, settings: Settings, observers: Sequence[Observer]
 
     Raises ComponentError at the end when a component fails to terminate.
     """
-    with ExitStack() as stack:
+    with usual(), ExitStack() as stack:
         for name, component in system.components.items():
             stack.callback(_free, name, component)
         watch = Stopwatch()

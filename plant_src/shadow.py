@@ -63,7 +63,7 @@ class Shadow:
     `twist` and `torque`; Bullet's motion takes the place of the one foreseen.
     """
 
-    PIECES: ClassVar[Mapping[str, int]] = {"twist": 6, "motion": 6, "torque": 3, "pose": 7}  # name -> size
+    PIECES: ClassVar[Mapping[str, int]] = {"twist": 6, "motion": 6, "pose": 7}  # name -> size
     SPAWN: ClassVar[Names] = (("parameters",), ("constants", "predicted", "twist", "motion", "pose"))
     BEFORE: ClassVar[Names]
     AFTER: ClassVar[Names] = (("start", "predicted", "twist", "motion", "constants", "step"), ("state", "impulse", "outputs"))
@@ -81,7 +81,7 @@ class Shadow:
         # memoryviews: numpy takes longer for so few numbers
         self.motion: Any = pieces["motion"].data
         self.twist: Any = pieces["twist"].data
-        self.torque: Any = pieces["torque"].data if "torque" in self.BEFORE[1] else None
+        self.torque: Any = pieces["torque"].data if "torque" in pieces else None
         library = load(spawn.model.name)
         #: where a free step leads
         self.predict = self._bound(library.shadow_before, self.BEFORE)
@@ -144,6 +144,7 @@ class Shadow:
 class FreeBody(Shadow):
     """A vehicle that moves freely in space; its frame in Bullet has the principal axes of inertia."""
 
+    PIECES = {**Shadow.PIECES, "torque": 3}
     SPAWN: ClassVar[Names] = (("parameters", "axes"), Shadow.SPAWN[1])
     BEFORE: ClassVar[Names] = (
         (*_BEFORE, "axes"),
@@ -154,7 +155,7 @@ class FreeBody(Shadow):
 class FloatingBody(Shadow):
     """A vessel that moves freely in space; the contact impulse of a step is carried over to the next one."""
 
-    PIECES = {**Shadow.PIECES, "carried": 6, "previous": 6}
+    PIECES = {**Shadow.PIECES, "torque": 3, "carried": 6, "previous": 6}
     BEFORE = (
         (*_BEFORE, "carried"),
         ("start", "predicted", "twist", "motion", "torque", "pose", "previous", "path", "alarm"),

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import float_mode
 from ..component import GOOD, Call, DoStep
 from .executor import CALL, ROWS, STEPS, Executor
 from .moves import Move, pieces
@@ -82,8 +83,7 @@ class PythonExecutor(Executor):
     def _steps(self, first: int, end: int) -> None:
         clock, marker, phases, exponents = self._clock, self.marker.data, self._phases, self._exponents
         keepers, row, every = self.recorder.keepers, self.recorder.rows, self.recorder.every
-        # equal in the default rounding mode only, and the least denormal is no zero only if it is not flushed
-        one, little, least = 1.0, 2.0**-54, 5e-324
+        one, little, least = float_mode.PROBE
         origin, stride, denominator = self.plan.grid.integers.values()
         for n in range(first, end):
             clock.value = (origin + n * stride) / denominator

@@ -24,7 +24,7 @@ class SignalError(InputError, KeyError):
     __str__ = Exception.__str__  # KeyError would print the repr
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """A recorded run; `result["plant.uav.position.z"]` are the values of one signal, shape (rows,).
 
@@ -63,6 +63,18 @@ class Result:
     def __len__(self) -> int:
         """Number of signals."""
         return len(self.recording.columns)
+
+    def __repr__(self) -> str:
+        """What ran, how far, and the KPIs."""
+        rows = f"{len(self.time)} rows of {len(self)} signals"
+        span = f", {self.time[0]:g} s to {self.time[-1]:g} s" if len(self.time) else ""
+        failure, units = self.metadata.get("failure"), self.metadata.get("kpi_units", {})
+        lines = [f"{self.metadata.get('name', 'Result')}: {rows}{span}", *([f"ended early: {failure}"] if failure else [])]
+        width = max(map(len, self.kpis), default=0)
+        for name, value in self.kpis.items():
+            text = str(value) if isinstance(value, bool) else f"{value:.6g}"
+            lines.append(f"  {name:{width}}  {text} {units.get(name, '')}".rstrip())
+        return "\n".join(lines)
 
     def signals(self, pattern: str = "*") -> list[str]:
         """Names that match `pattern`, in recorded order; `*` stands for any text, dots and brackets included."""

@@ -12,6 +12,7 @@ from typing import Any
 
 from ..component import Component
 from ..errors import InputError
+from ..float_mode import usual
 from ..fmi import FmuFile
 from ..journal import blamed
 from ..python_component import package_files
@@ -28,7 +29,7 @@ from .tree import Node, Scenario, load
 Function = tuple[str, Callable[..., Any], Mapping[str, Any]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Assembly:
     """A scenario ready to run. Its components live until `simulate` or `free`."""
 
@@ -39,6 +40,11 @@ class Assembly:
     workshop: Workshop
     #: wall time (s) of "load_seconds" (all), of it "parse_seconds", "instantiate_seconds" and "wiring_seconds"
     timing: Mapping[str, float]
+
+    def __repr__(self) -> str:
+        system, settings = self.system, self.settings
+        times = f"{float(settings.start_time):g} s to {float(settings.stop_time):g} s in steps of {float(settings.step_size):g} s"
+        return f"{self.spec.name}: {', '.join(system.components)}; {len(system.connections)} connections; {times}"
 
     @property
     def document(self) -> Document:
@@ -84,6 +90,7 @@ class Assembly:
         _free(self.system.components)
 
 
+@usual()
 def assemble(
     scenario: str | Path,
     settings: Mapping[str, Any] | None = None,

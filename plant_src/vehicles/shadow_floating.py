@@ -73,7 +73,7 @@ class FloatingBody:
         return ca.Function("shadow_before", [*arguments, carried], results)
 
     def _after(self) -> ca.Function:
-        arguments = symbols_after(self.model, 6)
+        arguments = symbols_after(self.model)
         start, predicted, twist, motion, constants, step = arguments
         (previous,) = symbols(previous=6)
         hull, attitude = self.vessel.at(constants), kinematics.matrix(start[3:7])

@@ -11,6 +11,10 @@ Each vehicle exports three functions beside its FMU:
     shadow_after   these, and the motion that Bullet made of it
                    -> state, contact impulse (zero for a free step), published variables
 
+Each kind of body adds what it alone needs: a free one the `axes` of its body in Bullet, a planar one by what it was `pressed`,
+a floating one the impulse that is `carried` over. Floating vessels export `shadow_surface` too, the height of the water
+(`waves.py`).
+
 Bullet's solver changes the motion when something is in the way. That change times Bullet's inertia is the contact impulse;
 divided by the vehicle's inertia it is added to the velocity that the equations predicted. The published velocity is that
 of Bullet while there is contact: the own velocity is a label for the end of the step and not zero at rest. Bullet moves a
@@ -91,7 +95,7 @@ class FreeBody:
         return ca.Function("shadow_before", [*arguments, axes], results)
 
     def _after(self) -> ca.Function:
-        start, predicted, twist, motion, constants, step = arguments = symbols_after(self.model, 6)
+        start, predicted, twist, motion, constants, step = arguments = symbols_after(self.model)
         linear, angular = ca.vertsplit(motion - twist, 3)
         rigid, to_body = self.rigid(constants), kinematics.matrix(predicted[3:7]).T
         turned = rigid.inverse @ (to_body @ (rigid.in_world(start[3:7]) @ angular))
@@ -142,7 +146,7 @@ class PlanarBody:
         return ca.Function("shadow_before", [*arguments, pressed], results)
 
     def _after(self) -> ca.Function:
-        start, predicted, twist, motion, _, step = arguments = symbols_after(self.model, 6)
+        start, predicted, twist, motion, _, step = arguments = symbols_after(self.model)
         (previous,) = symbols(previous=2)
         change = motion - twist
         velocity = predicted[3:6] + ca.vertcat(_turn(predicted[2]).T @ change[0:2], change[5])
@@ -172,10 +176,10 @@ def symbols_before(model: ContinuousModel) -> list[ca.SX]:
     return [state, given, around, model.constant_symbols(), *symbols(step=1, anchor=3, leash=3)]
 
 
-def symbols_after(model: ContinuousModel, motion: int) -> list[ca.SX]:
+def symbols_after(model: ContinuousModel) -> list[ca.SX]:
     """State at the start and foreseen at the end of a step, foreseen and real mean motion, constants and step."""
     count = len(model.states)
-    states = symbols(start=count, predicted=count, twist=motion, motion=motion)
+    states = symbols(start=count, predicted=count, twist=LINEAR_ANGULAR, motion=LINEAR_ANGULAR)
     return [*states, model.constant_symbols(), *symbols(step=1)]
 
 

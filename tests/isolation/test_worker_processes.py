@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mmap
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -11,6 +12,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from helpers import end, run, system
 from cosim.component import Ports, Variable
 from cosim.fmi import FmuFile, Isolation, instantiate
 from cosim.fmi.isolated.block import Block
-from cosim.fmi.isolated.lines import DONE, TURN, Vigil, decode, encode, read_line, write
+from cosim.fmi.isolated.lines import DONE, LOOKS, TURN, Vigil, decode, encode, read_line, write
 from cosim.fmi.isolated.process import Lost, Process
 from cosim.journal import CHANGES
 from cosim.simulate import Settings, simulate
@@ -73,6 +75,29 @@ def test_lines_come_back_whole_however_long_they_are(worker):
 
 def test_an_empty_line_comes_back(worker):
     assert worker(lambda line: line).request(TURN, 5.0) == DONE
+
+
+def test_who_waits_in_vain_sleeps_at_once_and_ever_longer(monkeypatch):
+    """Looking pays where the answer comes soon; the first one that does makes a worker look again."""
+    reader, writer = os.pipe()
+    poll, looks = select.poll(), []
+    counted = SimpleNamespace(register=poll.register, unregister=poll.unregister)
+    counted.poll = lambda milliseconds: (looks.append(milliseconds == 0), poll.poll(min(milliseconds, 1)))[1]
+    monkeypatch.setattr(select, "poll", lambda: counted)
+    vigil = Vigil([reader])
+
+    def looked() -> int:
+        looks.clear()
+        vigil.wait(60_000)
+        return sum(looks)
+
+    assert [looked() for _ in range(8)] == [LOOKS, 0, LOOKS, 0, 0, LOOKS, 0, 0]
+    os.write(writer, TURN)
+    assert [looked() for _ in range(5)] == [0, 0, 1, 1, 1]
+    os.read(reader, 1)
+    assert [looked() for _ in range(4)] == [LOOKS, 0, LOOKS, 0]
+    os.close(writer)
+    os.close(reader)
 
 
 def test_a_process_that_does_not_answer_is_found_at_its_deadline(worker):

@@ -60,6 +60,20 @@ def test_a_star_matches_dots_and_brackets(result, pattern, places):
     assert result.signals(pattern) == [list(result)[place] for place in places]
 
 
+def test_a_result_is_shown_as_what_ran_and_its_kpis(result):
+    assert repr(result) == "Result: 2 rows of 5 signals, 0 s to 0.01 s"
+    kpis = {"landing.lateral_error": 0.05, "landing.landed_at_end": True, "landing.bounces": 2}
+    about = {"name": "demo", "failure": "uav: fmi2DoStep failed", "kpi_units": {"landing.lateral_error": "m"}}
+    assert repr(Result(result.recording, kpis, metadata=about)).splitlines() == [
+        "demo: 2 rows of 5 signals, 0 s to 0.01 s",
+        "ended early: uav: fmi2DoStep failed",
+        "  landing.lateral_error  0.05 m",
+        "  landing.landed_at_end  True",
+        "  landing.bounces        2",
+    ]
+    assert repr(Result(Recording.empty())) == "Result: 0 rows of 0 signals"
+
+
 def test_csv_keeps_every_signal(result, tmp_path):
     result.to_csv(tmp_path / "result.csv")
     returned = Result.from_csv(str(tmp_path / "result.csv"))

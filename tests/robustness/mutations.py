@@ -53,7 +53,7 @@ def _drop(draw: Callable[..., Any], document: Any, path: Path_) -> None:
 
 
 def _replace(draw: Callable[..., Any], document: Any, path: Path_) -> None:
-    at(document, path[:-1])[path[-1]] = draw(VALUES)
+    at(document, path[:-1])[path[-1]] = copy.deepcopy(draw(VALUES))  # what is changed next must not be the list in TELLING
 
 
 def _rename(draw: Callable[..., Any], document: Any, path: Path_) -> None:

@@ -1,5 +1,10 @@
 """The life cycle around the steps: events, observers, failures, cleaning up."""
 
+import ctypes
+import platform
+import struct
+import sys
+from contextlib import contextmanager
 from fractions import Fraction
 
 import pytest
@@ -8,6 +13,8 @@ from helpers import end, run, system
 
 from cosim.component import StepResult, Variable
 from cosim.errors import ComponentError, InputError
+from cosim.float_mode import changed, traps
+from cosim.fmi import FmuFile, instantiate
 from cosim.simulate import Event, Settings, simulate
 from cosim.timing import exact
 
@@ -115,3 +122,49 @@ def test_observers_see_progress_and_the_end():
     assert seen[0] == (0, 1000)
     assert seen[-1] == (1000, 1000)
     assert len(seen) == 101
+
+
+def flush_small_numbers(library):
+    """Sets two bits of SSE's control word, which lies at byte 28 of Linux's fenv_t."""
+    environment = ctypes.create_string_buffer(512)
+    library.fegetenv(environment)
+    (mode,) = struct.unpack_from("I", environment, 28)
+    struct.pack_into("I", environment, 28, mode | 0x8040)
+    library.fesetenv(environment)
+
+
+def round_up(library):
+    library.fesetround(0x0800)
+
+
+def trap_division_by_zero(library):
+    library.feenableexcept(0x04)
+
+
+@contextmanager
+def floating_point_mode(change):
+    """As left behind by libraries that change it for good when they are imported."""
+    library, before = ctypes.PyDLL(None), ctypes.create_string_buffer(512)
+    library.fegetenv(before)
+    change(library)
+    try:
+        yield
+    finally:
+        library.fesetenv(before)
+
+
+@pytest.mark.skipif((sys.platform, platform.machine()) != ("linux", "x86_64"), reason="numbers of <fenv.h>")
+@pytest.mark.parametrize("change", [flush_small_numbers, round_up, trap_division_by_zero])
+def test_results_do_not_depend_on_the_floating_point_mode_of_the_caller(probe, change):
+    """Nor is a component blamed for it; afterwards the caller has his mode again."""
+
+    def of_a_run():
+        built = system({"a": instantiate(FmuFile(probe), "a")}, start_values={"a": {"u": 1 / 3}})
+        return run(built, 1, "1/10", ["a.y"]).columns["a.y"].tobytes()
+
+    usual = of_a_run()
+    with floating_point_mode(change):
+        mode = changed(), traps()
+        assert of_a_run() == usual
+        assert (changed(), traps()) == mode != (False, 0)
+    assert (changed(), traps()) == (False, 0)
