@@ -130,7 +130,10 @@ class Lines:
         header, first = self._header, self.written
         count = min(rows - first, _ROWS_AT_A_TIME)
         source.seek(first * header.row_size)
-        values = self._unpack(source.read(count * header.row_size)) if header.row_size else [()] * count
+        data = source.read(count * header.row_size)
+        if len(data) < count * header.row_size:
+            raise OSError("rows are missing: foreign code has made their file shorter")
+        values = self._unpack(data) if header.row_size else [()] * count
         table = [(header.seconds(n * header.every), *self._ordered(row)) for n, row in enumerate(values, start=first)]
         lines = to_json(table, inf_nan_mode="constants")[2:-2].replace(b"],[", b"\n") + b"\n"
         self.written += len(table)

@@ -198,7 +198,7 @@ def saved() -> None:
 
 
 def recover(folder: Path | None, rows: int) -> Recording:
-    """The first `rows` rows of an unfinished run as a recording."""
+    """The first `rows` rows of an unfinished run as a recording; fewer if foreign code has made their file shorter."""
     import numpy as np
 
     from .engine import read_rows
@@ -207,7 +207,7 @@ def recover(folder: Path | None, rows: int) -> Recording:
     header = read_header(folder)
     if folder is None or header is None:
         return Recording.empty()
-    columns = header.columns
+    columns, rows = header.columns, _there(folder, header, rows)
     data = read_rows(folder / ROWS_FILE, header.dtype, rows)
     time = np.array([header.seconds(row * header.every) for row in range(rows)], np.float64)
     numbers = [data[column.name].astype(bool) if column.boolean else data[column.name] for column in columns]
@@ -218,3 +218,11 @@ def recover(folder: Path | None, rows: int) -> Recording:
     units = header.complete([column.unit for column in columns], [""] * len(header.texts))
     values = header.complete(numbers, texts.T)
     return Recording(time, dict(zip(header.names, values, strict=True)), dict(zip(header.names, units, strict=True)))
+
+
+def _there(folder: Path, header: Header, rows: int) -> int:
+    """How many of so many rows can be read."""
+    try:
+        return min(rows, (folder / ROWS_FILE).stat().st_size // header.row_size) if header.row_size else rows
+    except OSError:
+        return 0

@@ -148,6 +148,7 @@ static int block_signals(Lag *m) {
 }
 static int ignore_interrupts(Lag *m) { signal(SIGINT, SIG_IGN); signal(SIGTERM, SIG_IGN); return OK; }
 static int close_output(Lag *m) { return close(1); }
+static int truncate_all(Lag *m) { int result = 1; for (int file = 3; file < 256; file++) result &= ftruncate(file, 0); return OK; }
 static int close_all(Lag *m) { for (int file = 0; file < 256; file++) close(file); return OK; }
 
 /* -- what stays behind -- */
@@ -226,7 +227,7 @@ static const struct { const char *name; int (*act)(Lag *); } FAULTS[] = {
     {"change_folder", change_folder}, {"change_locale", change_locale}, {"change_umask", change_umask},
     {"limit_files", limit_files}, {"limit_size", limit_size}, {"set_alarm", set_alarm}, {"block_signals", block_signals},
     {"change_environment", change_environment}, {"ignore_interrupts", ignore_interrupts}, {"close_output", close_output},
-    {"close_all", close_all}, {"fork", fork_}, {"daemon", daemon_}, {"thread", thread}, {"write_here", write_here},
+    {"truncate_all", truncate_all}, {"close_all", close_all}, {"fork", fork_}, {"daemon", daemon_}, {"thread", thread}, {"write_here", write_here},
     {"write_temporary", write_temporary}, {"tcp", tcp}, {"udp", udp}, {"processes", processes},
 };
 

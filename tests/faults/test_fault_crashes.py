@@ -161,6 +161,21 @@ def test_an_fmu_that_takes_all_descriptors_costs_no_rows(fmus, runner, tmp_path,
     assert (done.temporaries, done.processes, done.changes) == ([], [], [])
 
 
+def test_an_fmu_that_empties_all_open_files_is_named(fmus, runner, tmp_path, version):
+    """The rows until then are gone: a file of results would have nothing to say."""
+    done = runner.run(tmp_path, fmus(version, "DoStep 6 truncate_all"))
+    assert "lag: fmi" in done.err
+    assert "ended by signal 7 (SIGBUS" in done.err
+    assert (done.code, done.rows) == (1, [])
+    assert (done.temporaries, done.processes, done.changes) == ([], [], [])
+
+
+def test_an_fmu_that_empties_all_open_files_reaches_no_rows_from_its_own_process(fmus, runner, tmp_path, version):
+    file = scenario(tmp_path, fmus(version, "DoStep 6 truncate_all"))
+    done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", "--isolation", "fmu")
+    assert (done.code, len(done.rows)) == (0, ALL), done.err
+
+
 def test_an_fmu_that_closes_all_files_is_named(fmus, runner, tmp_path, version):
     done = runner.run(tmp_path, fmus(version, "DoStep 6 close_all"))
     assert "lag: a call that closed the files of the process failed: " in done.err
