@@ -71,7 +71,7 @@ class World(Component):
         self._flags = np.zeros((len(read.vehicles), 2), _FLAG)
         self._flags_data = self._flags.reshape(-1).data
         self._bound_inputs: dict[str, np.ndarray] = {}
-        self._client = connect()
+        self._client, self._disconnect = connect(self)
         try:
             self._populate(read)
         except BaseException:
@@ -225,9 +225,7 @@ class World(Component):
     def terminate(self) -> None: ...
 
     def free(self) -> None:
-        if self._client >= 0:
-            pybullet.disconnect(self._client)
-            self._client = -1
+        self._disconnect()
 
     # -- state ---------------------------------------------------------------------------------------------------------
 
@@ -239,7 +237,7 @@ class World(Component):
         self._surroundings.block[:] = state.surroundings
 
     def free_state(self, state: State) -> None:
-        if self._client >= 0:
+        if self._disconnect.alive:
             self._fleet.free_state(state.fleet)
 
 

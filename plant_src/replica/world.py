@@ -18,7 +18,7 @@ from cosim.errors import ComponentError, InputError, Problem, did_you_mean
 
 from .. import arguments
 from ..arguments import Platform
-from ..bullet import pybullet
+from ..bullet import connect, pybullet
 from ..scene import replay
 from ..shadow import LARGEST_STATE, compound, set_dynamics
 from ..vehicles.ar_drone.parameters import GRAVITY
@@ -67,7 +67,7 @@ class World(Component):
         self._name, self._sub_steps, self._step_size = instance_name, sub_steps, math.nan
         self._inputs, self._outputs = np.zeros(len(INPUTS)), np.zeros(len(OUTPUTS))
         self._bound_inputs, self._bound_outputs = np.zeros(len(INPUTS)), np.zeros(len(OUTPUTS))
-        self._client = pybullet.connect(pybullet.DIRECT)
+        self._client, self._disconnect = connect(self)
         try:
             self._populate(spawns, boxes)
         except BaseException:
@@ -161,9 +161,7 @@ class World(Component):
     def terminate(self) -> None: ...
 
     def free(self) -> None:
-        if self._client >= 0:
-            pybullet.disconnect(self._client)
-            self._client = -1
+        self._disconnect()
 
     # -- state ---------------------------------------------------------------------------------------------------------
 

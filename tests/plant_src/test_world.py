@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 from typing import Any
 
@@ -106,6 +107,15 @@ def test_a_refused_world_leaves_no_client_behind() -> None:
 def test_a_freed_world_leaves_no_client_behind() -> None:
     clients = [pybullet.isConnected(k) for k in range(20)]
     World("plant", {"uav": UAV}).free()
+    assert [pybullet.isConnected(k) for k in range(20)] == clients
+
+
+def test_a_world_that_nobody_has_any_more_leaves_no_client_behind() -> None:
+    """As in a notebook: a scenario was loaded and not run."""
+    gc.collect()
+    clients = [pybullet.isConnected(k) for k in range(20)]
+    Trial({"uav": UAV}).step(3)
+    gc.collect()
     assert [pybullet.isConnected(k) for k in range(20)] == clients
 
 
