@@ -24,6 +24,7 @@ static void set_float_state(unsigned state) { fesetround((int)state); }
 #endif
 
 enum { WARNING = 1, DISCARD = 2 };                      /* FMI statuses; OK is 0, everything else is bad */
+enum { AFTER_STEP = 1, WITHOUT_STEP = 2 };              /* the simulation ends with this macro step, or with the one before */
 /* what is reported beside FMI statuses, and an exception of Python: no FMU can return these, whatever it returns */
 static const int64_t FLOAT_STATE_CHANGED = INT64_C(1) << 33, NOT_FINITE = INT64_C(1) << 34, RAISED = INT64_MIN;
 enum { TRIALS = 3 };                                    /* so often the duration of a doStep is measured */
@@ -102,7 +103,7 @@ typedef struct {
     uint32_t *references;       /* of the usual turns */
     int packed;
     PyThreadState *thread;      /* while the interpreter lock is released */
-    int stop;                   /* a component asked to end the simulation after this macro step */
+    long end;                   /* whether a component asked to end the simulation, and when */
 } Program;
 
 /* ---- values ---------------------------------------------------------------------------------------------------------- */
@@ -199,14 +200,15 @@ static void leave_python(Program *p) { p->thread = PyEval_SaveThread(); }
 
 static inline int is_bad(int64_t status) { return status != 0 && status != WARNING; }
 
-/* Tell Python; returns -1 with an exception set when the run has failed. */
+/* Tell Python; returns -1 with an exception set when the run has failed. Otherwise the turn goes on. */
 static int report(Program *p, int number, int64_t status) {
     enter_python(p);
-    PyObject *end = PyObject_CallFunction(p->on_status, "iL", number, (long long)status);
-    if (end && PyObject_IsTrue(end)) p->stop = 1;
-    Py_XDECREF(end);
+    PyObject *answer = PyObject_CallFunction(p->on_status, "iL", number, (long long)status);
+    long end = answer ? PyLong_AsLong(answer) : -1;
+    if (end > p->end) p->end = end;
+    Py_XDECREF(answer);
     leave_python(p);
-    return end ? 0 : -1;
+    return end < 0 ? -1 : 0;
 }
 
 static int64_t nanoseconds(void) {
@@ -271,14 +273,14 @@ static int float_state_changed(Program *p, int number) {
     return report(p, number, FLOAT_STATE_CHANGED);
 }
 
-/* The operations of one turn, one after the other, until one ends it. */
+/* The operations of one turn, one after the other. */
 static int turn(Program *p, Operation *op, const Operation *end, double time) {
     for (; op < end; op++) {
         p->marker[0] = op->number;
         int64_t status = call(p, op, time);
         if (status == RAISED) return -1;
         if (float_state() != p->float_state && float_state_changed(p, op->number) < 0) return -1;
-        if (is_bad(status)) return report(p, op->number, status);
+        if (is_bad(status) && report(p, op->number, status) < 0) return -1;
     }
     return 0;
 }
@@ -295,21 +297,21 @@ static inline int usual_turn(Program *p, const UsualTurn *t, double time) {
     marker[0] = t->number;
     int status = two ? ((Access2 *)t->set)(t->instance, t->set_references, t->set_count, t->set_values)
                      : ((Access3 *)t->set)(t->instance, t->set_references, t->set_count, t->set_values, t->set_size);
-    if (is_bad(status)) return bad(p, t->number, status);
+    if (is_bad(status) && bad(p, t->number, status) < 0) return -1;
     marker[0] = t->number + 1;
     if (two) {
         status = ((Step2 *)t->step)(t->instance, time, t->step_size, 1);
     } else {
         bool *flags = t->memory->flags;
         status = ((Step3 *)t->step)(t->instance, time, t->step_size, true, flags, flags + 1, flags + 2, t->memory->reached);
-        if (!is_bad(status) && (flags[0] | flags[1] | flags[2])) return bad(p, t->number + 2, DISCARD);
+        if (!is_bad(status) && (flags[0] | flags[1] | flags[2]) && bad(p, t->number + 2, DISCARD) < 0) return -1;
     }
-    if (is_bad(status)) return bad(p, t->number + 1, status);
+    if (is_bad(status) && bad(p, t->number + 1, status) < 0) return -1;
     const int last = t->number + (two ? 2 : 3);
     marker[0] = last;
     status = two ? ((Access2 *)t->get)(t->instance, t->get_references, t->get_count, t->get_values)
                  : ((Access3 *)t->get)(t->instance, t->get_references, t->get_count, t->get_values, t->get_size);
-    if (is_bad(status)) return bad(p, last, status);
+    if (is_bad(status) && bad(p, last, status) < 0) return -1;
     return float_state() == p->float_state ? 0 : float_state_changed(p, t->number + 1);
 }
 
@@ -450,10 +452,11 @@ static int look_for_signals(Program *p) {
 static int run_steps(Program *p, int64_t first, int64_t count, double origin, double stride, double denominator) {
     const int64_t per_look = macro_steps_per_look(p);
     int64_t left = per_look;
-    for (int64_t n = first; n < first + count && !p->stop; n++) {
+    for (int64_t n = first; n < first + count && !p->end; n++) {
         double time = (origin + (double)n * stride) / denominator;
         *p->clock = time;
         if (macro_step(p, n, time) < 0) return -1;
+        if (p->end == WITHOUT_STEP) return 0;
         if (!all_finite(p) && report(p, -1, NOT_FINITE) < 0) return -1;
         if (record(p, n + 1) < 0) return -1;
         p->marker[1] = n + 1;
@@ -471,7 +474,7 @@ static PyObject *run(Program *p, PyObject *arguments) {
     long long first, count;
     double origin, stride, denominator;
     if (!PyArg_ParseTuple(arguments, "LLddd", &first, &count, &origin, &stride, &denominator)) return NULL;
-    p->stop = 0;
+    p->end = 0;
     p->float_state = float_state();
     if (!p->packed && all_measured(p) && pack(p) < 0) return NULL;
     leave_python(p);

@@ -2,7 +2,7 @@ from collections.abc import Callable
 from typing import Any
 
 class Program:
-    def __init__(self, clock: int, marker: int, on_status: Callable[[int, int], bool], /) -> None: ...
+    def __init__(self, clock: int, marker: int, on_status: Callable[[int, int], int], /) -> None: ...
     def move(
         self,
         target: int,

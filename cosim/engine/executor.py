@@ -35,10 +35,11 @@ _FLOATS = (np.dtype(np.float64), np.dtype(np.float32))
 
 
 class Termination(NamedTuple):
-    """A component asked to end the simulation."""
+    """A component asked to end the simulation; `complete`: at the end of its step, so that the macro step counts."""
 
     component: str
     time: float
+    complete: bool = True
 
 
 class Executor(ABC):
@@ -130,18 +131,22 @@ class Executor(ABC):
         return again, [self._delays[gather].move for gather in phase.gathers if gather.delay], self._turns_of(phase)
 
     def _iterate(self, rounds: Rounds) -> int:
-        return _TERMINATION if rounds.step(self._clock.value) else 0
+        before = self.termination
 
-    def _take(self, turn: Turn) -> bool:
-        """Take a turn from Python; returns whether the simulation is to end."""
-        for number, call in enumerate(turn.calls, start=turn.first):
+        def try_again() -> None:
+            self.termination = before
+
+        rounds.step(self._clock.value, try_again)
+        return _TERMINATION if self.termination else 0
+
+    def _take(self, turn: Turn, begin: int = 0) -> None:
+        """Take a turn from Python, from one of its calls on."""
+        for number, call in enumerate(turn.calls[begin:], start=turn.first + begin):
             self.marker[CALL] = number
             if (status := call.function(*call.arguments)) not in GOOD:
                 self._bad_status(turn, call, status)
-                break
         if float_mode.changed():
             self._float_state_changed(turn, turn.calls[-1])
-        return self.termination is not None
 
     def _move(self, gather: Gather) -> Move:
         return self._delays[gather].move if gather.delay else copy(gather)
@@ -183,10 +188,11 @@ class Executor(ABC):
     def _side_by_side(self, together: SideBySide) -> int:
         assert self._crew is not None
         endings = [ending for lane in self._crew.run(together.lanes) for ending in lane]
-        for turn, call, status in sorted(endings, key=lambda ending: ending.turn.first):
-            if status is None:
-                self._float_state_changed(turn, call)
-            self._bad_status(turn, call, status)
+        for ending in sorted(endings, key=lambda ending: ending.turn.first):
+            if ending.status is None:
+                self._float_state_changed(ending.turn, ending.call)
+            self._bad_status(ending.turn, ending.call, ending.status)
+            self._take(ending.turn, ending.place + 1)
         return _TERMINATION if self.termination else 0
 
     def _turn_of(self, number: int) -> tuple[Turn, Call]:
@@ -201,9 +207,11 @@ class Executor(ABC):
 
     def _ended_early(self, step: Step, result: StepResult) -> None:
         time = self._clock.value
+        complete = result.time_reached >= time + step.step_size
         if result.terminate_requested:
-            self.termination = self.termination or Termination(step.name, result.time_reached)
-        elif not result.time_reached >= time + step.step_size:
+            if not self.termination or (self.termination.complete and not complete):
+                self.termination = Termination(step.name, result.time_reached, complete)
+        elif not complete:
             reached = f"reached only t = {result.time_reached!r} s of {time + step.step_size!r} s"
             raise ComponentError(step.name, "do_step", f"{reached}; staged stepping needs whole steps", time)
 

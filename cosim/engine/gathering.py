@@ -12,7 +12,7 @@ import numpy as np
 
 from ..component import Variable
 from ..system import Connection, System
-from .layout import Layout, Slot
+from .layout import Dtype, Layout, Slot
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +41,13 @@ class Gathering:
     def __init__(self, system: System, inputs: Layout, signals: Layout):
         self._system, self._inputs, self._signals = system, inputs, signals
         #: (dtype of source, place of target) -> offset of source, for all connections that just copy
-        self._copies: dict[tuple[Any, Slot], int] = {}
+        self._copies: dict[tuple[Dtype, Slot], int] = {}
         for connection in system.connections:
             if not connection.delay and self._conversion(connection) == (1.0, 0.0):
                 source, target = self._ends(connection)
                 self._copies[source.dtype, target] = source.offset
+        #: targets of the phases so far: what they read earlier on purpose is not read again
+        self._read: set[Slot] = set()
 
     def _ends(self, connection: Connection) -> tuple[Slot, Slot]:
         return self._signals.places[connection.source], self._inputs.places[connection.target]
@@ -54,7 +56,9 @@ class Gathering:
         return conversion(self._system.place(connection.source).variable, self._system.place(connection.target).variable)
 
     def gathers(self, connections: Iterable[Connection]) -> Iterator[Gather]:
-        """The gathers of one phase, by dtypes, delay, and with or without conversion."""
+        """The gathers of one phase, by dtypes, delay, and with or without conversion. Phases come in order."""
+        connections = list(connections)
+        self._read |= {self._ends(connection)[1] for connection in connections}
         kinds: dict[tuple[Any, ...], list[Connection]] = defaultdict(list)
         for connection in connections:
             source, target = self._ends(connection)
@@ -68,8 +72,8 @@ class Gathering:
 
     def _special(self, connections: list[Connection], delay: int, converted: bool) -> Gather:
         sources, targets = zip(*map(self._ends, connections), strict=True)
-        factors, offsets = np.array([self._conversion(connection) for connection in connections]).T
-        return self._gather(sources, targets, delay, *((factors, offsets) if converted else ()))
+        both = np.ascontiguousarray(np.transpose([self._conversion(connection) for connection in connections]))
+        return self._gather(sources, targets, delay, *(both if converted else ()))
 
     def _runs(self, connections: list[Connection]) -> Iterator[Gather]:
         """Copies, joined to runs of neighbouring targets.
@@ -82,13 +86,16 @@ class Gathering:
         runs = [[offsets[0]]]
         for before, after in pairwise(offsets):
             gap = range(before + 1, after)
-            if all((source_dtype, Slot(target_dtype, offset)) in self._copies for offset in gap):
+            if all(self._may_be_read_early(source_dtype, Slot(target_dtype, offset)) for offset in gap):
                 runs[-1] += [*gap, after]
             else:
                 runs.append([after])
         for run in runs:
             targets = [Slot(target_dtype, offset) for offset in run]
             yield self._gather([Slot(source_dtype, self._copies[source_dtype, target]) for target in targets], targets)
+
+    def _may_be_read_early(self, source_dtype: Dtype, target: Slot) -> bool:
+        return (source_dtype, target) in self._copies and target not in self._read
 
     def _gather(self, sources: Sequence[Slot], targets: Sequence[Slot], *more: Any) -> Gather:
         return Gather(

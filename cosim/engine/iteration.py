@@ -26,9 +26,9 @@ Round = tuple[Sequence[Move], Sequence[Move], Sequence[Turn]]
 
 
 class Rounds:
-    """The rounds of a loop's macro step; `take` takes a turn and says whether the simulation is to end."""
+    """The rounds of a loop's macro step; `take` takes a turn."""
 
-    def __init__(self, loop: Loop, signals: Layout, phases: Sequence[Round], take: Callable[[Turn], bool]):
+    def __init__(self, loop: Loop, signals: Layout, phases: Sequence[Round], take: Callable[[Turn], None]):
         self._loop, self._phases, self._take = loop, phases, take
         self._components = loop.components
         outputs: dict[Dtype, dict[int, str]] = defaultdict(dict)
@@ -38,8 +38,8 @@ class Rounds:
         self._watched = [(signals.arrays[dtype], list(found)) for dtype, found in outputs.items()]
         self._names = [list(found.values()) for found in outputs.values()]
 
-    def step(self, time: float) -> bool:
-        """The macro step from `time`; returns whether the simulation is to end.
+    def step(self, time: float, try_again: Callable[[], None]) -> None:
+        """The macro step from `time`. Before each further round `try_again` forgets what the components asked for in the last one.
 
         Raises ComponentError when the outputs still change after the last round that is allowed.
         """
@@ -47,13 +47,13 @@ class Rounds:
             states = {name: self._state(name, component, time, stack) for name, component in self._components.items()}
             for number in range(self._loop.iteration.limit):
                 if number:
+                    try_again()
                     self._return_to(states, time)
                 before = self._values()
-                if self._round(first=number == 0):
-                    return True
+                self._round(first=number == 0)
                 moved = [self._moved(old, new) for old, new in zip(before, self._values(), strict=True)]
                 if not any(flags.any() for flags in moved):
-                    return False
+                    return
         raise ComponentError(self._loop.name, "iteration", self._complaint(moved), time)
 
     def _state(self, name: str, component: Component, time: float, stack: ExitStack) -> Any:
@@ -73,14 +73,12 @@ class Rounds:
             with calling(name, "set_state", "step", time):
                 self._components[name].set_state(state)
 
-    def _round(self, first: bool) -> bool:
+    def _round(self, first: bool) -> None:
         for moves, once, turns in self._phases:
             for move in (*moves, *once) if first else moves:
                 move()
             for turn in turns:
-                if self._take(turn):
-                    return True
-        return False
+                self._take(turn)
 
     def _values(self) -> list[np.ndarray]:
         return [array[places] for array, places in self._watched]

@@ -121,16 +121,16 @@ class NativeExecutor(Executor):
         self.recorder.record(n)
         self.marker[ROWS] = self.recorder.rows
 
-    def _on_status(self, number: int, status: int) -> bool:
-        """What a bad status means; returns whether the simulation shall end after this macro step."""
+    def _on_status(self, number: int, status: int) -> int:
+        """What a bad status means; returns 1 when the simulation shall end after this macro step, 2 when it was not finished."""
         if status == _NOT_FINITE:
             self._check_finite()
-            return False
+            return 0
         turn, call = self._turn_of(number)
         if status == _FLOAT_STATE_CHANGED:
             self._float_state_changed(turn, call)
         self._bad_status(turn, call, status)
-        return self.termination is not None
+        return 0 if self.termination is None else 1 if self.termination.complete else 2
 
 
 #: numpy's characters for dtypes -> those of the struct module
@@ -138,6 +138,8 @@ _KINDS = str.maketrans({"l": "q", "L": "Q"})
 
 
 def _address(array: np.ndarray | None) -> int:
+    """Where the values lie, one after the other."""
+    assert array is None or array.flags.c_contiguous
     return 0 if array is None else array.ctypes.data
 
 

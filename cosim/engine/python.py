@@ -96,9 +96,10 @@ class PythonExecutor(Executor):
                     for marker[CALL], function, arguments in calls:
                         if (status := function(*arguments)) and status not in GOOD:
                             self._bad_status(*self._turn_of(marker[CALL]), status)
-                            break
                     if one + little != one - little or not least + least:
                         self._float_state_changed(*self._turn_of(calls[-1][0]))
+            if (termination := self.termination) and not termination.complete:
+                return
             for contents, high in exponents:
                 if 0x7F in (found := contents()[high]) or 0xFF in found:
                     self._check_finite()
@@ -108,7 +109,7 @@ class PythonExecutor(Executor):
                 row += 1
                 marker[ROWS] = row
             marker[STEPS] = n + 1
-            if self.termination:
+            if termination:
                 return
 
 

@@ -22,23 +22,27 @@ class Turn(NamedTuple):
 
 
 class Ending(NamedTuple):
-    """A turn that did not end well: which call, and its status; None: the floating-point mode was changed."""
+    """A turn that stopped: after which of its calls, and its status; None: the floating-point mode was changed."""
 
     turn: Turn
-    call: Call
+    place: int
     status: int | None
+
+    @property
+    def call(self) -> Call:
+        return self.turn.calls[self.place]
 
 
 def take(turns: Sequence[Turn], n: int) -> list[Ending]:
-    """Take the turns that are due in macro step n, one after the other; those that did not end well are returned."""
+    """Take the turns that are due in macro step n, one after the other; those that stopped are returned."""
     return [ending for turn in turns if n % turn.step.divisor == 0 for ending in _take(turn)]
 
 
 def _take(turn: Turn) -> Iterator[Ending]:
-    for call in turn.calls:
+    for place, call in enumerate(turn.calls):
         status = call.function(*call.arguments)
         if status not in GOOD:
-            yield Ending(turn, call, status)
+            yield Ending(turn, place, status)
             break
     if float_mode.changed():
-        yield Ending(turn, turn.calls[-1], None)
+        yield Ending(turn, -1, None)

@@ -9,6 +9,7 @@ from helpers import run, system, wire
 
 from cosim import resources
 from cosim.api import load
+from cosim.component import StepResult
 from cosim.engine import EXECUTORS
 from cosim.errors import ComponentError, InputError
 from cosim.simulate import Settings, simulate
@@ -66,6 +67,20 @@ def test_a_delayed_value_arrives_once_in_a_step_however_many_rounds_it_takes():
     group = Group("all", (("count", "a", "b"),), "auto", TIGHT)
     recording = run(system(parts, "count.y >2 a.u, b.y > a.w, a.y > b.u", [(group,)]), 6, 1, ["a.y"])
     np.testing.assert_allclose(recording.columns["a.y"][1:], np.array([0, 0, 0, 1, 2, 3]) / 0.75, atol=1e-12)
+
+
+@pytest.mark.usefixtures("executor")
+def test_only_the_last_round_may_ask_to_end_the_simulation():
+    """s = 0.8 u and u = 8 - 0.5 s from s = 0: the first guess is u = 8, the solution 8 / 1.4 = 5.7."""
+
+    def step(values, t, h):
+        values["y"] = 8 - 0.5 * values["u"] + t
+        return StepResult(t + h, terminate_requested=values["y"] > 6.5)
+
+    parts = {"s": gain(0.8), "h": Fake([*inputs("u"), *outputs("y")], step)}
+    built = system(parts, "s.y > h.u, h.y > s.u", [(Group("all", (("h",), ("s",)), "auto", TIGHT),)])
+    recording = run(built, 5, 1, ["h.y"])
+    np.testing.assert_allclose(recording.columns["h.y"][1:], (8 + np.arange(3)) / 1.4, atol=1e-11)  # 5.7, 6.4, 7.1: the end
 
 
 @pytest.mark.usefixtures("executor")

@@ -6,10 +6,11 @@ import re
 import numpy as np
 import pytest
 from fakes import Fake, clock, counter, gain, inputs, integrator, outputs
-from helpers import run, system
+from helpers import end, run, system
 
-from cosim.component import Variable
+from cosim.component import StepResult, Variable
 from cosim.errors import ComponentError
+from cosim.simulate import Settings, simulate
 from cosim.system import Group
 from cosim.timing import exact
 from cosim.units import parse
@@ -153,16 +154,25 @@ def test_an_algebraic_loop_in_initialization_is_named():
 
 
 def test_a_step_that_ends_early_is_an_error_that_says_how_far_it_came():
-    from cosim.component import StepResult
-
     short = Fake(outputs("y"), lambda values, t, h: StepResult(t + h / 2))
     with pytest.raises(ComponentError, match=r"a: do_step failed at t = 0 s: reached only t = 0\.5 s of 1\.0 s"):
         run(system({"a": short}), 1, 1)
 
 
-def test_a_step_that_ends_at_no_time_is_an_error():
-    from cosim.component import StepResult
+@pytest.mark.parametrize(("part", "rows"), [(1.0, [0, 1, 2, 3]), (0.5, [0, 1, 2])], ids=["at its end", "within"])
+def test_a_step_in_which_the_simulation_ends_counts_when_it_was_made_to_its_end(part, rows):
+    def step(values, t, h):
+        values["y"] += 1
+        return StepResult(t + part * h, terminate_requested=True) if t == 2 else None
 
+    built = system({"a": Fake(outputs("y"), step), "b": counter()})
+    outcome = simulate(built, Settings(exact(0), exact(9), exact(1), {"a.y": end("a.y"), "b.y": end("b.y")}))
+    assert (outcome.failure, outcome.termination.time) == (None, 2 + part)
+    assert outcome.recording.time.tolist() == rows == outcome.recording.columns["a.y"].tolist()
+    assert outcome.recording.columns["b.y"].tolist() == rows
+
+
+def test_a_step_that_ends_at_no_time_is_an_error():
     lost = Fake(outputs("y"), lambda values, t, h: StepResult(float("nan")))
     with pytest.raises(ComponentError, match="a: do_step failed at t = 0 s: reached only t = nan s"):
         run(system({"a": lost}), 1, 1)

@@ -57,6 +57,7 @@ TABLE = [pytest.param(case, v, id=f"FMI{v} {case.order}") for case in CASES for 
 def test_a_bad_return_stops_the_run_with_one_line_and_keeps_the_rows(fmus, runner, tmp_path, case, version):
     done = runner.run(tmp_path, fmus(version, case.order))
     assert (done.code, len(done.rows)) == (case.code, case.rows), done.err
+    assert [row["lag.y"] for row in done.rows] == [lag_output(n) for n in range(case.rows)]
     assert case.words.format(f=function_name(version, case.order.split()[0])) in done.err
     assert "Traceback" not in done.err
     assert (done.temporaries, done.processes, done.changes) == ([], [], [])
@@ -83,6 +84,19 @@ def test_nothing_is_overlooked_in_the_usual_turn_of_set_step_and_get(fmus, runne
     assert f"lag: {function_name(version, order.split()[0])}{words}" in done.err
 
 
+@pytest.mark.parametrize("isolation", ["run", "fmu"])
+@pytest.mark.parametrize("executor", ["python", "native"])
+@pytest.mark.parametrize("what", ["event", "terminate"])
+def test_outputs_are_read_after_a_step_with_a_flag_too(fmus, runner, tmp_path, what, executor, isolation):
+    """An event that nobody handles here; or the wish to end, said in the last step."""
+    file = scenario(tmp_path, fmus(3, f"DoStep 6 {what}"))
+    words = ("run", file, "--output-dir", "out", "--no-report", "--isolation", isolation)
+    done = runner.cosim(tmp_path, *words, executor=executor)
+    assert done.code == 0, done.err
+    count = {"event": COUNT + 1, "terminate": 7}[what]
+    assert [row["lag.y"] for row in done.rows] == [lag_output(n) for n in range(count)]
+
+
 @pytest.mark.parametrize("what", ["hundred", "negative"])
 def test_the_other_executor_takes_no_other_status_for_a_good_one(fmus, runner, tmp_path, version, what):
     done = runner.run(tmp_path, fmus(version, f"DoStep 6 {what}"), executor="python")
@@ -99,10 +113,11 @@ def test_an_fmu_that_does_not_say_how_far_a_discarded_step_came(fmus, runner, tm
 
 
 def test_an_fmu_that_terminates_may_say_nothing_of_the_time(fmus, runner, tmp_path):
+    """Then nobody knows what its outputs would belong to: the step does not count."""
     fmu = fmus(2, "GetRealStatus 1 discard")
     words = ("run", scenario(tmp_path, fmu), "--output-dir", "out", "--no-report", "--set", "lag.fault=DoStep 6 terminate")
     done = runner.cosim(tmp_path, *words)
-    assert (done.code, len(done.rows)) == (0, 7), done.err
+    assert (done.code, len(done.rows)) == (0, 6), done.err
 
 
 def test_a_deadline_may_be_longer_than_can_be_counted(fmus, runner, tmp_path, version):

@@ -153,21 +153,18 @@ class RemoteFmu(Component):
             target[:] = source
         self._command = "turn"
         answer = self._request(TURN)
-        if answer != DONE:
-            return self._ended_early(self._value(answer))
+        result = None if answer == DONE else self._value(answer)
         for target, source in self._out:
             target[:] = source
-        return OK
+        return OK if result is None else self._ended_early(result)
 
     def _turn_with_texts(self, clock: ctypes.c_double) -> int:
         self._clock.value = clock.value
         self._copy_inputs()
         result, found = self._ask("turn", self._texts_in.tolist())
-        if result:
-            return self._ended_early(result)
         self._copy_outputs()
         self._texts_out[:] = found
-        return OK
+        return self._ended_early(result) if result else OK
 
     def _ended_early(self, result: Sequence[Any]) -> int:
         self._result = StepResult(*result)

@@ -111,16 +111,16 @@ class Worker:
 
     def _turn(self) -> StepResult | None:
         marker, traps = self._block.marker, float_mode.traps
-        # equal in the default rounding mode only, and the least denormal is no zero only if it is not flushed
-        one, little, least = 1.0, 2.0**-54, 5e-324
+        one, little, least = float_mode.PROBE
+        result = None
         for number, function, arguments, steps, call in self._calls:
             marker[CALL] = number
             status = function(*arguments)
             if status and status not in GOOD:
-                return self._instance.failed(call.name, status)
+                result = self._instance.failed(call.name, status)
             if one + little != one - little or not least + least or (steps and traps()):
                 raise ComponentError(self._instance.name, call.name, float_mode.REASON, self._block.clock.value)
-        return None
+        return result
 
     # -- states stay here ----------------------------------------------------------------------------------------------
 
