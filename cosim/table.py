@@ -19,6 +19,9 @@ from .paths import open_text
 
 Interpolation = Literal["linear", "hold"]
 
+#: units in the last place by which a time and a sum of two others may differ
+_ROUNDING = 4
+
 
 class Table(Component):
     """Columns over time (s); before the first and after the last row the nearest row holds.
@@ -53,7 +56,10 @@ class Table(Component):
     def set_inputs(self) -> None: ...
 
     def do_step(self, time: float, step_size: float) -> None:
-        self._now = time + step_size
+        """To the end of the step; if only rounding keeps that from being a row's time, it is the row's."""
+        now = time + step_size
+        row = int(np.searchsorted(self._time, now + _ROUNDING * np.spacing(max(abs(time), abs(now))), side="right")) - 1
+        self._now = max(now, float(self._time[row])) if row >= 0 else now
 
     def get_outputs(self) -> None:
         for i, column in enumerate(self._rows):
@@ -93,6 +99,7 @@ def read_table(path: Path, columns: Sequence[str], interpolation: Interpolation,
         for name in columns
         if name not in header[1:]
     ]
+    problems += [Problem(f'profile "{path}" has several columns "{name}"', where) for name in columns if header[1:].count(name) > 1]
     if header[:1] != ["time"]:
         problems.append(Problem(f'the first column of profile "{path}" must be "time", found "{(header or [""])[0]}"', where))
     try:

@@ -39,7 +39,7 @@ class Rounds:
         self._names = [list(found.values()) for found in outputs.values()]
 
     def step(self, time: float, try_again: Callable[[], None]) -> None:
-        """The macro step from `time`. Before each further round `try_again` forgets what the components asked for in the last one.
+        """The macro step from `time`; `try_again` forgets what components asked for in a round that is not the last one.
 
         Raises ComponentError when the outputs still change after the last round that is allowed.
         """

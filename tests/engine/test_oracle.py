@@ -87,22 +87,18 @@ class Oracle:
 
     def stages(self, stages, inside, n):
         for stage in stages:
+            groups = [set(members(member.stages)) for member in stage if isinstance(member, Group)]
             for connection in self.system.connections:
-                if connection.target.component in members([stage]) and connection.source.component in inside:
-                    if not any(self.within(member, connection) for member in stage):
-                        self.read(connection)
+                ends = {connection.source.component, connection.target.component}
+                reads_now = connection.target.component in members([stage]) and connection.source.component in inside
+                if reads_now and not any(ends <= group for group in groups):
+                    self.read(connection)
             for member in stage:
                 if not isinstance(member, Group):
                     self.step(member, n)
             for member in stage:
                 if isinstance(member, Group):
                     self.stages(member.stages, set(members(member.stages)), n)
-
-    @staticmethod
-    def within(member, connection):
-        return isinstance(member, Group) and {connection.source.component, connection.target.component} <= {
-            *members(member.stages)
-        }
 
     def read(self, connection):
         source, target = connection.source.component, connection.target.component
