@@ -53,7 +53,8 @@ class Variable:
 
     `type` is an FMI 3.0 type name (FMI 2.0 Real is Float64, Integer is Int32). `shape` is () for a scalar; an array
     occupies consecutive slots in row-major order. `dtype` is how a value lies in memory; it differs from the usual one
-    of the type only where FMI 2.0 demands it (Boolean and Enumeration are C int there).
+    of the type only where FMI 2.0 demands it (Boolean and Enumeration are C int there). `items` are the names and values of an
+    enumeration; a `relative` quantity is a difference, to which the offset of a unit does not apply.
     """
 
     name: str
@@ -66,6 +67,8 @@ class Variable:
     description: str = ""
     minimum: float | None = None
     maximum: float | None = None
+    items: tuple[tuple[str, int], ...] = ()
+    relative: bool = False
     dtype: np.dtype[Any] = field(default=None)  # type: ignore[arg-type]
 
     def __post_init__(self) -> None:

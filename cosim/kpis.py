@@ -97,7 +97,7 @@ def itae(result: Result, signal: str, target: Target = 0.0, start: float = -FORE
 def energy(result: Result, effort: str, flow: Target = 1.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
     """Integral of effort times flow (J): of force (N) and speed (m/s), torque (N.m) and rate (rad/s), or of a power (W) alone."""
     rows = _rows(result, start, stop)
-    power = result[effort] * (result[flow] if isinstance(flow, str) else flow)
+    power = result[effort].astype(np.float64) * (result[flow] if isinstance(flow, str) else flow)
     return {"value": _integral(result.time[rows], power[rows])}
 
 
@@ -114,6 +114,8 @@ def saturation_share(
     rows = _rows(result, start, stop)
     time, values = result.time[rows], result[signal][rows]
     if len(time) < 2 or time[-1] == time[0]:
+        return {"value": math.nan}
+    if np.isnan(values).any():
         return {"value": math.nan}
     saturated = (values <= lower) | (values >= upper)
     return {"value": float(np.diff(time) @ saturated[:-1] / (time[-1] - time[0]))}
@@ -176,12 +178,12 @@ def settling_time(
 ) -> dict[str, float]:
     """Time (s) from the first row until a step response stays within `band` times its way (see `rise_time`) of its target.
 
-    NaN when the last row is outside.
+    NaN when the last row is outside, or when a row is not a number.
     """
     time, share = _step(result, signal, start, stop, initial, target)
     away = np.abs(share - 1)
-    outside = np.flatnonzero(away > band)
-    if not share.size or away[-1] > band:
+    outside = np.flatnonzero(~(away <= band))
+    if not share.size or np.isnan(away).any() or away[-1] > band:
         return {"value": math.nan}
     if not outside.size:
         return {"value": 0.0}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import inspect
+import operator
 import sys
 from collections.abc import Callable, Mapping
 from hashlib import sha256
@@ -19,6 +20,7 @@ from pythonfmu.variables import Boolean, Integer, Real, ScalarVariable, String
 from . import log
 from .component import Component, Ports, Variable
 from .errors import ComponentError, InputError, Problem, did_you_mean, told
+from .memento import remember
 from .paths import is_file, real
 from .units import parse
 
@@ -26,10 +28,40 @@ _TYPES = {Real: "Float64", Integer: "Int32", Boolean: "Boolean", String: "String
 _CASTS: Mapping[str, Callable[[Any], Any]] = {"Float64": float, "Int32": int, "Boolean": bool, "String": str}
 
 
+def _number(value: Any) -> float:
+    if isinstance(value, str | bytes):
+        raise TypeError
+    return float(value)
+
+
+def _truth(value: Any) -> bool:
+    if isinstance(value, np.bool_):
+        return bool(value)
+    if operator.index(value) not in (0, 1):
+        raise ValueError
+    return bool(value)
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError
+    return value
+
+
+#: what an output of a type is as a rule, and what else becomes one without loss
+_ACCEPTED: Mapping[str, tuple[type, Callable[[Any], Any]]] = {
+    "Float64": (float, _number),
+    "Int32": (int, operator.index),
+    "Boolean": (bool, _truth),
+    "String": (str, _text),
+}
+
+
 class PythonSlave(Component):
     """A `pythonfmu.Fmi2Slave` that runs in process, without export.
 
-    Its state is what it registered as variables, as in an exported FMU.
+    Its state is all that it holds (see `memento`), or what its own `_get_fmu_state` says. An exported FMU by PythonFMU saves the
+    registered variables alone.
     """
 
     binds_everything = False
@@ -40,8 +72,9 @@ class PythonSlave(Component):
         self._registered: dict[str, ScalarVariable] = {v.name: v for v in slave.vars.values()}
         self.variables = [_variable(v) for v in slave.vars.values()]
         self._setters: list[tuple[Callable[[Any], None], np.ndarray, int]] = []
-        self._getters: list[tuple[str, Callable[[], Any], np.ndarray, int]] = []
+        self._getters: list[tuple[str, Callable[[], Any], type, Callable[[Any], Any], np.ndarray, int]] = []
         self._types = {variable.name: variable.type for variable in self.variables}
+        self._has_own_states = type(slave)._get_fmu_state is not Fmi2Slave._get_fmu_state
 
     def set(self, name: str, value: Any) -> None:
         registered = self._registered[name]
@@ -61,7 +94,7 @@ class PythonSlave(Component):
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         self._setters = [(self._registered[v.name].setter, *place) for v, place in _places(inputs)]
-        self._getters = [(v.name, self._registered[v.name].getter, *place) for v, place in _places(outputs)]
+        self._getters = [(v.name, self._registered[v.name].getter, *_ACCEPTED[v.type], *place) for v, place in _places(outputs)]
 
     def set_inputs(self) -> None:
         self._guard("set_inputs", self._set_all)
@@ -80,18 +113,18 @@ class PythonSlave(Component):
         self._guard("get_outputs", self._get_all)
 
     def _get_all(self) -> None:
-        for name, getter, array, index in self._getters:
+        for name, getter, kind, accept, array, index in self._getters:
             value = getter()
             try:
-                array[index] = value
-            except (TypeError, ValueError):
+                array[index] = value if value.__class__ is kind else accept(value)
+            except (TypeError, ValueError, OverflowError):
                 raise TypeError(f'output "{name}" is {value!r}, expected a value of type {self._types[name]}') from None
 
     def get_state(self) -> Any:
-        return self._slave._get_fmu_state()
+        return self._slave._get_fmu_state() if self._has_own_states else remember(self._slave, {"vars", "log_queue"})
 
     def set_state(self, state: Any) -> None:
-        self._slave._set_fmu_state(state)
+        self._slave._set_fmu_state(state) if self._has_own_states else state()
 
     def free_state(self, state: Any) -> None: ...
 

@@ -190,9 +190,9 @@ def incompatibility(source: Variable, target: Variable) -> str:
 def _converts(source: Variable, target: Variable) -> bool:
     if source.type == target.type:
         return source.type != "Clock"
-    integral = INTEGERS | {"Enumeration"}
     if target.type in FLOATS:
-        return source.type in FLOATS | integral
+        exact = source.type in INTEGERS and source.dtype.itemsize < target.dtype.itemsize
+        return source.type in FLOATS or source.type == "Enumeration" or exact
     if source.type == "Enumeration":  # its values are small, whatever their type
         return target.type in ("Int32", "Int64")
     if target.type == "Enumeration":

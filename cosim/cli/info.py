@@ -52,6 +52,7 @@ def _list(causality: str, variables: list[Variable]) -> None:
         dimensions = f"[{','.join(map(str, variable.shape))}]" if variable.shape else ""
         unit = variable.unit.name if variable.unit else "-"
         start = "" if variable.start is None else f" = {_shortened(variable.start)}"
+        start += "".join(f", {number}: {name}" for name, number in variable.items).replace(", ", "; ", 1)
         click.echo(f"  {variable.name:{width}} {variable.type + dimensions:12} {unit:8} {variable.description}{start}".rstrip())
 
 

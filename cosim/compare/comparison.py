@@ -168,10 +168,11 @@ class Comparer:
             yield Verdict(name, f"is {values[row]} at t = {time[row]:g} s in the {who}", float(time[row]))
 
     def _texts(self, name: str) -> Verdict:
-        """Texts hold until the next row; at the reference's rows they have to be equal."""
-        time, expected = self._reference.time, self._reference[name]
-        rows = np.searchsorted(self._result.time, time + slack(time), "right") - 1
-        found = self._result[name][rows]
+        """Texts hold until the next row; at the rows of both they have to be equal."""
+        own, other = self._result.time, self._reference.time
+        covered = own[(own >= other[0] - slack(other)) & (own <= other[-1] + slack(other))]
+        time = np.union1d(covered, other)
+        found, expected = (_held(run, name, time) for run in (self._result, self._reference))
         different = np.flatnonzero(found != expected)
         if not different.size:
             return Verdict(name, excess=-math.inf)
@@ -209,6 +210,11 @@ class Comparer:
 
 def _numbers(run: Result, name: str) -> np.ndarray:
     return run[name].astype(np.float64, copy=False)
+
+
+def _held(run: Result, name: str, time: np.ndarray) -> np.ndarray:
+    """Texts at these times."""
+    return run[name][np.searchsorted(run.time, time + slack(time), "right") - 1]
 
 
 def _relative(distance: float, half_width: float) -> float:

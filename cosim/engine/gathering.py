@@ -29,10 +29,14 @@ class Gather:
 
 
 def conversion(source: Variable, target: Variable) -> tuple[float, float]:
-    """(factor, offset) from the source's unit to the target's; (1.0, 0.0) where one of them has no unit."""
+    """(factor, offset) from the source's unit to the target's; (1.0, 0.0) where one of them has no unit.
+
+    Differences have no offset (FMI 2.0 section 2.2.3, FMI 3.0 section 2.4.4: relativeQuantity).
+    """
     if source.unit is None or target.unit is None:
         return 1.0, 0.0
-    return source.unit.conversion(target.unit)
+    factor, offset = source.unit.conversion(target.unit)
+    return factor, 0.0 if source.relative or target.relative else offset
 
 
 class Gathering:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..component import Variable
 from ..timing import exact
-from ..units import BASE, Unit
+from ..units import BASE, Unit, parse
 from .preflight import LIMITS, Examination, Limits, examine, refuse
 from .preflight.binary import platforms
 from .preflight.model import Model, ModelVariable, UnitDefinition
@@ -93,6 +93,8 @@ def describe(path: Path, examination: Examination) -> Description:
 def _unit(definition: UnitDefinition) -> Unit | None:
     base = definition.base
     if base is None:
+        with suppress(ValueError):  # FMI leaves open what it means; as a rule what its name says
+            return parse(definition.name)
         return None
     exponents = tuple(int(base.get(name, 0)) for name in BASE)
     return Unit(definition.name, exponents, float(base.get("factor", 1)), float(base.get("offset", 0)))
@@ -118,6 +120,8 @@ def _variables(model: Model, source: ModelVariable, units: Mapping[str, Unit | N
             text or texts[0] or "",
             _limit(source, "min"),
             _limit(source, "max"),
+            _items(source),
+            source.attribute("relativeQuantity") in _TRUE,
             _C_INT if as_c_int else None,  # type: ignore[arg-type]
         )
         for name, text in zip(_names(source), texts, strict=True)
@@ -131,6 +135,12 @@ def _start(source: ModelVariable) -> Any:
     texts = source.kind in ("String", "Binary", "Clock")
     values = [word if texts else value(word, source.kind) for word in source.starts]
     return values[0] if len(values) == 1 else tuple(values)
+
+
+def _items(source: ModelVariable) -> tuple[tuple[str, int], ...]:
+    if source.kind != "Enumeration" or source.declared is None:
+        return ()
+    return tuple((name, int(text)) for name, text in source.declared.items)
 
 
 def _limit(source: ModelVariable, name: str) -> float | None:

@@ -97,12 +97,14 @@ class Assembler:
         for name, value in self.outside.items():
             self._assign(self.start_values, self.root, name, value, f'setting "{name}"')
 
-    def _assign(self, values: dict[str, dict[str, Any]], node: Node, name: str, value: Any, where: str) -> None:
+    def _assign(
+        self, values: dict[str, dict[str, Any]], node: Node, name: str, value: Any, where: str, whole: bool = False
+    ) -> None:
         try:
             for target in resolve(node, name, ("parameters", "inputs"), hidden=True):
                 if target.component in self.components:
                     variables = self._variables(target.component)
-                    values[target.component] |= assign(target.component, variables, target.prefix, value)
+                    values[target.component] |= assign(target.component, variables, target.prefix, value, whole)
         except (Unknown, ValueError) as error:
             if str(error):
                 self.problems.append(Problem(str(error), where))
@@ -166,6 +168,9 @@ class Assembler:
         for node in self.root.walk():
             for name, child in node.children.items():
                 for port, inner in child.spec.ports.outputs.items():  # type: ignore[attr-defined]
+                    if port in child.spec.components:
+                        text = f'"{port}" is the name of a component here: it cannot be that of an output port, too'
+                        self.problems.append(Problem(text, child.where("ports", "outputs", port)))
                     try:
                         (target,) = resolve(child, inner, ("outputs",))
                     except Unknown as error:
@@ -196,7 +201,7 @@ class Assembler:
         for i, spec in kept(self.spec.events):
             values: dict[str, dict[str, Any]] = defaultdict(dict)
             for name, value in spec.values.items():
-                self._assign(values, self.root, name, value, self.root.where("events", i, "set", name))
+                self._assign(values, self.root, name, value, self.root.where("events", i, "set", name), whole=True)
             yield Event(spec.time, values, self.root.where("events", i))
 
     def _check_functions(self) -> None:

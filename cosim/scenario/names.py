@@ -9,6 +9,8 @@ from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..component import Component, Variable
 from ..errors import did_you_mean
 from .tree import Node
@@ -95,16 +97,17 @@ class Slots:
         return {slot[len(prefix) :]: slot for slot in sorted(found, key=self._places.__getitem__)}
 
 
-def assign(name: str, variables: Mapping[str, Variable], text: str, value: Any) -> dict[str, Any]:
+def assign(name: str, variables: Mapping[str, Variable], text: str, value: Any, whole: bool = False) -> dict[str, Any]:
     """Values by variable name for `text` = value; a list sets an array, or the scalars text[1], text[2], ...
 
-    `variables` are those of the component `name`, by their names.
+    `variables` are those of the component `name`, by their names. A list may be shorter than an array, whose other elements keep
+    their start values, unless it has to be `whole`.
 
     Raises Unknown when there is no such variable, ValueError when it does not take the value.
     """
     value = value.tolist() if hasattr(value, "tolist") else value
     if text in variables:
-        return {text: _checked(variables[text], value)}
+        return {text: _checked(variables[text], value, whole)}
     if f"{text}[1]" in variables:
         if not isinstance(value, list) or not value:
             raise ValueError(f'"{text}" is a list of values, found {json.dumps(value)}')
@@ -117,29 +120,61 @@ def assign(name: str, variables: Mapping[str, Variable], text: str, value: Any) 
     raise Unknown(f'component "{name}" has no variable "{text}"{did_you_mean(text, settable)}')
 
 
-def _checked(variable: Variable, value: Any) -> Any:
+def _checked(variable: Variable, value: Any, whole: bool = False) -> Any:
     if variable.causality not in ("parameter", "structuralParameter", "input") and variable.start is None:
         raise ValueError(f'"{variable.name}" is of causality {variable.causality} and cannot be set')
+    if variable.causality == "structuralParameter" and value != variable.start:
+        raise ValueError(
+            f'"{variable.name}" is a structural parameter: it stays {json.dumps(variable.start)}, found {json.dumps(value)}'
+        )
     if not variable.shape:
         return _scalar(variable, value)
     size = len(variable.slots)
     if not isinstance(value, list):
         raise ValueError(f'"{variable.name}" is an array of {size} values, expected a list, found {json.dumps(value)}')
-    if len(value) > size:
-        raise ValueError(f'"{variable.name}" takes at most {size} values, found {len(value)}')
+    if len(value) > size or (whole and len(value) < size):
+        raise ValueError(f'"{variable.name}" takes {"" if whole else "at most "}{size} values, found {len(value)}')
     start = variable.start if isinstance(variable.start, tuple) else (variable.start or 0,) * size
     return [*(_scalar(variable, element) for element in value), *start[len(value) :]]
 
 
+def _item(variable: Variable, value: Any) -> Any:
+    """The value of an enumeration's item, which may be given by name."""
+    items = dict(variable.items)
+    if value in items:
+        return items[value]
+    if value in items.values() and not isinstance(value, bool):
+        return value
+    valid = ", ".join(f"{name} ({number})" for name, number in items.items())
+    hint = did_you_mean(value, items) if isinstance(value, str) else ""
+    raise ValueError(f'"{variable.name}" is one of {valid}, found {json.dumps(value)}{hint}')
+
+
 def _scalar(variable: Variable, value: Any) -> Any:
     """The value as the variable's type. Raises ValueError when it is not of that type or out of range."""
+    if variable.items:
+        return _item(variable, value)
     if not _accepts(variable.type, value):
         raise ValueError(f'"{variable.name}" is of type {variable.type}, found {json.dumps(value)}')
-    low, high = variable.minimum, variable.maximum
+    low, high = _limits(variable)
     if (low is not None and value < low) or (high is not None and value > high):
         span = f"{'-inf' if low is None else low} ... {'inf' if high is None else high}"
         raise ValueError(f'"{variable.name}" must lie in {span}, found {json.dumps(value)}')
     return float(value) if variable.type in _REALS else value
+
+
+def _limits(variable: Variable) -> tuple[float | None, float | None]:
+    """What the variable allows, and at most what its type holds."""
+    low, high = variable.minimum, variable.maximum
+    least: float
+    largest: float
+    if variable.dtype.kind in "iu":
+        least, largest = np.iinfo(variable.dtype).min, np.iinfo(variable.dtype).max
+    elif variable.type == "Float32":
+        least, largest = float(np.finfo(np.float32).min), float(np.finfo(np.float32).max)
+    else:
+        return low, high
+    return least if low is None else max(low, least), largest if high is None else min(high, largest)
 
 
 def _accepts(kind: str, value: Any) -> bool:

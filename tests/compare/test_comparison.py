@@ -126,6 +126,13 @@ def test_texts_have_to_be_equal():
     assert failures(recorded(phase=TIME), EXACT, reference) == ["phase holds text in the reference, and numbers in the other"]
 
 
+def test_texts_count_between_the_rows_of_the_reference_too():
+    phases = np.array(["climb"] * 50 + ["hover"] * 3 + ["climb"] * 48, dtype=object)
+    ends = recorded(TIME[[0, -1]], phase=np.array(["climb", "climb"], dtype=object))
+    assert failures(recorded(phase=phases), EXACT, ends) == ['phase is "hover" at t = 5 s, expected "climb"']
+    assert failures(ends, EXACT, recorded(phase=phases)) == ['phase is "climb" at t = 5 s, expected "hover"']
+
+
 def test_nothing_to_compare_does_not_pass():
     empty = recorded([], a__x=[], a__y=[], b__x=[])
     assert failures(empty) == ["the result has no rows"]

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from fakes import Fake, gain, inputs, integrator, outputs
 from helpers import run, system, wire
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 
 from cosim import resources
 from cosim.api import load
 from cosim.component import StepResult
 from cosim.engine import EXECUTORS
 from cosim.errors import ComponentError, InputError
+from cosim.python_component import PythonSlave
 from cosim.simulate import Settings, simulate
 from cosim.system import Endpoint, Group, Iteration
 from cosim.timing import exact
@@ -81,6 +83,29 @@ def test_only_the_last_round_may_ask_to_end_the_simulation():
     built = system(parts, "s.y > h.u, h.y > s.u", [(Group("all", (("h",), ("s",)), "auto", TIGHT),)])
     recording = run(built, 5, 1, ["h.y"])
     np.testing.assert_allclose(recording.columns["h.y"][1:], (8 + np.arange(3)) / 1.4, atol=1e-11)  # 5.7, 6.4, 7.1: the end
+
+
+class Derivative(Fmi2Slave):
+    """y = -u - 0.05 u', which remembers the last u where nobody registered it."""
+
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        self.u, self.y, self._last = 1.0, 0.0, 1.0
+        self.register_variable(Real("u", causality=Fmi2Causality.input))
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+
+    def do_step(self, t, h):
+        self.y, self._last = -self.u - 0.05 * (self.u - self._last) / h, self.u
+        return True
+
+
+@pytest.mark.usefixtures("executor")
+def test_python_components_return_to_all_that_they_hold():
+    """x' = y by implicit Euler: x (1 + h + 0.05) = last x (1 + 0.05)."""
+    parts = {"x": integrator(1.0), "d": PythonSlave(Derivative(instance_name="d"), "d")}
+    built = system(parts, "x.y > d.u, d.y > x.u", [(Group("all", (("d",), ("x",)), "auto", TIGHT),)])
+    recording = run(built, 1, "1/10", ["x.y"])
+    np.testing.assert_allclose(recording.columns["x.y"], (1.05 / 1.15) ** np.arange(11), atol=1e-11)
 
 
 @pytest.mark.usefixtures("executor")

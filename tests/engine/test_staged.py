@@ -108,6 +108,12 @@ def test_units_are_converted_on_the_way():
     assert recording.columns["b.y"][-1] == np.pi
 
 
+def test_a_difference_has_no_offset():
+    source = Fake(outputs("y", unit=parse("degC"), relative=True), lambda values, t, h: None, start={"y": 1.5})
+    sink = Fake([*inputs("u", unit=parse("K"), relative=True), *outputs("y")], lambda v, t, h: v.update(y=v["u"]))
+    assert run(system({"a": source, "b": sink}, "a.y > b.u"), 1, 1, ["b.y"]).columns["b.y"][-1] == 1.5
+
+
 def test_integers_feed_reals_and_keep_their_own_type_in_the_recording():
     built = system({"a": counter(), "b": gain(0.5)}, "a.n > b.u", [("a",), ("b",)])
     recording = run(built, 3, 1, ["a.n", "b.y"])

@@ -123,7 +123,7 @@ def test_an_fmu_may_end_the_simulation(copies, probe):
     outcome = simulate(built, Settings(exact(0), exact(1), exact(0.01), {"a.y": end("a.y")}))
     assert outcome.failure is None
     assert outcome.termination.component == "a"
-    assert len(outcome.recording.time) == 4
+    assert len(outcome.recording.time) == {2: 3, 3: 4}[major]  # FMI 2.0: a step that was discarded does not count
 
 
 def test_a_snapshot_brings_everything_back_bit_for_bit(copies, probe):

@@ -140,6 +140,20 @@ def test_energy_is_the_integral_of_power():
     assert value(kpis.energy, "t", -2.0, stop=3.0) == pytest.approx(-9)
 
 
+def test_what_is_not_a_number_is_neither_settled_nor_unsaturated():
+    for place in (3, -1):
+        values = np.array([0.0, 0.5, 1.0, 1.0, 1.0, 1.0])
+        values[place] = math.nan
+        lost = run(range(6), x=values)
+        assert math.isnan(value(kpis.settling_time, "x", initial=0.0, target=1.0, result=lost))
+        assert math.isnan(value(kpis.saturation_share, "x", upper=2.0, result=lost))
+
+
+def test_energy_of_integers_does_not_overflow():
+    small = run([0, 3], force=np.array([100_000, 100_000], np.int32), speed=np.array([50_000, 50_000], np.int32))
+    assert value(kpis.energy, "force", "speed", result=small) == 1.5e10
+
+
 FUNCTIONS = [
     function for name, function in vars(kpis).items() if getattr(function, "__module__", "") == "cosim.kpis" and name[0].islower()
 ]

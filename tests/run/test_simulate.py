@@ -112,7 +112,7 @@ def test_a_component_may_end_the_simulation():
         return StepResult(t + h, terminate_requested=True) if t >= 1 else None
 
     outcome = simulate(system({"a": Fake(outputs("y"), step), "b": counter()}), settings(5, record=["b.y"]))
-    assert outcome.termination == ("a", 2.0)
+    assert outcome.termination == ("a", 2.0, True)
     assert outcome.recording.columns["b.y"].tolist() == [0, 1, 2]
 
 

@@ -134,6 +134,42 @@ def test_ranges_of_an_fmu_are_respected(folder, probes):
     assert '"y_start" must lie in -10.0 ... 10.0, found 11' in found[0]
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "line"),
+    [
+        ("int8_in", 300, '"int8_in" must lie in -128 ... 127, found 300'),
+        ("uint8_in", -1, '"uint8_in" must lie in 0 ... 255, found -1'),
+        ("int32_in", 2**40, '"int32_in" must lie in -2147483648 ... 2147483647'),
+        ("int64_in", 2**63, '"int64_in" must lie in'),
+        ("uint64_in", 2**64 + 5, '"uint64_in" must lie in 0 ... 18446744073709551615'),
+        ("f_in", 1e300, '"f_in" must lie in -3.4'),
+        ("e_in", 7, '"e_in" is one of off (1), on (2), found 7'),
+        ("e_in", "onn", '"e_in" is one of off (1), on (2), found "onn"; did you mean "on"?'),
+    ],
+)
+def test_no_value_wraps_around(folder, probes, name, value, line):
+    assert line in refused(folder, {"a": {"fmu": str(probes[3]), "parameters": {name: value}}})[0]
+
+
+@pytest.mark.parametrize("value", [2, "on"])
+def test_items_of_enumerations_have_names(folder, probe, value):
+    result = cosim.run(folder.scenario({"a": {"fmu": str(probe), "parameters": {"e_in": value}}}))
+    assert result["a.e_out"][-1] == 2
+
+
+def test_an_event_sets_the_whole_of_an_array(folder, probes):
+    """What it left out would fall back to the start values."""
+    events = [{"time": 1, "set": {"a.v_in": [11.0]}}]
+    assert "takes 3 values, found 1" in refused(folder, {"a": {"fmu": str(probes[3])}}, events=events)[0]
+
+
+def test_a_port_does_not_hide_a_component_of_the_nested_system(folder):
+    parts = {"left": folder.block("Gain"), "right": folder.block("Gain")}
+    folder.write({"components": parts, "ports": {"outputs": {"right": "left"}}}, "inner.json")
+    (line,) = refused(folder, {"u": {"system": "inner.json"}})
+    assert line.startswith("inner.json:") and '"right" is the name of a component here' in line
+
+
 def test_a_list_that_is_too_long_says_how_long_it_may_be(folder):
     found = refused(folder, {"a": folder.block("Controller", parameters={"gain": [1, 2, 3]})})
     assert [line.split(": ", 1)[1] for line in found] == [
@@ -186,10 +222,12 @@ def test_problems_of_a_python_component_stand_at_its_arguments(folder):
 
 def test_incompatible_units_and_types_are_refused(folder, probes):
     xml = {"a": {"fmu": str(probes[2])}, "b": {"fmu": str(probes[3])}}
-    found = refused(folder, xml, [wire("a.s_out", "b.u"), wire("a.b_out", "b.int8_in")])
-    assert [line.split(": ", 2)[2] for line in found] == [
+    wires = [wire("a.s_out", "b.u"), wire("a.b_out", "b.int8_in"), wire("b.uint64_out", "a.u"), wire("a.i_out", "b.f_in")]
+    assert [line.split(": ", 2)[2] for line in refused(folder, xml, wires)] == [
         "a.s_out cannot feed b.u: type String does not become Float64",
         "a.b_out cannot feed b.int8_in: type Boolean does not become Int8",
+        "b.uint64_out cannot feed a.u: type UInt64 does not become Float64",
+        "a.i_out cannot feed b.f_in: type Int32 does not become Float32",
     ]
 
 

@@ -1,8 +1,10 @@
 """Names, prefixes, ports: what a scenario's connections and parameters mean."""
 
+import pytest
 from helpers import wire
 
 import cosim
+from cosim.timing import exact
 
 WHOLE_PLANT = """
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
@@ -153,6 +155,17 @@ def test_a_held_profile_jumps_at_its_rows(folder):
     inputs = [{"file": "profile.csv", "to": {"step": "a.u"}, "interpolation": "hold"}]
     result = columns(folder.scenario({"a": folder.block("Gain")}, inputs=inputs, stop_time=2, step_size=0.5))
     assert result["inputs.0.step"] == [1, 1, 1, 2, 3]
+
+
+@pytest.mark.parametrize(("step_size", "count"), [("1/10", 9), ("1/100", 90), ("1/1000", 900)])
+def test_a_held_profile_jumps_exactly_there_whatever_times_are_rounded_to(folder, step_size, count):
+    """0.7 + 0.1 is less than 0.8."""
+    step = exact(step_size)
+    rows = "".join(f"{float(n * step)!r},{n}\n" for n in range(count + 1))
+    (folder.path / "profile.csv").write_text(f"time,step\n{rows}")
+    inputs = [{"file": "profile.csv", "to": {"step": "a.u"}, "interpolation": "hold"}]
+    result = columns(folder.scenario({"a": folder.block("Gain")}, inputs=inputs, stop_time="9/10", step_size=step_size))
+    assert result["inputs.0.step"] == list(range(count + 1))
 
 
 def test_events_set_inputs_and_tunable_parameters_through_ports_too(folder):

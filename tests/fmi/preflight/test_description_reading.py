@@ -62,8 +62,14 @@ def test_foreign_fmus_are_read_as_fmpy_reads_them(version, probes):
 FMI3 = """<?xml version="1.0"?>
 <fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="t">
   <CoSimulation modelIdentifier="m" canBeInstantiatedOnlyOncePerProcess="true"/>
-  <UnitDefinitions><Unit name="km/h"><BaseUnit m="1" s="-1" factor="0.2777777777777778"/></Unit></UnitDefinitions>
-  <TypeDefinitions><Float64Type name="Speed" unit="km/h" min="0" max="300" description="a speed"/></TypeDefinitions>
+  <UnitDefinitions>
+    <Unit name="km/h"><BaseUnit m="1" s="-1" factor="0.2777777777777778"/></Unit><Unit name="deg"/><Unit name="bar(g)"/>
+  </UnitDefinitions>
+  <TypeDefinitions>
+    <Float64Type name="Speed" unit="km/h" min="0" max="300" description="a speed"/>
+    <Float64Type name="Angle" unit="deg" relativeQuantity="true"/>
+    <EnumerationType name="Mode"><Item name="off" value="-1"/><Item name="on" value="4"/></EnumerationType>
+  </TypeDefinitions>
   <DefaultExperiment startTime="1" stopTime=" 2.5 "/>
   <ModelVariables>
     <Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
@@ -76,6 +82,9 @@ FMI3 = """<?xml version="1.0"?>
     </Float64>
     <Binary name="b" valueReference="4" causality="input"><Start value="00ff"/></Binary>
     <Clock name="c" valueReference="5" causality="input" intervalVariability="triggered"/>
+    <Float64 name="turn" valueReference="7" declaredType="Angle"/>
+    <Float64 name="gauge" valueReference="8" unit="bar(g)"/>
+    <Enumeration name="mode" valueReference="9" declaredType="Mode" causality="parameter" start="4"/>
     <Int8 name="i" valueReference="6" causality="input" clocks="5" start="-128"/>
   </ModelVariables>
   <ModelStructure/>
@@ -89,6 +98,9 @@ def test_what_only_fmi3_has(tmp_path):
     found = {variable.name: variable for variable in description.variables}
     assert (found["a"].shape, found["a"].start) == ((2, 3), (1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
     assert (found["speed"].unit.factor, found["speed"].minimum, found["speed"].maximum) == (0.2777777777777778, 0.0, 300.0)
+    assert (found["turn"].unit.factor, found["turn"].relative, found["speed"].relative) == (math.pi / 180, True, False)
+    assert found["gauge"].unit is None  # nothing says what it is
+    assert found["mode"].items == (("off", -1), ("on", 4))
     assert (found["v"].description, found["speed"].description, found["v"].start) == ("short", "a speed", 50.0)
     assert description.references["v"] == description.references["speed"] == 2
     assert (found["b"].start, found["i"].start, found["n"].variability) == ("00ff", -128, "fixed")

@@ -1,0 +1,62 @@
+"""What a PythonFMU class gives as an output has to be of the output's type, or become it without loss."""
+
+import numpy as np
+import pytest
+from helpers import run, system
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Integer, Real, String
+
+from cosim.errors import ComponentError
+from cosim.python_component import PythonSlave
+
+START = {Real: 0.0, Integer: 0, Boolean: False, String: ""}
+
+
+def last(kind, value):
+    class Giver(Fmi2Slave):
+        def __init__(self, **arguments):
+            super().__init__(**arguments)
+            self.y = START[kind]
+            self.register_variable(kind("y", causality=Fmi2Causality.output))
+
+        def do_step(self, t, h):
+            self.y = value
+            return True
+
+    return run(system({"a": PythonSlave(Giver(instance_name="a"), "a")}), 1, 1, ["a.y"]).columns["a.y"][-1]
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "expected"),
+    [
+        (Real, 2, 2.0),
+        (Real, np.float32(0.5), 0.5),
+        (Real, np.array(1.5), 1.5),
+        (Real, True, 1.0),
+        (Integer, np.int64(7), 7),
+        (Integer, True, 1),
+        (Boolean, np.True_, True),
+        (Boolean, 1, True),
+        (String, "x", "x"),
+    ],
+)
+def test_what_is_the_same_value_is_taken(kind, value, expected):
+    assert last(kind, value) == expected
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "type_"),
+    [
+        (Real, None, "Float64"),
+        (Real, "1.5", "Float64"),
+        (Real, np.zeros(2), "Float64"),
+        (Integer, 2.7, "Int32"),
+        (Integer, 2**31, "Int32"),
+        (Integer, np.int64(2**31), "Int32"),
+        (Boolean, "False", "Boolean"),
+        (Boolean, 2, "Boolean"),
+        (String, 5, "String"),
+    ],
+)
+def test_what_is_not_is_named(kind, value, type_):
+    with pytest.raises(ComponentError, match=f'output "y" is .*, expected a value of type {type_}'):
+        last(kind, value)
