@@ -79,7 +79,7 @@ class Executor(ABC):
     def initialize(self) -> None:
         """From instantiated components to the initial outputs at the start time, recorded as row 0.
 
-        In initialization mode outputs go to inputs again and again until nothing changes, at most once per component.
+        In initialization mode outputs go to inputs again and again until nothing changes (see `initialization`).
         """
         plan, grid = self.plan, self.plan.grid
         start, stop = grid.seconds(0), grid.seconds(grid.count)
