@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import ExitStack, contextmanager
@@ -27,6 +29,9 @@ from .system import Endpoint, System
 from .text_rows import SavingRecorder
 from .timing import Grid
 from .unfinished import write_header
+
+#: bytes that a recorded number takes in rows and in CSV, about; what takes less than so many is not looked at
+_VALUE_SIZE, _LARGE = 8 + 20, 1_000_000_000
 
 #: called with (finished macro steps, all macro steps); observers only look
 Observer = Callable[[int, int], None]
@@ -240,12 +245,28 @@ def problems(system: System, settings: Settings) -> list[Problem]:
     if interval < grid.step or (interval / grid.step).denominator != 1:
         text = f"recording interval {float(interval)!r} s is no multiple of the step size {float(grid.step)!r} s"
         found.append(Problem(text, subject=("record", "interval")))
+    elif text := _too_large(settings, grid, int(interval / grid.step)):
+        found.append(Problem(text, subject=("step_size",)))
     for event in settings.events:
         try:
             grid.index(event.time)
         except ValueError as error:
             found.append(Problem(f"event time {error}", event.where))
     return found
+
+
+def _too_large(settings: Settings, grid: Grid, every: int) -> str:
+    """Why there is no room for what is to be recorded; "" when there is."""
+    rows = grid.count // every + 1
+    size = rows * (len(settings.columns) + 1) * _VALUE_SIZE
+    if size < _LARGE:
+        return ""
+    journal = current()
+    folder = (journal and journal.folder) or Path(tempfile.gettempdir())
+    free = shutil.disk_usage(folder).free
+    table = f"{rows} rows of {len(settings.columns)} signals take about {size / 1e9:.3g} GB"
+    text = f"{table}, {free / 1e9:.3g} GB are free in {folder}"
+    return f'{text}; make the step longer, or set "record": {{"interval": ...}}' if size > free else ""
 
 
 def _period_problems(system: System, grid: Grid) -> Iterator[Problem]:

@@ -13,6 +13,7 @@ import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -87,6 +88,14 @@ class Header:
     def seconds(self, n: int) -> float:
         """Time of communication point n."""
         return (self.origin + n * self.stride) / self.denominator
+
+    def times(self, rows: int) -> np.ndarray:
+        """Times of the first rows (s), shape (rows,)."""
+        from .timing import Grid
+
+        start, step = Fraction(self.origin, self.denominator), Fraction(self.stride, self.denominator)
+        grid = Grid(start, step, rows * self.every, self.denominator, self.origin, self.stride)
+        return grid.times(range(0, rows * self.every, self.every))
 
 
 def write_header(folder: Path, executor: Executor) -> None:
@@ -209,7 +218,6 @@ def recover(folder: Path | None, rows: int) -> Recording:
         return Recording.empty()
     columns, rows = header.columns, _there(folder, header, rows)
     data = read_rows(folder / ROWS_FILE, header.dtype, rows)
-    time = np.array([header.seconds(row * header.every) for row in range(rows)], np.float64)
     numbers = [data[column.name].astype(bool) if column.boolean else data[column.name] for column in columns]
     reader = TextReader(folder, header)
     texts = np.empty((rows, len(header.texts)), object)
@@ -217,7 +225,8 @@ def recover(folder: Path | None, rows: int) -> Recording:
         texts[row] = reader.row(row)
     units = header.complete([column.unit for column in columns], [""] * len(header.texts))
     values = header.complete(numbers, texts.T)
-    return Recording(time, dict(zip(header.names, values, strict=True)), dict(zip(header.names, units, strict=True)))
+    named = (dict(zip(header.names, each, strict=True)) for each in (values, units))
+    return Recording(header.times(rows), *named)
 
 
 def _there(folder: Path, header: Header, rows: int) -> int:

@@ -36,8 +36,9 @@ def command(scenario: str, settings: tuple[str, ...], connections: bool, isolati
             _connections(assembly)
             _unfed(assembly)
         times = assembly.settings
+        steps = int((times.stop_time - times.start_time) / times.step_size)
         click.echo(
-            f"\n{assembly.spec.name}: {float(times.start_time):g} s ... {float(times.stop_time):g} s in steps of "
+            f"\n{assembly.spec.name}: {float(times.start_time):g} s ... {float(times.stop_time):g} s in {steps} steps of "
             f"{float(times.step_size):g} s, {len(times.columns)} signals recorded. All is well."
         )
     finally:

@@ -15,7 +15,7 @@ from cosim.component import StepResult, Variable
 from cosim.errors import ComponentError, InputError
 from cosim.float_mode import changed, traps
 from cosim.fmi import FmuFile, instantiate
-from cosim.simulate import Event, Settings, simulate
+from cosim.simulate import Event, Settings, problems, simulate
 from cosim.timing import exact
 
 pytestmark = pytest.mark.usefixtures("executor")
@@ -122,6 +122,13 @@ def test_observers_see_progress_and_the_end():
     assert seen[0] == (0, 1000)
     assert seen[-1] == (1000, 1000)
     assert len(seen) == 101
+
+
+def test_what_no_disk_could_hold_is_refused_before_it_is_begun():
+    with pytest.raises(InputError, match=r"3\d* rows of 1 signals take about .* GB are free in .*; make the step longer"):
+        simulate(system({"a": counter()}), settings(30, exact("1/1000000000000")))
+    sparse = settings(30, exact("1/1000000000000"), record_interval=exact(30))
+    assert problems(system({"a": counter()}), sparse) == []
 
 
 def flush_small_numbers(library):
