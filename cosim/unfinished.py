@@ -225,8 +225,8 @@ def recover(folder: Path | None, rows: int) -> Recording:
         texts[row] = reader.row(row)
     units = header.complete([column.unit for column in columns], [""] * len(header.texts))
     values = header.complete(numbers, texts.T)
-    named = (dict(zip(header.names, each, strict=True)) for each in (values, units))
-    return Recording(header.times(rows), *named)
+    signals = dict(zip(header.names, values, strict=True))
+    return Recording(header.times(rows), signals, dict(zip(header.names, units, strict=True)))
 
 
 def _there(folder: Path, header: Header, rows: int) -> int:
