@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+#: what passes through other people's code without being its failure; all else is, also what is no Exception (a library's panic)
+PASSING = (KeyboardInterrupt, GeneratorExit)
 #: characters of an exception's text that are shown
 _LONGEST_TEXT = 2000
 

@@ -16,7 +16,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from .errors import ComponentError, CosimError, told
+from .errors import PASSING, ComponentError, CosimError, told
 
 #: bytes of a journal; its fields: int64 until 64, the time as double, then two texts
 SIZE = 5 * 4096
@@ -196,9 +196,9 @@ def blamed(component: str, function: str, time: float = math.nan) -> Iterator[No
     """What is raised in this block is a failure of the component: a ComponentError, unless it is an error of cosim already."""
     try:
         yield
-    except CosimError:
+    except (CosimError, *PASSING):
         raise
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
         raise ComponentError(component, function, told(error), None if math.isnan(time) else time) from error
 
 

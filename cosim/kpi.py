@@ -19,7 +19,7 @@ from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
-from .errors import ComponentError, InputError, Problem, did_you_mean, told
+from .errors import PASSING, ComponentError, InputError, Problem, did_you_mean, told
 from .results import Result
 from .units import product
 
@@ -59,7 +59,9 @@ class Evaluation(NamedTuple):
             return self.function(result, **self.arguments)
         except InputError as error:
             raise InputError([Problem(str(problem), f'{kind} "{self.name}"') for problem in error.problems]) from error
-        except (Exception, SystemExit) as error:
+        except PASSING:
+            raise
+        except BaseException as error:
             raise self.failure(kind, told(error)) from error
 
     def failure(self, kind: str, reason: str) -> ComponentError:

@@ -19,7 +19,7 @@ from pythonfmu.variables import Boolean, Integer, Real, ScalarVariable, String
 
 from . import log
 from .component import Component, Ports, Variable
-from .errors import ComponentError, InputError, Problem, did_you_mean, told
+from .errors import PASSING, ComponentError, InputError, Problem, did_you_mean, told
 from .memento import remember
 from .paths import is_file, real
 from .units import parse
@@ -137,7 +137,9 @@ class PythonSlave(Component):
         """Call user code; what it raises becomes a ComponentError, what it logged reaches the log."""
         try:
             return call(*arguments)
-        except (Exception, SystemExit) as error:
+        except PASSING:
+            raise
+        except BaseException as error:
             raise ComponentError(self._name, function, told(error), self._time) from error
         finally:
             if self._slave.log_queue:
@@ -202,9 +204,9 @@ def _construct(kind: Callable[..., Any], reference: str, /, *positional: Any, **
         raise InputError(f"{reference} does not accept these arguments: {error}") from None
     try:
         return kind(*positional, **named)
-    except InputError:
+    except (InputError, *PASSING):
         raise
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
         raise InputError(f"{reference} cannot be constructed: {told(error)}") from error
 
 
@@ -248,5 +250,7 @@ def _import(path: Path) -> ModuleType:
     name = ".".join((unique, *path.relative_to(root).with_suffix("").parts))
     try:
         return importlib.import_module(name)
-    except (Exception, SystemExit) as error:
+    except PASSING:
+        raise
+    except BaseException as error:
         raise InputError(f'"{path.name}" cannot be imported: {type(error).__name__}: {error}') from error

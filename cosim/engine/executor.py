@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import float_mode
 from ..component import GOOD, Call, StepResult
-from ..errors import ComponentError, CosimError, told
+from ..errors import PASSING, ComponentError, CosimError, told
 from ..journal import calling
 from .gathering import Gather
 from .initialization import propagate, take_start_values
@@ -174,9 +174,9 @@ class Executor(ABC):
             if result is not None:
                 self._ended_early(step, result)
             component.get_outputs()
-        except CosimError:
+        except (CosimError, *PASSING):
             raise
-        except (Exception, SystemExit) as error:
+        except BaseException as error:
             raise ComponentError(step.name, "do_step", told(error), self._clock.value) from error
         return _TERMINATION if self.termination else 0
 

@@ -23,7 +23,7 @@ from inspect import getattr_static
 from pathlib import Path
 from typing import Any
 
-from ..errors import ComponentError, InputError, did_you_mean
+from ..errors import PASSING, ComponentError, InputError, did_you_mean
 from ..python_component import load_object
 from ..results.files import plain
 from ..scenario.document import read_document
@@ -88,9 +88,9 @@ def _answer(who: str, ask: Callable[..., Any], *values: Any, **named: Any) -> di
             raise TypeError(f"returned {type(answer).__name__}, expected a dict")
         json.dumps(plain(answer))
         return _completed(answer)
-    except InputError:
+    except (InputError, *PASSING):
         raise
-    except Exception as error:
+    except BaseException as error:
         raise ComponentError(who, "scene", f"{type(error).__name__}: {error}") from error
 
 

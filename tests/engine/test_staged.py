@@ -198,9 +198,14 @@ class Unspeakable(Exception):
         raise RuntimeError
 
 
+class Panic(BaseException):
+    """As libraries in Rust raise it."""
+
+
 FAILURES = {
     "ValueError": (ValueError("too\x1b[31m steep"), r"ValueError: too\\x1b\[31m steep \(test_staged.py:"),
     "SystemExit": (SystemExit(0), "SystemExit: 0"),
+    "no Exception": (Panic("index out of bounds"), "Panic: index out of bounds"),
     "text of no characters": (ValueError("\ud800"), r"ValueError: \\ud800"),
     "endless text": (ValueError("x" * 10**6), "x ... and 998000 characters more"),
     "no text": (Unspeakable(), "Unspeakable: "),

@@ -102,6 +102,7 @@ def test_no_scene_and_no_scenario_are_nothing_to_draw(tmp_path):
 
 WRONG = {
     "1 / 0": 'component "a".*ZeroDivisionError',
+    "exit('no lamp')": 'component "a".*SystemExit: no lamp',
     "[]": "list, expected a dict",
     "{'bodies': [object()]}": "not JSON serializable",
     "{'body': []}": 'unknown key "body"; did you mean "bodies"',

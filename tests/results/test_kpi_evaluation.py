@@ -48,6 +48,14 @@ def test_a_failing_kpi_is_named():
         evaluate_kpis(RESULT, [("speed", ratio, {})])
 
 
+def test_a_kpi_whose_library_panics_is_named():
+    def ratio(result):
+        raise BaseException("index out of bounds")
+
+    with pytest.raises(ComponentError, match=r'^KPI "speed": ratio failed: BaseException: index out of bounds'):
+        evaluate_kpis(RESULT, [("speed", ratio, {})])
+
+
 def test_an_unknown_signal_names_kpi_and_signal():
     with pytest.raises(InputError, match=r'^KPI "all": no signal "y" was recorded; valid: x$'):
         evaluate_kpis(RESULT, [("all", extent, {"signal": "y"})])

@@ -87,6 +87,8 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "a circle of links as FMU": (put("components/f/fmu", "circle.fmu"), "Too many levels of symbolic links"),
     "a circle of links as Python file": (put("components/a/python", "circle.py:A"), 'file "circle.py" does not exist'),
     "a module that exits": (put("components/a/python", "leaves.py:A"), '"leaves.py" cannot be imported: SystemExit: 0'),
+    "a module that panics": (put("components/a/python", "panics.py:A"), '"panics.py" cannot be imported: BaseException: lost'),
+    "a class that panics": (put("components/a/python", "panic.py:A"), "panic.py:A cannot be constructed: BaseException: lost"),
     "a folder as FMU": (put("components/f/fmu", "."), "is a folder, expected a regular file"),
     "a text as FMU": (put("components/f/fmu", "profile.csv"), "is no FMU"),
     "missing Python file": (put("components/a/python", "block.py:Gain"), 'file "block.py" does not exist'),
@@ -137,6 +139,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory, probes: dict[int, Path]) ->
     (folder / "inner.json").write_text(json.dumps(INNER))
     (folder / "scenario.json").write_text(TEXT)
     (folder / "leaves.py").write_text("raise SystemExit(0)")
+    (folder / "panics.py").write_text("raise BaseException('lost')")
+    (folder / "panic.py").write_text("def A(name):\n    raise BaseException('lost')")
     os.mkfifo(folder / "pipe")
     for circle in ("circle.fmu", "circle.py"):
         (folder / circle).symlink_to(circle)

@@ -105,3 +105,10 @@ class Broken(Block):
             raise ValueError("tilt beyond limit")
         self.values["y"] += 1
         return True
+
+
+class Panicking(Broken):
+    """Fails in its first step, as what libraries in Rust raise."""
+
+    def do_step(self, current_time, step_size):
+        raise BaseException("index out of bounds")

@@ -201,3 +201,10 @@ def test_a_component_that_fails_keeps_its_rows(folder):
         cosim.run(file)
     assert str(failure.value).startswith("a: do_step failed at t = 2 s: ValueError: tilt beyond limit (blocks.py:")
     assert failure.value.result["a.y"].tolist() == [0, 1, 2]
+
+
+def test_a_class_that_panics_has_failed(folder):
+    import pytest
+
+    with pytest.raises(cosim.ComponentError, match="a: do_step failed at t = 0 s: BaseException: index out of bounds"):
+        cosim.run(folder.scenario({"a": folder.block("Panicking")}))
