@@ -1,32 +1,25 @@
 """pytest runs scenarios: `pytest scenarios/` collects every scenario JSON that has checks or a reference as a test.
 
-A scenario passes as under `cosim regress`; results go to runs/ in pytest's root folder. Works in parallel under pytest-xdist.
+A scenario passes as under `cosim regress`; a JSON file that cannot be read fails too, and says where. Results go to runs/ in
+pytest's root folder, each to the folder there that its file's path names. Works in parallel under pytest-xdist.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from .cli.regression import EXPECTATIONS, Regression, holds
+
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """pytest's hook: asked for each file."""
-    if file_path.suffix == ".json" and _is_test(file_path):
+    if file_path.suffix == ".json" and holds(file_path, ("components",), EXPECTATIONS):
         return ScenarioFile.from_parent(parent, path=file_path)
     return None
-
-
-def _is_test(path: Path) -> bool:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    scenario = isinstance(content, dict) and {"components", "stop_time"} <= content.keys()
-    return scenario and bool(content.get("checks") or content.get("reference"))
 
 
 class ScenarioFile(pytest.File):
@@ -40,11 +33,16 @@ class Scenario(pytest.Item):
     """A scenario, held against its checks and its reference."""
 
     def runtest(self) -> None:
-        from .cli.regression import Regression
-
-        outcome = Regression(self.path, self.config.rootpath / "runs" / self.name, update=False).outcome()
+        outcome = Regression(self.path, self._directory, update=False).outcome()
         if outcome.code:
             raise Unmet("\n".join([outcome.summary, *outcome.details]))
+
+    @property
+    def _directory(self) -> Path:
+        """Of its own for each scenario: those of several folders may have the same name, and run at the same time."""
+        root = self.config.rootpath
+        inside = self.path.relative_to(root if self.path.is_relative_to(root) else self.path.anchor)
+        return root / "runs" / inside.with_suffix("")
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *more: Any, **options: Any) -> Any:
         """What the scenario did not meet, without a traceback."""

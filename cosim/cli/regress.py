@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,7 +12,7 @@ import click
 
 from .. import resources
 from ..errors import InputError
-from .regression import Outcome, Regression
+from .regression import EXPECTATIONS, Outcome, Regression, holds
 
 if TYPE_CHECKING:
     from ..report.junit import Case
@@ -38,7 +37,8 @@ def command(scenarios: tuple[Path, ...], update: bool, junit: Path | None, outpu
     few rows as describe them, and beside them what made them; a run that fails its checks becomes no reference. Ends with 3 when
     a check or comparison was not met, 1 when a component failed, 2 when a scenario was refused.
     """
-    files = list(_with_any(("reference",) if update else ("checks", "reference"), found(scenarios or [default_folder()])))
+    expected = ("reference",) if update else EXPECTATIONS
+    files = [file for file in found(scenarios or [default_folder()]) if holds(file, expected)]
     if not files:
         raise InputError('there is no scenario with a "reference" (or, without --update, "checks")')
     refuse_same_names(files)
@@ -73,17 +73,6 @@ def found(paths: Iterable[Path]) -> Iterator[Path]:
             yield from files
         else:
             raise InputError(f'the folder "{path}" holds no scenario (*.json)')
-
-
-def _with_any(keys: Sequence[str], files: Iterable[Path]) -> Iterator[Path]:
-    """Those with one of the keys, and those that cannot be read: running them says why."""
-    for file in files:
-        try:
-            content = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            content = dict.fromkeys(keys, True)
-        if isinstance(content, dict) and any(content.get(key) for key in keys):
-            yield file
 
 
 def refuse_same_names(files: Iterable[Path]) -> None:

@@ -7,17 +7,32 @@ import math
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import CosimError, InputError
+from ..paths import open_text
 
 if TYPE_CHECKING:
     from ..compare import Comparison, Tolerance
     from ..results import Result
+
+
+#: what a scenario expects of its run
+EXPECTATIONS = ("checks", "reference")
+
+
+def holds(file: Path, *groups: Sequence[str]) -> bool:
+    """Whether a JSON file has one key at least of each group; yes when it cannot be read: running it says why."""
+    try:
+        with open_text(file, encoding="utf-8") as stream:
+            content = json.load(stream)
+    except (OSError, ValueError, RecursionError):
+        return True
+    return isinstance(content, dict) and all(any(content.get(key) for key in group) for group in groups)
 
 
 @dataclass(frozen=True)

@@ -132,3 +132,5 @@ def test_nothing_to_do_and_what_cannot_be_found_are_refused(folder):
     assert 'no shipped scenario "colling"' in regress(folder, "colling").stderr
     (folder / "scenarios/aimless.json").write_text("{]")
     assert "aimless.json:1:2:" in regress(folder).stdout
+    (folder / "scenarios/aimless.json").write_text("[" * 100_000)
+    assert "nested more than 100 levels deep" in regress(folder).stdout

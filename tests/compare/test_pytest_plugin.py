@@ -16,13 +16,15 @@ KPIS = [{"name": "y", "python": "cosim.kpis:final", "arguments": {"signal": "a.y
 def folder(tmp_path):
     (tmp_path / "pytest.ini").write_text("[pytest]\n")
     (tmp_path / "data.json").write_text('{"checks": ["of something else"]}')
+    (tmp_path / "sweep.json").write_text('{"scenario": "good.json", "success": []}')
+    (tmp_path / "system.json").write_text('{"components": {}, "ports": {}}')
     return tmp_path
 
 
 def scenario(folder, name, block="Gain", **more):
     components = {"a": {"python": f"{BLOCKS}:{block}", **({"parameters": {"u": 1.5}} if block == "Gain" else {})}}
     content = {"name": name, "stop_time": 3, "step_size": 1, "components": components, "kpis": KPIS, **more}
-    (folder / f"{name}.json").write_text(json.dumps(content))
+    (folder / f"{name}.json").write_text(json.dumps({key: value for key, value in content.items() if value is not None}))
 
 
 def run_pytest(folder, *arguments):
@@ -56,3 +58,33 @@ def test_scenarios_are_chosen_by_name_and_run_in_parallel(folder):
         scenario(folder, name, checks=[{"kpi": "y.value", "equals": 3.0}])
     assert "1 passed, 2 deselected" in run_pytest(folder, "-k", "second").stdout
     assert "3 passed" in run_pytest(folder, "-p", "xdist", "-n", "2").stdout
+
+
+def test_what_cannot_be_read_or_is_misspelt_fails_with_its_place(folder):
+    checks = [{"kpi": "y.value", "equals": 3.0}]
+    scenario(folder, "misspelt", checks=checks, stop_time=None, stop_tme=3)
+    (folder / "torn.json").write_text('{"name": "torn",')
+    done = run_pytest(folder)
+    assert done.returncode == 1
+    assert "2 failed" in done.stdout
+    assert '$.stop_tme: unknown key; did you mean "stop_time"?' in done.stdout
+    assert "torn.json:1:17: expected a key in double quotes" in done.stdout
+
+
+def test_scenarios_of_one_name_have_results_of_their_own(folder):
+    for calm, limit in (("calm", 3.0), ("storm", 4.0)):
+        (folder / "scenarios" / calm).mkdir(parents=True)
+        scenario(folder / "scenarios" / calm, "course", checks=[{"kpi": "y.value", "equals": limit}])
+    assert "1 failed, 1 passed" in run_pytest(folder, "-p", "xdist", "-n", "2").stdout
+    results = (folder / "runs").rglob("result.csv")
+    assert sorted(path.parent.relative_to(folder / "runs").as_posix() for path in results) == [
+        "scenarios/calm/course",
+        "scenarios/storm/course",
+    ]
+
+
+def test_scenarios_outside_of_the_root_folder_leave_their_results_inside(folder, tmp_path_factory):
+    outside = tmp_path_factory.mktemp("outside")
+    scenario(outside, "course", checks=[{"kpi": "y.value", "equals": 3.0}])
+    assert "1 passed" in run_pytest(folder, f"--rootdir={folder}", str(outside)).stdout
+    assert (folder / "runs" / outside.relative_to(outside.anchor) / "course/result.csv").is_file()
