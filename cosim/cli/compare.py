@@ -12,15 +12,13 @@ if TYPE_CHECKING:
     from ..compare import Comparison, Tolerance
     from ..results import Result
 
-_NUMBER = click.FloatRange(min=0)
-
 
 @click.command()
 @click.argument("result", type=click.Path(path_type=Path))
 @click.argument("reference", type=click.Path(path_type=Path))
-@click.option("--absolute", type=_NUMBER, default=0.0, help="Tolerance in the unit of each signal.")
-@click.option("--relative", type=_NUMBER, default=0.0, help="Tolerance relative to the range of each signal of the reference.")
-@click.option("--time", type=_NUMBER, default=0.0, help="Tolerance in time, in s.")
+@click.option("--absolute", default=0.0, help="Tolerance in the unit of each signal.")
+@click.option("--relative", default=0.0, help="Tolerance relative to the range of each signal of the reference.")
+@click.option("--time", default=0.0, help="Tolerance in time, in s.")
 @click.option("--signals", multiple=True, metavar="PATTERN", help='Only these signals of the reference; "*" matches anything.')
 @click.option(
     "--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw the worst signals in their tubes (PNG or SVG)."

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import did_you_mean
+from ..errors import InputError, did_you_mean
 from ..results import Result
 from .tube import EvenWindows, Points, Tolerance, Tube, Windows, even_spacing, slack
 
@@ -77,7 +77,10 @@ def compare(result: Result, reference: Result, tolerances: Mapping[str, Toleranc
     "*" in a pattern matches anything, dots too; of several patterns that match, the last one counts. A signal fails when it
     leaves its tube (see `tube`), is missing, does not cover the time of the reference, or is NaN or infinite in either; texts
     fail where they are not equal. A pattern that matches nothing fails as well, so a comparison of nothing does not pass.
+    Raises InputError for tolerances that are negative, NaN or infinite.
     """
+    if problems := list(_problems(tolerances)):
+        raise InputError(problems)
     chosen = matched(tolerances, list(reference))
     idle = [pattern for pattern in tolerances if not reference.signals(pattern)]
     general = [
@@ -87,6 +90,13 @@ def compare(result: Result, reference: Result, tolerances: Mapping[str, Toleranc
         return Comparison((*general, Verdict("the reference" if not len(reference.time) else "the result", "has no rows")))
     comparer = Comparer(result, reference)
     return Comparison((*general, *(comparer.verdict(name, tolerance) for name, tolerance in chosen.items())))
+
+
+def _problems(tolerances: Mapping[str, Tolerance]) -> Iterator[str]:
+    for pattern, tolerance in tolerances.items():
+        for name, value in tolerance._asdict().items():
+            if not 0 <= value < math.inf:
+                yield f'tolerance of "{pattern}": "{name}" is {value}, expected a finite number of at least 0'
 
 
 def matched(tolerances: Mapping[str, Tolerance], names: list[str]) -> dict[str, Tolerance]:

@@ -85,4 +85,10 @@ def test_what_cannot_be_read_is_refused(tmp_path):
     missing = cosim("compare", tmp_path / "none.csv", csv(tmp_path / "b.csv"))
     assert (missing.returncode, "none.csv" in missing.stderr) == (2, True)
     assert cosim("compare", tmp_path / "b.csv", tmp_path / "b.csv", "--plot", "x.pdf").returncode == 2
-    assert cosim("compare", tmp_path / "b.csv", tmp_path / "b.csv", "--absolute", "-1").returncode == 2
+
+
+@pytest.mark.parametrize(("option", "value"), [("absolute", "nan"), ("relative", "inf"), ("time", "nan"), ("time", "-1.0")])
+def test_a_tolerance_that_says_nothing_is_refused(tmp_path, option, value):
+    done = cosim("compare", csv(tmp_path / "a.csv", offset=0.2), csv(tmp_path / "b.csv"), f"--{option}", value)
+    message = f'tolerance of "*": "{option}" is {value}, expected a finite number of at least 0\n'
+    assert (done.returncode, done.stderr) == (2, message)
