@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,10 +26,11 @@ _CAUSALITIES = {"inputs": ("input",), "outputs": ("output",), "parameters": ("pa
 
 @dataclass(frozen=True)
 class Source:
-    """Where a candidate comes from: its entry in a scenario ({"fmu": "/abs/my.fmu"}) and its name ("my")."""
+    """Where a candidate comes from: its entry in a scenario ({"fmu": "/abs/my.fmu"}), its name ("my"), and the user's text."""
 
     entry: Mapping[str, str]
     name: str
+    text: str
 
 
 def source(text: str) -> Source:
@@ -41,7 +42,7 @@ def source(text: str) -> Source:
         raise InputError(f'expected my.fmu, my.py:Class, my.mo:Model or a nested system my.json, found "{text}"')
     if not path.is_file():
         raise InputError(f'there is no file "{file}"')
-    return Source({kind: f"{path.resolve()}{separator}{member}"}, member or path.stem)
+    return Source({kind: f"{path.resolve()}{separator}{member}"}, member or path.stem, text)
 
 
 @dataclass(frozen=True)
@@ -69,12 +70,20 @@ def interface(candidate: Source) -> Interface:
     with TemporaryDirectory(prefix="cosim-") as folder:
         file = Path(folder) / f"{_NAME}.json"
         file.write_text(json.dumps(scenario), encoding="utf-8")
-        assembly = assemble(file, {"/step_size": _common_step(file)})
+        try:
+            assembly = assemble(file, {"/step_size": _common_step(file)})
+        except InputError as error:
+            raise InputError([_of_candidate(problem, file, candidate) for problem in error.problems]) from None
     try:
         root, components = assembly.root, assembly.system.components
         return _of_system(root, components) if _NAME in root.children else _of_component(components[_NAME])
     finally:
         assembly.free()
+
+
+def _of_candidate(problem: Problem, file: Path, candidate: Source) -> Problem:
+    """A problem whose place the user knows: not `file`, which is made up."""
+    return replace(problem, where=candidate.text) if problem.where.startswith(str(file)) else problem
 
 
 def _common_step(file: Path) -> str:

@@ -148,6 +148,20 @@ def test_what_does_not_fit_is_said_at_once(folder):
     assert not (folder / "runs/bench/shipped").exists()
 
 
+def test_what_is_no_controller_is_named_as_it_was_given(folder):
+    source = keeper(folder).replace("Keeper", "Kepeer")
+    done = bench(folder, source)
+    message = f'{source}: "{folder / "keeper.py"}" defines no "Kepeer"; did you mean "Keeper"?\n'
+    assert (done.returncode, done.stderr) == (2, message)
+
+
+def test_what_is_wrong_inside_a_nested_system_keeps_its_place(folder):
+    path = folder / "lost.json"
+    path.write_text('{"components": {"a": {"python": "lost.py:A"}}, "ports": {}}')
+    done = bench(folder, path)
+    assert (done.returncode, done.stderr) == (2, f'{path}:1:17: $.components.a: file "lost.py" does not exist\n')
+
+
 def test_what_the_scenario_says_about_missing_variables_is_left_out_and_noted(folder):
     done = bench(folder, keeper(folder))
     assert done.returncode == 3
