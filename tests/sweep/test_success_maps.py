@@ -3,14 +3,17 @@
 import json
 import math
 import re
+from itertools import combinations
 
 import pytest
 from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from matplotlib.patches import Rectangle
+from matplotlib.text import Text
 
 from cosim.errors import InputError
-from cosim.report.figures import svg
+from cosim.report.figures import style, svg
 from cosim.sweep.jobs import Record
 from cosim.sweep.map_figure import draw_map
 from cosim.sweep.maps import success_maps
@@ -97,6 +100,37 @@ def test_cells_too_small_for_text_have_none(tmp_path):
     sweep = sweep_of(tmp_path, factors=[CONTROLLER, SPEED | {"values": list(range(60))}])
     (found,) = success_maps(sweep, rows(sweep, dict.fromkeys(range(len(sweep)), 0.01)))
     assert not draw_map(found).axes[0].texts
+
+
+WORDS = {"name": "landing controller", "levels": {"inverse kinematics": {}, "incremental nonlinear dynamic inversion": {}}}
+STEPS = SPEED | {"values": [0.0137 * i for i in range(40)]}
+MANY = {"name": "sensor", "levels": {f"sensor_number_{i}": {} for i in range(16)}}
+CROWDED = {
+    "long names up": ([WORDS, SPEED], {"x": "speed", "y": "landing controller"}),
+    "long names along": ([WORDS, SPEED], {"x": "landing controller", "y": "speed"}),
+    "many numbers along": ([WORDS, STEPS], {"x": "speed", "y": "landing controller"}),
+    "many numbers up": ([STEPS, MANY], {"x": "sensor", "y": "speed", "columns": "seed"}),
+    "long names of columns": ([WORDS, SPEED], {"x": "speed", "y": "seed", "columns": "landing controller"}),
+    "long names of many columns": ([MANY, SPEED], {"x": "speed", "y": "seed", "columns": "sensor"}),
+    "long names of rows": ([WORDS, SPEED], {"x": "speed", "y": "seed", "rows": "landing controller"}),
+    "long titles": ([WORDS, SPEED], {"x": "speed", "y": "landing controller", "titles": {"speed": "speed " * 12}}),
+}
+
+
+@pytest.mark.parametrize("name", CROWDED)
+def test_texts_lie_inside_the_figure_and_beside_each_other(tmp_path, name):
+    factors, spec = CROWDED[name]
+    (found,) = success_maps(sweep_of(tmp_path, factors=factors, maps=[spec]), [])
+    with style():
+        figure = draw_map(found)
+        FigureCanvasAgg(figure).draw()
+        texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text()]
+        places = {text: text.get_window_extent() for text in texts}
+    for text, place in places.items():
+        assert figure.bbox.containsx(place.x0) and figure.bbox.containsx(place.x1), text
+        assert figure.bbox.containsy(place.y0) and figure.bbox.containsy(place.y1), text
+    for (one, place), (other, other_place) in combinations(places.items(), 2):
+        assert not place.overlaps(other_place), (one, other)
 
 
 def test_in_svg_every_cell_with_a_run_is_a_link(success_map):
