@@ -6,8 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cosim.recording import Recording
+from cosim.report.diagram import WIDTH
 from cosim.report.html import write_report
 from cosim.report.replay import write_replay
+from cosim.results import Result
 from plant_src.environment import sea
 
 BODIES = ("plant.uav", "plant.usv")
@@ -166,6 +169,36 @@ def test_the_water_has_the_waves_of_the_run(compared):
         assert compared(f"cosimReplay.view.water.height({x}, {y})") == pytest.approx(
             sea(ENVIRONMENT).elevation(x, y, time), abs=1e-6
         )
+
+
+NUMBERS = {
+    "tiny": (0.0, 3e-4, ["0", "0.0001", "0.0002", "0.0003"]),
+    "near": (999_950.0, 1_000_050.0, ["999950", "1000000", "1000050"]),
+    "huge": (-3.7e15, 3.7e15, ["-2.5e+15", "0", "2.5e+15"]),
+    "usual": (-4.0, 4.0, ["-2.5", "0", "2.5"]),
+}
+
+
+def test_numbers_at_an_axis_have_their_digits_and_room(visit, tmp_path):
+    time = np.linspace(0, 5, 101)
+    columns = {name: low + (high - low) * np.sin(time) ** 2 for name, (low, high, _) in NUMBERS.items()}
+    write_replay([Result(Recording(time, columns, {}), metadata={"name": "numbers"})], tmp_path / "numbers.html")
+    opened = visit(tmp_path / "numbers.html")
+    for number, (name, (_, _, texts)) in enumerate(NUMBERS.items()):
+        opened(f"cosimReplay.plots.add(['{name}'])")
+        chart = f"cosimReplay.plots.list[{number}].chart"
+        opened.until(f"{chart}.axes[1]._values?.length > 0")
+        assert opened(f"{chart}.axes[1]._values") == texts
+        widths = opened(f"{chart}.axes[1]._values.map((text) => {chart}.ctx.measureText(text).width)")
+        assert opened(f"{chart}.axes[1]._size") > max(widths) + 5
+
+
+def test_the_diagram_of_one_component_is_as_large_as_its_texts(visit, flight, tmp_path):
+    box = {"name": "alone", "origin": "alone.fmu", "inputs": 0, "outputs": 1, "period": None}
+    system = {"components": [box], "stages": [["alone"]], "connections": []}
+    write_report(replace(flight, metadata={"name": "alone", "system": system}), [], {}, tmp_path / "report.html")
+    rectangle = visit(tmp_path / "report.html").page.locator(".diagram .box").bounding_box()
+    assert rectangle["width"] == pytest.approx(WIDTH, abs=2)
 
 
 def test_the_report_shows_what_a_stranger_wrote_as_text(visit, flight, tmp_path):

@@ -8,10 +8,27 @@ const HEIGHT = 148;
 /** Four significant digits without an exponent where that is short. */
 export const shown = (value) => (Number.isFinite(value) ? String(Number(value.toPrecision(4))) : "–");
 
+/** The numbers along an axis with all their digits; where those are many and exponents are shorter, all have exponents. */
+function written(_, values) {
+  const plain = values.map(String);
+  const powers = values.map((value) => (value ? value.toExponential() : "0"));
+  return longest(plain) > 8 && longest(powers) < longest(plain) ? powers : plain;
+}
+
+const longest = (texts) => Math.max(...texts.map((text) => text.length));
+
 function axis(unit) {
   const { ink, rule } = theme();
-  const style = { stroke: ink, grid: { stroke: rule, width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif" };
-  return unit === undefined ? { ...style, size: 26, space: 70 } : { ...style, size: 54, space: 28 };
+  const lines = { stroke: ink, grid: { stroke: rule, width: 1 }, ticks: { show: false } };
+  const style = { ...lines, font: "11px system-ui, sans-serif", values: written };
+  return unit === undefined ? { ...style, size: 26, space: 70 } : { ...style, size: room, space: 28 };
+}
+
+/** The width of an axis: the same for all plots whose numbers are short, so that their times stand below each other. */
+function room(chart, texts, number) {
+  [chart.ctx.font] = chart.axes[number].font;
+  const widest = Math.max(0, ...(texts ?? []).map((text) => chart.ctx.measureText(text).width / uPlot.pxRatio));
+  return Math.max(54, widest + 12);
 }
 
 class Plot {
