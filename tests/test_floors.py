@@ -72,6 +72,11 @@ def test_imports_point_downwards(path):
         assert floor(other) < floor(own) or (own, other) in ALLOWED, f"{own} imports {other}"
 
 
+def test_the_plan_of_the_house_has_every_room():
+    plan = (PACKAGE.parent / "CONTRIBUTING.md").read_text()
+    assert {name for name in set().union(*FLOORS) - {"__main__"} if f"`{name}`" not in plan} == set()
+
+
 def test_cosim_knows_no_vehicle_and_no_bullet():
     for path in FILES:
         tree = ast.parse(path.read_text())
