@@ -11,7 +11,7 @@ PACKAGE = Path(__file__).parents[1] / "cosim"
 
 #: rooms from the ground up; a room imports only from its own floor or from below
 FLOORS = [
-    {"errors", "resources", "log", "stopwatch", "temporary", "float_mode"},
+    {"errors", "resources", "log", "stopwatch", "temporary", "float_mode", "memento"},
     {"journal", "paths"},
     {"timing", "units", "sandbox", "process_state"},
     {"component", "pacer"},
