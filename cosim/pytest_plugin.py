@@ -1,6 +1,6 @@
 """pytest runs scenarios: `pytest scenarios/` collects every scenario JSON that has checks or a reference as a test.
 
-A scenario passes as under `cosim regress`; a JSON file that cannot be read fails too, and says where. Results go to runs/ in
+A scenario passes as under `cosim regress`; one that is no JSON fails too, and says where. Results go to runs/ in
 pytest's root folder, each to the folder there that its file's path names. Works in parallel under pytest-xdist.
 """
 
@@ -17,9 +17,17 @@ from .cli.regression import EXPECTATIONS, Regression, holds
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """pytest's hook: asked for each file."""
-    if file_path.suffix == ".json" and holds(file_path, ("components",), EXPECTATIONS):
+    if file_path.suffix == ".json" and _may_be_scenario(file_path) and holds(file_path, ("components",), EXPECTATIONS):
         return ScenarioFile.from_parent(parent, path=file_path)
     return None
+
+
+def _may_be_scenario(file: Path) -> bool:
+    """Whatever else ends with .json, with comments in it perhaps, is none of our business."""
+    try:
+        return file.is_file() and b'"components"' in file.read_bytes()
+    except OSError:
+        return False
 
 
 class ScenarioFile(pytest.File):

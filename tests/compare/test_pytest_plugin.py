@@ -63,12 +63,13 @@ def test_scenarios_are_chosen_by_name_and_run_in_parallel(folder):
 def test_what_cannot_be_read_or_is_misspelt_fails_with_its_place(folder):
     checks = [{"kpi": "y.value", "equals": 3.0}]
     scenario(folder, "misspelt", checks=checks, stop_time=None, stop_tme=3)
-    (folder / "torn.json").write_text('{"name": "torn",')
+    (folder / "torn.json").write_text('{"components": {"a":')
+    (folder / "tsconfig.json").write_text('{"compilerOptions": {}, // comments are usual here\n}')
     done = run_pytest(folder)
     assert done.returncode == 1
     assert "2 failed" in done.stdout
     assert '$.stop_tme: unknown key; did you mean "stop_time"?' in done.stdout
-    assert "torn.json:1:17: expected a key in double quotes" in done.stdout
+    assert "torn.json:1:" in done.stdout
 
 
 def test_scenarios_of_one_name_have_results_of_their_own(folder):
