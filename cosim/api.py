@@ -14,9 +14,9 @@ from typing import Any, Literal
 
 from . import __version__
 from .errors import ComponentError, CosimError
-from .kpi import CheckOutcome, evaluate_checks, evaluate_kpis, kpi_senses, kpi_units
+from .kpi import CheckOutcome, evaluate_checks, evaluate_kpis, held_checks, kpi_senses, kpi_units
 from .pacer import Late
-from .results import Result
+from .results import Kpis, Result
 from .scenario import Assembly, assemble
 from .scenario.overview import overview
 from .simulate import Observer, Run, simulation
@@ -126,16 +126,17 @@ def _added(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str,
 
 def _with_kpis(result: Result, assembly: Assembly) -> Execution:
     """The result with all KPIs; when some fail, the others are there all the same."""
-    kpis: dict[str, Any] = {}
+    kpis = Kpis()
     failures: list[BaseException] = []
     functions = assembly.kpis()
     for kpi in functions:
         try:
-            kpis |= evaluate_kpis(result, [kpi])
+            kpis.update(evaluate_kpis(result, [kpi]))
         except (CosimError, KeyboardInterrupt) as error:
             failures.append(error)
     about = {"kpi_units": kpi_units(functions, kpis, result.units), "kpi_senses": kpi_senses(functions, kpis)}
-    evaluated = replace(result, kpis=kpis, metadata={**result.metadata, **about})
+    held = held_checks(kpis, assembly.checks)
+    evaluated = replace(result, kpis=kpis, metadata={**result.metadata, **about}, checks=held)
     return Execution(evaluated, failures[0] if failures else None)
 
 

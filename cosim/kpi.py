@@ -172,6 +172,10 @@ class CheckOutcome(NamedTuple):
         """The limits in words: "max 0.1"."""
         return ", ".join(f"{key} {str(limit).lower()}" for key, limit in self.check.items() if key != "kpi")
 
+    def __str__(self) -> str:
+        value = str(self.value).lower() if isinstance(self.value, bool) else f"{self.value:.6g}"
+        return f"{self.check['kpi']} is {value}, expected {self.limits}"
+
 
 def evaluate_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, Any]]) -> list[CheckOutcome]:
     """Hold `kpis` against checks such as {"kpi": "landing.lateral_error", "max": 0.1}; limits: "min", "max", "equals".
@@ -182,6 +186,12 @@ def evaluate_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, An
     if problems := [problem for check in checks for problem in _check_problems(kpis, check)]:
         raise InputError(problems)
     return [_outcome(check, kpis[check["kpi"]]) for check in checks]
+
+
+def held_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, Any]]) -> list[CheckOutcome]:
+    """As `evaluate_checks`, but a check of a KPI that was not evaluated is one that is not met: its value is NaN."""
+    checks = list(checks)
+    return evaluate_checks({**{check["kpi"]: math.nan for check in checks}, **kpis}, checks)
 
 
 def _check_problems(kpis: Mapping[str, Number], check: Mapping[str, Any]) -> list[Problem]:

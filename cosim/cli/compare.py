@@ -29,14 +29,15 @@ def command(
     """Compare RESULT with REFERENCE, each of them a CSV file or a folder that `cosim run` wrote.
 
     Every signal of the reference has to stay within the larger of the absolute and the relative tolerance in value, and
-    within the one in time; without any it has to be equal. REFERENCE may also be a scenario: then its reference and its
-    tolerances count. Ends with 3 when a signal leaves its tube, is missing, ends early, or is not finite.
+    within the one in time; without any it has to be equal. REFERENCE may also be a scenario, a file or the name of a shipped
+    one: then its reference and its tolerances count. Ends with 3 when a signal leaves its tube, is missing, ends early, or is
+    not finite.
     """
     from ..compare import Tolerance, compare
 
     if plot and plot.suffix not in (".png", ".svg"):
         raise click.BadParameter(f'"{plot}" is neither .png nor .svg', param_hint="--plot")
-    if reference.suffix == ".json":
+    if _is_scenario(reference):
         file, tolerances = _of_scenario(reference)
     else:
         file, tolerances = reference, dict.fromkeys(signals or ("*",), Tolerance(absolute, relative, time))
@@ -54,12 +55,18 @@ def _read(path: Path) -> Result:
     return Result.from_csv(path / "result.csv" if path.is_dir() else path)
 
 
-def _of_scenario(path: Path) -> tuple[Path, Mapping[str, Tolerance]]:
+def _is_scenario(path: Path) -> bool:
+    """A JSON file, or a name alone that nothing here has: that of a shipped scenario."""
+    return path.suffix == ".json" or (path.name == str(path) and not path.suffix and not path.exists())
+
+
+def _of_scenario(scenario: Path) -> tuple[Path, Mapping[str, Tolerance]]:
     """Where the reference of a scenario lies, and its tolerances."""
     from ..compare import Tolerance
     from ..errors import InputError
-    from ..scenario.tree import load
+    from ..scenario.tree import find, load
 
+    path = find(scenario)
     spec = load(path).spec.reference
     if spec is None:
         raise InputError(f'{path} names no "reference"')

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import shutil
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -22,6 +26,7 @@ _FILES = {
     ".github/workflows/ci.yml": _TEMPLATES / "project/ci.yml",
     "controllers/speed_keeper.py": _TEMPLATES / "python/speed_keeper.py",
     "scenarios/course.json": _TEMPLATES / "project/course.json",
+    "scenarios/pictures.py": _TEMPLATES / "vessel/pictures.py",
     "tests/test_controller.py": _TEMPLATES / "project/test_controller.py",
 }
 _PLANT = "fmus/strider.fmu"
@@ -44,19 +49,39 @@ def command(directory: Path, force: bool) -> int:
         click.echo("\n".join([f"course: {outcome.summary}", *outcome.details]), err=True)
         return outcome.code
     click.echo(f"{directory / 'scenarios/references/course.csv'}\n\nNext:")
-    click.echo(f"  cd {shlex.quote(str(directory))}\n  cosim run scenarios/course.json\n  cosim regress\n  pytest")
+    commands = ("pip install -r requirements.txt", "cosim run scenarios/course.json", "cosim regress", "python -m pytest")
+    click.echo("\n".join(f"  {line}" for line in (f"cd {shlex.quote(str(directory))}", *commands)))
     return 0
 
 
 def _write(directory: Path) -> None:
-    name = directory.resolve().name
+    marks = {"README.md": ("NAME", directory.resolve().name), "requirements.txt": ("COSIM", requirement(origin()))}
     for file, template in _FILES.items():
         path = directory / file
-        text = template.read_text(encoding="utf-8").replace("NAME", name) if file == "README.md" else template.read_text("utf-8")
+        text = template.read_text(encoding="utf-8")
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text.replace("VERSION", __version__), encoding="utf-8")
+        path.write_text(text.replace(*marks[file]) if file in marks else text, encoding="utf-8")
         click.echo(path)
     plant = directory / _PLANT
     plant.parent.mkdir(exist_ok=True)
     shutil.copyfile(resources.root() / _PLANT, plant)
     click.echo(plant)
+
+
+def origin() -> Mapping[str, Any] | None:
+    """Where pip got this cosim from, as its direct_url.json says (PEP 610); None when from an index, or not by pip."""
+    try:
+        text = distribution("fmi-cosim").read_text("direct_url.json")
+    except PackageNotFoundError:
+        return None
+    return json.loads(text) if text else None
+
+
+def requirement(source: Mapping[str, Any] | None) -> str:
+    """The line by which pip gets the same cosim again."""
+    if source is None:
+        return f"fmi-cosim=={__version__}"
+    url = source["url"]
+    if vcs := source.get("vcs_info"):
+        return f"fmi-cosim @ {vcs['vcs']}+{url}@{vcs['commit_id']}"
+    return f"-e {url}" if source.get("dir_info", {}).get("editable") else f"fmi-cosim @ {url}"

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import keyword
-import os
 import re
 import shlex
+import shutil
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ TEMPLATES = Path(__file__).parents[1] / "templates"
 #: what the templates are called: they are valid programs, in which a new controller's name replaces this one
 _SNAKE, _CAMEL = "speed_keeper", "SpeedKeeper"
 _TYPES = ("Real", "Integer", "Boolean", "String")
+_PICTURES, _PLANT = "pictures.py", "fmus/strider.fmu"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +62,9 @@ def controller(name: str, language: str, directory: Path, force: bool) -> None:
     names = _names(name, template.values())
     folder = directory / names[_SNAKE]
     files = {folder / _replaced(file, names): _replaced(text, names) for file, text in template.items()}
-    files[folder / f"{names[_SNAKE]}.json"] = _scenario(chosen, folder, names)
-    _write(files, force)
+    files[folder / f"{names[_SNAKE]}.json"] = _scenario(chosen, names)
+    files[folder / _PICTURES] = (TEMPLATES / "vessel" / _PICTURES).read_text()
+    _write(files, folder / _PLANT, force)
     _say_what_is_next(chosen, folder, names)
 
 
@@ -81,7 +82,7 @@ def _names(name: str, texts: Iterable[str]) -> dict[str, str]:
     snake = snake_case(name)
     camel = "".join(word[:1].upper() + word[1:] for word in snake.split("_"))
     taken = {*_TYPES, *(word for text in texts for word in re.findall(r"\w+", text))} - {_CAMEL}
-    modules = {*sys.stdlib_module_names, "pythonfmu"}
+    modules = {*sys.stdlib_module_names, "pythonfmu", Path(_PICTURES).stem}
     if camel in taken or snake in modules or keyword.iskeyword(snake) or keyword.iskeyword(camel):
         raise InputError(f'"{name}" means something else already; choose another name')
     return {_SNAKE: snake, _CAMEL: camel}
@@ -91,27 +92,22 @@ def _replaced(text: str, names: Mapping[str, str]) -> str:
     return re.sub("|".join(names), lambda match: names[match[0]], text)
 
 
-def _scenario(language: Language, folder: Path, names: Mapping[str, str]) -> str:
-    marks = {"SOURCE": language.key, "FILE": _replaced(language.component, names), "ROOT": _shipped_from(folder)}
-    quoted = {mark: json.dumps(text)[1:-1] for mark, text in marks.items()}
-    return _replaced((TEMPLATES / "scenario.json").read_text(), {**names, **quoted})
+def _scenario(language: Language, names: Mapping[str, str]) -> str:
+    marks = {"SOURCE": language.key, "FILE": _replaced(language.component, names)}
+    return _replaced((TEMPLATES / "scenario.json").read_text(), {**names, **marks})
 
 
-def _shipped_from(folder: Path) -> str:
-    """The way from a new scenario to what cosim ships: relative inside a clone, which may be moved, else absolute."""
-    root = resources.root()
-    inside = folder.resolve().is_relative_to(root)
-    return Path(os.path.relpath(root, folder.resolve()) if inside else root).as_posix()
-
-
-def _write(files: Mapping[Path, str], force: bool) -> None:
-    present = [path for path in files if path.exists()]
+def _write(files: Mapping[Path, str], plant: Path, force: bool) -> None:
+    present = [path for path in (*files, plant) if path.exists()]
     if present and not force:
         raise InputError([Problem("exists; --force overwrites it", str(path)) for path in present])
     for path, text in files.items():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
         click.echo(path)
+    plant.parent.mkdir(exist_ok=True)
+    shutil.copyfile(resources.root() / _PLANT, plant)
+    click.echo(plant)
 
 
 def _say_what_is_next(language: Language, folder: Path, names: Mapping[str, str]) -> None:

@@ -114,8 +114,7 @@ class _Run:
         from ..kpi import evaluate_checks
 
         kpis = {name: math.nan if value is None else value for name, value in self.result.kpis.items()}
-        failed = (outcome for outcome in evaluate_checks(kpis, self.checks) if not outcome.passed)
-        return [f"{outcome.check['kpi']} is {outcome.value:.6g}, expected {outcome.limits}" for outcome in failed]
+        return [str(outcome) for outcome in evaluate_checks(kpis, self.checks) if not outcome.passed]
 
     @property
     def path(self) -> Path:

@@ -19,9 +19,14 @@ def command(result: Path, other: Path | None, output_file: Path | None, shall_op
     """
     from ..report.replay import write_replay
     from ..report.runs import read_run
+    from ..report.scene import scene_of
 
     target = output_file or result / "replay.html"
-    write_replay([read_run(directory) for directory in (result, *([other] if other else []))], target)
+    runs = [read_run(directory) for directory in (result, *([other] if other else []))]
+    write_replay(runs, target)
+    if not scene_of(runs[0].metadata)["bodies"]:
+        text = 'nothing says what this run looks like (key "scene" of the scenario): the page shows signals, and nothing in 3-D'
+        click.echo(f"{result}: {text}", err=True)
     click.echo(target)
     if shall_open:
         click.launch(str(target.absolute()))

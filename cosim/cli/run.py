@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -30,7 +31,7 @@ _LATENESS = {"max": "max_lateness", "mean": "mean_lateness", "99 %": "lateness_9
 #: folder of a run that is going on, inside its output directory
 UNFINISHED = ".unfinished"
 
-RESULTS = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run.json", "report.html")
+RESULTS = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run.json", "report.html", "replay.html")
 
 
 @click.command(cls=strict.Command)
@@ -113,6 +114,7 @@ def _run(
     supervision.configure(assembly.spec.deadlines)
     directory = (output_dir or Path("runs") / assembly.spec.name).absolute()
     shown = output_dir or Path("runs") / assembly.spec.name
+    _say_whose_results_go(directory, shown, assembly.document.file.resolve())
     try:
         _prepare(directory, [spec.name for spec in assembly.spec.figures])
         control = live.control(assembly, link) if link else None
@@ -191,6 +193,17 @@ def _prepare(directory: Path, figures: Sequence[str]) -> None:
 
     prepare(directory)
     remove(directory, *RESULTS, *(f"{name}{suffix}" for name in figures for suffix in (".png", ".svg", ".csv")))
+
+
+def _say_whose_results_go(directory: Path, shown: Path, file: Path) -> None:
+    """A copied scenario whose name was not changed takes the folder of the first one."""
+    try:
+        former = json.loads((directory / "run.json").read_text(encoding="utf-8"))["scenario_file"]
+    except (OSError, ValueError, LookupError, TypeError):  # there are none, or they say nothing of it
+        return
+    if former != str(file):
+        text = f'replaces the results of {former} in {shown}; another "name" in the scenario or --output-dir keeps both'
+        click.echo(text, err=True)
 
 
 def _keep(partial: Result, directory: Path, shown: Path) -> None:

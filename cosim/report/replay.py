@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,11 @@ from ..errors import InputError
 from ..results import Result
 from ..results.files import replacing
 from .pages import embedded, render
-from .samples import packed
+from .samples import is_constant, packed
 from .scene import scene_of
+
+#: of a run without a scene: plots, and signals in each
+MOST_PLOTS, MOST_SIGNALS = 6, 6
 
 
 def replay_data(runs: Sequence[Result]) -> dict[str, Any]:
@@ -19,7 +23,18 @@ def replay_data(runs: Sequence[Result]) -> dict[str, Any]:
     for result in runs:
         if not len(result.time):
             raise InputError(f"the result {result.metadata.get('name', '')} holds no rows, so there is nothing to replay")
-    return {"scene": scene_of(runs[0].metadata), "runs": [packed(result) for result in runs]}
+    scene = scene_of(runs[0].metadata)
+    plots = scene["plots"] or ([] if scene["bodies"] else _some_plots(runs[0]))
+    return {"scene": {**scene, "plots": plots}, "runs": [packed(result) for result in runs]}
+
+
+def _some_plots(result: Result) -> list[list[str]]:
+    """For a run of which nobody says what to draw: its first numeric signals that change, if any does; one plot for a unit."""
+    numeric = [name for name in result if result[name].dtype != object]
+    plots: dict[str, list[str]] = {}
+    for name in [name for name in numeric if not is_constant(result[name])] or numeric:
+        plots.setdefault(result.units.get(name, ""), []).append(name)
+    return [names[:MOST_SIGNALS] for names in islice(plots.values(), MOST_PLOTS)]
 
 
 def write_replay(runs: Sequence[Result], path: Path) -> None:

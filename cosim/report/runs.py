@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..results import Result
+from ..results import Kpis, Result
 from ..scenario.functions import load_function
 
 Function = tuple[str, Callable[..., Any], Mapping[str, Any]]
@@ -27,7 +27,7 @@ def read_run(directory: str | Path) -> Result:
     kpis = _read_json(directory / "kpis.json") if (directory / "kpis.json").exists() else {}
     numbers = {name: math.nan if value is None else value for name, value in kpis.items()}
     recording = Result.from_csv(directory / "result.csv").recording
-    return Result(replace(recording, units={**recording.units, **units}), numbers, timing, about)
+    return Result(replace(recording, units={**recording.units, **units}), Kpis(numbers), timing, about)
 
 
 def _read_json(path: Path) -> dict[str, Any]:

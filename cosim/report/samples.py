@@ -23,7 +23,7 @@ def packed(result: Result) -> dict[str, Any]:
     Signals that never change stand in `constants`. Longer runs are thinned; extremes of signals are kept (see `thinned`).
     """
     numeric = {name: result[name] for name in result if result[name].dtype != object}
-    constants = {name: _number(values[0]) for name, values in numeric.items() if _is_constant(values)}
+    constants = {name: _number(values[0]) for name, values in numeric.items() if is_constant(values)}
     varying = {name: values for name, values in numeric.items() if name not in constants}
     most = max(2, min(MOST_ROWS, MOST_VALUES // (len(varying) + 1)))
     columns = {"time": sampled(result.time, most)} | {name: thinned(values, most) for name, values in varying.items()}
@@ -37,7 +37,7 @@ def packed(result: Result) -> dict[str, Any]:
     }
 
 
-def _is_constant(values: np.ndarray) -> bool:
+def is_constant(values: np.ndarray) -> bool:
     return bool(len(values) and np.isfinite(values[0]) and (values == values[0]).all())
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from .files import write_json
 from .mcap_files import write_mcap
 from .parquet_files import write_parquet
 
+if TYPE_CHECKING:
+    from ..kpi import CheckOutcome
+
 
 class SignalError(InputError, KeyError):
     """A signal was asked for that was not recorded."""
@@ -24,18 +27,34 @@ class SignalError(InputError, KeyError):
     __str__ = Exception.__str__  # KeyError would print the repr
 
 
+class KpiError(InputError, KeyError):
+    """A KPI was asked for that was not computed."""
+
+    __str__ = Exception.__str__
+
+
+class Kpis(dict[str, float | int | bool]):
+    """KPIs by their names; asking for another one raises KpiError (an InputError and a KeyError) with the nearest name."""
+
+    def __missing__(self, name: str) -> float | int | bool:
+        raise KpiError(f'no KPI "{name}" was computed{did_you_mean(name, self)}')
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """A recorded run; `result["plant.uav.position.z"]` are the values of one signal, shape (rows,).
 
     `kpis` maps "landing.lateral_error" to a number or Boolean, `timing` names of durations to wall time in s
-    ("loop_seconds": the stepping loop alone), `metadata` whatever describes the run: versions, hashes, seeds.
+    ("loop_seconds": the stepping loop alone), `metadata` whatever describes the run: versions, hashes, seeds. `checks` are the
+    scenario's checks held against the KPIs, each with its `check`, `value` and `passed`: one that is not met raises nothing. A
+    result that was read from files has none.
     """
 
     recording: Recording
     kpis: Mapping[str, float | int | bool] = field(default_factory=dict)
     timing: dict[str, float] = field(default_factory=dict)
     metadata: dict[str, Any] = field(default_factory=dict)
+    checks: Sequence[CheckOutcome] = ()
 
     @property
     def time(self) -> np.ndarray:
@@ -52,7 +71,8 @@ class Result:
         try:
             return self.recording.columns[name]
         except KeyError:
-            raise SignalError(f'no signal "{name}" was recorded{did_you_mean(name, self)}') from None
+            hint = "; the time of each row is in `result.time`" if name == "time" else did_you_mean(name, self)
+            raise SignalError(f'no signal "{name}" was recorded{hint}') from None
 
     def __contains__(self, name: object) -> bool:
         return name in self.recording.columns
@@ -65,16 +85,23 @@ class Result:
         return len(self.recording.columns)
 
     def __repr__(self) -> str:
-        """What ran, how far, and the KPIs."""
+        """What ran, how far, which checks it did not meet, and the KPIs."""
         rows = f"{len(self.time)} rows of {len(self)} signals"
         span = f", {self.time[0]:g} s to {self.time[-1]:g} s" if len(self.time) else ""
         failure, units = self.metadata.get("failure"), self.metadata.get("kpi_units", {})
         lines = [f"{self.metadata.get('name', 'Result')}: {rows}{span}", *([f"ended early: {failure}"] if failure else [])]
+        lines += self._verdict()
         width = max(map(len, self.kpis), default=0)
         for name, value in self.kpis.items():
             text = str(value) if isinstance(value, bool) else f"{value:.6g}"
             lines.append(f"  {name:{width}}  {text} {units.get(name, '')}".rstrip())
         return "\n".join(lines)
+
+    def _verdict(self) -> list[str]:
+        if not self.checks:
+            return []
+        failed = [f"  {outcome}" for outcome in self.checks if not outcome.passed]
+        return [f"{len(self.checks) - len(failed)} of {len(self.checks)} checks passed{':' * bool(failed)}", *failed]
 
     def signals(self, pattern: str = "*") -> list[str]:
         """Names that match `pattern`, in recorded order; `*` stands for any text, dots and brackets included."""

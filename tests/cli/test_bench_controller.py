@@ -117,7 +117,7 @@ def test_a_worse_controller_is_told_so_and_a_better_one_too(folder):
     path = lazy(folder)
     worse = bench(folder, path)
     assert worse.returncode == 3
-    assert "FAILED  sail" in worse.stdout and "waypoints.all_reached is 0, expected equals true" in worse.stdout
+    assert "FAILED  sail" in worse.stdout and "waypoints.all_reached is false, expected equals true" in worse.stdout
     assert words(worse, "waypoints.reached")[1:] == ["1", "2", "worse"]
     assert words(worse, "waypoints.time[2]")[1:] == ["s", "-", words(worse, "waypoints.time[2]")[3], "worse"]
     assert "last run" not in worse.stdout

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from cosim import resources
+
 
 def cosim(*arguments):
     command = [sys.executable, "-m", "cosim", *map(str, arguments)]
@@ -57,6 +59,16 @@ def test_a_scenario_brings_reference_and_tolerances(tmp_path):
     path.write_text(json.dumps(scenario))
     refused = cosim("compare", tmp_path / "a.csv", path)
     assert (refused.returncode, refused.stderr) == (2, f'{path} names no "reference"\n')
+
+
+def test_the_scenario_may_be_a_shipped_one_by_its_name(tmp_path):
+    shipped = resources.root() / "scenarios/references/free_flight.csv"
+    by_name = cosim("compare", shipped, "free_flight")
+    assert (by_name.returncode, by_name.stdout) == (0, "all 10 signals stay in their tubes\n"), by_name.stderr
+    misspelt = cosim("compare", shipped, "free_fligt")
+    assert misspelt.returncode == 2 and misspelt.stderr.endswith('did you mean "free_flight"?\n')
+    missing = cosim("compare", shipped, "runs/free_fligt")
+    assert (missing.returncode, missing.stderr) == (2, "cannot read runs/free_fligt: No such file or directory\n")
 
 
 def test_the_picture_shows_the_tube_and_what_is_outside(tmp_path):

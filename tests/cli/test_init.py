@@ -5,11 +5,15 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from cosim import __version__
+from cosim.cli.init import origin, requirement
 
 
 def run(*command, cwd):
@@ -19,9 +23,17 @@ def run(*command, cwd):
 
 
 @pytest.fixture(scope="module")
-def project(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("own")
-    made = run("cosim", "init", "my controllers", cwd=folder)
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("own")
+
+
+@pytest.fixture(scope="module")
+def made(folder):
+    return run("cosim", "init", "my controllers", cwd=folder)
+
+
+@pytest.fixture(scope="module")
+def project(folder, made):
     assert made.returncode == 0, made.stderr
     listed = {Path(line).relative_to("my controllers").as_posix() for line in made.stdout.splitlines() if line.startswith("my ")}
     root = folder / "my controllers"
@@ -41,9 +53,8 @@ def test_the_commands_of_its_workflow_pass(project):
 
 def test_a_changed_controller_is_noticed(project, tmp_path):
     own = tmp_path / "copy"
-    for file in ("scenarios/course.json", "scenarios/references/course.csv", "controllers/speed_keeper.py", "fmus/strider.fmu"):
-        (own / file).parent.mkdir(parents=True, exist_ok=True)
-        (own / file).write_bytes((project / file).read_bytes())
+    for folder in ("scenarios", "controllers", "fmus"):
+        shutil.copytree(project / folder, own / folder)
     source = own / "controllers/speed_keeper.py"
     text = source.read_text()
     source.write_text(text.replace("self.course_P * error", "0.5 * self.course_P * error"))
@@ -53,10 +64,36 @@ def test_a_changed_controller_is_noticed(project, tmp_path):
     assert "vessel.attitude.yaw leaves its tube at t = " in done.stdout
 
 
-def test_the_version_stands_in_the_requirements_and_the_name_in_the_readme(project):
-    from cosim import __version__
+def test_a_run_leaves_the_figure_and_the_replay_that_the_readme_promises(project):
+    done = run("cosim", "run", "scenarios/course.json", cwd=project)
+    assert done.returncode == 0 and "course.png, report.html in runs/course" in done.stdout
+    replayed = run("cosim", "replay", "runs/course", cwd=project)
+    assert (replayed.returncode, replayed.stderr) == (0, "")
 
-    assert (project / "requirements.txt").read_text() == f"fmi-cosim=={__version__}\npytest\n"
+
+@pytest.mark.parametrize(
+    ("source", "line"),
+    [
+        (None, f"fmi-cosim=={__version__}"),
+        (
+            {"url": "https://host/cosim.git", "vcs_info": {"vcs": "git", "commit_id": "1ab2"}},
+            "fmi-cosim @ git+https://host/cosim.git@1ab2",
+        ),
+        ({"url": "file:///home/me/cosim", "dir_info": {}}, "fmi-cosim @ file:///home/me/cosim"),
+        ({"url": "file:///home/me/cosim", "dir_info": {"editable": True}}, "-e file:///home/me/cosim"),
+        ({"url": "https://host/fmi_cosim.whl", "archive_info": {}}, "fmi-cosim @ https://host/fmi_cosim.whl"),
+    ],
+)
+def test_the_requirements_name_where_pip_got_this_cosim_from(source, line):
+    """On no index is a package of this name, so that its version alone could not be installed."""
+    assert requirement(source) == line
+
+
+def test_the_requirements_are_installed_first_and_the_name_stands_in_the_readme(made, project):
+    commands = [line.strip() for line in made.stdout.partition("Next:\n")[2].splitlines()]
+    assert commands[1] == "pip install -r requirements.txt" and commands[-1] == "python -m pytest"
+    named = [line for line in (project / "requirements.txt").read_text().splitlines() if not line.startswith("#")]
+    assert named == [requirement(origin()), "pytest"]
     assert (project / "README.md").read_text().startswith("# my controllers\n")
 
 

@@ -17,12 +17,13 @@ import pytest
 
 from cosim import resources
 from cosim.cli import main
+from cosim.report.scene import scene_of
 from cosim.results import Result
 
 MADE = {
-    "python": ["my_keeper.json", "my_keeper.py"],
-    "modelica": ["MyKeeper.mo", "my_keeper.json"],
-    "c": ["modelDescription.xml", "my_keeper.c", "my_keeper.json"],
+    "python": ["my_keeper.json", "my_keeper.py", "pictures.py"],
+    "modelica": ["MyKeeper.mo", "my_keeper.json", "pictures.py"],
+    "c": ["modelDescription.xml", "my_keeper.c", "my_keeper.json", "pictures.py"],
 }
 
 
@@ -52,7 +53,7 @@ def sailed(tmp_path_factory):
         folder = tmp_path_factory.mktemp(language)
         made = new(folder, "my_keeper", language)
         assert made.returncode == 0, made.stderr
-        assert sorted(path.name for path in (folder / "my_keeper").iterdir()) == MADE[language]
+        assert sorted(path.name for path in (folder / "my_keeper").iterdir()) == sorted([*MADE[language], "fmus"])
         for command in next_commands(made):
             done = cosim(*command, cwd=folder)
             assert done.returncode == 0, done.stdout + done.stderr
@@ -76,16 +77,14 @@ def test_all_languages_sail_the_same_course(sailed, language):
 
 
 @pytest.mark.parametrize("language", MADE)
-def test_the_exported_fmu_sails_the_same_course(sailed, language, tmp_path):
+def test_the_exported_fmu_sails_the_same_course(sailed, language):
     """`cosim new` proposes how to export it; here the FMU takes the source's place."""
-    scenario = json.loads((sailed(language) / "my_keeper/my_keeper.json").read_text())
-    scenario["components"]["usv"] = {
-        "fmu": str(sailed(language) / "my_keeper/my_keeper.fmu"),
-        "parameters": scenario["components"]["usv"]["parameters"],
-    }
-    (tmp_path / "exported.json").write_text(json.dumps(scenario))
-    assert cosim("run", "exported.json", "--no-report", "--output-dir", "out", cwd=tmp_path).returncode == 0
-    first, second = (Result.from_csv(file / "result.csv") for file in (sailed(language) / "runs/my_keeper", tmp_path / "out"))
+    folder = sailed(language)
+    scenario = json.loads((folder / "my_keeper/my_keeper.json").read_text())
+    scenario["components"]["usv"] = {"fmu": "my_keeper.fmu", "parameters": scenario["components"]["usv"]["parameters"]}
+    (folder / "my_keeper/exported.json").write_text(json.dumps(scenario))
+    assert cosim("run", "my_keeper/exported.json", "--no-report", "--output-dir", "out", cwd=folder).returncode == 0
+    first, second = (Result.from_csv(file / "result.csv") for file in (folder / "runs/my_keeper", folder / "out"))
     assert np.array_equal(first["vessel.position.x"], second["vessel.position.x"])
 
 
@@ -114,17 +113,22 @@ def test_two_controllers_in_c_do_not_take_each_others_binary(tmp_path):
     assert "another GUID" in done.stderr
 
 
-def test_inside_a_clone_the_scenario_can_move_with_it(tmp_path):
-    clone = tmp_path / "clone"
-    (clone / "work").mkdir(parents=True)
-    for name in ("cosim", "controllers", "fmus", "plant_src"):
-        shutil.copytree(resources.root() / name, clone / name, ignore=shutil.ignore_patterns("__pycache__"))
-    command = [sys.executable, "-c", "import sys; sys.path.insert(0, '..'); from cosim.cli import main; main()"]
-    arguments = ["new", "controller", "keeper", "--language", "python"]
-    subprocess.run([*command, *arguments], cwd=clone / "work", check=True, capture_output=True)
-    moved = clone.rename(tmp_path / "moved")
-    assert json.loads((moved / "work/keeper/keeper.json").read_text())["components"]["vessel"]["fmu"] == "../../fmus/strider.fmu"
-    assert cosim("run", "work/keeper/keeper.json", "--no-report", cwd=moved).returncode == 0
+def test_the_folder_can_be_given_to_somebody_else(tmp_path):
+    """Nothing in it names a place outside, so it runs wherever it lies."""
+    assert new(tmp_path, "keeper", "python").returncode == 0
+    given = (tmp_path / "keeper").rename(tmp_path / "given")
+    texts = [path.read_text() for path in given.iterdir() if path.is_file()]
+    assert not [text for text in texts if str(tmp_path) in text or str(resources.root()) in text]
+    done = cosim("run", "given/keeper.json", "--no-report", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_run_leaves_a_figure_and_a_replay(sailed):
+    runs = sailed("python") / "runs/my_keeper"
+    assert (runs / "course.png").is_file()
+    assert scene_of(json.loads((runs / "run.json").read_text()))["bodies"][0]["name"] == "vessel"
+    done = cosim("replay", runs, cwd=sailed("python"))
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_files_are_overwritten_only_by_force(tmp_path):
@@ -135,7 +139,8 @@ def test_files_are_overwritten_only_by_force(tmp_path):
     refused = new(tmp_path, "keeper", "python")
     assert refused.returncode == 2
     assert refused.stderr.splitlines() == [
-        f"keeper/{file}: exists; --force overwrites it" for file in ("keeper.py", "keeper.json")
+        f"keeper/{file}: exists; --force overwrites it"
+        for file in ("keeper.py", "keeper.json", "pictures.py", "fmus/strider.fmu")
     ]
     assert source.read_text() == "mine"
     assert new(tmp_path, "keeper", "python", "--force").returncode == 0
@@ -151,6 +156,7 @@ def test_files_are_overwritten_only_by_force(tmp_path):
         ("../keeper", "c", '"../keeper" is no name of a controller'),
         ("2fast", "python", '"2fast" is no name of a controller'),
         ("math", "python", '"math" means something else already; choose another name'),
+        ("pictures", "python", '"pictures" means something else already; choose another name'),
         ("vehicle", "modelica", '"vehicle" means something else already; choose another name'),
         ("Boolean", "modelica", '"Boolean" means something else already; choose another name'),
     ],

@@ -215,6 +215,7 @@ def test_a_result_without_a_scene_has_its_signals_still(visit, flight, tmp_path)
     write_replay([replace(flight, metadata={"name": "numbers"})], tmp_path / "numbers.html")
     opened = visit(tmp_path / "numbers.html")
     assert opened.page.locator("canvas[aria-label='3-D replay']").count() == 0
+    assert opened.page.locator(".plot").count() == 6
     opened.page.locator(".add input").fill("plant.usv.position.*")
     opened.page.keyboard.press("Enter")
-    assert opened.page.locator(".plot figcaption span").count() == 3
+    assert opened.page.locator(".plot").nth(6).locator("figcaption span").count() == 3

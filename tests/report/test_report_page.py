@@ -4,16 +4,19 @@ import json
 import re
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from cosim import resources
 from cosim.api import load
 from cosim.cli.replay import command as replay
 from cosim.cli.report_page import command as report
 from cosim.cli.run import command as run
 from cosim.errors import InputError
+from cosim.recording import Recording
 from cosim.report import pages
-from cosim.results import write_run
+from cosim.results import Result, write_run
 
 
 class Reader(HTMLParser):
@@ -103,10 +106,22 @@ def short_run(folder):
     return invoke(run, "demo1_box", *words, "--output-dir", folder)
 
 
-def test_no_report_writes_no_page_and_removes_the_old_one(tmp_path):
-    (tmp_path / "report.html").write_text("old")
+def test_no_report_writes_no_page_and_removes_the_old_ones(tmp_path):
+    for name in ("report.html", "replay.html"):
+        (tmp_path / name).write_text("old")
     assert short_run(tmp_path).exception is None
     assert sorted(path.name for path in tmp_path.iterdir()) == ["kpis.json", "result.csv", "run.json"]
+
+
+def test_who_takes_the_folder_of_another_scenario_says_so(tmp_path):
+    """A copy, whose name is still that of the first one."""
+    copy = tmp_path / "mine.json"
+    shipped = resources.root() / "scenarios/free_flight.json"
+    copy.write_text(shipped.read_text().replace('"../', f'"{resources.root()}/'))
+    words = ("--stop-time", "0.1", "--isolation", "none", "--no-report", "--output-dir", tmp_path / "out")
+    said = [invoke(run, file, *words).stderr for file in ("free_flight", "free_flight", copy)]
+    text = f'replaces the results of {shipped} in {tmp_path / "out"}; another "name" in the scenario or --output-dir keeps both\n'
+    assert said[0] == said[1] == "" and said[2] == text
 
 
 def test_a_folder_without_a_run_is_refused(tmp_path):
@@ -129,6 +144,17 @@ def test_warnings_of_components_reach_the_page(tmp_path):
     assert done.exit_code == 0, done.output
     texts = Reader((tmp_path / "out/report.html").read_text()).texts
     assert "WARNING loud: rotor <3> hot" in texts
+
+
+def test_a_run_without_a_scene_shows_what_changes(tmp_path):
+    """Plots instead of an empty page, and the command says why there is nothing in 3-D."""
+    columns = {"a.x": np.array([0.0, 1.0]), "a.still": np.zeros(2), "a.v": np.array([2.0, 1.0]), "b.x": np.array([3.0, 1.0])}
+    units = {"a.x": "m", "a.still": "m", "a.v": "m/s", "b.x": "m"}
+    write_run(Result(Recording(np.array([0.0, 1.0]), columns, units), metadata={"name": "numbers"}), tmp_path)
+    done = invoke(replay, tmp_path)
+    assert done.exit_code == 0 and "nothing says what this run looks like" in done.stderr
+    data = re.search(r'id="replay-data">(.*?)</script>', (tmp_path / "replay.html").read_text(), re.S).group(1)
+    assert json.loads(data)["scene"]["plots"] == [["a.x", "b.x"], ["a.v"]]
 
 
 LOUD = """

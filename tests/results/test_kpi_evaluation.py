@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+import cosim
 from cosim.errors import ComponentError, InputError
-from cosim.kpi import evaluate_checks, evaluate_kpis, kpi_units, units
+from cosim.kpi import evaluate_checks, evaluate_kpis, held_checks, kpi_units, units
 from cosim.recording import Recording
 from cosim.results import Result
 
@@ -120,3 +121,17 @@ def test_all_bad_checks_are_refused_together():
         'check of "landing.error": unknown limit "mx"; did you mean "max"?',
         'check of "landing.error": no limit given, expected one of min, max, equals',
     ]
+
+
+def test_a_check_of_a_kpi_that_was_not_evaluated_is_not_met():
+    """In a result no check may be missing, and a misspelt one is none that passed."""
+    eror, error = held_checks({"landing.error": 0.0}, [{"kpi": "landing.eror", "max": 1}, {"kpi": "landing.error", "max": 1}])
+    assert (eror.passed, error.passed) == (False, True)
+    assert str(eror) == "landing.eror is nan, expected max 1"
+
+
+def test_a_run_from_python_tells_which_checks_it_did_not_meet():
+    result = cosim.run("demo1_box", stop_time=0.1)
+    failed = {outcome.check["kpi"] for outcome in result.checks if not outcome.passed}
+    assert len(result.checks) == 5 and "landing.landed_at_end" in failed
+    assert "  landing.landed_at_end is false, expected equals true" in repr(result).splitlines()

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from cosim.errors import InputError
+from cosim.kpi import held_checks
 from cosim.recording import Recording
-from cosim.results import Result, write_run
+from cosim.results import Kpis, Result, write_run
 
 
 @pytest.fixture
@@ -43,6 +44,16 @@ def test_an_unknown_signal_is_a_key_error_too(result):
     assert "wind" not in result
 
 
+def test_who_asks_for_the_time_as_a_signal_is_sent_to_it(result):
+    with pytest.raises(InputError, match=r"the time of each row is in `result.time`$"):
+        result["time"]
+
+
+def test_an_unknown_kpi_names_the_nearest():
+    with pytest.raises(KeyError, match=r'^no KPI "landing.tme" was computed; did you mean "landing.time"\?$'):
+        Kpis({"landing.time": 14.5})["landing.tme"]
+
+
 @pytest.mark.parametrize(
     ("pattern", "places"),
     [
@@ -70,6 +81,11 @@ def test_a_result_is_shown_as_what_ran_and_its_kpis(result):
         "  landing.lateral_error  0.05 m",
         "  landing.landed_at_end  True",
         "  landing.bounces        2",
+    ]
+    checks = held_checks(kpis, [{"kpi": "landing.bounces", "max": 1}, {"kpi": "landing.landed_at_end", "equals": True}])
+    assert repr(Result(result.recording, checks=checks)).splitlines()[1:] == [
+        "1 of 2 checks passed:",
+        "  landing.bounces is 2, expected max 1",
     ]
     assert repr(Result(Recording.empty())) == "Result: 0 rows of 0 signals"
 
