@@ -6,7 +6,7 @@ import json
 import shlex
 import shutil
 from collections.abc import Mapping
-from importlib.metadata import PackageNotFoundError, distribution
+from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
 
@@ -70,11 +70,8 @@ def _write(directory: Path) -> None:
 
 def origin() -> Mapping[str, Any] | None:
     """Where pip got this cosim from, as its direct_url.json says (PEP 610); None when from an index, or not by pip."""
-    try:
-        text = distribution("fmi-cosim").read_text("direct_url.json")
-    except PackageNotFoundError:
-        return None
-    return json.loads(text) if text else None
+    found = (made.read_text("direct_url.json") for made in distributions(name="fmi-cosim"))  # a clone has a record of its own
+    return next((json.loads(text) for text in found if text), None)
 
 
 def requirement(source: Mapping[str, Any] | None) -> str:

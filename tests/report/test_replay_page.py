@@ -184,9 +184,9 @@ def test_numbers_at_an_axis_have_their_digits_and_room(visit, tmp_path):
     columns = {name: low + (high - low) * np.sin(time) ** 2 for name, (low, high, _) in NUMBERS.items()}
     write_replay([Result(Recording(time, columns, {}), metadata={"name": "numbers"})], tmp_path / "numbers.html")
     opened = visit(tmp_path / "numbers.html")
-    for number, (name, (_, _, texts)) in enumerate(NUMBERS.items()):
+    for name, (_, _, texts) in NUMBERS.items():
         opened(f"cosimReplay.plots.add(['{name}'])")
-        chart = f"cosimReplay.plots.list[{number}].chart"
+        chart = "cosimReplay.plots.list.at(-1).chart"
         opened.until(f"{chart}.axes[1]._values?.length > 0")
         assert opened(f"{chart}.axes[1]._values") == texts
         widths = opened(f"{chart}.axes[1]._values.map((text) => {chart}.ctx.measureText(text).width)")
