@@ -99,7 +99,9 @@ def read_table(path: Path, columns: Sequence[str], interpolation: Interpolation,
         for name in columns
         if name not in header[1:]
     ]
-    problems += [Problem(f'profile "{path}" has several columns "{name}"', where) for name in columns if header[1:].count(name) > 1]
+    problems += [
+        Problem(f'profile "{path}" has several columns "{name}"', where) for name in columns if header[1:].count(name) > 1
+    ]
     if header[:1] != ["time"]:
         problems.append(Problem(f'the first column of profile "{path}" must be "time", found "{(header or [""])[0]}"', where))
     try:

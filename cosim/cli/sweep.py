@@ -72,6 +72,8 @@ def _run(
             if error.exit_code != InputError.exit_code:
                 write(sweep, ledger, folder, parquet)
             raise
+    if not interrupted:
+        sweep.check_criteria(ledger)
     summary = write(sweep, ledger, folder, parquet)
     _draw(sweep, ledger, summary, folder, replays and not interrupted, workers)
     _print(sweep, summary)

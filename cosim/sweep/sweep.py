@@ -16,7 +16,7 @@ from .document import Read, read
 from .jobs import Job, Record
 from .ledger import Ledger
 from .schema import SweepSpec
-from .study import Laboratory, Observer, Study, run_all
+from .study import Laboratory, Observer, Seen, Study, run_all
 
 #: so many points are tried at most before anything runs
 _CHECKED = 20
@@ -67,8 +67,9 @@ class Sweep:
         return self.study.checks if own is None else [check.model_dump(exclude_none=True) for check in own]
 
     def passed(self, kpis: Mapping[str, Number]) -> bool:
-        """Whether these KPIs are a success. Raises InputError for criteria about KPIs that do not exist."""
-        return all(outcome.passed for outcome in evaluate_checks(kpis, self.criteria))
+        """Whether these KPIs are a success; without one that the criteria are about they are none."""
+        known = all(check["kpi"] in kpis for check in self.criteria)
+        return known and all(outcome.passed for outcome in evaluate_checks(kpis, self.criteria))
 
     def check(self, engine: Laboratory) -> None:
         """Raises InputError with everything that keeps a level of a factor from being run."""
@@ -91,15 +92,28 @@ class Sweep:
                 return
 
     def run(self, ledger: Ledger, engine: Laboratory, observe: Observer) -> None:
-        """Run what is not done. Raises InputError before anything runs, and for criteria that the first run shows to be wrong."""
+        """Run what is not done. Raises InputError before anything runs, and when the first runs show criteria to be wrong."""
+        seen = Seen()
 
         def look(record: Record) -> None:
-            if not record.failure:
-                self.passed(record.kpis)
+            seen.add(record)
+            if seen.enough:
+                self._refuse_criteria(seen)
             observe(record)
 
         self.check(engine)
         run_all(self.jobs(), ledger, engine, look)
+
+    def check_criteria(self, ledger: Ledger) -> None:
+        """Raises InputError for criteria about KPIs that no run has."""
+        seen = Seen()
+        for row in self.rows(ledger):
+            seen.add(row.record)
+        self._refuse_criteria(seen)
+
+    def _refuse_criteria(self, seen: Seen) -> None:
+        if seen.runs:
+            evaluate_checks(seen.kpis, self.criteria)
 
     def rows(self, ledger: Ledger) -> Iterator[Row]:
         """Finished runs in the order of the design."""

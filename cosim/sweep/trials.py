@@ -11,7 +11,7 @@ from .tune import Trial, Tuning
 
 
 def write(tuning: Tuning, folder: Path) -> Trial:
-    """Write trials.csv and best.json; returns the best trial. Raises ValueError when nothing was tried."""
+    """Write trials.csv and best.json; returns the best trial. Something must have been tried."""
     names = [spec.name for spec in tuning.spec.parameters]
     lines = ([*trial.parameters.values(), trial.value, trial.violation, trial.failure] for trial in tuning.trials)
     write_rows([*names, "value", "violation", "failure"], lines, folder / "trials.csv")

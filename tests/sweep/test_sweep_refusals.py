@@ -99,12 +99,19 @@ def test_what_cannot_be_set_is_found_before_anything_runs(lag):
     assert lag.records() == []
 
 
-def test_criteria_about_kpis_that_do_not_exist_end_the_sweep_at_its_first_run(lag):
+def test_criteria_about_kpis_that_do_not_exist_end_the_sweep_at_its_first_runs(lag):
     factors = [{"name": "y", "set": "lag.y_start", "values": list(range(50))}]
     done = lag.call("sweep", lag.write(factors=factors, success=[{"kpi": "end.valeu", "max": 1.0}]))
     assert done.code == 2
     assert 'no such KPI; did you mean "end.value"?' in done.err
     assert len(lag.records()) < 50
+
+
+def test_so_they_do_when_all_runs_are_there(lag):
+    factors = [{"name": "y", "set": "lag.y_start", "values": [1, 2]}]
+    for _ in range(2):
+        assert lag.call("sweep", lag.write(factors=factors, success=[{"kpi": "end.valeu", "max": 1.0}])).code == 2
+    assert len(lag.records()) == 2
 
 
 def test_a_file_that_cannot_be_imported_is_named(lag):

@@ -82,6 +82,17 @@ def test_what_is_done_is_not_done_again_and_what_is_new_is_added(lag):
     assert "3 of 3 runs, 1 made now" in done.out
 
 
+def test_a_run_without_a_kpi_of_the_criteria_is_no_success(lag):
+    """Runs that end above 1 have another KPI, the first one too."""
+    (lag.folder / "own.py").write_text(
+        "def own(result):\n    y = result['lag.y'][-1]\n    return {'low' if y < 1 else 'high': y}\n"
+    )
+    content = {"settings": {"/kpis": [{"name": "own", "python": "own.py:own"}]}, "success": [{"kpi": "own.low", "max": 1.0}]}
+    done = lag.call("sweep", lag.write(factors=[{"name": "y", "set": "lag.y_start", "values": [3, 1, 4]}], **content))
+    assert done.code == 0, done.err
+    assert [(row["passed"], bool(row["own.low"])) for row in lag.table()] == [("0", False), ("1", True), ("0", False)]
+
+
 @pytest.mark.long
 def test_another_scenario_makes_other_runs(lag):
     sweep = lag.write(factors=[{"name": "T", "set": "lag.T", "values": [0.5]}])
