@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import Annotated, Any, Literal
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import AfterValidator, BaseModel, Field, StringConstraints, model_validator
 
 from ..errors import did_you_mean
 from ..scenario.schema import CheckSpec, Names, Spec
+from ..scenario.tree import pointer_keys
 
 #: distribution -> its arguments; `min` and `max` of truncated_normal may be left out
 DISTRIBUTIONS = {
@@ -35,6 +36,7 @@ def _label(value: str) -> str:
     return value
 
 
+Paths = Annotated[Names, Field(min_length=1)]
 Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_. ]*$"), AfterValidator(_label)]
 Scale = Literal["linear", "log"]
 
@@ -105,7 +107,7 @@ class FactorSpec(Spec):
     """What varies: paths as of `--set` and the values that they take, or named levels that set several things at once."""
 
     name: Label
-    set: Names | None = Field(None, description="variable or JSON pointer; of several, all get the same value")
+    set: Paths | None = Field(None, description="variable or JSON pointer; of several, all get the same value")
     values: list[Any] | None = Field(None, min_length=1)
     range: RangeSpec | None = None
     distribution: DistributionSpec | None = None
@@ -121,11 +123,17 @@ class FactorSpec(Spec):
             raise ValueError('expected "set" beside values, range or distribution, and not beside levels')
         return self
 
+    def settings(self) -> Iterator[tuple[str, Any]]:
+        """What it may set, with the values that are known; without any the value None."""
+        for level in (self.levels or {}).values():
+            yield from level.items()
+        yield from ((path, value) for path in self.set or () for value in self.values or (None,))
+
 
 class SeedsSpec(Spec):
     """Replications: every point is run with each of `count` seeds, the same ones for all points."""
 
-    set: Names
+    set: Paths
     first: int = 1
     count: int = Field(ge=1)
 
@@ -192,7 +200,8 @@ class SweepSpec(StudySpec):
     def _consistent(self) -> SweepSpec:
         names = [factor.name for factor in self.factors]
         _unique("factors", names)
-        _set_once(self.factors, self.seeds)
+        seeds = [("seed", [(path, None) for path in self.seeds.set])] if self.seeds else []
+        _set_once(self.settings, [*((factor.name, factor.settings()) for factor in self.factors), *seeds])
         if not names and self.seeds is None:
             raise ValueError('expected "factors", "seeds" or both')
         for name in (name for group in self.by for name in group):
@@ -212,7 +221,7 @@ class ParameterSpec(Spec):
     """What a tuning may change, and within which bounds."""
 
     name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$"), AfterValidator(_label)]
-    set: Names
+    set: Paths
     min: float
     max: float
     start: float | None = None
@@ -250,6 +259,9 @@ class TuneSpec(StudySpec):
     @model_validator(mode="after")
     def _consistent(self) -> TuneSpec:
         _unique("parameters", [parameter.name for parameter in self.parameters])
+        cases = [setting for case in self.cases for setting in case.items()]
+        parameters = [(each.name, [(path, None) for path in each.set]) for each in self.parameters]
+        _set_once(self.settings, [("cases", cases), *parameters])
         return self
 
 
@@ -275,19 +287,65 @@ def _has_labels(factor: FactorSpec, sampled: bool) -> bool:
     return factor.levels is not None or not sampled
 
 
-def _set_once(factors: Sequence[FactorSpec], seeds: SeedsSpec | None) -> None:
-    """Raises ValueError when two factors set the same thing."""
-    setters = {
-        factor.name: {*(factor.set or ()), *(path for level in (factor.levels or {}).values() for path in level)}
-        for factor in factors
-    }
-    setters["seed"] = {*(seeds.set if seeds else ())}
-    owners: dict[str, str] = {}
-    for name, paths in setters.items():
-        for path in sorted(paths):
-            if path in owners:
-                raise ValueError(f'both "{owners[path]}" and "{name}" set "{path}"')
-            owners[path] = name
+class _Setting(NamedTuple):
+    """Whose setting it is, how it is written, and the keys that lead to its place in the scenario."""
+
+    owner: str
+    text: str
+    place: tuple[str, ...]
+
+    @property
+    def pointer(self) -> bool:
+        """Whether it changes the scenario's JSON; variables are set after all that."""
+        return self.text.startswith("/")
+
+    def conflict(self, other: _Setting) -> str:
+        if self.text == other.text:
+            return f'both {other.owner} and {self.owner} set "{self.text}"'
+        return f'both {other.owner} and {self.owner} set the same thing, as "{other.text}" and as "{self.text}"'
+
+
+def _settings(owner: str, pairs: Iterable[tuple[str, Any]]) -> list[_Setting]:
+    """What is set, also within objects; a variable is a parameter of the component that its name begins with."""
+    found: dict[_Setting, None] = {}
+    for text, value in pairs:
+        component, dot, variable = text.partition(".")
+        place = ["components", component, "parameters", variable] if dot else [text]
+        if text.startswith("/"):
+            place = pointer_keys(text)
+        found |= {_Setting(owner, text, each): None for each in _places((*place,), value)}
+    return list(found)
+
+
+def _places(place: tuple[str, ...], value: Any) -> Iterator[tuple[str, ...]]:
+    yield place
+    for key, inner in value.items() if isinstance(value, dict) else ():
+        yield from _places((*place, key), inner)
+
+
+def _set_once(common: Mapping[str, Any], setters: Iterable[tuple[str, Iterable[tuple[str, Any]]]]) -> None:
+    """Raises ValueError where one of two settings would have no effect.
+
+    `setters` are (name, settings) in the order in which they are applied; they may change what is `common` to all runs.
+    """
+    defaults = _settings("the settings", common.items())
+    known = {each.place: each for each in defaults if not each.pointer}
+    beneath = _beneath(defaults)
+    for name, pairs in setters:
+        own = _settings(f'"{name}"', pairs)
+        for each in own:
+            other = known.get(each.place)
+            if other and not (other in defaults and other.text == each.text):
+                raise ValueError(each.conflict(other))
+            if each.pointer and (other := beneath.get(each.place)):
+                raise ValueError(f'"{each.text}" of {each.owner} replaces "{other.text}" of {other.owner}')
+        known |= {each.place: each for each in own}
+        beneath |= _beneath(own)
+
+
+def _beneath(settings: Iterable[_Setting]) -> dict[tuple[str, ...], _Setting]:
+    """For every place that something is set within: one such setting."""
+    return {each.place[:depth]: each for each in settings if each.pointer for depth in range(1, len(each.place))}
 
 
 def json_schema(kind: type[BaseModel]) -> dict[str, Any]:

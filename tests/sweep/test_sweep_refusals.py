@@ -34,6 +34,7 @@ def problems(folder, kind, content):
         ({}, ['expected "factors", "seeds" or both']),
         ({"factors": [FACTOR, FACTOR]}, ['two factors are called "f"']),
         ({"factors": [FACTOR, FACTOR | {"name": "g"}]}, ['both "f" and "g" set "a.b"']),
+        ({"factors": [FACTOR | {"set": []}]}, ["$.factors[0].set", "at least 1 item"]),
         ({"factors": [FACTOR], "by": ["g"]}, ['"by" names no factor "g"', "valid: f, seed"]),
         ({"factors": [FACTOR | {"range": {"min": 0.0, "max": 1.0}}]}, ["$.factors[0]", "found values and range"]),
         ({"factors": [{"name": "f", "set": "a.b"}]}, ["$.factors[0]", "found none"]),
@@ -61,6 +62,50 @@ def test_a_sweep_is_refused_with_its_place(tmp_path, content, words):
     assert all(word in line for word in words), line
 
 
+B = "/components/a/parameters/b"
+
+
+@pytest.mark.parametrize(
+    ("factors", "common", "words"),
+    [
+        ({"f": "a.b", "g": B}, {}, 'both "f" and "g" set the same thing, as "a.b" and as "/components/a/parameters/b"'),
+        ({"f": "stop_time", "g": "/stop_time"}, {}, 'both "f" and "g" set the same thing'),
+        ({"f": B}, {"a.b": 7}, 'both the settings and "f" set the same thing'),
+        ({"f": "a.b", "g": {"/components/a": {"parameters": {"b": 1}}}}, {}, 'both "f" and "g" set the same thing'),
+        ({"f": B, "g": "/components/a"}, {}, '"/components/a" of "g" replaces "/components/a/parameters/b" of "f"'),
+        ({"f": "/components/a"}, {B: 7}, '"/components/a" of "f" replaces "/components/a/parameters/b" of the settings'),
+    ],
+)
+def test_what_would_have_no_effect_is_refused(tmp_path, factors, common, words):
+    (line,) = problems(tmp_path, SweepSpec, {"factors": varied(factors), "settings": common})
+    assert words in line
+
+
+@pytest.mark.parametrize(
+    ("factors", "common"),
+    [
+        ({"f": "a.b"}, {"a.b": 7}),
+        ({"f": "a.b"}, {B: 7}),
+        ({"f": "/components/a", "g": B}, {}),
+        ({"f": "/components/a", "g": "a.b"}, {"/components": {}}),
+        ({"f": "a.b", "g": "a.c.b", "h": "/components/a/arguments/b"}, {}),
+    ],
+)
+def test_what_is_changed_further_is_not(tmp_path, factors, common):
+    (tmp_path / "s.json").write_text(
+        json.dumps({"name": "s", "scenario": "demo1_box", "factors": varied(factors), "settings": common})
+    )
+    read(tmp_path / "s.json", SweepSpec)
+
+
+def varied(factors):
+    """Factors that set a path, or that have a level with settings."""
+    return [
+        FACTOR | {"name": name, "set": what} if isinstance(what, str) else {"name": name, "levels": {"x": what}}
+        for name, what in factors.items()
+    ]
+
+
 def test_everything_that_is_wrong_is_said_at_once(tmp_path):
     found = problems(
         tmp_path, SweepSpec, {"factors": [{"name": "f"}, FACTOR | {"values": []}], "dedline": 1, "design": {"kind": "grid"}}
@@ -75,6 +120,7 @@ def test_everything_that_is_wrong_is_said_at_once(tmp_path):
         ({"minimize": "k", "parameters": [PARAMETER], "constraints": ["k < 1"]}, ["$.constraints[0]", "<= or >="]),
         ({"minimize": "k", "parameters": [PARAMETER | {"start": 2.0}]}, ["$.parameters[0]", 'expected "start" between']),
         ({"minimize": "k", "parameters": []}, ["$.parameters"]),
+        ({"minimize": "k", "parameters": [PARAMETER], "cases": [{}, {"a.b": 1}]}, ['both "cases" and "p" set "a.b"']),
         ({"minimize": "k", "parameters": [PARAMETER], "method": {"kind": "magic"}}, ["$.method.kind", "magic"]),
     ],
 )
