@@ -35,17 +35,14 @@ def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, *
     was when it is called again. Exit code 0: all runs were made; 1: some failed; 2: the sweep was refused; 130: interrupted,
     what was finished is written.
     """
-    from ..results.files import prepare
     from ..results.parquet_files import require_parquet
-    from ..sweep.ledger import Ledger
     from ..sweep.sweep import Sweep
 
     if parquet:
         require_parquet()
     read = Sweep.of(sweep)
     folder = output_dir or Path("runs") / read.read.spec.name
-    prepare(folder)
-    with Ledger(folder, where.pop("retry_failed")) as ledger:
+    with studies.ledger(folder, where.pop("retry_failed")) as ledger:
         return _run(read, ledger, folder, parquet, replays, **where)
 
 

@@ -27,14 +27,11 @@ def command(tuning: str, output_dir: Path | None, **where: Any) -> int:
     goes on where it was when it is called again. Exit code 0: a point was found; 1: a run failed at every point; 2: refused;
     3: no point keeps the constraints, or none has a value; 130: interrupted.
     """
-    from ..results.files import prepare
-    from ..sweep.ledger import Ledger
     from ..sweep.tune import Tuning
 
     read = Tuning.of(tuning)
     folder = output_dir or Path("runs") / read.spec.name
-    prepare(folder)
-    with Ledger(folder, where.pop("retry_failed")) as ledger:
+    with studies.ledger(folder, where.pop("retry_failed")) as ledger:
         return _run(read, ledger, folder, **where)
 
 

@@ -93,6 +93,17 @@ def test_a_run_without_a_kpi_of_the_criteria_is_no_success(lag):
     assert [(row["passed"], bool(row["own.low"])) for row in lag.table()] == [("0", False), ("1", True), ("0", False)]
 
 
+def test_damaged_records_are_counted_and_made_again(lag):
+    file = lag.write(factors=[{"name": "y", "set": "lag.y_start", "values": [1, 2, 3]}])
+    lag.call("sweep", file)
+    journal = lag.folder / "runs/sweep/journal.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(lines[0] + b"\0" * 10 + lines[1][10:] + lines[2])
+    done = lag.call("sweep", file)
+    assert "unreadable lines in runs/sweep/journal.jsonl, whose runs are made again: 1" in done.err
+    assert "3 of 3 runs, 1 made now" in done.out
+
+
 @pytest.mark.long
 def test_another_scenario_makes_other_runs(lag):
     sweep = lag.write(factors=[{"name": "T", "set": "lag.T", "values": [0.5]}])
