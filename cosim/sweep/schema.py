@@ -299,6 +299,11 @@ class _Setting(NamedTuple):
         """Whether it changes the scenario's JSON; variables are set after all that."""
         return self.text.startswith("/")
 
+    @property
+    def part(self) -> bool:
+        """Whether it is within an object that is set."""
+        return self.place != _place(self.text)
+
     def conflict(self, other: _Setting) -> str:
         if self.text == other.text:
             return f'both {other.owner} and {self.owner} set "{self.text}"'
@@ -306,15 +311,16 @@ class _Setting(NamedTuple):
 
 
 def _settings(owner: str, pairs: Iterable[tuple[str, Any]]) -> list[_Setting]:
-    """What is set, also within objects; a variable is a parameter of the component that its name begins with."""
-    found: dict[_Setting, None] = {}
-    for text, value in pairs:
-        component, dot, variable = text.partition(".")
-        place = ["components", component, "parameters", variable] if dot else [text]
-        if text.startswith("/"):
-            place = pointer_keys(text)
-        found |= {_Setting(owner, text, each): None for each in _places((*place,), value)}
-    return list(found)
+    """What is set, also within objects."""
+    return list(dict.fromkeys(_Setting(owner, text, place) for text, value in pairs for place in _places(_place(text), value)))
+
+
+def _place(text: str) -> tuple[str, ...]:
+    """A variable is a parameter of the component that its name begins with."""
+    if text.startswith("/"):
+        return (*pointer_keys(text),)
+    component, dot, variable = text.partition(".")
+    return ("components", component, "parameters", variable) if dot else (text,)
 
 
 def _places(place: tuple[str, ...], value: Any) -> Iterator[tuple[str, ...]]:
@@ -326,7 +332,8 @@ def _places(place: tuple[str, ...], value: Any) -> Iterator[tuple[str, ...]]:
 def _set_once(common: Mapping[str, Any], setters: Iterable[tuple[str, Iterable[tuple[str, Any]]]]) -> None:
     """Raises ValueError where one of two settings would have no effect.
 
-    `setters` are (name, settings) in the order in which they are applied; they may change what is `common` to all runs.
+    `setters` are (name, settings) in the order in which they are applied. They may change what is `common` to all runs, and
+    variables that are common to all runs may change parts of objects that they set.
     """
     defaults = _settings("the settings", common.items())
     known = {each.place: each for each in defaults if not each.pointer}
@@ -335,7 +342,7 @@ def _set_once(common: Mapping[str, Any], setters: Iterable[tuple[str, Iterable[t
         own = _settings(f'"{name}"', pairs)
         for each in own:
             other = known.get(each.place)
-            if other and not (other in defaults and other.text == each.text):
+            if other and (other not in defaults or not (each.part or each.text == other.text)):
                 raise ValueError(each.conflict(other))
             if each.pointer and (other := beneath.get(each.place)):
                 raise ValueError(f'"{each.text}" of {each.owner} replaces "{other.text}" of {other.owner}')
@@ -345,7 +352,8 @@ def _set_once(common: Mapping[str, Any], setters: Iterable[tuple[str, Iterable[t
 
 def _beneath(settings: Iterable[_Setting]) -> dict[tuple[str, ...], _Setting]:
     """For every place that something is set within: one such setting."""
-    return {each.place[:depth]: each for each in settings if each.pointer for depth in range(1, len(each.place))}
+    pointers = [each for each in settings if each.pointer and not each.part]
+    return {each.place[:depth]: each for each in pointers for depth in range(1, len(each.place))}
 
 
 def json_schema(kind: type[BaseModel]) -> dict[str, Any]:

@@ -86,6 +86,8 @@ def test_what_would_have_no_effect_is_refused(tmp_path, factors, common, words):
     [
         ({"f": "a.b"}, {"a.b": 7}),
         ({"f": "a.b"}, {B: 7}),
+        ({"f": {"/record": {"interval": 1}}}, {"/record": {"signals": ["*"]}}),
+        ({"f": {"/components/a": {"parameters": {"b": 1, "c": 2}}}}, {"a.b": 7}),
         ({"f": "/components/a", "g": B}, {}),
         ({"f": "/components/a", "g": "a.b"}, {"/components": {}}),
         ({"f": "a.b", "g": "a.c.b", "h": "/components/a/arguments/b"}, {}),
