@@ -70,7 +70,7 @@ def _run(
                 write(sweep, ledger, folder, parquet)
             raise
     if not interrupted:
-        sweep.check_criteria(ledger)
+        sweep.check_names(ledger)
     summary = write(sweep, ledger, folder, parquet)
     _draw(sweep, ledger, summary, folder, replays and not interrupted, workers)
     _print(sweep, summary)

@@ -13,13 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .design import Design
+from .schema import QUANTILES
 from .sweep import Row
 from .table import Rows
 
 #: quantile of the normal distribution for intervals of 95 %
 _Z = 1.959963984540054
-
-QUANTILES = {"min": 0.0, "q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95, "max": 1.0}
 
 
 class Interval(NamedTuple):

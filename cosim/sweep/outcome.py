@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from ..results.files import write_json
-from .aggregate import QUANTILES, Group, causes, groupings, groups
+from .aggregate import Group, causes, groupings, groups
 from .bundle import identity
 from .ledger import Ledger
+from .schema import AGGREGATES, SUCCESS
 from .sweep import Row, Sweep, kpi_names
 from .table import write_csv, write_parquet, write_rows
 
@@ -47,9 +48,8 @@ def write(sweep: Sweep, ledger: Ledger, folder: Path, parquet: bool) -> Summary:
             statistics += [_statistic(group, factors, kpi, numbers) for kpi, numbers in group.statistics()]
             group.kpis = group.kpis if not names else {}
             found.append(group)
-    write_rows([*factors, "kpi", "count", "mean", "std", *QUANTILES], statistics, folder / "aggregates.csv")
-    columns = [*factors, "runs", "failed", "passed", "rate", "low", "high"]
-    write_rows(columns, (_success(group, factors) for group in found), folder / "success.csv")
+    write_rows([*factors, *AGGREGATES], statistics, folder / "aggregates.csv")
+    write_rows([*factors, *SUCCESS], (_success(group, factors) for group in found), folder / "success.csv")
     write_rows(["run", *factors, "failure", "output", "command"], _failures(sweep, rows()), folder / "failures.csv")
     summary = Summary(found[0].runs if found else 0, found, causes(rows()))
     write_json(_description(sweep, summary), folder / "sweep.json")

@@ -26,18 +26,26 @@ _OPTIONAL = {"truncated_normal": {"min", "max"}}
 _POSITIVE = ("std", "sigma", "median", "shape", "scale")
 #: what makes the levels of a factor
 _LEVELS = ("values", "range", "distribution", "levels")
-#: columns of the table that factors may not be called
-RESERVED = ("run", "seed", "status", "passed", "failure")
+#: quantiles in the aggregates
+QUANTILES = {"min": 0.0, "q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95, "max": 1.0}
+#: columns that stand beside factors, and beside the parameters of a tuning, in some file
+TABLE = ("run", "seed", "status", "passed", "failure", "output", "command")
+AGGREGATES = ("kpi", "count", "mean", "std", *QUANTILES)
+SUCCESS = ("runs", "failed", "passed", "rate", "low", "high")
+TRIALS = ("value", "violation", "failure")
 
 
-def _label(value: str) -> str:
-    if value in RESERVED:
-        raise ValueError(f"expected a name other than {', '.join(RESERVED)}")
-    return value
+def _no_column(*names: str) -> AfterValidator:
+    def check(value: str) -> str:
+        if value in names:
+            raise ValueError(f"expected a name other than those of columns: {', '.join(dict.fromkeys(names))}")
+        return value
+
+    return AfterValidator(check)
 
 
 Paths = Annotated[Names, Field(min_length=1)]
-Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_. ]*$"), AfterValidator(_label)]
+Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_. ]*$"), _no_column(*TABLE, *AGGREGATES, *SUCCESS)]
 Scale = Literal["linear", "log"]
 
 
@@ -220,7 +228,7 @@ class SweepSpec(StudySpec):
 class ParameterSpec(Spec):
     """What a tuning may change, and within which bounds."""
 
-    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$"), AfterValidator(_label)]
+    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$"), _no_column(*TRIALS)]
     set: Paths
     min: float
     max: float

@@ -9,7 +9,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from ..errors import Problem
+from ..errors import InputError, Problem
 from ..kpi import Number, evaluate_checks
 from .design import Design, Point, design
 from .document import Read, read
@@ -97,6 +97,7 @@ class Sweep:
 
         def look(record: Record) -> None:
             seen.add(record)
+            self._refuse_names(record.kpis)
             if seen.enough:
                 self._refuse_criteria(seen)
             observe(record)
@@ -104,12 +105,21 @@ class Sweep:
         self.check(engine)
         run_all(self.jobs(), ledger, engine, look)
 
-    def check_criteria(self, ledger: Ledger) -> None:
-        """Raises InputError for criteria about KPIs that no run has."""
+    def check_names(self, ledger: Ledger) -> None:
+        """Raises InputError for criteria about KPIs that no run has, and for factors that are called like a KPI."""
         seen = Seen()
         for row in self.rows(ledger):
             seen.add(row.record)
+        self._refuse_names(seen.kpis)
         self._refuse_criteria(seen)
+
+    def _refuse_names(self, kpis: Mapping[str, Number]) -> None:
+        names = [factor.name for factor in self.read.spec.factors]
+        places = {name: self.read.document.where(("factors", i, "name")) for i, name in enumerate(names) if name in kpis}
+        if places:
+            raise InputError(
+                [Problem(f'expected a name other than that of the KPI "{each}"', where) for each, where in places.items()]
+            )
 
     def _refuse_criteria(self, seen: Seen) -> None:
         if seen.runs:

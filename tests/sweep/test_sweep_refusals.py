@@ -40,6 +40,8 @@ def problems(folder, kind, content):
         ({"factors": [{"name": "f", "set": "a.b"}]}, ["$.factors[0]", "found none"]),
         ({"factors": [{"name": "f", "values": [1]}]}, ["$.factors[0]", 'expected "set"']),
         ({"factors": [FACTOR | {"name": "status"}]}, ["$.factors[0].name", "expected a name other than"]),
+        ({"factors": [FACTOR | {"name": "q05"}]}, ["$.factors[0].name", "expected a name other than"]),
+        ({"factors": [FACTOR | {"name": "rate"}]}, ["$.factors[0].name", "expected a name other than"]),
         ({"factors": [{"name": "f", "set": "a", "range": {"min": 1.0, "max": 1.0}}]}, ["$.factors[0].range", "less than"]),
         ({"factors": [{"name": "f", "set": "a", "range": {"min": 0.0, "max": 1.0}}]}, ['the factor "f" needs a "count"']),
         (
@@ -122,6 +124,7 @@ def test_everything_that_is_wrong_is_said_at_once(tmp_path):
         ({"minimize": "k", "parameters": [PARAMETER], "constraints": ["k < 1"]}, ["$.constraints[0]", "<= or >="]),
         ({"minimize": "k", "parameters": [PARAMETER | {"start": 2.0}]}, ["$.parameters[0]", 'expected "start" between']),
         ({"minimize": "k", "parameters": []}, ["$.parameters"]),
+        ({"minimize": "k", "parameters": [PARAMETER | {"name": "value"}]}, ["$.parameters[0].name", "expected a name other"]),
         ({"minimize": "k", "parameters": [PARAMETER], "cases": [{}, {"a.b": 1}]}, ['both "cases" and "p" set "a.b"']),
         ({"minimize": "k", "parameters": [PARAMETER], "method": {"kind": "magic"}}, ["$.method.kind", "magic"]),
     ],
@@ -153,6 +156,13 @@ def test_criteria_about_kpis_that_do_not_exist_end_the_sweep_at_its_first_runs(l
     assert done.code == 2
     assert 'no such KPI; did you mean "end.value"?' in done.err
     assert len(lag.records()) < 50
+
+
+def test_a_factor_is_not_called_like_a_kpi(lag):
+    """Which KPIs there are is known after a run."""
+    done = lag.call("sweep", lag.write(factors=[{"name": "end.value", "set": "lag.y_start", "values": [1, 2]}]))
+    assert done.code == 2
+    assert '$.factors[0].name: expected a name other than that of the KPI "end.value"' in done.err
 
 
 def test_so_they_do_when_all_runs_are_there(lag):
