@@ -66,13 +66,11 @@ def fmus(files: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted(path for path in files if path.endswith(".fmu")))
 
 
-def absolute_paths(scenario: Path, variants: Iterable[Mapping[str, Any]] = ({},)) -> list[Problem]:
+def absolute_paths(scenario: Path, settings: Mapping[str, Any]) -> list[Problem]:
     """Paths that mean nothing on another machine."""
-    loaded = [load(scenario, _pointers(settings)) for settings in variants]
     return [
         Problem(f'absolute path "{path}" cannot be shipped to a cluster, expected one relative to this file', where)
-        for each in loaded
-        for node in each.root.walk()
+        for node in load(scenario, _pointers(settings)).root.walk()
         for path, where in _named(node)
         if Path(path).is_absolute() and paths.is_file(Path(path))
     ]

@@ -60,10 +60,10 @@ class Study:
         spec = load(self.read.scenario, {k: v for k, v in self.spec.settings.items() if k.startswith("/")}).spec
         return [check.model_dump(exclude_none=True) for check in spec.checks]
 
-    def refuse(self, problems: Iterable[Problem]) -> None:
-        """Raises InputError, with places in the study's own file, if there are problems."""
-        if found := self.read.located(problems):
-            raise InputError(found)
+    def check(self, engine: Laboratory, jobs: Iterable[Job]) -> None:
+        """Raises InputError, with places in the study's own file, when some of these jobs cannot be run."""
+        if problems := [found for job in jobs for found in self.read.located(engine.check(job), job.settings)]:
+            raise InputError(dict.fromkeys(problems))
 
 
 @dataclass

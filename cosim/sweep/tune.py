@@ -95,7 +95,7 @@ class Tuning:
 
     def run(self, ledger: Ledger, engine: Laboratory, observe: Observer) -> Trial:
         """The best trial. Raises InputError before anything runs when a parameter or case cannot be set."""
-        self.study.refuse([problem for job in self._jobs([_start(self.spec)]) for problem in engine.check(job)])
+        self.study.check(engine, self._jobs([_start(self.spec)]))
 
         def evaluate(places: Sequence[Sequence[float]]) -> list[float]:
             parameters = [self._parameters(place) for place in places]
@@ -142,8 +142,9 @@ class Tuning:
 
 
 def _number(spec: ParameterSpec, place: float) -> float:
-    """Twelve digits are enough, and the same on every machine."""
-    return float(f"{between(place, spec.min, spec.max, spec.scale == 'log'):.12g}")
+    """Twelve digits are enough, and the same on every machine; bounds are kept."""
+    rounded = float(f"{between(place, spec.min, spec.max, spec.scale == 'log'):.12g}")
+    return min(max(rounded, spec.min), spec.max)
 
 
 def _start(spec: TuneSpec) -> dict[str, float]:

@@ -150,6 +150,21 @@ def test_what_cannot_be_set_is_found_before_anything_runs(lag):
     assert lag.records() == []
 
 
+def test_what_a_pointer_sets_wrongly_has_its_place_in_the_sweep_file(lag):
+    """Of two levels the second is wrong, of a setting that is an object a part."""
+    levels = {"good": {"/components/lag/fmu": "lag.fmu"}, "bad": {"/components/lag/fmu": "lga.fmu"}}
+    factors = [{"name": "fmu", "levels": levels}, {"name": "step", "set": "/step_size", "values": [0.01, -1]}]
+    common = {"/record": {"signals": ["lag.y", "lag.yy"]}}
+    lines = lag.call("sweep", lag.write(factors=factors, settings=common)).err.splitlines()
+    places = {line.split(": ")[1].partition(", in ")[0] for line in lines if line.startswith(str(lag.folder / "sweep.json"))}
+    assert len(lines) == 3, lines
+    assert places == {
+        '$.factors[0].levels.bad["/components/lag/fmu"]',
+        "$.factors[1].set",
+        '$.settings["/record"].signals[1]',
+    }
+
+
 def test_criteria_about_kpis_that_do_not_exist_end_the_sweep_at_its_first_runs(lag):
     factors = [{"name": "y", "set": "lag.y_start", "values": list(range(50))}]
     done = lag.call("sweep", lag.write(factors=factors, success=[{"kpi": "end.valeu", "max": 1.0}]))
