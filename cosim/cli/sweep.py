@@ -104,6 +104,10 @@ def _print(sweep: Sweep, summary: Summary) -> None:
         studies.print_table(["KPI", "mean", "std", "min", "median", "max"], kpis)
     if sweep.criteria or summary.failed:
         studies.print_table(["runs", "n", "success", "95 % interval"], [_success(group) for group in summary.groups[:_SHOWN]])
+        if summary.groups[0].distinct < summary.groups[0].runs:
+            click.echo(
+                f"{summary.groups[0].distinct} of {summary.groups[0].runs} runs are distinct; intervals are those of so many"
+            )
     for cause, count, first in summary.causes[:_SHOWN]:
         click.echo(f"{count} failed, the first is run {first}: {cause}", err=True)
 

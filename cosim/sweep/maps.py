@@ -15,13 +15,17 @@ from .design import Design
 from .schema import MapSpec
 from .sweep import Row, Sweep
 
+#: the name of a map, with a number behind it where there are several
+MAP = "success_map"
+
 
 class Run(NamedTuple):
-    """What a map knows of a run; `value` is that of the KPI which ranks successes."""
+    """What a map knows of a run; `value` is that of the KPI which ranks successes, `key` is the same for the same run."""
 
     number: int
     passed: bool
     value: float
+    key: str
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,9 @@ class Cell:
 
     @property
     def interval(self) -> Interval:
-        return wilson(self.passed, len(self.runs))
+        """Of the share, as many runs as are distinct having been made."""
+        distinct = len({run.key for run in self.runs})
+        return wilson(self.passed * distinct / max(1, len(self.runs)), distinct)
 
     @cached_property
     def shown(self) -> Run | None:
@@ -91,10 +97,10 @@ def success_maps(sweep: Sweep, rows: Iterable[Row]) -> list[SuccessMap]:
     specs, kpi = sweep.read.spec.maps, ranking(sweep.criteria)
     found: list[dict[str, list[Run]]] = [{} for _ in specs]
     for row in rows if specs else ():
-        run = Run(row.run, row.passed, float(row.record.kpis.get(kpi, math.nan)))
+        run = Run(row.run, row.passed, float(row.record.kpis.get(kpi, math.nan)), sweep.keys[row.run])
         for spec, cells in zip(specs, found, strict=True):
             cells.setdefault(_key(row.point.labels[name] for name in spec.factors), []).append(run)
-    names = ["success_map" if len(specs) == 1 else f"success_map_{i + 1}" for i in range(len(specs))]
+    names = [MAP if len(specs) == 1 else f"{MAP}_{i + 1}" for i in range(len(specs))]
     return [_map(*each, sweep.design, kpi) for each in zip(names, specs, found, strict=True)]
 
 

@@ -10,7 +10,7 @@ from os.path import normpath
 from pathlib import Path
 from typing import Any
 
-from ..results.files import write_json
+from ..results.files import remove, write_json
 from .aggregate import Group, causes, groupings, groups
 from .bundle import identity
 from .ledger import Ledger
@@ -33,7 +33,7 @@ class Summary:
 
 
 def write(sweep: Sweep, ledger: Ledger, folder: Path, parquet: bool) -> Summary:
-    """Write table.csv, aggregates.csv, success.csv, failures.csv and sweep.json to a folder."""
+    """Write table.csv, aggregates.csv, success.csv, failures.csv and sweep.json to a folder; no older table stays."""
     factors, kpis = sweep.design.columns, kpi_names(sweep.rows(ledger))
 
     def rows() -> Iterator[Row]:
@@ -42,6 +42,8 @@ def write(sweep: Sweep, ledger: Ledger, folder: Path, parquet: bool) -> Summary:
     write_csv(rows, factors, kpis, folder / "table.csv")
     if parquet:
         write_parquet(rows, factors, kpis, folder / "table.parquet")
+    else:
+        remove(folder, "table.parquet")
     found, statistics = [], []
     for names in groupings(sweep.design, sweep.read.spec.by):
         for group in groups(rows, names):
@@ -62,7 +64,7 @@ def _statistic(group: Group, factors: list[str], kpi: str, numbers: dict[str, fl
 
 def _success(group: Group, factors: list[str]) -> list[Any]:
     labels = (group.labels.get(name) for name in factors)
-    return [*labels, group.runs, group.failed, group.passed, group.rate, *group.interval]
+    return [*labels, group.runs, group.distinct, group.failed, group.passed, group.rate, *group.interval]
 
 
 def _failures(sweep: Sweep, rows: Iterator[Row]) -> Iterator[list[Any]]:

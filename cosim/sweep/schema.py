@@ -31,7 +31,7 @@ QUANTILES = {"min": 0.0, "q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "
 #: columns that stand beside factors, and beside the parameters of a tuning, in some file
 TABLE = ("run", "seed", "status", "passed", "failure", "output", "command")
 AGGREGATES = ("kpi", "count", "mean", "std", *QUANTILES)
-SUCCESS = ("runs", "failed", "passed", "rate", "low", "high")
+SUCCESS = ("runs", "distinct", "failed", "passed", "rate", "low", "high")
 TRIALS = ("value", "violation", "failure")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,12 +25,16 @@ _CHECKED = 20
 
 @dataclass(frozen=True)
 class Row:
-    """A finished run of a sweep: its number, its point, what became of it, and whether that was a success."""
+    """A finished run of a sweep: its number, its point, what became of it, and whether that was a success.
+
+    `shared` says that other points have the very same run.
+    """
 
     run: int
     point: Point
     record: Record
     passed: bool
+    shared: bool = False
 
 
 @dataclass(frozen=True)
@@ -61,6 +66,11 @@ class Sweep:
         return [job.key for job in self.jobs()]
 
     @cached_property
+    def shared_keys(self) -> frozenset[str]:
+        """Keys of runs that several points have."""
+        return frozenset(key for key, count in Counter(self.keys).items() if count > 1)
+
+    @cached_property
     def criteria(self) -> list[dict[str, Any]]:
         """What a run must meet to count as a success."""
         own = self.read.spec.success
@@ -73,10 +83,8 @@ class Sweep:
 
     def check(self, engine: Laboratory) -> None:
         """Raises InputError with everything that keeps a level of a factor from being run."""
-        problems: list[Problem] = []
-        for point in islice(self._representatives(), _CHECKED):
-            problems += engine.check(self.study.job(point.settings))
-        self.study.refuse(problems)
+        points = islice(self._representatives(), _CHECKED)
+        self.study.check(engine, (self.study.job(point.settings) for point in points))
 
     def _representatives(self) -> Iterator[Point]:
         """The first point, and the first with each further listed level of a factor."""
@@ -130,7 +138,8 @@ class Sweep:
         for run, key in enumerate(self.keys):
             if key in ledger:
                 record = ledger[key]
-                yield Row(run, self.design[run], record, not record.failure and self.passed(record.kpis))
+                passed = not record.failure and self.passed(record.kpis)
+                yield Row(run, self.design[run], record, passed, key in self.shared_keys)
 
 
 def kpi_names(rows: Iterable[Row]) -> list[str]:

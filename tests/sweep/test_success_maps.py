@@ -11,6 +11,7 @@ from matplotlib.patches import Rectangle
 
 from cosim.errors import InputError
 from cosim.report.figures import svg
+from cosim.sweep.aggregate import wilson
 from cosim.sweep.jobs import Record
 from cosim.sweep.map_figure import draw_map
 from cosim.sweep.maps import success_maps
@@ -32,7 +33,7 @@ def sweep_of(folder, **more):
 def rows(sweep, errors):
     """Runs with these lateral errors; None is a run that crashed."""
     for run, error in errors.items():
-        record = Record("", {} if error is None else {"landing.lateral_error": error}, "crashed" if error is None else "")
+        record = Record(str(run), {} if error is None else {"landing.lateral_error": error}, "crashed" if error is None else "")
         yield Row(run, sweep.design[run], record, error is not None and error <= 0.1)
 
 
@@ -74,6 +75,16 @@ def test_panels_tell_further_factors_apart(tmp_path):
     assert panels.along("seed") == [1, 2, 3]
     assert [run.number for run in panels.cell(None, "old", 2, 1.0).runs] == [4]
     assert [run.number for run in flat.cell(None, None, 0.5, 3).runs] == [2, 8]
+
+
+def test_a_run_that_several_points_have_counts_once_in_intervals(tmp_path):
+    twice = {"one": {"uav.vtol.landing_time": 8.0}, "other": {"uav.vtol.landing_time": 8.0}}
+    more = {"name": "more", "levels": twice}
+    factors = [SPEED, CONTROLLER | {"levels": {"old": {}}}, more]
+    sweep = sweep_of(tmp_path, factors=factors, seeds=None)
+    (found,) = success_maps(sweep, rows(sweep, {0: 0.01, 1: 0.01}))
+    cell = found.cell(None, None, "old", 0.5)
+    assert (cell.share, cell.interval) == (1.0, wilson(1, 1))
 
 
 def test_levels_that_are_nothing_or_equal_in_python_have_cells_of_their_own(tmp_path):

@@ -82,6 +82,12 @@ def test_parameters_keep_their_bounds(lag):
     assert best.parameters["T"] == pytest.approx(1.1, rel=0.01)
 
 
+def test_bounds_of_many_digits_are_kept(lag):
+    low = 0.7853981633974483
+    _, trials, _ = tuned(lag, parameters=[PARAMETER | {"min": low, "start": low}], method=SEARCH | {"evaluations": 3})
+    assert min(trial.parameters["T"] for trial in trials) == low
+
+
 def test_constraints_are_kept(lag):
     """The smallest end that is not below 0.3 is 0.3."""
     method = {"kind": "differential_evolution", "population": 8, "generations": 6, "seed": 1}
