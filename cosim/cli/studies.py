@@ -7,12 +7,14 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 if TYPE_CHECKING:
     from ..sweep.jobs import Record
+    from ..sweep.ledger import Ledger
     from ..sweep.study import Laboratory, Study
 
 #: without a terminal a line of progress is printed so often (s)
@@ -30,6 +32,18 @@ _retry = click.option("--retry-failed", is_flag=True, help="Run again what faile
 def options(command: Callable[..., int]) -> Callable[..., int]:
     """Where runs are made."""
     return _workers(_scheduler(_retry(command)))
+
+
+def ledger(folder: Path, retry: bool) -> Ledger:
+    """The finished runs of a folder; says how many of them cannot be read."""
+    from ..results.files import prepare
+    from ..sweep.ledger import Ledger
+
+    prepare(folder)
+    found = Ledger(folder, retry)
+    if found.unreadable:
+        click.echo(f"unreadable lines in {found.path}, whose runs are made again: {found.unreadable}", err=True)
+    return found
 
 
 def engine(study: Study, workers: int | None, scheduler: str | None) -> Laboratory:

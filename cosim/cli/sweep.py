@@ -35,17 +35,14 @@ def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, *
     was when it is called again. Exit code 0: all runs were made; 1: some failed; 2: the sweep was refused; 130: interrupted,
     what was finished is written.
     """
-    from ..results.files import prepare
     from ..results.parquet_files import require_parquet
-    from ..sweep.ledger import Ledger
     from ..sweep.sweep import Sweep
 
     if parquet:
         require_parquet()
     read = Sweep.of(sweep)
     folder = output_dir or Path("runs") / read.read.spec.name
-    prepare(folder)
-    with Ledger(folder, where.pop("retry_failed")) as ledger:
+    with studies.ledger(folder, where.pop("retry_failed")) as ledger:
         return _run(read, ledger, folder, parquet, replays, **where)
 
 
@@ -72,6 +69,8 @@ def _run(
             if error.exit_code != InputError.exit_code:
                 write(sweep, ledger, folder, parquet)
             raise
+    if not interrupted:
+        sweep.check_names(ledger)
     summary = write(sweep, ledger, folder, parquet)
     _draw(sweep, ledger, summary, folder, replays and not interrupted, workers)
     _print(sweep, summary)
@@ -105,6 +104,10 @@ def _print(sweep: Sweep, summary: Summary) -> None:
         studies.print_table(["KPI", "mean", "std", "min", "median", "max"], kpis)
     if sweep.criteria or summary.failed:
         studies.print_table(["runs", "n", "success", "95 % interval"], [_success(group) for group in summary.groups[:_SHOWN]])
+        if summary.groups[0].distinct < summary.groups[0].runs:
+            click.echo(
+                f"{summary.groups[0].distinct} of {summary.groups[0].runs} runs are distinct; intervals are those of so many"
+            )
     for cause, count, first in summary.causes[:_SHOWN]:
         click.echo(f"{count} failed, the first is run {first}: {cause}", err=True)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,17 +24,14 @@ def command(tuning: str, output_dir: Path | None, **where: Any) -> int:
     """Search as TUNE says, a JSON file or the name of a shipped one.
 
     Writes trials.csv (every point that was tried) and best.json to the output directory. A tuning that was interrupted or killed
-    goes on where it was when it is called again. Exit code 0: a point was found; 1: every run failed; 2: refused; 3: no point
-    keeps the constraints; 130: interrupted.
+    goes on where it was when it is called again. Exit code 0: a point was found; 1: a run failed at every point; 2: refused;
+    3: no point keeps the constraints, or none has a value; 130: interrupted.
     """
-    from ..results.files import prepare
-    from ..sweep.ledger import Ledger
     from ..sweep.tune import Tuning
 
     read = Tuning.of(tuning)
     folder = output_dir or Path("runs") / read.spec.name
-    prepare(folder)
-    with Ledger(folder, where.pop("retry_failed")) as ledger:
+    with studies.ledger(folder, where.pop("retry_failed")) as ledger:
         return _run(read, ledger, folder, **where)
 
 
@@ -49,7 +47,7 @@ def _run(tuning: Tuning, ledger: Ledger, folder: Path, workers: int | None, sche
         ):
             tuning.run(ledger, engine, progress)
     except (CosimError, KeyboardInterrupt) as error:
-        if not isinstance(error, InputError):
+        if tuning.trials and not isinstance(error, InputError):
             write(tuning, folder)
         raise
     best = write(tuning, folder)
@@ -72,8 +70,16 @@ def _print(tuning: Tuning, best: Trial, folder: Path) -> None:
     rows.append([tuning.objective.text, f"{first.value:.6g}", f"{best.value:.6g}"])
     studies.print_table(["", "start", "best"], rows)
     if not best.feasible:
-        reason = best.failure or f"the best violates them by {best.violation:.3g}"
-        click.echo(f"no point keeps the constraints: {reason}", err=True)
+        click.echo(_shortcoming(tuning, best), err=True)
     settings = {**tuning.spec.settings, **tuning.spec.cases[0], **tuning.settings(best.parameters)}
     click.echo(f"{len(tuning.trials)} points tried; trials.csv and best.json in {folder}")
     click.echo(run_command(tuning.read.scenario, settings))
+
+
+def _shortcoming(tuning: Tuning, best: Trial) -> str:
+    """What is wrong with every point, the best one included."""
+    if best.failure:
+        return f"a run failed at every point, the first time: {best.failure}"
+    if not best.value < math.inf:
+        return f"the value of {tuning.objective.text} is {best.value:g} at every point"
+    return f"no point keeps the constraints: the best violates them by {best.violation:.3g}"

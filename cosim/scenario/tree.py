@@ -144,9 +144,18 @@ def _load_children(node: Node, ancestors: tuple[Path, ...]) -> list[Problem]:
     return problems
 
 
+def pointer_keys(pointer: str) -> list[str]:
+    """The steps of a JSON pointer.
+
+    >>> pointer_keys("/components/uav/and~1or")
+    ['components', 'uav', 'and/or']
+    """
+    return [key.replace("~1", "/").replace("~0", "~") for key in pointer[1:].split("/")]
+
+
 def _set_pointer(document: Document, pointer: str, value: Any) -> list[Problem]:
     """Change the JSON value before it is read; the last step may be new."""
-    keys = [key.replace("~1", "/").replace("~0", "~") for key in pointer[1:].split("/")]
+    keys = pointer_keys(pointer)
     target, where = document.value, f'setting "{pointer}"'
     for depth, key in enumerate(keys[:-1]):
         target = _child(target, key)

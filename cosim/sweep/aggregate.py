@@ -13,13 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .design import Design
+from .schema import QUANTILES
 from .sweep import Row
 from .table import Rows
 
 #: quantile of the normal distribution for intervals of 95 %
 _Z = 1.959963984540054
-
-QUANTILES = {"min": 0.0, "q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95, "max": 1.0}
 
 
 class Interval(NamedTuple):
@@ -29,7 +28,7 @@ class Interval(NamedTuple):
     high: float
 
 
-def wilson(successes: int, count: int) -> Interval:
+def wilson(successes: float, count: int) -> Interval:
     """Wilson's score interval (95 %) of a share (E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), 209-212)."""
     if count == 0:
         return Interval(0.0, 1.0)
@@ -41,16 +40,24 @@ def wilson(successes: int, count: int) -> Interval:
 
 @dataclass
 class Group:
-    """Runs that share the labels of some factors, and the finite values of their KPIs."""
+    """Runs that share the labels of some factors, and the finite values of their KPIs.
+
+    `distinct` counts a run that several points have once: it says nothing new the second time.
+    """
 
     labels: Mapping[str, Any]
     runs: int = 0
+    distinct: int = 0
     failed: int = 0
     passed: int = 0
     kpis: dict[str, array[float]] = field(default_factory=dict)
+    _shared: set[str] = field(default_factory=set)
 
     def add(self, row: Row) -> None:
         self.runs += 1
+        self.distinct += row.record.key not in self._shared
+        if row.shared:
+            self._shared.add(row.record.key)
         self.failed += bool(row.record.failure)
         self.passed += row.passed
         for name, value in row.record.kpis.items():
@@ -65,7 +72,8 @@ class Group:
 
     @property
     def interval(self) -> Interval:
-        return wilson(self.passed, self.runs)
+        """Of the rate, as many runs as are distinct having been made."""
+        return wilson(self.passed * self.distinct / self.runs, self.distinct)
 
     def statistics(self) -> Iterator[tuple[str, dict[str, float]]]:
         """(KPI, statistics) of each KPI: number of finite values, their mean, standard deviation (n - 1) and quantiles."""

@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from .. import __version__, resources
+from .. import __version__, paths, resources
 from ..errors import InputError, Problem
 from ..python_component import package_files, package_root
 from ..scenario import load
@@ -66,15 +66,13 @@ def fmus(files: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted(path for path in files if path.endswith(".fmu")))
 
 
-def absolute_paths(scenario: Path, variants: Iterable[Mapping[str, Any]] = ({},)) -> list[Problem]:
+def absolute_paths(scenario: Path, settings: Mapping[str, Any]) -> list[Problem]:
     """Paths that mean nothing on another machine."""
-    loaded = [load(scenario, _pointers(settings)) for settings in variants]
     return [
         Problem(f'absolute path "{path}" cannot be shipped to a cluster, expected one relative to this file', where)
-        for each in loaded
-        for node in each.root.walk()
+        for node in load(scenario, _pointers(settings)).root.walk()
         for path, where in _named(node)
-        if Path(path).is_absolute()
+        if Path(path).is_absolute() and paths.is_file(Path(path))
     ]
 
 
@@ -82,21 +80,25 @@ def _files(scenario: Path, settings: Mapping[str, Any]) -> Iterator[Path]:
     root = load(scenario, _pointers(settings)).root
     for node in root.walk():
         yield node.document.file.resolve()
-        for name, _ in _named(node):
-            path = (node.folder / name).resolve()
-            if path.suffix == ".py" and path.is_file():
-                yield from _package(path)
-            elif path.is_file():
-                yield path
+        yield from _there(node.folder, (name for name, _ in _named(node)))
+    variables = [value for name, value in settings.items() if not name.startswith("/")]
+    yield from _there(root.folder, _texts(variables))
+
+
+def _there(folder: Path, names: Iterable[str]) -> Iterator[Path]:
+    """Those of some names that are files, Python ones with their packages."""
+    for path in (paths.real(folder / name) for name in names):
+        if paths.is_file(path):
+            yield from _package(path) if path.suffix == ".py" else [path]
 
 
 def _pointers(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Only these can change which files are used."""
+    """Those that change the scenario's JSON."""
     return {name: value for name, value in settings.items() if name.startswith("/")}
 
 
 def _named(node: Node) -> Iterator[tuple[str, str]]:
-    """(path, where it stands) of all files that a system names, and of texts in arguments that may be files."""
+    """(path, where it stands) of all files that a system names, and of texts in arguments and parameters that may be files."""
     for name, component in node.spec.components.items():
         where = node.where("components", name)
         yield from ((path, where) for path in _sources(component))
@@ -115,6 +117,7 @@ def _sources(component: ComponentSpec) -> Iterator[str]:
         if reference is not None:
             yield reference.rpartition(":")[0]
     yield from _texts(component.arguments)
+    yield from _texts(component.parameters)
 
 
 def _texts(value: Any) -> Iterator[str]:

@@ -46,7 +46,7 @@ class ClusterEngine:
 
     def __init__(self, study: Study, scheduler: str):
         require_cluster()
-        study.refuse(absolute_paths(study.read.scenario, study.all_variants))
+        _refuse_absolute_paths(study)
         self._bundle, self._scheduler = study.bundle, scheduler
         files = dict(self._bundle.files)
         deadline = study.spec.deadline
@@ -149,6 +149,12 @@ class ClusterEngine:
         except (OSError, ValueError, KeyError) as error:
             if address in self._client.scheduler_info(n_workers=-1)["workers"]:
                 raise ClusterError(f'files cannot be sent to worker "{address}": {error}') from None
+
+
+def _refuse_absolute_paths(study: Study) -> None:
+    scenario, read = study.read.scenario, study.read
+    if problems := [found for each in study.all_variants for found in read.located(absolute_paths(scenario, each), each)]:
+        raise InputError(dict.fromkeys(problems))
 
 
 def _lost(job: Job, check: bool) -> dict[str, Any]:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from pydantic import ValidationError
 
 from .. import paths, resources
 from ..errors import InputError, Problem, did_you_mean
-from ..scenario.document import Document, read_document
-from ..scenario.tree import find
+from ..scenario.document import Document, json_path, read_document
+from ..scenario.tree import find, pointer_keys
 from ..scenario.validate import refusals
 from .schema import StudySpec
 
@@ -34,22 +34,49 @@ class Read(Generic[S]):
         near = self.document.file.parent / self.spec.scenario
         return near if paths.is_file(near) else find(self.spec.scenario)
 
-    def located(self, problems: Iterable[Problem]) -> list[Problem]:
-        """Problems with a run's settings, at the place in this file that makes the setting."""
-        return list(dict.fromkeys(replace(problem, where=self._place(problem.where)) for problem in problems))
+    def located(self, problems: Iterable[Problem], settings: Mapping[str, Any]) -> list[Problem]:
+        """Problems of a run with these settings, at the places in this file that make them, as far as a setting does."""
+        return list(dict.fromkeys(replace(problem, where=self._place(problem.where, settings)) for problem in problems))
 
-    def _place(self, where: str) -> str:
+    def _place(self, where: str, settings: Mapping[str, Any]) -> str:
         _, quote, name = where.partition('setting "')
-        if not quote:
+        if quote:
+            return self._made(name.removesuffix('"'), settings) or where
+        position, _, path = where.partition(": $")
+        if Path(position.rsplit(":", 2)[0]).name != self.scenario.name:
             return where
-        path = next((path for path, value in self._strings() if name.rstrip('"') in (path[-1], value)), None)
-        return self.document.where(path) if path else where
+        pointers = {each: _json_path(each) for each in settings if each.startswith("/")}
+        above = [each for each, start in pointers.items() if _within(path, start)]
+        if above:
+            nearest = max(above, key=lambda each: len(pointers[each]))
+            return self._made(nearest, settings, path.removeprefix(pointers[nearest])) or where
+        below = [place for each, start in pointers.items() if _within(start, path) and (place := self._made(each, settings))]
+        return f"{below[0]}, in {where}" if len(below) == 1 else where
 
-    def _strings(self) -> Iterable[tuple[tuple[str | int, ...], object]]:
-        """Paths in the file that name settings: keys of objects, and texts of "set"."""
+    def _made(self, name: str, settings: Mapping[str, Any], part: str = "") -> str:
+        """Where this file makes a setting, or a part of it; "" where it does not."""
+        found = [path for path in self._places() if self._makes(path, name, settings)]
+        return self.document.where(found[-1]) + (part if found[-1][-1] == name else "") if found else ""
+
+    def _makes(self, path: tuple[str | int, ...], name: str, settings: Mapping[str, Any]) -> bool:
+        """Whether a place in this file is where a setting is made: a key with its value, or a text of "set"."""
+        value = _at(self.document.value, path)
+        return value == name or (path[-1] == name and value == settings.get(name))
+
+    def _places(self) -> Iterable[tuple[str | int, ...]]:
+        """Paths in the file that may name settings, in their order."""
         for path in sorted(self.document.offsets, key=lambda path: self.document.offsets[path]):
             if path and ("set" in path or "settings" in path or "levels" in path or "cases" in path):
-                yield path, _at(self.document.value, path)
+                yield path
+
+
+def _json_path(pointer: str) -> str:
+    """A JSON pointer as places are written, without "$"."""
+    return json_path([int(key) if key.isdigit() else key for key in pointer_keys(pointer)])[1:]
+
+
+def _within(path: str, start: str) -> bool:
+    return path == start or path.startswith((f"{start}.", f"{start}["))
 
 
 def _at(value: object, path: tuple[str | int, ...]) -> object:

@@ -10,10 +10,12 @@ import math
 import operator
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..errors import did_you_mean
 
+#: characters
+_LONGEST = 1000
 _BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -22,17 +24,26 @@ _BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Pow: lambda a, b: math.pow(a, b),
 }
 _UNARY: Mapping[type[ast.unaryop], Callable[[Any], Any]] = {ast.USub: operator.neg, ast.UAdd: operator.pos}
-FUNCTIONS: Mapping[str, Callable[..., float]] = {
-    "abs": abs,
-    "min": min,
-    "max": max,
-    "sqrt": math.sqrt,
-    "exp": math.exp,
-    "log": math.log,
+
+
+class Function(NamedTuple):
+    """What can be called, with how many arguments, and that in words."""
+
+    call: Callable[..., float]
+    counts: range = range(1, 2)
+    expected: str = "1 argument"
+
+
+_SEVERAL = range(2, _LONGEST), "2 arguments or more"
+FUNCTIONS: Mapping[str, Function] = {
+    "abs": Function(abs),
+    "min": Function(min, *_SEVERAL),
+    "max": Function(max, *_SEVERAL),
+    "sqrt": Function(math.sqrt),
+    "exp": Function(math.exp),
+    "log": Function(math.log, range(1, 3), "1 or 2 arguments"),
 }
 _EXPECTED = f"numbers, KPIs, + - * / ** and {', '.join(FUNCTIONS)}"
-#: characters
-_LONGEST = 1000
 
 
 @dataclass(frozen=True)
@@ -53,9 +64,9 @@ class Expression:
         return f'no KPI or parameter "{missing[0]}"{did_you_mean(missing[0], known)}' if missing else ""
 
     def __call__(self, values: Mapping[str, float]) -> float:
-        """Its value; NaN where it has none, as at a division by zero."""
+        """Its value; NaN where it or a part of it has none, as at a division by zero or of a KPI that is NaN or missing."""
         try:
-            return float(_value(self.tree, values))
+            return _value(self.tree, values)
         except (ArithmeticError, ValueError):
             return math.nan
 
@@ -120,6 +131,8 @@ def _check(node: ast.AST) -> None:
                 raise ValueError(f'unknown function "{name}"{did_you_mean(name, FUNCTIONS)}')
             for argument in arguments:
                 _check(argument)
+            if len(arguments) not in FUNCTIONS[name].counts:
+                raise ValueError(f'"{name}" takes {FUNCTIONS[name].expected}, found {len(arguments)}')
         case _ if _name(node):
             return
         case _:
@@ -148,13 +161,21 @@ def _names(node: ast.AST) -> Iterator[str]:
 
 
 def _value(node: ast.AST, values: Mapping[str, float]) -> float:
+    """Raises ArithmeticError or ValueError without one: `min`, `max` and `**` by themselves would drop some NaN."""
+    value = float(_computed(node, values))
+    if math.isnan(value):
+        raise ArithmeticError
+    return value
+
+
+def _computed(node: ast.AST, values: Mapping[str, float]) -> float:
     match node:
         case ast.Constant(value=int() | float() as value):
-            return float(value)
+            return value
         case ast.BinOp(left=left, op=op, right=right):
             return float(_BINARY[type(op)](_value(left, values), _value(right, values)))
         case ast.UnaryOp(op=op, operand=operand):
             return float(_UNARY[type(op)](_value(operand, values)))
         case ast.Call(func=ast.Name(id=name), args=arguments):
-            return float(FUNCTIONS[name](*(_value(argument, values) for argument in arguments)))
-    return float(values[_name(node)])
+            return FUNCTIONS[name].call(*(_value(argument, values) for argument in arguments))
+    return values.get(_name(node), math.nan)

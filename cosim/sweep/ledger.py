@@ -1,7 +1,7 @@
 """What is known about finished runs: a file with one line per record, so that nothing is run twice.
 
 Lines are only ever appended. A kill at any moment costs at most the line that was being written; the file is forced to the disk
-every second.
+every second. Lines that cannot be read are passed over.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from .jobs import Job, Record
 FILE = "journal.jsonl"
 #: s
 _SYNC = 1.0
+#: how every line begins
+_FIRST = b'{"key": "'
 #: position of a record that is being made
 _ASKED = -1
 
@@ -25,7 +27,8 @@ _ASKED = -1
 class Ledger:
     """Records by key, in a folder that no other process may use meanwhile; in memory are only their positions in the file.
 
-    With `retry` runs that failed count as not done. Raises InputError when the folder cannot be used.
+    With `retry` runs that failed count as not done. Raises InputError when the folder cannot be used, or holds another file of
+    that name.
     """
 
     def __init__(self, folder: Path, retry: bool = False):
@@ -37,25 +40,35 @@ class Ledger:
             raise InputError(f'another sweep is writing to "{folder}"') from None
         except OSError as error:
             raise InputError(f'cannot write "{self.path}": {error.strerror}') from None
+        #: lines that are no records; their runs count as not done
+        self.unreadable = 0
         self._positions: dict[bytes, int] = {}
         self._end = self._synced = 0.0
         self._size = self._read(retry)
 
     def _read(self, retry: bool) -> int:
-        """Index the file and cut it off where a line is not whole, as after a power cut; returns the size."""
+        """Index the file, and cut off what a kill or power cut has left of a last line; returns the size."""
         size = 0
         with self.path.open("rb") as file:
             for line in file:
                 record = _record(line)
-                if record is None:
+                if size == 0 and not record and not _FIRST.startswith(line[: len(_FIRST)]):
+                    os.close(self._file)
+                    raise InputError(f'"{self.path}" is no file of finished runs, expected one or none')
+                if not line.endswith(b"\n"):
                     os.ftruncate(self._file, size)
                     break
-                if retry and record.failure:
-                    self._positions.pop(bytes.fromhex(record.key), None)
-                else:
-                    self._positions[bytes.fromhex(record.key)] = size
+                if record:
+                    self._index(record, size, retry)
+                self.unreadable += record is None
                 size += len(line)
         return size
+
+    def _index(self, record: Record, position: int, retry: bool) -> None:
+        if retry and record.failure:
+            self._positions.pop(bytes.fromhex(record.key), None)
+        else:
+            self._positions[bytes.fromhex(record.key)] = position
 
     def open_jobs(self, jobs: Iterable[Job]) -> Iterator[Job]:
         """Those that are not done; of several with one key the first."""
@@ -101,8 +114,10 @@ class Ledger:
 
 
 def _record(line: bytes) -> Record | None:
-    """A line's record; None when it is not whole."""
+    """A line's record; None when it holds none."""
     try:
-        return Record.from_json(line) if line.endswith(b"\n") else None
+        record = Record.from_json(line)
+        bytes.fromhex(record.key)
+        return record if line.endswith(b"\n") and isinstance(record.kpis, dict) else None
     except (ValueError, TypeError):
         return None

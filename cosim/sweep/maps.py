@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from typing import Any, NamedTuple
 
 from .aggregate import Interval, wilson
@@ -13,13 +15,17 @@ from .design import Design
 from .schema import MapSpec
 from .sweep import Row, Sweep
 
+#: the name of a map, with a number behind it where there are several
+MAP = "success_map"
+
 
 class Run(NamedTuple):
-    """What a map knows of a run; `value` is that of the KPI which ranks successes."""
+    """What a map knows of a run; `value` is that of the KPI which ranks successes, `key` is the same for the same run."""
 
     number: int
     passed: bool
     value: float
+    key: str
 
 
 @dataclass(frozen=True)
@@ -42,7 +48,9 @@ class Cell:
 
     @property
     def interval(self) -> Interval:
-        return wilson(self.passed, len(self.runs))
+        """Of the share, as many runs as are distinct having been made."""
+        distinct = len({run.key for run in self.runs})
+        return wilson(self.passed * distinct / max(1, len(self.runs)), distinct)
 
     @cached_property
     def shown(self) -> Run | None:
@@ -67,7 +75,8 @@ class SuccessMap:
     name: str
     spec: MapSpec
     levels: Mapping[str, Sequence[Any]]
-    cells: Mapping[tuple[Any, ...], Cell]
+    #: by the labels of the spec's factors, as JSON: Python takes 1, 1.0 and true for the same
+    cells: Mapping[str, Cell]
 
     def along(self, factor: str | None) -> Sequence[Any]:
         """Labels along an axis; one None where the map has no such factor."""
@@ -75,7 +84,9 @@ class SuccessMap:
 
     def cell(self, row: Any, column: Any, y: Any, x: Any) -> Cell:
         """By labels; None for what the map does not tell apart."""
-        return self.cells[tuple(label for label in (row, column, y, x) if label is not None)]
+        spec = self.spec
+        axes = zip((spec.rows, spec.columns, spec.y, spec.x), (row, column, y, x), strict=True)
+        return self.cells[_key(label for factor, label in axes if factor is not None)]
 
     def title(self, factor: str) -> str:
         return self.spec.titles.get(factor, factor)
@@ -84,12 +95,12 @@ class SuccessMap:
 def success_maps(sweep: Sweep, rows: Iterable[Row]) -> list[SuccessMap]:
     """The maps that a sweep asks for, of its finished runs."""
     specs, kpi = sweep.read.spec.maps, ranking(sweep.criteria)
-    found: list[dict[tuple[Any, ...], list[Run]]] = [{} for _ in specs]
+    found: list[dict[str, list[Run]]] = [{} for _ in specs]
     for row in rows if specs else ():
-        run = Run(row.run, row.passed, float(row.record.kpis.get(kpi, math.nan)))
+        run = Run(row.run, row.passed, float(row.record.kpis.get(kpi, math.nan)), sweep.keys[row.run])
         for spec, cells in zip(specs, found, strict=True):
-            cells.setdefault(tuple(row.point.labels[name] for name in spec.factors), []).append(run)
-    names = ["success_map" if len(specs) == 1 else f"success_map_{i + 1}" for i in range(len(specs))]
+            cells.setdefault(_key(row.point.labels[name] for name in spec.factors), []).append(run)
+    names = [MAP if len(specs) == 1 else f"{MAP}_{i + 1}" for i in range(len(specs))]
     return [_map(*each, sweep.design, kpi) for each in zip(names, specs, found, strict=True)]
 
 
@@ -98,10 +109,12 @@ def ranking(criteria: Iterable[Mapping[str, Any]]) -> str:
     return next((check["kpi"] for check in criteria if "min" in check or "max" in check), "")
 
 
-def _map(name: str, spec: MapSpec, runs: Mapping[tuple[Any, ...], Sequence[Run]], design: Design, kpi: str) -> SuccessMap:
+def _key(labels: Iterable[Any]) -> str:
+    return json.dumps(list(labels))
+
+
+def _map(name: str, spec: MapSpec, runs: Mapping[str, Sequence[Run]], design: Design, kpi: str) -> SuccessMap:
     levels = {factor: design.labels(factor) for factor in spec.factors}
-    places: list[tuple[Any, ...]] = [()]
-    for factor in spec.factors:
-        places = [(*place, label) for place in places for label in levels[factor]]
-    cells = {place: Cell(dict(zip(spec.factors, place, strict=True)), runs.get(place, ()), kpi) for place in places}
+    places = product(*levels.values())
+    cells = {_key(place): Cell(dict(zip(levels, place, strict=True)), runs.get(_key(place), ()), kpi) for place in places}
     return SuccessMap(name, spec, levels, cells)

@@ -10,10 +10,11 @@ from os.path import normpath
 from pathlib import Path
 from typing import Any
 
-from ..results.files import write_json
-from .aggregate import QUANTILES, Group, causes, groupings, groups
+from ..results.files import remove, write_json
+from .aggregate import Group, causes, groupings, groups
 from .bundle import identity
 from .ledger import Ledger
+from .schema import AGGREGATES, SUCCESS
 from .sweep import Row, Sweep, kpi_names
 from .table import write_csv, write_parquet, write_rows
 
@@ -32,7 +33,7 @@ class Summary:
 
 
 def write(sweep: Sweep, ledger: Ledger, folder: Path, parquet: bool) -> Summary:
-    """Write table.csv, aggregates.csv, success.csv, failures.csv and sweep.json to a folder."""
+    """Write table.csv, aggregates.csv, success.csv, failures.csv and sweep.json to a folder; no older table stays."""
     factors, kpis = sweep.design.columns, kpi_names(sweep.rows(ledger))
 
     def rows() -> Iterator[Row]:
@@ -41,15 +42,16 @@ def write(sweep: Sweep, ledger: Ledger, folder: Path, parquet: bool) -> Summary:
     write_csv(rows, factors, kpis, folder / "table.csv")
     if parquet:
         write_parquet(rows, factors, kpis, folder / "table.parquet")
+    else:
+        remove(folder, "table.parquet")
     found, statistics = [], []
     for names in groupings(sweep.design, sweep.read.spec.by):
         for group in groups(rows, names):
             statistics += [_statistic(group, factors, kpi, numbers) for kpi, numbers in group.statistics()]
             group.kpis = group.kpis if not names else {}
             found.append(group)
-    write_rows([*factors, "kpi", "count", "mean", "std", *QUANTILES], statistics, folder / "aggregates.csv")
-    columns = [*factors, "runs", "failed", "passed", "rate", "low", "high"]
-    write_rows(columns, (_success(group, factors) for group in found), folder / "success.csv")
+    write_rows([*factors, *AGGREGATES], statistics, folder / "aggregates.csv")
+    write_rows([*factors, *SUCCESS], (_success(group, factors) for group in found), folder / "success.csv")
     write_rows(["run", *factors, "failure", "output", "command"], _failures(sweep, rows()), folder / "failures.csv")
     summary = Summary(found[0].runs if found else 0, found, causes(rows()))
     write_json(_description(sweep, summary), folder / "sweep.json")
@@ -62,7 +64,7 @@ def _statistic(group: Group, factors: list[str], kpi: str, numbers: dict[str, fl
 
 def _success(group: Group, factors: list[str]) -> list[Any]:
     labels = (group.labels.get(name) for name in factors)
-    return [*labels, group.runs, group.failed, group.passed, group.rate, *group.interval]
+    return [*labels, group.runs, group.distinct, group.failed, group.passed, group.rate, *group.interval]
 
 
 def _failures(sweep: Sweep, rows: Iterator[Row]) -> Iterator[list[Any]]:

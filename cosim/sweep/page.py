@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,15 +11,16 @@ from .. import __version__
 from ..kpi import evaluate_checks
 from ..report.figures import save, svg
 from ..report.pages import markup, render
-from ..results.files import replacing
-from .design import Factor
+from ..results.files import remove, replacing
+from .design import Design
 from .map_figure import draw_map
-from .maps import Cell, SuccessMap
+from .maps import MAP, Cell, SuccessMap
 from .outcome import Summary, run_command
 from .replays import page_of, settings_of
 from .sweep import Sweep
 
 PAGE = "sweep.html"
+_FILE = re.compile(rf"{MAP}(_\d+)?\.(png|svg)")
 #: so many different labels of a factor are listed
 _LISTED = 12
 
@@ -26,9 +28,12 @@ _LISTED = 12
 def write_page(sweep: Sweep, summary: Summary, maps: Sequence[SuccessMap], folder: Path) -> None:
     """Write every map as NAME.png and NAME.svg, and sweep.html: maps, success by levels, KPIs, causes of failures, the design.
 
-    A click on a cell of a map leads to the replay of one of its runs where there is one, else to the command that shows it.
+    A click on a cell of a map leads to the replay of one of its runs where there is one, else to the command that shows it. Maps
+    that an earlier call wrote and this one does not are removed.
     """
     overall = summary.groups[0] if summary.groups else None
+    drawn = {f"{each.name}{suffix}" for each in maps for suffix in (".png", ".svg")}
+    remove(folder, *(path.name for path in folder.glob(f"{MAP}*") if _FILE.fullmatch(path.name) and path.name not in drawn))
     cells = list(_cells(sweep, maps, folder))
     text = render(
         "sweep.html",
@@ -56,20 +61,25 @@ def _limits(check: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def _design(sweep: Sweep) -> Iterator[tuple[str, str]]:
-    for factor in sweep.design.factors:
-        yield factor.name, _levels(factor)
+    for i, factor in enumerate(sweep.design.factors):
+        yield factor.name, _levels(sweep.design, i)
     if seeds := sweep.design.seeds:
         yield "seed", f"{seeds[0].label} ... {seeds[-1].label}"
     design = sweep.read.spec.design
     yield "design", design.kind.replace("_", " ") + (f", seed {design.seed}" if design.runs else "")
 
 
-def _levels(factor: Factor) -> str:
-    levels = factor.listed or (factor.grid if len(factor.grid) <= _LISTED else ())
-    if levels:
-        return ", ".join(str(level.label) for level in levels)
-    low, high = factor.at(0.0).label, factor.at(1 - 1e-9).label
-    return f"{low:.4g} ... {high:.4g}"
+def _levels(design: Design, number: int) -> str:
+    """All levels of a factor, of many the lowest and the highest."""
+    factor = design.factors[number]
+    if factor.listed or (design.samples is None and len(factor.grid) <= _LISTED):
+        return ", ".join(str(level.label) for level in factor.grid)
+    if design.samples is None:
+        ends = factor.grid[0], factor.grid[-1]
+    else:
+        places = design.samples[:, number]
+        ends = factor.at(float(places.min())), factor.at(float(places.max()))
+    return " ... ".join(f"{level.label:.4g}" for level in ends)
 
 
 def _drawn(sweep: Sweep, map_: SuccessMap, folder: Path) -> dict[str, Any]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import Annotated, Any, Literal
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import AfterValidator, BaseModel, Field, StringConstraints, model_validator
 
 from ..errors import did_you_mean
 from ..scenario.schema import CheckSpec, Names, Spec
+from ..scenario.tree import pointer_keys
 
 #: distribution -> its arguments; `min` and `max` of truncated_normal may be left out
 DISTRIBUTIONS = {
@@ -25,17 +26,26 @@ _OPTIONAL = {"truncated_normal": {"min", "max"}}
 _POSITIVE = ("std", "sigma", "median", "shape", "scale")
 #: what makes the levels of a factor
 _LEVELS = ("values", "range", "distribution", "levels")
-#: columns of the table that factors may not be called
-RESERVED = ("run", "seed", "status", "passed", "failure")
+#: quantiles in the aggregates
+QUANTILES = {"min": 0.0, "q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95, "max": 1.0}
+#: columns that stand beside factors, and beside the parameters of a tuning, in some file
+TABLE = ("run", "seed", "status", "passed", "failure", "output", "command")
+AGGREGATES = ("kpi", "count", "mean", "std", *QUANTILES)
+SUCCESS = ("runs", "distinct", "failed", "passed", "rate", "low", "high")
+TRIALS = ("value", "violation", "failure")
 
 
-def _label(value: str) -> str:
-    if value in RESERVED:
-        raise ValueError(f"expected a name other than {', '.join(RESERVED)}")
-    return value
+def _no_column(*names: str) -> AfterValidator:
+    def check(value: str) -> str:
+        if value in names:
+            raise ValueError(f"expected a name other than those of columns: {', '.join(dict.fromkeys(names))}")
+        return value
+
+    return AfterValidator(check)
 
 
-Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_. ]*$"), AfterValidator(_label)]
+Paths = Annotated[Names, Field(min_length=1)]
+Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_. ]*$"), _no_column(*TABLE, *AGGREGATES, *SUCCESS)]
 Scale = Literal["linear", "log"]
 
 
@@ -105,7 +115,7 @@ class FactorSpec(Spec):
     """What varies: paths as of `--set` and the values that they take, or named levels that set several things at once."""
 
     name: Label
-    set: Names | None = Field(None, description="variable or JSON pointer; of several, all get the same value")
+    set: Paths | None = Field(None, description="variable or JSON pointer; of several, all get the same value")
     values: list[Any] | None = Field(None, min_length=1)
     range: RangeSpec | None = None
     distribution: DistributionSpec | None = None
@@ -121,11 +131,17 @@ class FactorSpec(Spec):
             raise ValueError('expected "set" beside values, range or distribution, and not beside levels')
         return self
 
+    def settings(self) -> Iterator[tuple[str, Any]]:
+        """What it may set, with the values that are known; without any the value None."""
+        for level in (self.levels or {}).values():
+            yield from level.items()
+        yield from ((path, value) for path in self.set or () for value in self.values or (None,))
+
 
 class SeedsSpec(Spec):
     """Replications: every point is run with each of `count` seeds, the same ones for all points."""
 
-    set: Names
+    set: Paths
     first: int = 1
     count: int = Field(ge=1)
 
@@ -192,7 +208,8 @@ class SweepSpec(StudySpec):
     def _consistent(self) -> SweepSpec:
         names = [factor.name for factor in self.factors]
         _unique("factors", names)
-        _set_once(self.factors, self.seeds)
+        seeds = [("seed", [(path, None) for path in self.seeds.set])] if self.seeds else []
+        _set_once(self.settings, [*((factor.name, factor.settings()) for factor in self.factors), *seeds])
         if not names and self.seeds is None:
             raise ValueError('expected "factors", "seeds" or both')
         for name in (name for group in self.by for name in group):
@@ -211,8 +228,8 @@ class SweepSpec(StudySpec):
 class ParameterSpec(Spec):
     """What a tuning may change, and within which bounds."""
 
-    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$"), AfterValidator(_label)]
-    set: Names
+    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$"), _no_column(*TRIALS)]
+    set: Paths
     min: float
     max: float
     start: float | None = None
@@ -250,6 +267,9 @@ class TuneSpec(StudySpec):
     @model_validator(mode="after")
     def _consistent(self) -> TuneSpec:
         _unique("parameters", [parameter.name for parameter in self.parameters])
+        cases = [setting for case in self.cases for setting in case.items()]
+        parameters = [(each.name, [(path, None) for path in each.set]) for each in self.parameters]
+        _set_once(self.settings, [("cases", cases), *parameters])
         return self
 
 
@@ -275,19 +295,73 @@ def _has_labels(factor: FactorSpec, sampled: bool) -> bool:
     return factor.levels is not None or not sampled
 
 
-def _set_once(factors: Sequence[FactorSpec], seeds: SeedsSpec | None) -> None:
-    """Raises ValueError when two factors set the same thing."""
-    setters = {
-        factor.name: {*(factor.set or ()), *(path for level in (factor.levels or {}).values() for path in level)}
-        for factor in factors
-    }
-    setters["seed"] = {*(seeds.set if seeds else ())}
-    owners: dict[str, str] = {}
-    for name, paths in setters.items():
-        for path in sorted(paths):
-            if path in owners:
-                raise ValueError(f'both "{owners[path]}" and "{name}" set "{path}"')
-            owners[path] = name
+class _Setting(NamedTuple):
+    """Whose setting it is, how it is written, and the keys that lead to its place in the scenario."""
+
+    owner: str
+    text: str
+    place: tuple[str, ...]
+
+    @property
+    def pointer(self) -> bool:
+        """Whether it changes the scenario's JSON; variables are set after all that."""
+        return self.text.startswith("/")
+
+    @property
+    def part(self) -> bool:
+        """Whether it is within an object that is set."""
+        return self.place != _place(self.text)
+
+    def conflict(self, other: _Setting) -> str:
+        if self.text == other.text:
+            return f'both {other.owner} and {self.owner} set "{self.text}"'
+        return f'both {other.owner} and {self.owner} set the same thing, as "{other.text}" and as "{self.text}"'
+
+
+def _settings(owner: str, pairs: Iterable[tuple[str, Any]]) -> list[_Setting]:
+    """What is set, also within objects."""
+    return list(dict.fromkeys(_Setting(owner, text, place) for text, value in pairs for place in _places(_place(text), value)))
+
+
+def _place(text: str) -> tuple[str, ...]:
+    """A variable is a parameter of the component that its name begins with."""
+    if text.startswith("/"):
+        return (*pointer_keys(text),)
+    component, dot, variable = text.partition(".")
+    return ("components", component, "parameters", variable) if dot else (text,)
+
+
+def _places(place: tuple[str, ...], value: Any) -> Iterator[tuple[str, ...]]:
+    yield place
+    for key, inner in value.items() if isinstance(value, dict) else ():
+        yield from _places((*place, key), inner)
+
+
+def _set_once(common: Mapping[str, Any], setters: Iterable[tuple[str, Iterable[tuple[str, Any]]]]) -> None:
+    """Raises ValueError where one of two settings would have no effect.
+
+    `setters` are (name, settings) in the order in which they are applied. They may change what is `common` to all runs, and
+    variables that are common to all runs may change parts of objects that they set.
+    """
+    defaults = _settings("the settings", common.items())
+    known = {each.place: each for each in defaults if not each.pointer}
+    beneath = _beneath(defaults)
+    for name, pairs in setters:
+        own = _settings(f'"{name}"', pairs)
+        for each in own:
+            other = known.get(each.place)
+            if other and (other not in defaults or not (each.part or each.text == other.text)):
+                raise ValueError(each.conflict(other))
+            if each.pointer and (other := beneath.get(each.place)):
+                raise ValueError(f'"{each.text}" of {each.owner} replaces "{other.text}" of {other.owner}')
+        known |= {each.place: each for each in own}
+        beneath |= _beneath(own)
+
+
+def _beneath(settings: Iterable[_Setting]) -> dict[tuple[str, ...], _Setting]:
+    """For every place that something is set within: one such setting."""
+    pointers = [each for each in settings if each.pointer and not each.part]
+    return {each.place[:depth]: each for each in pointers for depth in range(1, len(each.place))}
 
 
 def json_schema(kind: type[BaseModel]) -> dict[str, Any]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
 
 from ..errors import InputError, Problem
+from ..kpi import Number
 from ..scenario import load
 from .bundle import Bundle, bundle, fmus
 from .document import Read
@@ -18,6 +19,9 @@ from .schema import StudySpec
 
 #: called after every run with its record
 Observer = Callable[[Record], None]
+
+#: so many runs without a KPI are taken to mean that there is none of that name
+_ENOUGH = 10
 
 
 @dataclass(frozen=True)
@@ -56,10 +60,28 @@ class Study:
         spec = load(self.read.scenario, {k: v for k, v in self.spec.settings.items() if k.startswith("/")}).spec
         return [check.model_dump(exclude_none=True) for check in spec.checks]
 
-    def refuse(self, problems: Iterable[Problem]) -> None:
-        """Raises InputError, with places in the study's own file, if there are problems."""
-        if found := self.read.located(problems):
-            raise InputError(found)
+    def check(self, engine: Laboratory, jobs: Iterable[Job]) -> None:
+        """Raises InputError, with places in the study's own file, when some of these jobs cannot be run."""
+        if problems := [found for job in jobs for found in self.read.located(engine.check(job), job.settings)]:
+            raise InputError(dict.fromkeys(problems))
+
+
+@dataclass
+class Seen:
+    """The KPIs of successful runs so far: which there are is not known before, and one run may have fewer than another."""
+
+    runs: int = 0
+    kpis: dict[str, Number] = field(default_factory=dict)
+
+    def add(self, record: Record) -> None:
+        if not record.failure:
+            self.runs += 1
+            self.kpis |= record.kpis
+
+    @property
+    def enough(self) -> bool:
+        """Whether names that are not among them may be called wrong before all runs are made."""
+        return self.runs >= _ENOUGH
 
 
 class Laboratory(Engine, AbstractContextManager["Laboratory"], Protocol):

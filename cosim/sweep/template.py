@@ -37,7 +37,9 @@ _MODULES = ("fmpy.fmi1", "fmpy.fmi2", "fmpy.fmi3", "cosim.fmi.isolated.remote", 
 
 def serve(control: socket.socket) -> None:
     """Fork lanes until whoever started this process is gone."""
-    request = json.loads(control.recv(1 << 16))
+    if not (message := control.recv(1 << 16)):
+        return
+    request = json.loads(message)
     order = Order(Path(request["scenario"]), Path(request["root"]), request["deadline"], tuple(request["fmus"]))
     with run_folder() as folder:
         tempfile.tempdir = os.environ["TMPDIR"] = folder
@@ -121,4 +123,5 @@ def _answer(request: dict[str, Any], order: Order, prepared: Prepared) -> str:
 
 
 if __name__ == "__main__":
-    serve(socket.socket(fileno=int(sys.argv[1])))
+    with suppress(ConnectionError):  # it was interrupted while this process warmed up
+        serve(socket.socket(fileno=int(sys.argv[1])))

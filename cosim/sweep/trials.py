@@ -6,15 +6,16 @@ from pathlib import Path
 
 from ..results.files import write_json
 from .bundle import identity
+from .schema import TRIALS
 from .table import write_rows
 from .tune import Trial, Tuning
 
 
 def write(tuning: Tuning, folder: Path) -> Trial:
-    """Write trials.csv and best.json; returns the best trial. Raises ValueError when nothing was tried."""
+    """Write trials.csv and best.json; returns the best trial. Something must have been tried."""
     names = [spec.name for spec in tuning.spec.parameters]
     lines = ([*trial.parameters.values(), trial.value, trial.violation, trial.failure] for trial in tuning.trials)
-    write_rows([*names, "value", "violation", "failure"], lines, folder / "trials.csv")
+    write_rows([*names, *TRIALS], lines, folder / "trials.csv")
     best = min(tuning.trials, key=lambda trial: trial.rank)
     description = {
         "name": tuning.spec.name,

@@ -2,8 +2,8 @@
 
 Optimizers see a point as a place in the unit cube. Points are compared as by K. Deb (Comput. Methods Appl. Mech. Engrg. 186
 (2000), 311-338): one that meets the constraints is better than one that does not, of those the smaller value, of these the
-smaller violation; a run that failed is the worst. Every run is kept in the ledger, so a tuning that was killed and is called
-again repeats its way without running anything twice.
+smaller violation; then come points without a value, and last those where a run failed. Every run is kept in the ledger, so a
+tuning that was killed and is called again repeats its way without running anything twice.
 """
 
 from __future__ import annotations
@@ -19,17 +19,18 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, Problem
-from ..kpi import Number
 from .design import between
 from .document import Read, read
 from .expression import Constraint, Expression, constraint, expression
 from .jobs import Job
 from .ledger import Ledger
 from .schema import MethodSpec, ParameterSpec, TuneSpec
-from .study import Laboratory, Observer, Study, run_all
+from .study import Laboratory, Observer, Seen, Study, run_all
 
-#: what a violation or a failure adds: more than any KPI
-_INFEASIBLE, _FAILED = 1e100, 1e200
+#: ranks of what is worse than any value: violations, no value, a failure; optimizers can still square and add them
+_LARGEST, _INFEASIBLE, _WORTHLESS, _FAILED = 1e99, 1e100, 1e149, 1e150
+#: differential evolution has converged when values differ by so much of their mean
+_ALIKE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -44,9 +45,11 @@ class Trial:
     @property
     def rank(self) -> float:
         """Smaller is better."""
-        if self.failure or math.isnan(self.value):
+        if self.failure:
             return _FAILED
-        return min(_INFEASIBLE * (1 + self.violation), _FAILED) if self.violation else self.value
+        if not self.value < math.inf:
+            return _WORTHLESS
+        return min(_INFEASIBLE * (1 + self.violation), _WORTHLESS) if self.violation else min(self.value, _LARGEST)
 
     @property
     def feasible(self) -> bool:
@@ -61,6 +64,8 @@ class Tuning:
     objective: Expression
     constraints: Sequence[Constraint]
     trials: list[Trial] = field(default_factory=list)
+    #: the KPIs of runs so far
+    seen: Seen = field(default_factory=Seen)
 
     @classmethod
     def of(cls, file: str | Path) -> Tuning:
@@ -90,16 +95,19 @@ class Tuning:
 
     def run(self, ledger: Ledger, engine: Laboratory, observe: Observer) -> Trial:
         """The best trial. Raises InputError before anything runs when a parameter or case cannot be set."""
-        self.study.refuse([problem for job in self._jobs([_start(self.spec)]) for problem in engine.check(job)])
+        self.study.check(engine, self._jobs([_start(self.spec)]))
 
         def evaluate(places: Sequence[Sequence[float]]) -> list[float]:
             parameters = [self._parameters(place) for place in places]
             run_all((job for each in parameters for job in self._jobs([each])), ledger, engine, observe)
             found = [self._trial(each, ledger) for each in parameters]
             self.trials += found
+            if self.seen.enough:
+                self._refuse_unknown()
             return [trial.rank for trial in found]
 
         METHODS[self.spec.method.kind](evaluate, _places(self.spec), self.spec.method)
+        self._refuse_unknown()
         return min(self.trials, key=lambda trial: trial.rank)
 
     def settings(self, parameters: Mapping[str, float]) -> dict[str, float]:
@@ -114,24 +122,29 @@ class Tuning:
 
     def _trial(self, parameters: Mapping[str, float], ledger: Ledger) -> Trial:
         records = [ledger[job.key] for job in self._jobs([parameters])]
+        for record in records:
+            self.seen.add(record)
         if failures := [record.failure for record in records if record.failure]:
             return Trial(parameters, math.nan, math.inf, failures[0])
         names = [{**record.kpis, **parameters} for record in records]
-        self._refuse_unknown(names[0])
         values = [self.objective(each) for each in names]
         violation = sum(each.violation(known) for each in self.constraints for known in names)
-        return Trial(parameters, max(values) if self.spec.over_cases == "max" else fmean(values), violation)
+        return Trial(parameters, float(np.max(values)) if self.spec.over_cases == "max" else fmean(values), violation)
 
-    def _refuse_unknown(self, known: Mapping[str, Number]) -> None:
+    def _refuse_unknown(self) -> None:
+        """Raises InputError for names that no run has a KPI for, if any run says which there are."""
+        known = {**self.seen.kpis, **dict.fromkeys(each.name for each in self.spec.parameters)}
         found = [(self.objective, ("minimize",))]
         found += [(side, ("constraints", i)) for i, each in enumerate(self.constraints) for side in (each.left, each.right)]  # type: ignore[misc]
-        if problems := [Problem(text, self.read.document.where(path)) for each, path in found if (text := each.unknown(known))]:
+        problems = [Problem(text, self.read.document.where(path)) for each, path in found if (text := each.unknown(known))]
+        if problems and self.seen.runs:
             raise InputError(problems)
 
 
 def _number(spec: ParameterSpec, place: float) -> float:
-    """Twelve digits are enough, and the same on every machine."""
-    return float(f"{between(place, spec.min, spec.max, spec.scale == 'log'):.12g}")
+    """Twelve digits are enough, and the same on every machine; bounds are kept."""
+    rounded = float(f"{between(place, spec.min, spec.max, spec.scale == 'log'):.12g}")
+    return min(max(rounded, spec.min), spec.max)
 
 
 def _start(spec: TuneSpec) -> dict[str, float]:
@@ -160,6 +173,12 @@ def _differential_evolution(evaluate: Evaluate, start: Sequence[float], spec: Me
     generator = np.random.default_rng(spec.seed)
     population = qmc.LatinHypercube(len(start), rng=generator).random(spec.population)
     population[0] = start
+
+    def converged(intermediate_result: Any) -> bool:
+        """As SciPy has it, but not as long as points differ only in how bad they are."""
+        ranks = intermediate_result.population_energies
+        return bool(ranks.max() < _INFEASIBLE and np.std(ranks) <= _ALIKE * abs(np.mean(ranks)))
+
     differential_evolution(
         lambda places: np.array(evaluate(places.T.tolist())),
         [(0.0, 1.0)] * len(start),
@@ -169,7 +188,9 @@ def _differential_evolution(evaluate: Evaluate, start: Sequence[float], spec: Me
         polish=False,
         vectorized=True,
         updating="deferred",
-        tol=1e-6,
+        callback=converged,
+        tol=0.0,
+        atol=-1.0,  # never by SciPy's own measure
     )
 
 

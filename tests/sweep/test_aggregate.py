@@ -1,5 +1,7 @@
 """Rates and statistics of many runs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -40,6 +42,13 @@ def test_statistics_are_those_of_the_finite_values():
 def test_groups_come_in_the_order_of_the_runs_and_failures_count():
     found = groups(lambda: [row(0, 1.0, "b"), row(1, 9.0, "a"), row(2, 0.0, "b", "broken")], ["f"])
     assert [(g.labels["f"], g.runs, g.failed, g.passed, g.rate) for g in found] == [("b", 2, 1, 1, 0.5), ("a", 1, 0, 0, 0.0)]
+
+
+def test_a_run_that_several_points_have_counts_once_in_intervals():
+    """Eight points of each group, and two runs, the same in both: one of them is a success."""
+    rows = [replace(row(run, 9 * (run % 2), "ab"[run // 8]), record=Record(str(run % 2), {}), shared=True) for run in range(16)]
+    for group in groups(lambda: rows, ["f"]):
+        assert (group.runs, group.distinct, group.rate, group.interval) == (8, 2, 0.5, wilson(1, 2))
 
 
 def test_one_value_has_no_spread():

@@ -37,6 +37,31 @@ def test_a_line_that_was_not_finished_is_cut_off(tmp_path):
             assert [ledger[key].kpis["a"] for key in KEYS[:2]] == [1.0, 3.0]
 
 
+@pytest.mark.parametrize("line", [b"\0" * 20, b"{", b'{"key": "zz"}', b'{"key": "00", "kpis": 3}', b"[1]", b"\xff"])
+def test_a_line_that_cannot_be_read_costs_no_other_one(tmp_path, line):
+    file = filled(tmp_path, Record(KEYS[0], {"a": 1.0}))
+    file.write_bytes(file.read_bytes() + line + b"\n")
+    filled(tmp_path, Record(KEYS[1], {"a": 2.0}))
+    with Ledger(tmp_path) as ledger:
+        assert [ledger[key].kpis["a"] for key in KEYS[:2]] == [1.0, 2.0]
+        assert ledger.unreadable == 1
+
+
+@pytest.mark.parametrize("content", [b"notes\nof mine\n", b"notes", b'{"time": 1}\n'])
+def test_a_foreign_file_is_left_alone(tmp_path, content):
+    (tmp_path / FILE).write_bytes(content)
+    with pytest.raises(InputError, match="is no file of finished runs"):
+        Ledger(tmp_path)
+    assert (tmp_path / FILE).read_bytes() == content
+
+
+def test_of_a_first_line_nothing_may_be_left(tmp_path):
+    (tmp_path / FILE).write_bytes(b'{"key": "0123')
+    filled(tmp_path, Record(KEYS[0]))
+    with Ledger(tmp_path) as ledger:
+        assert KEYS[0] in ledger
+
+
 def test_jobs_are_asked_for_once(tmp_path):
     filled(tmp_path, Record(KEYS[0]))
     with Ledger(tmp_path) as ledger:

@@ -14,6 +14,7 @@ from matplotlib.text import Text
 
 from cosim.errors import InputError
 from cosim.report.figures import style, svg
+from cosim.sweep.aggregate import wilson
 from cosim.sweep.jobs import Record
 from cosim.sweep.map_figure import draw_map
 from cosim.sweep.maps import success_maps
@@ -35,7 +36,7 @@ def sweep_of(folder, **more):
 def rows(sweep, errors):
     """Runs with these lateral errors; None is a run that crashed."""
     for run, error in errors.items():
-        record = Record("", {} if error is None else {"landing.lateral_error": error}, "crashed" if error is None else "")
+        record = Record(str(run), {} if error is None else {"landing.lateral_error": error}, "crashed" if error is None else "")
         yield Row(run, sweep.design[run], record, error is not None and error <= 0.1)
 
 
@@ -51,23 +52,23 @@ def success_map(tmp_path):
 
 
 def test_shares_are_those_of_the_runs_of_a_cell(success_map):
-    shares = {place: (cell.passed, len(cell.runs)) for place, cell in success_map.cells.items()}
+    shares = {(*cell.labels.values(),): (cell.passed, len(cell.runs)) for cell in success_map.cells.values()}
     assert shares == {("old", 0.5): (3, 3), ("old", 1.0): (1, 3), ("new", 0.5): (0, 3), ("new", 1.0): (0, 0)}
-    assert math.isnan(success_map.cells["new", 1.0].share)
+    assert math.isnan(success_map.cell(None, None, "new", 1.0).share)
 
 
 def test_a_run_without_success_is_shown_before_all_others(success_map):
-    cell = success_map.cells["old", 1.0]
+    cell = success_map.cell(None, None, "old", 1.0)
     assert (cell.shown.number, cell.why) == (4, "the first that is no success")
 
 
 def test_of_successes_the_median_one_is_shown(success_map):
-    cell = success_map.cells["old", 0.5]
+    cell = success_map.cell(None, None, "old", 0.5)
     assert (cell.shown.number, cell.why) == (2, "the median of landing.lateral_error")
 
 
 def test_nothing_is_shown_where_nothing_was_run(success_map):
-    assert success_map.cells["new", 1.0].shown is None
+    assert success_map.cell(None, None, "new", 1.0).shown is None
 
 
 def test_panels_tell_further_factors_apart(tmp_path):
@@ -77,6 +78,24 @@ def test_panels_tell_further_factors_apart(tmp_path):
     assert panels.along("seed") == [1, 2, 3]
     assert [run.number for run in panels.cell(None, "old", 2, 1.0).runs] == [4]
     assert [run.number for run in flat.cell(None, None, 0.5, 3).runs] == [2, 8]
+
+
+def test_a_run_that_several_points_have_counts_once_in_intervals(tmp_path):
+    twice = {"one": {"uav.vtol.landing_time": 8.0}, "other": {"uav.vtol.landing_time": 8.0}}
+    more = {"name": "more", "levels": twice}
+    factors = [SPEED, CONTROLLER | {"levels": {"old": {}}}, more]
+    sweep = sweep_of(tmp_path, factors=factors, seeds=None)
+    (found,) = success_maps(sweep, rows(sweep, {0: 0.01, 1: 0.01}))
+    cell = found.cell(None, None, "old", 0.5)
+    assert (cell.share, cell.interval) == (1.0, wilson(1, 1))
+
+
+def test_levels_that_are_nothing_or_equal_in_python_have_cells_of_their_own(tmp_path):
+    speeds = SPEED | {"set": "/components/usv/period", "values": [None, 1, 1.0]}
+    sweep = sweep_of(tmp_path, factors=[CONTROLLER, speeds], seeds=None)
+    (found,) = success_maps(sweep, rows(sweep, dict(enumerate([0.1, 0.2, 0.3]))))
+    assert [[run.number for run in found.cell(None, None, "old", x).runs] for x in found.along("speed")] == [[0], [1], [2]]
+    draw_map(found)
 
 
 def squares(figure):

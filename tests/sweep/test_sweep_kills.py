@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
+import socket
+import subprocess
+import sys
 import time
 
 import pytest
@@ -76,3 +80,15 @@ def test_an_interrupt_keeps_what_is_finished(lag, going):
     assert f"{len(lag.records())} of {RUNS} runs" in out
     wait_until(lambda: not any(map(alive, below)), 10)
     assert_completed(lag)
+
+
+@pytest.mark.parametrize(
+    "request_", [b"", json.dumps({"scenario": "", "root": "", "fmus": [], "deadline": None, "cold": True}).encode()]
+)
+def test_a_template_whose_sweep_was_interrupted_ends_quietly(request_):
+    own, other = socket.socketpair()
+    with own, other:
+        command = [sys.executable, "-m", "cosim.sweep.template", str(other.fileno())]
+        process = subprocess.Popen(command, pass_fds=[other.fileno()], stderr=subprocess.PIPE)
+        own.sendall(request_)
+    assert (process.communicate()[1], process.returncode) == (b"", 0)

@@ -82,6 +82,50 @@ def test_what_is_done_is_not_done_again_and_what_is_new_is_added(lag):
     assert "3 of 3 runs, 1 made now" in done.out
 
 
+def test_a_run_that_several_points_have_is_said_to_be_one(lag):
+    factors = [{"name": "y", "set": "lag.y_start", "range": {"min": 1, "max": 2}, "integer": True}]
+    content = {"factors": factors, "design": {"kind": "sobol", "runs": 8}, "success": [{"kpi": "end.value", "max": 1.5}]}
+    done = lag.call("sweep", lag.write(**content))
+    assert "2 of 8 runs are distinct; intervals are those of so many" in done.out
+    assert "2 of the 8 runs are distinct" in (lag.folder / "runs/sweep/sweep.html").read_text()
+    overall = lag.table(file="success.csv")[0]
+    assert (overall["runs"], overall["distinct"], overall["rate"]) == ("8", "2", "0.5")
+
+
+def test_a_run_without_a_kpi_of_the_criteria_is_no_success(lag):
+    """Runs that end above 1 have another KPI, the first one too."""
+    (lag.folder / "own.py").write_text(
+        "def own(result):\n    y = result['lag.y'][-1]\n    return {'low' if y < 1 else 'high': y}\n"
+    )
+    content = {"settings": {"/kpis": [{"name": "own", "python": "own.py:own"}]}, "success": [{"kpi": "own.low", "max": 1.0}]}
+    done = lag.call("sweep", lag.write(factors=[{"name": "y", "set": "lag.y_start", "values": [3, 1, 4]}], **content))
+    assert done.code == 0, done.err
+    assert [(row["passed"], bool(row["own.low"])) for row in lag.table()] == [("0", False), ("1", True), ("0", False)]
+
+
+def test_tables_and_maps_of_an_earlier_call_do_not_stay(lag):
+    pytest.importorskip("pyarrow")
+    factors = [{"name": name, "set": f"lag.{name}", "values": [1, 2]} for name in ("T", "y_start")]
+    maps = [{"x": "T", "y": "y_start"}, {"x": "y_start", "y": "T"}]
+    lag.call("sweep", lag.write(factors=factors, maps=maps), "--parquet")
+    folder = lag.folder / "runs/sweep"
+    (folder / "success_map_of_mine.png").write_bytes(b"")
+    lag.call("sweep", lag.write(factors=factors, maps=maps[:1]))
+    found = {path.name for path in folder.iterdir() if path.suffix in (".png", ".svg", ".parquet")}
+    assert found == {"success_map.png", "success_map.svg", "success_map_of_mine.png"}
+
+
+def test_damaged_records_are_counted_and_made_again(lag):
+    file = lag.write(factors=[{"name": "y", "set": "lag.y_start", "values": [1, 2, 3]}])
+    lag.call("sweep", file)
+    journal = lag.folder / "runs/sweep/journal.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(lines[0] + b"\0" * 10 + lines[1][10:] + lines[2])
+    done = lag.call("sweep", file)
+    assert "unreadable lines in runs/sweep/journal.jsonl, whose runs are made again: 1" in done.err
+    assert "3 of 3 runs, 1 made now" in done.out
+
+
 @pytest.mark.long
 def test_another_scenario_makes_other_runs(lag):
     sweep = lag.write(factors=[{"name": "T", "set": "lag.T", "values": [0.5]}])
