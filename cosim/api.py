@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from . import __version__
-from .errors import ComponentError, CosimError
+from .errors import ComponentError, CosimError, InputError, Problem
 from .kpi import CheckOutcome, evaluate_checks, evaluate_kpis, held_checks, kpi_senses, kpi_units
 from .pacer import Late
 from .results import Kpis, Result
@@ -129,9 +129,10 @@ def _with_kpis(result: Result, assembly: Assembly) -> Execution:
     kpis = Kpis()
     failures: list[BaseException] = []
     functions = assembly.kpis()
-    for kpi in functions:
+    for i, kpi in enumerate(functions):
         try:
-            kpis.update(evaluate_kpis(result, [kpi]))
+            with _placed(assembly, "kpis", i):
+                kpis.update(evaluate_kpis(result, [kpi]))
         except (CosimError, KeyboardInterrupt) as error:
             failures.append(error)
     about = {"kpi_units": kpi_units(functions, kpis, result.units), "kpi_senses": kpi_senses(functions, kpis)}
@@ -141,8 +142,21 @@ def _with_kpis(result: Result, assembly: Assembly) -> Execution:
 
 
 def checks(assembly: Assembly, result: Result) -> list[CheckOutcome]:
-    """The scenario's checks held against a result."""
-    return evaluate_checks(result.kpis, assembly.checks)
+    """The scenario's checks held against a result. Raises InputError for those of KPIs that it does not have."""
+    outcomes = []
+    for i, check in enumerate(assembly.checks):
+        with _placed(assembly, "checks", i):
+            outcomes += evaluate_checks(result.kpis, [check])
+    return outcomes
+
+
+@contextmanager
+def _placed(assembly: Assembly, *path: str | int) -> Iterator[None]:
+    """What is refused in this block gets its place in the scenario file."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError([Problem(str(problem), assembly.root.where(*path)) for problem in error.problems]) from error
 
 
 def _metadata(assembly: Assembly) -> dict[str, Any]:

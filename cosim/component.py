@@ -22,7 +22,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from .errors import ComponentError
+from .errors import ComponentError, did_you_mean
 from .units import Unit
 
 Causality = Literal["parameter", "calculatedParameter", "structuralParameter", "input", "output", "local", "independent"]
@@ -72,6 +72,10 @@ class Variable:
     dtype: np.dtype[Any] = field(default=None)  # type: ignore[arg-type]
 
     def __post_init__(self) -> None:
+        if self.type not in DTYPES:
+            raise ValueError(
+                f'variable "{self.name}": type is "{self.type}", expected one of FMI 3.0{did_you_mean(self.type, DTYPES)}'
+            )
         if self.dtype is None:
             object.__setattr__(self, "dtype", DTYPES[self.type])
 

@@ -120,15 +120,20 @@ def one_of(names: Iterable[str]) -> str:
 def did_you_mean(name: str, valid: Iterable[str]) -> str:
     """The nearest valid name as the end of a message, or the list of valid names when it is short, or nothing.
 
+    Nearest is a name with two neighbouring letters swapped.
+
     >>> did_you_mean("stop_tme", ["start_time", "stop_time"])
     '; did you mean "stop_time"?'
+    >>> did_you_mean("uva", ["usv", "uav"])
+    '; did you mean "uav"?'
     """
     return _did_you_mean(name, tuple(valid))
 
 
 @lru_cache(16)  # a name that is wrong in one place often is so in the next ones
 def _did_you_mean(name: str, names: tuple[str, ...]) -> str:
-    if near := difflib.get_close_matches(name, names, n=1):
+    swapped = {name[:i] + name[i + 1] + name[i] + name[i + 2 :] for i in range(len(name) - 1)}
+    if near := [other for other in names if other in swapped] or difflib.get_close_matches(name, names, n=1):
         return f'; did you mean "{near[0]}"?'
     if 0 < len(names) <= 8:
         return f"; valid: {', '.join(names)}"

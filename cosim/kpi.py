@@ -3,7 +3,9 @@
 A KPI is a plain function `function(result, **arguments)` that returns its numbers by name:
 
     @units(lateral_error="m")
-    def landing(result: Result, vehicle: str, deck: str) -> dict[str, float]: ...
+    def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, float]: ...
+
+Arguments that are annotated as `Signal` or `Prefix` are held against the recorded signals before a scenario runs.
 """
 
 from __future__ import annotations
@@ -24,6 +26,10 @@ from .results import Result
 from .units import product
 
 Number = float | int | bool
+#: the name of a recorded signal: "plant.uav.position.z"
+Signal = str
+#: what names of recorded signals begin with, up to a dot or bracket: "plant.uav"
+Prefix = str
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 LIMITS: Mapping[str, Callable[[Any, Any], bool]] = {"min": operator.ge, "max": operator.le, "equals": operator.eq}

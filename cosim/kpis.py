@@ -14,30 +14,33 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .kpi import better, first_time, units
+from .kpi import Signal, better, first_time, units
 from .results import Result
 
-Target = float | str
 FOREVER = math.inf
 
 
 @better(value="lower")
 @units(value="{signal}")
-def rms(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+def rms(
+    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
+) -> dict[str, float]:
     """Root of the mean squared error over time."""
     time, error = _error(result, signal, target, start, stop)
     return {"value": math.sqrt(_mean(time, error**2))}
 
 
 @units(value="{signal}")
-def mean(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+def mean(
+    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
+) -> dict[str, float]:
     """Mean error over time."""
     return {"value": _mean(*_error(result, signal, target, start, stop))}
 
 
 @units(value="{signal}")
 def maximum(
-    result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER
+    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
     """Largest error, with its sign: the largest value of the signal where there is no target."""
     _, error = _error(result, signal, target, start, stop)
@@ -46,7 +49,7 @@ def maximum(
 
 @units(value="{signal}")
 def minimum(
-    result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER
+    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
     """Smallest error, with its sign."""
     _, error = _error(result, signal, target, start, stop)
@@ -55,14 +58,16 @@ def minimum(
 
 @better(value="lower")
 @units(value="{signal}")
-def peak(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+def peak(
+    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
+) -> dict[str, float]:
     """Largest error without its sign."""
     _, error = _error(result, signal, target, start, stop)
     return {"value": float(np.abs(error).max()) if error.size else math.nan}
 
 
 @units(value="{signal}")
-def final(result: Result, signal: str, target: Target = 0.0, stop: float = FOREVER) -> dict[str, float]:
+def final(result: Result, signal: Signal, target: Signal | float = 0.0, stop: float = FOREVER) -> dict[str, float]:
     """Error in the last row."""
     _, error = _error(result, signal, target, -FOREVER, stop)
     return {"value": float(error[-1]) if error.size else math.nan}
@@ -70,7 +75,9 @@ def final(result: Result, signal: str, target: Target = 0.0, stop: float = FOREV
 
 @better(value="lower")
 @units(value="{signal}.s")
-def iae(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+def iae(
+    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
+) -> dict[str, float]:
     """Integral of the absolute error, in the signal's unit times s."""
     time, error = _error(result, signal, target, start, stop)
     return {"value": _integral(time, np.abs(error))}
@@ -78,7 +85,9 @@ def iae(result: Result, signal: str, target: Target = 0.0, start: float = -FOREV
 
 @better(value="lower")
 @units(value="{signal}2.s")
-def ise(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+def ise(
+    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
+) -> dict[str, float]:
     """Integral of the squared error, in the signal's unit squared times s."""
     time, error = _error(result, signal, target, start, stop)
     return {"value": _integral(time, error**2)}
@@ -86,7 +95,9 @@ def ise(result: Result, signal: str, target: Target = 0.0, start: float = -FOREV
 
 @better(value="lower")
 @units(value="{signal}.s2")
-def itae(result: Result, signal: str, target: Target = 0.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+def itae(
+    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
+) -> dict[str, float]:
     """Integral of the absolute error times the time since the first row, in the signal's unit times s2."""
     time, error = _error(result, signal, target, start, stop)
     return {"value": _integral(time, (time - time[:1]) * np.abs(error))}
@@ -94,7 +105,9 @@ def itae(result: Result, signal: str, target: Target = 0.0, start: float = -FORE
 
 @better(value="lower")
 @units(value="J")
-def energy(result: Result, effort: str, flow: Target = 1.0, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+def energy(
+    result: Result, effort: Signal, flow: Signal | float = 1.0, start: float = -FOREVER, stop: float = FOREVER
+) -> dict[str, float]:
     """Integral of effort times flow (J): of force (N) and speed (m/s), torque (N.m) and rate (rad/s), or of a power (W) alone."""
     rows = _rows(result, start, stop)
     power = result[effort].astype(np.float64) * (result[flow] if isinstance(flow, str) else flow)
@@ -104,7 +117,7 @@ def energy(result: Result, effort: str, flow: Target = 1.0, start: float = -FORE
 @better(value="lower")
 def saturation_share(
     result: Result,
-    signal: str,
+    signal: Signal,
     lower: float = -FOREVER,
     upper: float = FOREVER,
     start: float = -FOREVER,
@@ -123,7 +136,9 @@ def saturation_share(
 
 @better(value="lower")
 @units(value="s")
-def time_to_reach(result: Result, signal: str, level: float, start: float = -FOREVER, stop: float = FOREVER) -> dict[str, float]:
+def time_to_reach(
+    result: Result, signal: Signal, level: float, start: float = -FOREVER, stop: float = FOREVER
+) -> dict[str, float]:
     """Time (s) from the first row until the signal first is at `level` or has crossed it, whichever side it came from."""
     rows = _rows(result, start, stop)
     time, values = result.time[rows], result[signal][rows].astype(np.float64)
@@ -135,7 +150,7 @@ def time_to_reach(result: Result, signal: str, level: float, start: float = -FOR
 @units(value="s")
 def rise_time(
     result: Result,
-    signal: str,
+    signal: Signal,
     start: float = -FOREVER,
     stop: float = FOREVER,
     initial: float | None = None,
@@ -154,7 +169,7 @@ def rise_time(
 @better(value="lower")
 def overshoot(
     result: Result,
-    signal: str,
+    signal: Signal,
     start: float = -FOREVER,
     stop: float = FOREVER,
     initial: float | None = None,
@@ -169,7 +184,7 @@ def overshoot(
 @units(value="s")
 def settling_time(
     result: Result,
-    signal: str,
+    signal: Signal,
     start: float = -FOREVER,
     stop: float = FOREVER,
     initial: float | None = None,
@@ -213,7 +228,7 @@ def _rows(result: Result, start: float, stop: float) -> slice:
     return slice(int(np.searchsorted(result.time, start, "left")), int(np.searchsorted(result.time, stop, "right")))
 
 
-def _error(result: Result, signal: str, target: Target, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
+def _error(result: Result, signal: str, target: Signal | float, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
     rows = _rows(result, start, stop)
     wanted = result[target] if isinstance(target, str) else target
     return result.time[rows], (result[signal].astype(np.float64) - wanted)[rows]

@@ -19,6 +19,7 @@ from pythonfmu.variables import Boolean, Integer, Real, ScalarVariable, String
 
 from . import log
 from .component import Component, Ports, Variable
+from .contract import violations
 from .errors import PASSING, ComponentError, InputError, Problem, did_you_mean, told
 from .memento import remember
 from .paths import is_file, real
@@ -182,7 +183,7 @@ def _places(ports: Ports) -> list[tuple[Variable, tuple[np.ndarray, int]]]:
 def load_component(reference: str, folder: Path, instance_name: str, arguments: Mapping[str, Any]) -> Component:
     """An instance of `file.py:Class`, a component or a PythonFMU class; relative paths start at `folder`.
 
-    Raises InputError when the file, the class or its arguments are not what they should be.
+    Raises InputError when the file, the class, its arguments or what it makes are not what they should be.
     """
     kind = load_object(reference, folder)
     if inspect.isclass(kind) and issubclass(kind, Fmi2Slave):
@@ -190,10 +191,8 @@ def load_component(reference: str, folder: Path, instance_name: str, arguments: 
             raise InputError(f'{reference} gets its "instance_name" from the scenario; it is no argument')
         return PythonSlave(_construct(kind, reference, instance_name=instance_name, **arguments), instance_name)
     made = _construct(kind, reference, instance_name, **arguments)
-    expected = (name for name in {**Component.__annotations__, **vars(Component)} if not name.startswith("_"))
-    if missing := [name for name in expected if not hasattr(made, name)]:
-        text = f"{reference} makes a {type(made).__name__} without {', '.join(missing)}"
-        raise InputError(f"{text}; expected a component or an Fmi2Slave class")
+    if found := [Problem(f"{reference} makes a {type(made).__name__}: {text}") for text in violations(made)]:
+        raise InputError(found)
     return made
 
 

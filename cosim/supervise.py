@@ -26,6 +26,7 @@ from .errors import ComponentError, one_of
 from .journal import CALL, CHANGES, CODE, ROWS, STEPS, Journal, Phase
 from .live_csv import LiveCsv
 from .sandbox.process import detach, lower
+from .streams import outlasting
 from .temporary import run_folder
 from .unfinished import read_header
 
@@ -139,15 +140,10 @@ def _detach(foreign_output: int, supervisor: int) -> None:
     detach(supervisor)
     lower(resource.RLIMIT_DATA, MEMORY)
     lower(resource.RLIMIT_CORE, 0)
-    sys.stdout, sys.stderr = _kept(sys.stdout), _kept(sys.stderr)
+    sys.stdout, sys.stderr = outlasting(sys.stdout, apart=True), outlasting(sys.stderr, apart=True)
     os.dup2(foreign_output, 1)
     os.dup2(foreign_output, 2)
     os.close(foreign_output)
-
-
-def _kept(stream):  # type: ignore[no-untyped-def]
-    """The stream on a file descriptor that foreign code does not know."""
-    return os.fdopen(os.dup(stream.fileno()), "w", encoding=stream.encoding, errors="replace", buffering=1)
 
 
 # -- in the supervisor -------------------------------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from matplotlib.patches import Circle, Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 
+from cosim.kpi import Prefix, Signal
 from cosim.results import Result
 
 from .kpis import horizontal_distance, touchdown_row, waypoints
@@ -31,8 +32,8 @@ COLUMN = 3.5  # in, width of a column in a two-column paper
 
 def paths(
     result: Result,
-    vehicle: str,
-    deck: str,
+    vehicle: Prefix,
+    deck: Prefix,
     x: Sequence[float] = (),
     y: Sequence[float] = (),
     radius: float = 0.0,
@@ -93,10 +94,10 @@ def _fit_height(figure: Figure, axes: Axes) -> None:
 
 def landing(
     result: Result,
-    vehicle: str,
-    deck: str,
-    altitude_reference: str | None = None,
-    mode: str | None = None,
+    vehicle: Prefix,
+    deck: Prefix,
+    altitude_reference: Signal | None = None,
+    mode: Signal | None = None,
     phases: Sequence[str] = (),
     limit: float | None = None,
     start: float = 0.0,
@@ -175,8 +176,8 @@ def _mark_touchdown(figure: Figure, time: float, altitude: float) -> None:
 
 def tracking_error(
     result: Result,
-    vehicle: str,
-    target: str,
+    vehicle: Prefix,
+    target: Prefix,
     x: Sequence[float] = (),
     y: Sequence[float] = (),
     radius: float = 0.0,

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cosim.kpi import Number, better, units
+from cosim.kpi import Number, Prefix, Signal, better, units
 from cosim.results import Result
 
 from . import deck_frame
@@ -31,7 +31,7 @@ FLIGHT_TIME = 0.1
     final_lateral_error="lower",
 )
 @units(time="s", lateral_error="m", touchdown_speed="m/s", tangential_speed="m/s", slide="m", final_lateral_error="m")
-def landing(result: Result, vehicle: str, deck: str) -> dict[str, Number]:
+def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, Number]:
     """The landing of `vehicle` on a vessel whose landing deck is `deck` ("plant.usv.deck").
 
     Touchdown is the first row with contact between the vehicle and a vessel after the vehicle flew.
@@ -112,7 +112,7 @@ def _slide(result: Result, vehicle: str, deck: str, row: int) -> float:
     deck_heave="m",
     peak_force="N",
 )
-def touchdown(result: Result, vehicle: str, deck: str, mass: float) -> dict[str, Number]:
+def touchdown(result: Result, vehicle: Prefix, deck: Prefix, mass: float) -> dict[str, Number]:
     """How `vehicle` of `mass` (kg) meets the landing deck of a vessel ("plant.usv.deck"), seen from the deck.
 
     Touchdown is that of `landing`. Speeds are those one row earlier, relative to the point of the deck below the vehicle.
@@ -151,7 +151,7 @@ def touchdown(result: Result, vehicle: str, deck: str, mass: float) -> dict[str,
 
 @better(time_to_land="lower", aborts="lower")
 @units(time_to_land="s")
-def descent(result: Result, vehicle: str, mode: str, descending: float) -> dict[str, Number]:
+def descent(result: Result, vehicle: Prefix, mode: Signal, descending: float) -> dict[str, Number]:
     """How the way down went, told by the signal `mode`: `descending` is its value for that, lower ones come before it.
 
     time_to_land  s  from the first row in that mode to the touchdown of `landing`, aborted descents included
@@ -168,7 +168,7 @@ def descent(result: Result, vehicle: str, mode: str, descending: float) -> dict[
 
 @better(reached="higher", all_reached="higher", time="lower")
 @units(time="s")
-def waypoints(result: Result, vehicle: str, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
+def waypoints(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
     """Whether `vehicle` came within `radius` (m) of the waypoints (`x`, `y`) (m, world), one after the other.
 
     reached      1  number of waypoints reached in order, from the first on
@@ -193,7 +193,7 @@ def waypoints(result: Result, vehicle: str, x: Sequence[float], y: Sequence[floa
 
 @better(rms="lower", max="lower", leg="lower")
 @units(rms="m", max="m", leg="m")
-def cross_track(result: Result, vehicle: str, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
+def cross_track(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
     """How far `vehicle` was from the straight legs between its place in the first row and the waypoints (see `waypoints`).
 
     A leg begins when the waypoint before it is reached, and ends when its own is, or with the last row; the distance is that
@@ -227,7 +227,7 @@ def _distance_from_line(place: np.ndarray, start: complex, end: complex) -> np.n
 
 @better(rms="lower", max="lower")
 @units(rms="m", max="m")
-def tracking(result: Result, vehicle: str, target: str, start: float, stop: float = math.inf) -> dict[str, Number]:
+def tracking(result: Result, vehicle: Prefix, target: Prefix, start: float, stop: float = math.inf) -> dict[str, Number]:
     """How well `vehicle` stayed above `target` ("plant.usv" or "plant.usv.deck") over start <= time <= stop (s).
 
     rms  m  root of the mean squared horizontal distance over the rows
@@ -241,7 +241,7 @@ def tracking(result: Result, vehicle: str, target: str, start: float, stop: floa
 
 @better(stopped_at_end="higher")
 @units(stop_time="s", final_speed="rad/s", max_speed="rad/s")
-def motors(result: Result, rotor_speed: str, threshold: float = 1.0) -> dict[str, Number]:
+def motors(result: Result, rotor_speed: Prefix, threshold: float = 1.0) -> dict[str, Number]:
     """Whether the motors were switched off: the commands `rotor_speed`[1], [2], ... ("uav.mixer.rotor_speed"), in rad/s.
 
     stopped_at_end         whether the last row's commands are all below `threshold` (rad/s)
@@ -263,6 +263,6 @@ def motors(result: Result, rotor_speed: str, threshold: float = 1.0) -> dict[str
 
 
 @units(value="{signal}")
-def final(result: Result, signal: str) -> dict[str, float]:
+def final(result: Result, signal: Signal) -> dict[str, float]:
     """`value`: the last value of one signal, in its own unit."""
     return {"value": result[signal][-1].item()}

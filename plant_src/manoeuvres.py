@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.errors import InputError
-from cosim.kpi import Number, better, first_time, units
+from cosim.kpi import Number, Prefix, better, first_time, units
 from cosim.results import Result
 
 DEGREE = math.pi / 180
@@ -97,7 +97,7 @@ def _offset(result: Result, vehicle: str, point: Point) -> np.ndarray:
     steady_speed="m/s",
 )
 def turning_circle(
-    result: Result, vehicle: str, start: float, length: float, midships: Point = CENTRE_OF_MASS
+    result: Result, vehicle: Prefix, start: float, length: float, midships: Point = CENTRE_OF_MASS
 ) -> dict[str, Number]:
     """The turning circle of `vehicle`, to either side, rudder hard over from `start` on (MSC.137(76), 5.2.1).
 
@@ -150,7 +150,7 @@ def _speed(result: Result, vehicle: str, time: float) -> float:
 
 @better(overshoot="lower", initial_turning_time="lower", reach="lower")
 @units(overshoot="rad", execute="s", initial_turning_time="s", reach="s", period="s")
-def zigzag(result: Result, vehicle: str, start: float, angle: float = 10 * DEGREE, overshoots: int = 2) -> dict[str, Number]:
+def zigzag(result: Result, vehicle: Prefix, start: float, angle: float = 10 * DEGREE, overshoots: int = 2) -> dict[str, Number]:
     """The zig-zag of `vehicle` from `start` on: the rudder is reversed whenever the heading is `angle` (rad) off the original
     course on the side to which the vessel turns (MSC.137(76), 5.2.3).
 
@@ -202,7 +202,7 @@ def _back_on_course(own: Track, reversal: float) -> float:
 @better(distance="lower", distance_lengths="lower", time="lower")
 @units(distance="m", time="s")
 def initial_turning(
-    result: Result, vehicle: str, start: float, length: float, angle: float = 10 * DEGREE, midships: Point = CENTRE_OF_MASS
+    result: Result, vehicle: Prefix, start: float, length: float, angle: float = 10 * DEGREE, midships: Point = CENTRE_OF_MASS
 ) -> dict[str, Number]:
     """How quickly `vehicle` answers 10 deg of rudder from `start` on (MSC.137(76), 5.2.2).
 
@@ -219,7 +219,7 @@ def initial_turning(
 @better(track_reach="lower", track_reach_lengths="lower", head_reach="lower", lateral_deviation="lower", time="lower")
 @units(track_reach="m", head_reach="m", lateral_deviation="m", time="s")
 def stopping(
-    result: Result, vehicle: str, start: float, length: float, speed: float = 0.0, midships: Point = CENTRE_OF_MASS
+    result: Result, vehicle: Prefix, start: float, length: float, speed: float = 0.0, midships: Point = CENTRE_OF_MASS
 ) -> dict[str, Number]:
     """How `vehicle` stops after the engine's order at `start` (MSC.137(76), 5.2.4).
 

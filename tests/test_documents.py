@@ -58,12 +58,15 @@ def schema(example):
     return json_schema(nested="ports" in example)
 
 
-def test_the_example_scenario_runs(tmp_path):
-    """With the KPI of the same page, and a gust to go with it."""
+@pytest.mark.parametrize("keeper", ["../controllers/python/course_keeper.py:CourseKeeper", "my_keeper.py:Keeper"])
+def test_the_example_scenario_runs(tmp_path, keeper):
+    """With the KPI of the same page, and a gust to go with it; also with the page's own component."""
     text = (ROOT / "docs/scenarios.md").read_text()
     (scenario,) = (block for block in re.findall(r"```json\n(.*?)```", text, re.DOTALL) if "stop_time" in block)
-    (kpi,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    component, kpi = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    scenario = re.sub(r"[^\"]*course_keeper.py:CourseKeeper", keeper, scenario)
     (tmp_path / "example.json").write_text(scenario.replace("../", f"{ROOT}/"))
+    (tmp_path / "my_keeper.py").write_text(component)
     (tmp_path / "my_kpis.py").write_text(kpi)
     (tmp_path / "gust.csv").write_text("time,force\n0,0\n3,0.2\n4,0\n")
     done = subprocess.run(

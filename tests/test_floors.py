@@ -11,11 +11,11 @@ PACKAGE = Path(__file__).parents[1] / "cosim"
 
 #: rooms from the ground up; a room imports only from its own floor or from below
 FLOORS = [
-    {"errors", "resources", "log", "stopwatch", "temporary", "float_mode", "memento"},
+    {"errors", "resources", "log", "stopwatch", "temporary", "float_mode", "streams", "memento"},
     {"journal", "paths"},
     {"timing", "units", "sandbox", "process_state"},
     {"component", "pacer"},
-    {"system", "recording"},
+    {"system", "recording", "contract"},
     {"engine"},
     {"unfinished"},
     {"live_csv", "text_rows"},

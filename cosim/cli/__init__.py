@@ -12,6 +12,7 @@ import click
 
 from .. import __version__
 from ..errors import CosimError
+from ..streams import outlasting
 
 #: command -> (module in this package, what it does)
 COMMANDS = {
@@ -62,6 +63,7 @@ def cli(debug: bool) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of the command `cosim`; ends the process with the exit code of the outcome."""
+    sys.stdout, sys.stderr = outlasting(sys.stdout), outlasting(sys.stderr)
     sys.exit(_code(sys.argv[1:] if arguments is None else arguments))
 
 
@@ -73,9 +75,6 @@ def guarded(command: Callable[[], int]) -> int:
     """The exit code of a command; what it raises is reported to the user."""
     try:
         return command()
-    except BrokenPipeError:
-        sys.stderr.close()
-        return 0
     except (Exception, KeyboardInterrupt) as error:
         return report(error)
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from ..errors import InputError
 from ..system import Group, Stage
 from . import strict, supervision
 
@@ -21,25 +22,33 @@ if TYPE_CHECKING:
 def command(scenario: str, settings: tuple[str, ...], connections: bool, isolation: str, sandbox: str | None) -> None:
     """Load, wire and validate SCENARIO without running it; print components, processes, stages, connections and conversions.
 
+    What is probably a mistake is a warning: a forgotten connection, a missing reference, an event after the end.
     --isolation and --sandbox are those of `cosim run`; here they only say what would run where.
     """
     from ..api import load
+    from ..scenario.doubts import doubts
     from ..scenario.tree import parse_settings
 
     apart: Literal["fmu", "none"] = "fmu" if isolation == "fmu" else "none"
     assembly = load(scenario, parse_settings(settings), isolation=apart, sandbox=bool(sandbox))
     try:
+        if problems := assembly.figure_problems():
+            raise InputError(problems)
         _components(assembly)
         _processes(assembly, isolation, sandbox)
         _stages(assembly)
         if connections:
             _connections(assembly)
             _unfed(assembly)
+        found = doubts(assembly)
+        for problem in found:
+            click.echo(f"WARNING {problem}", err=True)
+        verdict = f"{len(found)} warning{'s' * (len(found) > 1)}." if found else "All is well."
         times = assembly.settings
         steps = int((times.stop_time - times.start_time) / times.step_size)
         click.echo(
             f"\n{assembly.spec.name}: {float(times.start_time):g} s ... {float(times.stop_time):g} s in {steps} steps of "
-            f"{float(times.step_size):g} s, {len(times.columns)} signals recorded. All is well."
+            f"{float(times.step_size):g} s, {len(times.columns)} signals recorded. {verdict}"
         )
     finally:
         assembly.free()
@@ -98,9 +107,11 @@ def _connections(assembly: Assembly) -> None:
 
 
 def _unfed(assembly: Assembly) -> None:
-    """Inputs that keep their start values unless an event sets them."""
-    fed = {connection.target for connection in assembly.system.connections}
-    for name, component in assembly.system.components.items():
-        inputs = [slot for variable in component.variables if variable.causality == "input" for slot in variable.slots]
-        if free := [slot for slot in inputs if (name, slot) not in fed]:
-            click.echo(f"\ninputs of {name} that nothing feeds\n  {', '.join(free)}")
+    """Inputs that keep their own start values."""
+    from ..scenario.doubts import unfed
+
+    free: dict[str, list[str]] = {}
+    for end in unfed(assembly):
+        free.setdefault(end.component, []).append(end.slot)
+    for name, slots in free.items():
+        click.echo(f"\ninputs of {name} that nothing feeds or sets\n  {', '.join(slots)}")

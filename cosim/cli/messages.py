@@ -1,9 +1,12 @@
-"""What components say while they run goes to standard error."""
+"""What components say while they run, and warnings about the scenario, go to standard error."""
 
 from __future__ import annotations
 
 import logging
 import sys
+from collections.abc import Iterable
+
+from ..errors import Problem
 
 #: warnings that are kept for the report
 MOST_KEPT = 200
@@ -29,3 +32,9 @@ def show(level: int = logging.INFO) -> list[str]:
     logger.handlers[:] = [handler, keeper]
     logger.setLevel(level)
     return keeper.texts
+
+
+def warn(problems: Iterable[Problem]) -> None:
+    """Print problems that do not keep anything from running, as `show` prints the warnings of components."""
+    for problem in problems:
+        logging.getLogger("cosim").warning("%s", problem)

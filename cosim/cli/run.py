@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import CosimError
+from ..errors import CosimError, InputError
 from ..journal import STEPS
 from . import live, report, strict, supervision
 from .progress import progress_bar
@@ -100,6 +100,7 @@ def _run(
     from ..api import executed, load
     from ..results.mcap_files import require_mcap
     from ..results.parquet_files import require_parquet
+    from ..scenario.doubts import missing_connections
     from ..scenario.tree import parse_settings
     from ..unfinished import unfinished
     from . import messages
@@ -112,10 +113,13 @@ def _run(
     began = time.perf_counter()
     assembly = load(scenario, parse_settings(settings), stop_time=stop_time, step_size=step_size, **conditions)
     supervision.configure(assembly.spec.deadlines)
+    messages.warn(missing_connections(assembly))
     directory = (output_dir or Path("runs") / assembly.spec.name).absolute()
     shown = output_dir or Path("runs") / assembly.spec.name
     _say_whose_results_go(directory, shown, assembly.document.file.resolve())
     try:
+        if not no_report and (problems := assembly.figure_problems()):
+            raise InputError(problems)
         _prepare(directory, [spec.name for spec in assembly.spec.figures])
         control = live.control(assembly, link) if link else None
     except CosimError:

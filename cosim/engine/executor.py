@@ -207,6 +207,8 @@ class Executor(ABC):
 
     def _ended_early(self, step: Step, result: StepResult) -> None:
         time = self._clock.value
+        if not isinstance(result, StepResult):
+            raise ComponentError(step.name, "do_step", f"returned {result!r}, expected None or a StepResult", time)
         complete = result.time_reached >= time + step.step_size
         if result.terminate_requested:
             if not self.termination or (self.termination.complete and not complete):

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from ..component import Component, Variable
-from ..errors import InputError, Problem, did_you_mean
+from ..errors import InputError, Problem
 from ..fmi import FmuFile, Isolation
 from ..journal import Deadlines
 from ..simulate import Event, Settings, problems
 from ..system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System
 from ..table import read_table
-from .functions import function_problem
+from .functions import function_problem, number_problem, signal_problems
 from .names import Slots, Target, Unknown, assign, resolve
 from .schema import SystemSpec, kept
 from .selection import Selection
@@ -38,6 +38,8 @@ class Assembler:
         self.workshop = Workshop(Isolation(deadlines, sandbox), apart or sandbox, prepared)
         self.components: dict[str, Component] = {}
         self._by_name: dict[str, Mapping[str, Variable]] = {}
+        #: signals are missing because something was refused
+        self._incomplete = False
         self.start_values: dict[str, dict[str, Any]] = defaultdict(dict)
 
     def wire(self) -> None:
@@ -195,6 +197,7 @@ class Assembler:
         patterns = [(text, self.root.where("record", "signals", i)) for i, text in enumerate(self.spec.record.signals)]
         chosen = selection.choose(patterns)
         self.problems += selection.problems
+        self._incomplete = bool(broken or selection.problems)
         return chosen
 
     def _events(self) -> Iterator[Event]:
@@ -206,19 +209,21 @@ class Assembler:
 
     def _check_functions(self) -> None:
         for kind in ("kpis", "figures"):
-            for i, spec in kept(getattr(self.spec, kind)):
+            specs = list(kept(getattr(self.spec, kind)))
+            for i, spec in specs:
                 if text := function_problem(spec, self.root.folder):
                     self.problems.append(Problem(text, self.root.where(kind, i)))
-            names = [spec.name for _, spec in kept(getattr(self.spec, kind))]
-            for i, spec in kept(getattr(self.spec, kind)):
+            names = [spec.name for _, spec in specs]
+            for i, spec in specs:
                 if spec.name in names[:i]:
                     self.problems.append(Problem(f'the name "{spec.name}" stands twice', self.root.where(kind, i, "name")))
         if self.spec.scene and (text := function_problem(self.spec.scene, self.root.folder)):
             self.problems.append(Problem(text, self.root.where("scene")))
-        names = [spec.name for _, spec in kept(self.spec.kpis)]
+        kpis = [spec for _, spec in kept(self.spec.kpis)]
+        if not self._incomplete:
+            self.problems += signal_problems(self.root, "kpis", self.settings.columns)
         for i, check in kept(self.spec.checks):
-            if check.kpi.partition(".")[0] not in names:
-                text = f'no KPI "{check.kpi}"{did_you_mean(check.kpi.partition(".")[0], names)}'
+            if text := number_problem(check.kpi, kpis, self.root.folder):
                 self.problems.append(Problem(text, self.root.where("checks", i, "kpi")))
 
     # -- reporting -----------------------------------------------------------------------------------------------------

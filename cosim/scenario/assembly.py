@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ..component import Component
-from ..errors import InputError
+from ..errors import InputError, Problem
 from ..float_mode import usual
 from ..fmi import FmuFile
 from ..journal import blamed
@@ -21,7 +21,7 @@ from ..stopwatch import Stopwatch
 from ..system import System
 from .assembler import Assembler
 from .document import Document
-from .functions import load_function
+from .functions import load_function, signal_problems
 from .schema import FunctionSpec, ScenarioSpec
 from .sources import Workshop
 from .tree import Node, Scenario, load
@@ -63,6 +63,10 @@ class Assembly:
     def figures(self) -> list[Function]:
         """(name, function, arguments) of every figure."""
         return self._functions(self.spec.figures)
+
+    def figure_problems(self) -> list[Problem]:
+        """Why figures could not be drawn from what is recorded, which is no matter where none are drawn, as in sweeps."""
+        return list(signal_problems(self.root, "figures", self.settings.columns))
 
     def _functions(self, specs: Sequence[FunctionSpec]) -> list[Function]:
         return [(spec.name, load_function(spec.python, self.root.folder), spec.arguments) for spec in specs]

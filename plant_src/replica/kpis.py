@@ -8,14 +8,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from cosim.kpi import Number, units
+from cosim.kpi import Number, Prefix, units
 from cosim.results import Result
 
 from ..kpis import horizontal_distance, waypoints
 
 
 @units(leg="m")
-def overshoots(result: Result, vehicle: str, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
+def overshoots(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
     """`leg[i]` (m): largest distance of `vehicle` from the straight line to waypoint i, while it heads there.
 
     The lines start where the vehicle started and at the waypoints before (`x`, `y`, m); a leg ends when the circle of `radius`
@@ -34,7 +34,7 @@ def overshoots(result: Result, vehicle: str, x: Sequence[float], y: Sequence[flo
 
 @units(straight="m", turn="m", least_turn="m")
 def turns(
-    result: Result, vehicle: str, target: str, x: Sequence[float], y: Sequence[float], radius: float, settling: float
+    result: Result, vehicle: Prefix, target: Prefix, x: Sequence[float], y: Sequence[float], radius: float, settling: float
 ) -> dict[str, Number]:
     """How well `vehicle` follows `target`, which turns at the waypoints (`x`, `y`, m) when within `radius` (m) of them.
 
@@ -62,7 +62,7 @@ def _switches(result: Result, vehicle: str, x: Sequence[float], y: Sequence[floa
 
 @units(time="s", error="m", speed="m/s", lowest="m")
 def touchdown(
-    result: Result, vehicle: str, target: str, rest_height: float, start: float, margin: float = 0.005
+    result: Result, vehicle: Prefix, target: Prefix, rest_height: float, start: float, margin: float = 0.005
 ) -> dict[str, Number]:
     """The first landing after `start` (s): the origin of `vehicle` comes within `margin` (m) of `rest_height` (m, world).
 

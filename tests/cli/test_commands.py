@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-BLOCKS = Path(__file__).parents[1] / "scenario" / "blocks.py"
+ROOT = Path(__file__).parents[2]
+BLOCKS = ROOT / "tests/scenario/blocks.py"
 
 
 def cosim(*arguments, cwd=None, **more):
@@ -78,6 +79,21 @@ def test_checks_decide_the_exit_code(tmp_path):
     assert json.loads((tmp_path / "runs/small/kpis.json").read_text()) == {"end.value": 10.0}
 
 
+@pytest.mark.parametrize("isolation", ["run", "none"])
+def test_a_reader_that_goes_away_ends_the_output_but_not_the_run(tmp_path, isolation):
+    """As with `| head`: the exit code is that of the run, here of a check that is not met, and all results are written."""
+    (tmp_path / "kpis.py").write_text(KPIS)
+    kpi = {"name": "end", "python": "kpis.py:last", "arguments": {"signal": "a.y"}}
+    file = scenario(tmp_path, kpis=[kpi], checks=[{"kpi": "end.value", "min": 1}])
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "cosim", "run", file, "--isolation", isolation]
+    done = subprocess.run(command, cwd=tmp_path, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (3, "")
+    assert (tmp_path / "runs/small/report.html").exists()
+
+
 def test_a_failing_component_ends_with_one_and_keeps_the_rows(tmp_path):
     done = cosim("run", scenario(tmp_path, "Broken"), cwd=tmp_path)
     assert done.returncode == 1
@@ -93,7 +109,7 @@ def test_a_failing_kpi_loses_nothing(tmp_path):
     kpi = {"name": "end", "python": "kpis.py:last", "arguments": {"signal": "a.z"}}
     done = cosim("run", scenario(tmp_path, kpis=[kpi]), cwd=tmp_path)
     assert done.returncode == 2
-    assert 'KPI "end": no signal "a.z" was recorded; did you mean "a.y"?' in done.stderr
+    assert '$.kpis[0]: KPI "end": no signal "a.z" was recorded; did you mean "a.y"?' in done.stderr
     assert len((tmp_path / "runs/small/result.csv").read_text().splitlines()) == 5
 
 
@@ -157,6 +173,42 @@ def test_wrong_usage_ends_with_two(arguments, tmp_path):
     assert "Traceback" not in done.stderr
 
 
+def test_a_check_of_a_number_that_a_kpi_does_not_have_names_its_place(tmp_path):
+    """Where the number could not be known before the run."""
+    (tmp_path / "kpis.py").write_text("def last(result):\n    values = {'value': 1.0}\n    return values\n")
+    file = scenario(tmp_path, kpis=[{"name": "end", "python": "kpis.py:last"}], checks=[{"kpi": "end.valu", "max": 1}])
+    done = cosim("run", file, cwd=tmp_path)
+    assert done.returncode == 2
+    assert '$.checks[0]: check of "end.valu": no such KPI; did you mean "end.value"?' in done.stderr
+
+
+def test_a_figure_of_signals_that_are_not_recorded_is_refused_where_it_would_be_drawn(tmp_path):
+    """A run that draws nothing may record less, as those of sweeps do."""
+    figure = {"name": "f", "python": str(ROOT / "plant_src/figures.py:paths"), "arguments": {"vehicle": "a.y", "deck": "b"}}
+    file = scenario(tmp_path, figures=[figure])
+    for command in ("check", "run"):
+        done = cosim(command, file, cwd=tmp_path)
+        assert done.returncode == 2
+        assert [line.split("$.figures[0].arguments.")[1] for line in done.stderr.splitlines()] == [
+            'vehicle: no signal below "a.y" is recorded; valid: a',
+            'deck: no signal below "b" is recorded; valid: a',
+        ]
+    assert cosim("run", file, "--no-report", cwd=tmp_path).returncode == 0
+
+
+def test_check_and_run_warn_of_a_forgotten_connection(tmp_path):
+    components = {"plant": {"python": f"{BLOCKS}:Plant"}, "pilot": {"python": f"{BLOCKS}:Controller"}}
+    file = scenario(tmp_path, components=components, connections=[{"from": "plant.ship", "to": "pilot.vehicle"}])
+    checked, ran = cosim("check", file), cosim("run", file, cwd=tmp_path)
+    for done in (checked, ran):
+        assert done.returncode == 0
+        (warning,) = done.stderr.splitlines()
+        assert warning.startswith(f"WARNING {file}:1:")
+        assert "nothing feeds or sets plant.ship.motor[1] and 1 more input, but there is an output pilot.motor[1]" in warning
+    assert "1 warning." in checked.stdout and "All is well" not in checked.stdout
+    assert warning in json.loads((tmp_path / "runs/small/run.json").read_text())["warnings"]
+
+
 def test_check_prints_the_expanded_system(tmp_path):
     components = {"a": {"python": f"{BLOCKS}:Gain"}, "b": {"python": f"{BLOCKS}:Gain", "period": 3}}
     wires = [{"from": "a.y", "to": "b.u", "delay": 2}]
@@ -165,7 +217,7 @@ def test_check_prints_the_expanded_system(tmp_path):
     assert "a.y -> b.u  (delay 2)" in done.stdout
     assert "1. a" in done.stdout
     assert "every 3 s" in done.stdout
-    assert "inputs of a that nothing feeds\n  u\n" in done.stdout
+    assert "inputs of a that nothing feeds or sets\n  u\n" in done.stdout
 
 
 def test_simulate_runs_one_fmu(probe, tmp_path):

@@ -6,6 +6,7 @@ from helpers import wire
 
 import cosim
 from cosim import resources
+from cosim.errors import did_you_mean
 
 
 def lines(file, **more):
@@ -308,7 +309,20 @@ def test_a_name_is_the_name_of_a_folder(folder):
 
 
 FUNCTIONS = """
+from cosim.kpi import Prefix, Signal
+
 def good(result, signal, limit=1.0): ...
+
+def error(result, vehicle: Prefix, target: float | Signal = 0.0):
+    if not result:
+        return nothing()
+    return {"largest": 1.0, "final_error": 0.0, **{f"time[{i}]": 0.0 for i in range(3)}}
+
+def unsaid(result, vehicle: Prefix):
+    if not result:
+        return {"found": False}
+    values = {"value": 1.0}
+    return values
 """
 
 
@@ -324,6 +338,50 @@ def test_arguments_of_kpis_are_checked_before_the_run(folder, arguments, line):
     kpi = {"name": "k", "python": "f.py:good", "arguments": arguments}
     (found,) = refused(folder, {"a": folder.block("Gain")}, kpis=[kpi])
     assert found.endswith(f"$.kpis[0]: {line}")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ({"vehicle": "a.shpi"}, 'vehicle: no signal below "a.shpi" is recorded; did you mean "a.ship"?'),
+        (
+            {"vehicle": "a.ship", "target": "a.ship"},
+            'target: no signal "a.ship" is recorded; valid: a.ship.position.x, a.ship.position.y',
+        ),
+    ],
+)
+def test_signals_of_functions_are_known_before_the_run(folder, arguments, line):
+    (folder.path / "f.py").write_text(FUNCTIONS)
+    kpi = {"name": "k", "python": "f.py:error", "arguments": arguments}
+    (found,) = refused(folder, {"a": folder.block("Plant")}, kpis=[kpi])
+    assert found.endswith(f"$.kpis[0].arguments.{line}")
+
+
+def test_missing_signals_of_a_refused_component_are_not_missed(folder):
+    kpi = {"name": "k", "python": "cosim.kpis:rms", "arguments": {"signal": "a.y"}}
+    (found,) = refused(folder, {"a": {"python": "none.py:A"}, "b": folder.block("Gain")}, kpis=[kpi])
+    assert 'file "none.py" does not exist' in found
+
+
+@pytest.mark.parametrize(
+    ("number", "message"),
+    [
+        ("error.final_eror", 'no KPI "error.final_eror"; did you mean "error.final_error"?'),
+        ("error", 'no KPI "error"; did you mean "error.time"?'),
+        ("eror.time[1]", 'no KPI "eror.time[1]"; did you mean "error"?'),
+    ],
+)
+def test_checks_hold_numbers_that_a_kpi_has(folder, number, message):
+    """As far as the function writes them down; what it makes elsewhere may have any name."""
+    (folder.path / "f.py").write_text(FUNCTIONS)
+    known, unknown = ({"name": name, "python": f"f.py:{name}", "arguments": {"vehicle": "a"}} for name in ("error", "unsaid"))
+    checks = [{"kpi": each, "max": 1} for each in (number, "error.largest", "error.time[2]", "unsaid.anything")]
+    (found,) = refused(folder, {"a": folder.block("Gain")}, kpis=[known, unknown], checks=checks)
+    assert found.endswith(f"$.checks[0].kpi: {message}")
+
+
+def test_swapped_letters_are_the_nearest_name():
+    assert did_you_mean("plant.uva", ["plant.usv", "plant.uav"]) == '; did you mean "plant.uav"?'
 
 
 def test_two_kpis_do_not_share_a_name(folder):
