@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from ...units import BASE
 from .findings import DESCRIPTION, Finding, Rule
 from .model import Model, UnitDefinition
-from .values import real
+from .values import real, value
 
 _ROOT = "FMI 2.0.5 section 2.2.1, FMI 3.0.2 section 2.4.1"
 _INTERFACE = "FMI 2.0.5 section 4.3.1, FMI 3.0.2 sections 2.4.2 and 4.4"
@@ -77,6 +77,12 @@ def check_types(model: Model) -> Iterator[Finding]:
         for what, words in (("item", [item[0] for item in definition.items]), ("value", [item[1] for item in definition.items])):
             for word, _ in _twice((word, 0) for word in words):
                 text = f'the {what} "{word}" of enumeration "{definition.name}" stands twice'
+                yield ITEMS(text, DESCRIPTION, definition.line)
+        for name, word in definition.items:
+            try:
+                value(word, "Int64")
+            except ValueError:
+                text = f'the item "{name}" of enumeration "{definition.name}" is "{word}", expected an integer'
                 yield ITEMS(text, DESCRIPTION, definition.line)
         if definition.kind == "Enumeration" and not definition.items:
             yield TYPE_KIND(f'the enumeration "{definition.name}" has no items', DESCRIPTION, definition.line)

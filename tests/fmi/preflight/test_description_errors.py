@@ -58,6 +58,14 @@ ERRORS = {
         10,
         "defined twice",
     ),
+    "item of no integer": (
+        2,
+        '<Item name="on" value="2"/>',
+        '<Item name="on" value="2.0"/>',
+        "type.items",
+        9,
+        'the item "on" of enumeration "Mode" is "2.0", expected an integer',
+    ),
     "item twice": (
         2,
         'name="on" value="2"',
