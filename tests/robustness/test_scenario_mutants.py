@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import re
 import shutil
 import time
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
 from good_scenario import INNER, SCENARIO, furnish
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 from mutations import mutants
 
@@ -26,13 +28,18 @@ PLACE = re.compile(r"^(\S.*\.\w+:\d+:\d+: |\S.*: |setting |cannot read )")
 SHIPPED = sorted(path.stem for path in (resources.root() / "scenarios").glob("*.json"))
 
 
-def counted(examples: int) -> settings:
-    """Always the same examples."""
+def counted(examples: int, part: int = 0) -> Callable[[Any], Any]:
+    """Always the same examples, others in each part."""
     off = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example]
     phases = [Phase.generate, Phase.shrink]
-    return settings(
-        max_examples=examples, derandomize=True, database=None, deadline=None, suppress_health_check=off, phases=phases
-    )
+    many = settings(max_examples=examples, database=None, deadline=None, suppress_health_check=off, phases=phases)
+    return lambda test: seed(part)(many(test))
+
+
+def in_parts(short: int, long: int) -> pytest.MarkDecorator:
+    """A short run, and a long one in parts that may run at the same time."""
+    parts = [pytest.param(counted(long // 4, part), marks=pytest.mark.fuzz, id=f"{long // 4} {part}") for part in range(1, 5)]
+    return pytest.mark.parametrize("count", [pytest.param(counted(short), id=str(short)), *parts])
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +53,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, probes: dict[int, Path]) ->
 def judge(file: Path, text: str, limit: float = 2.0) -> bool:
     """Whether a scenario is accepted, within `limit` s of processor time."""
     file.write_text(text, encoding="utf-8")
+    gc.disable()  # it would go through all that Hypothesis keeps, seconds long
     begin = time.process_time()
     try:
         cosim.load(file).free()
@@ -58,6 +66,7 @@ def judge(file: Path, text: str, limit: float = 2.0) -> bool:
             assert "\n" not in str(problem), problem
             str(problem).encode()
     assert time.process_time() - begin < limit
+    gc.enable()
     return accepted
 
 
@@ -70,7 +79,7 @@ def test_the_scenario_is_good_before_it_is_changed(folder):
     assert write(folder, SCENARIO, INNER)
 
 
-@pytest.mark.parametrize("count", [counted(500), pytest.param(counted(100_000), marks=pytest.mark.fuzz)])
+@in_parts(500, 100_000)
 def test_mutated_scenarios(folder, count):
     results = set()
 
@@ -83,7 +92,7 @@ def test_mutated_scenarios(folder, count):
     assert results == {True, False}
 
 
-@pytest.mark.parametrize("count", [counted(150), pytest.param(counted(20_000), marks=pytest.mark.fuzz)])
+@in_parts(150, 20_000)
 def test_mutated_nested_systems(folder, count):
     results = set()
 
@@ -96,7 +105,7 @@ def test_mutated_nested_systems(folder, count):
     assert results == {True, False}
 
 
-@pytest.mark.parametrize("count", [counted(250), pytest.param(counted(20_000), marks=pytest.mark.fuzz)])
+@in_parts(250, 20_000)
 def test_mutated_texts(folder, count):
     """Characters changed, so that most of them are no JSON any more."""
     text = json.dumps(SCENARIO)
@@ -111,7 +120,7 @@ def test_mutated_texts(folder, count):
     change()
 
 
-@pytest.mark.parametrize("count", [counted(25), pytest.param(counted(5_000), marks=pytest.mark.fuzz)])
+@in_parts(25, 5_000)
 def test_mutated_shipped_scenarios(tmp_path_factory, count):
     """All that is shipped stands beside the mutant, so that its paths are right."""
     root = tmp_path_factory.mktemp("shipped")
