@@ -13,7 +13,7 @@ from measure import compare, heading, show
 
 SIZES = (2, 8, 32, 128, 1024)
 #: steps times FMUs
-BUDGETS = {"native": 1_000_000, "python": 50_000}
+BUDGETS = {"native": 4_000_000, "python": 100_000}
 #: generous: times the C limit
 LARGEST_RATIO = {"C limit": 2, "cosim, native": 20, "cosim, python": 2000}
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]
@@ -28,7 +28,7 @@ def test_ring(version, recorded, tmp_path):
     heading(f"ring of FMI {version}.0 FMUs, {recorded} recorded")
     for size in SIZES:
         names = [f"s{i}.y1" for i in range(1 if recorded == "one signal" else size)]
-        contenders = {"C limit": lambda size=size, names=names: limit(size, 1_000_000 // size, recorded=len(names))}
+        contenders = {"C limit": lambda size=size, names=names: limit(size, BUDGETS["native"] // size, recorded=len(names))}
         for executor in choices:
             steps = max(200, BUDGETS[executor] // size)
             contenders[label(executor)] = lambda s=size, n=steps, r=names, e=executor: cost(ring(fmu, s), n, r, e)
