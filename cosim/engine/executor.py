@@ -23,7 +23,7 @@ from .moves import DelayLine, Move, copy
 from .parallel import TRIALS, Crew, SideBySide, may_overlap, processors
 from .plan import Loop, Phase, Plan, Step
 from .recorder import Recorder
-from .turns import SHOWN, Ending, Turn, take
+from .turns import Ending, Turn, shown, take
 
 #: places in the marker: number of the present call, macro steps finished, rows recorded
 CALL, STEPS, ROWS, MARKER_SIZE = 0, 1, 2, 3
@@ -162,8 +162,7 @@ class Executor(ABC):
     def _join(self, together: SideBySide) -> Turn:
         """A turn that stands for several, which are taken at the same time."""
         names = [turn.step.name for turn in together.turns]
-        some = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
-        step = Step(f"one of {some}", together.turns[0].step.component, 1, 0.0)
+        step = Step(f"one of {shown(names)}", together.turns[0].step.component, 1, 0.0)
         return self._turn([Call(self._side_by_side, (together,), "a step side by side")], step)
 
     def _python_turn(self, step: Step) -> int:

@@ -13,7 +13,7 @@ from ..system import Endpoint
 from .layout import Dtype
 from .moves import copy
 from .plan import Plan
-from .turns import SHOWN
+from .turns import shown
 
 #: a loop may take so many rounds more than a chain, until outputs change by no more than this, relative to 1 + their size
 ROUNDS, TOLERANCE = 100, 1e-12
@@ -46,7 +46,7 @@ def propagate(plan: Plan, time: float) -> None:
             changing += [Endpoint(name, slot) for slot in _changed(outputs[name], before, found[name], tolerance)]
         if not changing:
             return
-    raise ComponentError(_listed([end.component for end in changing]), "initialization", _complaint(plan, changing), time)
+    raise ComponentError(shown(end.component for end in changing), "initialization", _complaint(plan, changing), time)
 
 
 def _contents(ports: Ports) -> Values:
@@ -78,12 +78,7 @@ def _bits(array: np.ndarray) -> object:
 def _complaint(plan: Plan, changing: Sequence[Endpoint]) -> str:
     wires = [f"{c.source} -> {c.target}" for c in plan.system.connections if c.source in changing]
     advice = "a component in the loop has to answer in a step instead of at once, or the answers have to become smaller"
-    return f"an algebraic loop does not settle in {len(plan.system.components) + ROUNDS} rounds, {_listed(wires)}; {advice}"
-
-
-def _listed(texts: Sequence[str]) -> str:
-    different = list(dict.fromkeys(texts))
-    return ", ".join(different[:SHOWN]) + (f", ... ({len(different)} in all)" if len(different) > SHOWN else "")
+    return f"an algebraic loop does not settle in {len(plan.system.components) + ROUNDS} rounds, {shown(wires)}; {advice}"
 
 
 def take_start_values(component: Component, ports: Ports) -> None:

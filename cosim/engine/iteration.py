@@ -19,7 +19,7 @@ from ..journal import calling
 from .layout import Dtype, Layout
 from .moves import Move
 from .plan import Loop
-from .turns import SHOWN, Turn
+from .turns import Turn, shown
 
 #: the moves of a phase, those that are made in the first round only, and its turns
 Round = tuple[Sequence[Move], Sequence[Move], Sequence[Turn]]
@@ -91,6 +91,7 @@ class Rounds:
 
     def _complaint(self, moved: Sequence[np.ndarray]) -> str:
         changing = [name for names, flags in zip(self._names, moved, strict=True) for name in np.array(names)[flags]]
-        some = ", ".join(changing[:SHOWN]) + (f", ... ({len(changing)} in all)" if len(changing) > SHOWN else "")
         iteration = self._loop.iteration
-        return f"after {iteration.limit} rounds these outputs still change by more than {iteration.tolerance:g}: {some}"
+        return (
+            f"after {iteration.limit} rounds these outputs still change by more than {iteration.tolerance:g}: {shown(changing)}"
+        )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from .. import float_mode
@@ -11,6 +11,12 @@ from .plan import Step
 
 #: components or outputs shown in messages about several
 SHOWN = 8
+
+
+def shown(names: Iterable[str]) -> str:
+    """The names, each once; of many the first ones and how many there are."""
+    different = list(dict.fromkeys(names))
+    return ", ".join(different[:SHOWN]) + (f", ... ({len(different)} in all)" if len(different) > SHOWN else "")
 
 
 class Turn(NamedTuple):
