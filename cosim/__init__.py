@@ -8,16 +8,17 @@ result["plant.uav.position.z"]
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from .core.version import __version__
+
 if TYPE_CHECKING:
     from .api import load, run
-    from .errors import CheckError, ComponentError, CosimError, InputError
+    from .core.errors import CheckError, ComponentError, CosimError, InputError
     from .results import Result
 
-__version__ = "0.1.0"
-__all__ = ["CheckError", "ComponentError", "CosimError", "InputError", "Result", "load", "run"]
+__all__ = ["CheckError", "ComponentError", "CosimError", "InputError", "Result", "__version__", "load", "run"]
 
 _HOMES = {"load": "api", "run": "api", "Result": "results"} | {
-    name: "errors" for name in ("CheckError", "ComponentError", "CosimError", "InputError")
+    name: "core.errors" for name in ("CheckError", "ComponentError", "CosimError", "InputError")
 }
 
 

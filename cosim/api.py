@@ -12,15 +12,16 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
 
-from . import __version__
-from .errors import ComponentError, CosimError, InputError, Problem
-from .kpi import CheckOutcome, evaluate_checks, evaluate_kpis, held_checks, kpi_senses, kpi_units
-from .pacer import Late
+from .core.errors import ComponentError, CosimError, InputError, Problem
+from .core.version import __version__
+from .engine.pacer import Late
+from .engine.run_loop import Observer, Run, simulation
+from .process.run_files.folder import write_metadata
 from .results import Kpis, Result
+from .results.checks import CheckOutcome, evaluate_checks, held_checks
+from .results.kpi import evaluate_kpis, kpi_senses, kpi_units
 from .scenario import Assembly, assemble
 from .scenario.overview import overview
-from .simulate import Observer, Run, simulation
-from .unfinished import write_metadata
 
 #: packages whose versions can change a result
 _PACKAGES = ("numpy", "scipy", "fmpy", "pybullet", "pybullet-arm64", "pythonfmu")

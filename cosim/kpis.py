@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .kpi import Signal, better, first_time, units
 from .results import Result
+from .results.kpi import Signal, better, first_time, units
 
 FOREVER = math.inf
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from .cli.regression import EXPECTATIONS, Regression, holds
+from .studies.regression import EXPECTATIONS, Regression, holds
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:

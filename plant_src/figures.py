@@ -16,8 +16,8 @@ from matplotlib.patches import Circle, Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 
-from cosim.kpi import Prefix, Signal
 from cosim.results import Result
+from cosim.results.kpi import Prefix, Signal
 
 from .kpis import horizontal_distance, touchdown_row, waypoints
 

@@ -12,8 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cosim.kpi import Number, Prefix, Signal, better, units
 from cosim.results import Result
+from cosim.results.checks import Number
+from cosim.results.kpi import Prefix, Signal, better, units
 
 from . import deck_frame
 

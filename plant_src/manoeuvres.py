@@ -17,9 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.errors import InputError
-from cosim.kpi import Number, Prefix, better, first_time, units
+from cosim.core.errors import InputError
 from cosim.results import Result
+from cosim.results.checks import Number
+from cosim.results.kpi import Prefix, better, first_time, units
 
 DEGREE = math.pi / 180
 

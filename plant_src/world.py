@@ -10,20 +10,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cosim import log
-from cosim.component import DTYPES, Call, Component, Ports, Variable
-from cosim.errors import ComponentError, InputError, Problem, did_you_mean
+from cosim.core import component_log
+from cosim.core.component import DTYPES, Call, Component, Ports, Variable
+from cosim.core.errors import ComponentError, InputError, Problem, did_you_mean
 
-from . import arguments
-from .arguments import Arguments, Platform
-from .binary import library
-from .bullet import connect, keep_in_stock, pybullet
+from . import world_settings
 from .catalogue import MODELS
 from .environment.surroundings import Surroundings
-from .fleet import Fleet, Snapshot
+from .physics.body import UnsoundError, compound, set_dynamics
+from .physics.client import connect, keep_in_stock, pybullet
+from .physics.compiled_equations import library
+from .physics.fleet import Fleet, Snapshot
+from .placement import Platform
 from .scene import replay
-from .shadow import UnsoundError, compound, set_dynamics
-from .vehicles.shapes import Box
+from .vehicles.common.shapes import Box
+from .world_settings import Arguments
 
 #: a step of Bullet is at most this long (s); a longer do_step is split into equal ones
 LONGEST_STEP = 0.01
@@ -65,7 +66,7 @@ class World(Component):
         platforms: Mapping[str, Any] | None = None,
         environment: Mapping[str, Any] | None = None,
     ):
-        read = arguments.read(vehicles, {} if platforms is None else platforms, {} if environment is None else environment)
+        read = world_settings.read(vehicles, {} if platforms is None else platforms, {} if environment is None else environment)
         self._name = instance_name
         self._step, self._step_size, self._step_count, self._start_time = np.zeros(1), math.nan, 1, 0.0
         self._flags = np.zeros((len(read.vehicles), 2), _FLAG)
@@ -94,13 +95,13 @@ class World(Component):
 
     def _populate(self, read: Arguments) -> None:
         names = {self._add_platform(platform): f"platforms.{platform.name}" for platform in read.platforms}
-        self._fleet = Fleet(self._client, read, self._step, self._flags)
+        self._fleet = Fleet(self._client, read.vehicles, read.platforms, self._step, self._flags)
         names |= {shadow.body: f"vehicles.{shadow.name}" for shadow in self._fleet.shadows}
         self._refuse_overlaps(names)
-        self._surroundings = Surroundings(read, self._fleet.shadows)
+        self._surroundings = Surroundings(read.environment, read.sea, read.vehicles, read.platforms, self._fleet.shadows)
         self._acting = bool(self._surroundings.updates)  # a calm world pays nothing
         for name in self._surroundings.unmoved:
-            log.message(self._name, log.WARNING, f"the planar vessel {name} does not move with the waves")
+            component_log.message(self._name, component_log.WARNING, f"the planar vessel {name} does not move with the waves")
 
     def _add_platform(self, platform: Platform) -> int:
         x, y, z = platform.size

@@ -17,7 +17,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
-from cosim.component import Ports, Variable
+from cosim.core.component import Ports, Variable
 
 from .world import State, World
 

@@ -29,7 +29,7 @@ def pytest_collection_modifyitems(config, items):
 
 @pytest.fixture
 def measured(request):
-    """States a quantity of the plant beside its reference (tests/validation.py)."""
+    """States a quantity of the plant beside its reference (tests/support/validation.py)."""
     return Measured(request.node)
 
 
@@ -38,5 +38,5 @@ def executor(request, monkeypatch):
     """Whatever a test simulates, it does so with each executor."""
     if request.param == "native" and not native_available():
         pytest.skip("the native executor was not built")
-    monkeypatch.setattr("cosim.simulate.executor_kind", lambda kind: EXECUTORS[request.param])
+    monkeypatch.setattr("cosim.engine.run_loop.executor_kind", lambda kind: EXECUTORS[request.param])
     return request.param

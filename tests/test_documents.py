@@ -51,7 +51,7 @@ def test_json_examples_satisfy_the_schema(text):
 def schema(example):
     """The schema of what an example is."""
     from cosim.scenario import json_schema
-    from cosim.sweep import schema as sweeps
+    from cosim.studies import schema as sweeps
 
     if "factors" in example or "minimize" in example:
         return sweeps.json_schema(sweeps.SweepSpec if "factors" in example else sweeps.TuneSpec)

@@ -10,9 +10,9 @@ from typing import Any
 
 import click
 
-from .. import __version__
-from ..errors import CosimError
-from ..streams import outlasting
+from ..core.errors import CosimError
+from ..core.version import __version__
+from ..process.standard_streams import outlasting
 
 #: command -> (module in this package, what it does)
 COMMANDS = {
@@ -25,7 +25,7 @@ COMMANDS = {
     "sweep": ("sweep", "Run a scenario at many points: parameter studies and Monte Carlo, here or on a cluster."),
     "tune": ("tune", "Find the parameters that make a KPI small."),
     "plot": ("plot", "Draw the figures of finished runs again."),
-    "report": ("report_page", "Make the page about a finished run again."),
+    "report": ("report", "Make the page about a finished run again."),
     "replay": ("replay", "Make a page with the 3-D replay of one run, or of two to compare."),
     "info": ("info", "Print what an FMU says about itself."),
     "validate": ("validate", "Examine FMUs against the FMI standard without running them."),
@@ -46,7 +46,7 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         if name not in COMMANDS:
             return None
-        command: click.Command = import_module(f".{COMMANDS[name][0]}", __name__).command
+        command: click.Command = import_module(f".commands.{COMMANDS[name][0]}", __name__).command
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

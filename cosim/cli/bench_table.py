@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from ..report.tables import LONGEST_LINE, number_text
 
 if TYPE_CHECKING:
-    from ..bench.score import Row
-    from ..kpi import Number
+    from ..results.checks import Number
+    from ..studies.controller_bench.score import Row
 
 _COLOURS = {"better": "[green]better[/]", "worse": "[red]worse[/]", "": ""}
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .regress import in_parallel
-from .regression import Outcome, Regression
+from ..studies.regression import Outcome, Regression
+from .commands.regress import in_parallel
 
 if TYPE_CHECKING:
-    from ..bench.score import Row, Scores
+    from ..studies.controller_bench.score import Row, Scores
 
 
 @dataclass(frozen=True)
@@ -26,14 +26,14 @@ class Trial:
 
     def fly(self) -> Flight:
         """Run the scenario with the candidate."""
-        from ..bench.score import Scores
+        from ..studies.controller_bench.score import Scores
 
         last = Scores.read(self.own)
         return Flight(self, Regression(self.file, self.own, update=False).outcome(), last)
 
     def fly_shipped(self) -> None:
         """Run the original, unless what the last run of it has left is what it would be again."""
-        from ..bench.score import is_current
+        from ..studies.controller_bench.score import is_current
 
         if not is_current(self.shipped, self.original):
             Regression(self.original, self.shipped, update=False).outcome()
@@ -53,7 +53,7 @@ class Flight:
 
     def rows(self) -> list[Row]:
         """The KPIs, none when the run did not come to its end."""
-        from ..bench.score import Scores, rows
+        from ..studies.controller_bench.score import Scores, rows
 
         scores = Scores.read(self.trial.own) if self.outcome.code in (0, 3) else None
         checks = json.loads(self.trial.file.read_text(encoding="utf-8"))["checks"]

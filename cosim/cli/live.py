@@ -14,9 +14,9 @@ from . import supervision
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-    from ..live.control import Control
+    from ..process.supervisor import Outcome
+    from ..report.live.control import Control
     from ..scenario import Assembly
-    from ..supervise import Outcome
 
 #: simulated seconds per second, unless `--real-time` says otherwise: what runs as fast as it can is over before it is seen
 _SPEED = 1.0
@@ -37,7 +37,7 @@ def option(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def require(isolation: str, sandbox: str | None, late: str) -> None:
     """Raises UsageError when a run under these conditions cannot be shown."""
-    from ..supervise import possible
+    from ..process.supervisor import possible
 
     if isolation == "none" or not possible():
         raise click.UsageError("--view shows a supervised run: it does not go with --isolation none, nor where there is none")
@@ -49,8 +49,8 @@ def require(isolation: str, sandbox: str | None, late: str) -> None:
 
 def viewed(run: Callable[[Connection], int], isolation: str, salvage: Callable[[Outcome], None], port: int) -> int:
     """Do as `supervision.protected` while the page is served; `run` gets the pipe that commands come through."""
-    from ..live.viewing import Viewing, has_display, open_browser
-    from ..temporary import run_folder
+    from ..process.temporary_folders import run_folder
+    from ..report.live.viewing import Viewing, has_display, open_browser
 
     viewing = Viewing(port)
     click.echo(f"live view: {viewing.url}")
@@ -62,9 +62,9 @@ def viewed(run: Callable[[Connection], int], isolation: str, salvage: Callable[[
 
 def control(assembly: Assembly, link: Connection) -> Control:
     """What steers a run from the other end of `link`."""
-    from ..live.control import Control
+    from ..core.time_grid import Grid
+    from ..report.live.control import Control
     from ..report.scene import scene_of
-    from ..timing import Grid
 
     settings, value = assembly.settings, assembly.document.value
     grid = Grid.of(settings.start_time, settings.stop_time, settings.step_size)

@@ -6,7 +6,7 @@ import logging
 import sys
 from collections.abc import Iterable
 
-from ..errors import Problem
+from ..core.errors import Problem
 
 #: warnings that are kept for the report
 MOST_KEPT = 200

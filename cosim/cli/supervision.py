@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import CosimError
+from ..core.errors import CosimError
 from . import guarded
-from .strict import KINDS
+from .strict_sandbox import KINDS
 
 if TYPE_CHECKING:
-    from ..journal import Journal
-    from ..recording import Recording
-    from ..supervise import Outcome
+    from ..core.recording import Recording
+    from ..process.journal import Journal
+    from ..process.supervisor import Outcome
 
 _isolation = click.option(
     "--isolation",
@@ -51,7 +51,7 @@ def protected(
 
     Raises ComponentError for the component that was to blame, KeyboardInterrupt when the user ended the child.
     """
-    from ..supervise import possible, supervised
+    from ..process.supervisor import possible, supervised
 
     if isolation == "none" or not possible():
         return entry()
@@ -81,7 +81,7 @@ def _salvage(outcome: Outcome, salvage: Callable[[Outcome], None], folder: Path)
 
 def leaving(code: int) -> int:
     """All results are written and the outcome is certain: what components do from now on cannot change it."""
-    from ..journal import CODE, Phase, current
+    from ..process.journal import CODE, Phase, current
 
     if journal := current():
         journal[CODE] = code
@@ -91,7 +91,7 @@ def leaving(code: int) -> int:
 
 def configure(deadlines: Any) -> None:
     """Deadlines of a scenario for the supervisor."""
-    from ..journal import Deadlines, current
+    from ..process.journal import Deadlines, current
 
     if journal := current():
         journal.deadlines = Deadlines(deadlines.load, deadlines.initialization, deadlines.step, deadlines.end)
@@ -99,6 +99,6 @@ def configure(deadlines: Any) -> None:
 
 def recovered(outcome: Outcome) -> Recording:
     """What was recorded by a child that has come to a bad end."""
-    from ..unfinished import recover
+    from ..process.run_files.folder import recover
 
     return recover(outcome.journal.folder, outcome.rows)

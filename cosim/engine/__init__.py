@@ -3,11 +3,10 @@
 from typing import Literal
 
 from .executor import MARKER_SIZE, Executor, Termination
-from .native import NativeExecutor, available
+from .native_executor import NativeExecutor, available
 from .plan import Plan, compile_plan
-from .python import PythonExecutor
+from .python_executor import PythonExecutor
 from .recorder import Recorder
-from .rows import read_rows
 
 Kind = Literal["auto", "native", "python"]
 
@@ -32,5 +31,4 @@ __all__ = [
     "available",
     "compile_plan",
     "executor_kind",
-    "read_rows",
 ]

@@ -1,6 +1,6 @@
 /* The native executor: runs macro steps of a plan that was laid out as a list of operations.
 
-   Nothing is looked up or allocated while it runs. Addresses come from cosim/engine/native.py, which also keeps what they
+   Nothing is looked up or allocated while it runs. Addresses come from cosim/engine/native_executor.py, which also keeps what they
    point to alive. Values, order and rounding are those of the pure Python executor, bit for bit.                            */
 
 #define PY_SSIZE_T_CLEAN

@@ -12,18 +12,18 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 
-from .. import float_mode
-from ..component import GOOD, Call, StepResult
-from ..errors import PASSING, ComponentError, CosimError, told
-from ..journal import calling
-from .gathering import Gather
+from ..core.component import GOOD, Call, StepResult
+from ..core.errors import PASSING, ComponentError, CosimError, told
+from ..process import float_mode
+from ..process.journal import calling
+from .component_step import Ending, Turn, shown, take
 from .initialization import propagate, take_start_values
 from .iteration import Round, Rounds
-from .moves import DelayLine, Move, copy
 from .parallel import TRIALS, Crew, SideBySide, may_overlap, processors
 from .plan import Loop, Phase, Plan, Step
 from .recorder import Recorder
-from .turns import Ending, Turn, shown, take
+from .transfer_plan import Gather
+from .transfers import DelayLine, Move, copy
 
 #: places in the marker: number of the present call, macro steps finished, rows recorded
 CALL, STEPS, ROWS, MARKER_SIZE = 0, 1, 2, 3

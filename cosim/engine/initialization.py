@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..component import Component, Ports
-from ..errors import ComponentError
-from ..journal import calling
-from ..system import Endpoint
+from ..core.component import Component, Ports
+from ..core.errors import ComponentError
+from ..core.system import Endpoint
+from ..process.journal import calling
+from .component_step import shown
 from .layout import Dtype
-from .moves import copy
 from .plan import Plan
-from .turns import shown
+from .transfers import copy
 
 #: a loop may take so many rounds more than a chain, until outputs change by no more than this, relative to 1 + their size
 ROUNDS, TOLERANCE = 100, 1e-12

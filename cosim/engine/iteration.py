@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from ..component import Component
-from ..errors import ComponentError
-from ..journal import calling
+from ..core.component import Component
+from ..core.errors import ComponentError
+from ..process.journal import calling
+from .component_step import Turn, shown
 from .layout import Dtype, Layout
-from .moves import Move
 from .plan import Loop
-from .turns import Turn, shown
+from .transfers import Move
 
 #: the moves of a phase, those that are made in the first round only, and its turns
 Round = tuple[Sequence[Move], Sequence[Move], Sequence[Turn]]

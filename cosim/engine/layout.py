@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..component import Ports, Variable
-from ..system import Endpoint
+from ..core.component import Ports, Variable
+from ..core.system import Endpoint
 
 Dtype = np.dtype[Any]
 

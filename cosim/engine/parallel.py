@@ -14,9 +14,9 @@ from queue import SimpleQueue
 from threading import Event, Thread
 from typing import Generic, TypeVar
 
-from ..component import DoStep
-from ..system import Parallel
-from .turns import Turn
+from ..core.component import DoStep
+from ..core.system import Parallel
+from .component_step import Turn
 
 #: macro steps in which the steps of components are measured before anything runs on threads
 TRIALS = 3

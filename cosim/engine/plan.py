@@ -12,11 +12,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ..component import Causality, Component, Variable
-from ..system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System, members
-from ..timing import Grid
-from .gathering import Gather, Gathering
+from ..core.component import Causality, Component, Variable
+from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System, members
+from ..core.time_grid import Grid
 from .layout import Layout, lay_out
+from .transfer_plan import Gather, Gathering
 
 
 @dataclass(frozen=True, eq=False)

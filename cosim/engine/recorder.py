@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..recording import Recording
-from ..system import Endpoint
+from ..core.recording import Recording
+from ..core.system import Endpoint
+from ..process.run_files.row_store import filled, rows_for
 from .layout import Slot
-from .moves import FEW
 from .plan import Plan
-from .rows import filled, rows_for
+from .transfers import FEW
 
 #: puts the present values into a row, given its number
 Keeper = Callable[[int], object]

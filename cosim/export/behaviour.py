@@ -15,8 +15,8 @@ from zlib import crc32
 
 import numpy as np
 
-from ..component import Component, Ports, Variable
-from ..errors import ComponentError
+from ..core.component import Component, Ports, Variable
+from ..core.errors import ComponentError
 
 STEPS, STEP_SIZE, STEPS_PER_INPUT = 300, 0.01, 15
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-9, 1e-12
@@ -88,7 +88,7 @@ def traces(path: Path, seed: int) -> list[Trace]:
 
 
 def _trace(path: Path, random: np.random.Generator, vary_parameters: bool) -> Trace:
-    from ..fmi import FmuFile, instantiate
+    from ..components.fmi import FmuFile, instantiate
 
     component = instantiate(FmuFile(path), path.stem)
     variables = [variable for variable in component.variables if variable.type in _NUMBERS]

@@ -9,8 +9,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, Problem, did_you_mean
-from ..resources import cache_directory
+from ..core.errors import InputError, Problem, did_you_mean
+from ..core.resources import cache_directory
 from .sources import KINDS, Source, export, find_sources, source_file, source_of, tools
 
 #: FMI version -> folder of the FMUs

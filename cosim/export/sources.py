@@ -9,14 +9,14 @@ from importlib.metadata import PackageNotFoundError, version
 from itertools import pairwise
 from pathlib import Path
 
-from ..errors import CosimError, InputError, Problem
-from .block import Block
-from .c_sources import write_c_fmu
-from .compiler import compiler_version, find_compiler
-from .imports import with_relative_imports
-from .package import write_fmu
-from .python_class import source_files, write_python_fmu
-from .validation import DESCRIPTION
+from ..core.errors import CosimError, InputError, Problem
+from .fmu.block import Block
+from .fmu.compiler import compiler_version, find_compiler
+from .fmu.package import write_fmu
+from .fmu.validation import DESCRIPTION
+from .foreign.c_sources import write_c_fmu
+from .foreign.python_class import source_files, write_python_fmu
+from .foreign.relative_imports import with_relative_imports
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ def _load_modelica(path: Path, model: str | None) -> Block:
 
 
 def _load_equations(path: Path, model: str | None) -> Block:
-    from ..python_component import load_object
+    from ..components.python_class import load_object
 
     block = load_object(f"{path.name}:block", path.parent)
     try:

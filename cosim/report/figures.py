@@ -12,9 +12,9 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..kpi import Evaluation
 from ..results import Result
 from ..results.files import replacing
+from ..results.kpi import Evaluation
 from .numbers import write_numbers
 
 if TYPE_CHECKING:

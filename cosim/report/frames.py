@@ -16,9 +16,9 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from ..errors import CosimError
-from ..python_component import load_object
-from ..resources import root
+from ..components.python_class import load_object
+from ..core.errors import CosimError
+from ..core.resources import root
 from ..results import Result
 
 if TYPE_CHECKING:

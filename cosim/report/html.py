@@ -8,8 +8,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..kpi import CheckOutcome, Number
 from ..results import Result
+from ..results.checks import CheckOutcome, Number
 from ..results.files import plain, replacing
 from .diagram import diagram
 from .pages import embedded, markup, render

@@ -23,11 +23,11 @@ from inspect import getattr_static
 from pathlib import Path
 from typing import Any
 
-from ..errors import PASSING, ComponentError, InputError, did_you_mean
-from ..python_component import load_object
+from ..components.python_class import load_object
+from ..core.errors import PASSING, ComponentError, InputError, did_you_mean
 from ..results.files import plain
-from ..scenario.document import read_document
 from ..scenario.functions import load_function
+from ..scenario.json_document import read_document
 
 LISTS = ("bodies", "fixed", "markers", "views", "spans", "plots")
 

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, TextIO
 
-from ..kpi import CheckOutcome, Number
+from ..results.checks import CheckOutcome, Number
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -21,7 +21,7 @@ def print_kpis(
     units: Mapping[str, str] | None = None,
     file: TextIO | None = None,
 ) -> None:
-    """Print all KPIs with their units (`cosim.kpi.kpi_units`), and beside them their checks and whether they are met.
+    """Print all KPIs with their units (`cosim.results.kpi.kpi_units`), and beside them their checks and whether they are met.
 
     Colours only where rich sees a terminal and no NO_COLOR; elsewhere lines are as long as they need to be. Prints nothing
     when there are no KPIs.

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..compare import Comparison, Tolerance, Verdict
-from ..compare.comparison import Comparer, matched
 from ..results import Result
+from ..results.comparison import Comparison, Tolerance, Verdict
+from ..results.comparison.comparison import Comparer, matched
 
 WIDTH, HEIGHT = 7.16, 1.7  # in: a page, each signal
 OUTSIDE = "#D55E00"

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pydantic_core
 
-from ..errors import InputError, Problem
-from ..paths import open_text
-from ..recording import Recording
+from ..core.errors import InputError, Problem
+from ..core.paths import open_text
+from ..core.recording import Recording
 from .files import pieces, replacing
 
 ROWS_AT_A_TIME = 2000

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import CosimError, InputError, OutputError
+from ..core.errors import CosimError, InputError, OutputError
 
 #: what the disk is to blame for, and not the path
 _DISK = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}

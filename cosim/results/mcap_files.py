@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 import pydantic_core
 
-from ..errors import InputError
-from ..recording import Recording
+from ..core.errors import InputError
+from ..core.recording import Recording
 from .files import pieces, plain, replacing
 
 ROWS_AT_A_TIME = 2000

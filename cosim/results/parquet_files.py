@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..recording import Recording
+from ..core.errors import InputError
+from ..core.recording import Recording
 from .files import pieces, replacing
 
 ROWS_AT_A_TIME = 1 << 17

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, did_you_mean
-from ..recording import Recording
+from ..core.errors import InputError, did_you_mean
+from ..core.recording import Recording
 from .csv_files import read_csv, write_csv
 from .files import write_json
 from .mcap_files import write_mcap
 from .parquet_files import write_parquet
 
 if TYPE_CHECKING:
-    from ..kpi import CheckOutcome
+    from .checks import CheckOutcome
 
 
 class SignalError(InputError, KeyError):

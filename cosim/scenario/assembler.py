@@ -9,19 +9,19 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from ..component import Component, Variable
-from ..errors import InputError, Problem
-from ..fmi import FmuFile, Isolation
-from ..journal import Deadlines
-from ..simulate import Event, Settings, problems
-from ..system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System
-from ..table import read_table
+from ..components.fmi import FmuFile, Isolation
+from ..components.input_table import read_table
+from ..core.component import Component, Variable
+from ..core.errors import InputError, Problem
+from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System
+from ..engine.run_loop import Event, Settings, problems
+from ..process.journal import Deadlines
+from .component_factory import Workshop
 from .functions import function_problem, number_problem, signal_problems
-from .names import Slots, Target, Unknown, assign, resolve
+from .name_resolution import Slots, Target, Unknown, assign, resolve
+from .nested_systems import Node, Scenario
+from .recorded_signals import Selection
 from .schema import SystemSpec, kept
-from .selection import Selection
-from .sources import Workshop
-from .tree import Node, Scenario
 from .wiring import Wiring
 
 #: full name of the components made from input profiles: PROFILES.0, PROFILES.1, ...

@@ -10,21 +10,21 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from ..component import Component
-from ..errors import InputError, Problem
-from ..float_mode import usual
-from ..fmi import FmuFile
-from ..journal import blamed
-from ..python_component import package_files
-from ..simulate import Settings
-from ..stopwatch import Stopwatch
-from ..system import System
+from ..components.fmi import FmuFile
+from ..components.python_class import package_files
+from ..core.component import Component
+from ..core.errors import InputError, Problem
+from ..core.stopwatch import Stopwatch
+from ..core.system import System
+from ..engine.run_loop import Settings
+from ..process.float_mode import usual
+from ..process.journal import blamed
 from .assembler import Assembler
-from .document import Document
+from .component_factory import Workshop
 from .functions import load_function, signal_problems
+from .json_document import Document
+from .nested_systems import Node, Scenario, load
 from .schema import FunctionSpec, ScenarioSpec
-from .sources import Workshop
-from .tree import Node, Scenario, load
 
 Function = tuple[str, Callable[..., Any], Mapping[str, Any]]
 
@@ -53,7 +53,7 @@ class Assembly:
 
     @property
     def checks(self) -> list[dict[str, Any]]:
-        """The scenario's checks as `cosim.kpi.evaluate_checks` takes them."""
+        """The scenario's checks as `cosim.results.kpi.evaluate_checks` takes them."""
         return [check.model_dump(exclude_none=True) for check in self.spec.checks]
 
     def kpis(self) -> list[Function]:

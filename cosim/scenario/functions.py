@@ -11,11 +11,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ..errors import Problem, did_you_mean
-from ..paths import is_file
-from ..python_component import load_object
+from ..components.python_class import load_object
+from ..core.errors import Problem, did_you_mean
+from ..core.paths import is_file
+from .nested_systems import Node
 from .schema import CallSpec, FunctionSpec, kept
-from .tree import Node
 
 
 def function_problem(spec: CallSpec, folder: Path) -> str:
@@ -41,7 +41,7 @@ def function_problem(spec: CallSpec, folder: Path) -> str:
 def signal_problems(root: Node, kind: str, signals: Collection[str]) -> Iterator[Problem]:
     """What is wrong with arguments of a scenario's sound "kpis" or "figures" that have to name something of `signals`.
 
-    Annotations say so: `Signal` is one of them, `Prefix` something that has signals below it (see `cosim.kpi`).
+    Annotations say so: `Signal` is one of them, `Prefix` something that has signals below it (see `cosim.results.kpi`).
     """
     for i, spec in kept(getattr(root.spec, kind)):
         if not function_problem(spec, root.folder):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from ..engine.gathering import conversion
-from ..system import Connection, Group, Stage, System
+from ..core.system import Connection, Group, Stage, System
+from ..engine.transfer_plan import conversion
 from .assembly import Assembly
 
 

@@ -17,7 +17,7 @@ from pydantic import (
     model_validator,
 )
 
-from ..timing import exact
+from ..core.time_grid import exact
 
 S = TypeVar("S")
 SOURCES = ("fmu", "python", "modelica", "system")

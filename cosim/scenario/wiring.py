@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from ..component import Component
-from ..errors import Problem, did_you_mean
-from ..system import Connection, Endpoint
-from .names import Slots, Target, Unknown, resolve
+from ..core.component import Component
+from ..core.errors import Problem, did_you_mean
+from ..core.system import Connection, Endpoint
+from .name_resolution import Slots, Target, Unknown, resolve
+from .nested_systems import Node
 from .schema import ConnectionSpec, kept
-from .tree import Node
 
 
 class _Candidate(NamedTuple):

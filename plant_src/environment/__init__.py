@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from cosim.errors import InputError
+from cosim.core.errors import InputError
 
-from ..reading import Reader
+from ..json_reader import Reader
 from . import settings
 from .sea import CALM, Sea, realise
 

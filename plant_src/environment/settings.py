@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..reading import Keys, Numbers, Reader
+from ..json_reader import Keys, Numbers, Reader
 from .current import Current, Ramp, Variation
 from .sea import MOST_COMPONENTS, Waves
 from .spectrum import GAMMA, LARGEST_GAMMA, SIGNIFICANT_HEIGHTS, SMALLEST_GAMMA, SPECTRA, fully_developed_period

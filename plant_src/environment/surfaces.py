@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from .sea import Sea
 
 if TYPE_CHECKING:
-    from ..arguments import Platform
-    from ..shadow import Shadow
+    from ..physics.body import Shadow
+    from ..placement import Platform
 
 #: so high above the still water (m) waves make no difference to a rotor any more
 HIGH = 5.0

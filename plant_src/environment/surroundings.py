@@ -9,19 +9,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cosim.component import Variable
+from cosim.core.component import Variable
 
-from ..shadow import FloatingBody
-from ..vehicles.interface import CURRENT, WAVE_GAIN, WIND, scalar
+from ..physics.body import FloatingBody
+from ..vehicles.common.interface import CURRENT, WAVE_GAIN, WIND, scalar
 from .current import Current
 from .noise import BLOCK, GRID
+from .sea import Sea
 from .settings import Environment
 from .surfaces import Below
 from .wind import Gusts, Wind
 
 if TYPE_CHECKING:
-    from ..arguments import Arguments, Spawn
-    from ..shadow import Shadow
+    from ..physics.body import Shadow
+    from ..placement import Platform, Spawn
 
 _ROUNDING = 1e-6  # of the grid of noise: times are not exact multiples of it
 _NUMBER = struct.calcsize("d")
@@ -40,8 +41,14 @@ class Surroundings:
     `update` is to be called before each step of the vehicles and `publish` after the last one, with the time since the start.
     """
 
-    def __init__(self, read: Arguments, shadows: Sequence[Shadow]):
-        environment = read.environment
+    def __init__(
+        self,
+        environment: Environment,
+        sea: Sea,
+        vehicles: Sequence[Spawn],
+        platforms: Sequence[Platform],
+        shadows: Sequence[Shadow],
+    ):
         self._blown = _with(shadows, "wind.x") if environment.wind else []
         self._waved = [shadow for shadow in shadows if isinstance(shadow, FloatingBody)] if environment.waves else []
         self.input_variables, self.output_variables = _inputs(environment), _outputs(self._blown, self._waved)
@@ -51,9 +58,12 @@ class Surroundings:
         #: vessels that the waves pass by
         self.unmoved = [s.name for s in shadows if environment.waves and s.model.is_vessel and s not in self._waved]
         self._gain: Any = self._input("wave_gain") if environment.waves else np.ones(1).data
-        self.updates = list(self._updates(read, shadows))
+        self.updates = list(self._updates(environment, shadows))
+        if lifted := _in_ground_effect(vehicles, shadows):
+            vessels = [shadow for shadow in shadows if shadow.model.is_vessel]
+            self.updates.append(_Ground(lifted, Below(vessels, platforms, sea), self._gain).update)
         first = 3 * len(self._blown)
-        self._floating = [(shadow.surface(read.sea), first + k) for k, shadow in enumerate(self._waved)]
+        self._floating = [(shadow.surface(len(sea.phase), sea.table()), first + k) for k, shadow in enumerate(self._waved)]
         self._published: Any = self.outputs.data
 
     def _input(self, name: str) -> Any:
@@ -61,8 +71,8 @@ class Surroundings:
         names = [variable.name for variable in self.input_variables]
         return self.inputs[names.index(f"environment.{name}") :].data
 
-    def _updates(self, read: Arguments, shadows: Sequence[Shadow]) -> Iterator[Update]:
-        seed, wind, current = read.environment.seed, read.environment.wind, read.environment.current
+    def _updates(self, environment: Environment, shadows: Sequence[Shadow]) -> Iterator[Update]:
+        seed, wind, current = environment.seed, environment.wind, environment.current
         if wind:
             yield _Air(wind, seed, self._input("wind.x"), self._blown, self.outputs.data).update
         if current:
@@ -70,9 +80,6 @@ class Surroundings:
         if self._waved:
             gains = [_slot(shadow, "wave_gain") for shadow in self._waved]
             yield lambda time: _fill(gains, self._gain[0])
-        if lifted := _in_ground_effect(read.vehicles, shadows):
-            vessels = [shadow for shadow in shadows if shadow.model.is_vessel]
-            yield _Ground(lifted, Below(vessels, read.platforms, read.sea), self._gain).update
 
     def update(self, time: float) -> None:
         """Write the surroundings of all vehicles."""

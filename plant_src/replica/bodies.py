@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arguments import Numbers
-from ..bullet import pybullet
-from ..shadow import compound, set_dynamics
+from ..json_reader import Numbers
+from ..physics.body import compound, set_dynamics
+from ..physics.client import pybullet
 from ..vehicles.ar_drone import geometry as ar_drone
 from ..vehicles.ar_drone.parameters import AIRFRAME, CENTRE_OF_MASS, ROTOR_SENSES, ROTORS
-from ..vehicles.shapes import quaternion
+from ..vehicles.common.shapes import quaternion
 from ..vehicles.strider import geometry as strider
 from ..vehicles.strider.parameters import RUDDER_ARM
 

@@ -6,9 +6,9 @@ clockwise as seen from above, all rad. The vessel's is x forward, y left, z up; 
 
 from __future__ import annotations
 
-from cosim.component import Variable
+from cosim.core.component import Variable
 
-from ..vehicles.interface import scalar, vector
+from ..vehicles.common.interface import scalar, vector
 
 ROTORS = range(1, 5)
 

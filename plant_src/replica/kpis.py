@@ -8,8 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from cosim.kpi import Number, Prefix, units
 from cosim.results import Result
+from cosim.results.checks import Number
+from cosim.results.kpi import Prefix, units
 
 from ..kpis import horizontal_distance, waypoints
 

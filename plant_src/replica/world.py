@@ -13,16 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from cosim.component import Component, Ports, Variable
-from cosim.errors import ComponentError, InputError, Problem, did_you_mean
+from cosim.core.component import Component, Ports, Variable
+from cosim.core.errors import ComponentError, InputError, Problem, did_you_mean
 
-from .. import arguments
-from ..arguments import Platform
-from ..bullet import connect, pybullet
+from .. import world_settings
+from ..physics.body import LARGEST_STATE, compound, set_dynamics
+from ..physics.client import connect, pybullet
+from ..placement import Platform, Spawn
 from ..scene import replay
-from ..shadow import LARGEST_STATE, compound, set_dynamics
 from ..vehicles.ar_drone.parameters import GRAVITY
-from ..vehicles.shapes import Box
+from ..vehicles.common.shapes import Box
 from .bodies import Quadcopter, Vessel
 from .interface import INPUTS, OUTPUTS
 
@@ -79,7 +79,7 @@ class World(Component):
         """What the 3-D replay draws of this world, see `scene.replay`."""
         return replay.published(name, scenario)
 
-    def _populate(self, spawns: Mapping[str, arguments.Spawn], platforms: list[Platform]) -> None:
+    def _populate(self, spawns: Mapping[str, Spawn], platforms: list[Platform]) -> None:
         pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)
         for platform in platforms:
             _add_platform(self._client, platform)
@@ -176,7 +176,7 @@ class World(Component):
         pybullet.removeState(state.bullet, physicsClientId=self._client)
 
 
-def _read(vehicles: Any, platforms: Any, sub_steps: Any) -> tuple[dict[str, arguments.Spawn], list[Platform]]:
+def _read(vehicles: Any, platforms: Any, sub_steps: Any) -> tuple[dict[str, Spawn], list[Platform]]:
     found = vehicles if isinstance(vehicles, Mapping) else {}
     problems = [
         Problem(f'expected the vehicles "uav" and "usv", found {sorted(found)}', "vehicles", ("arguments", "vehicles"))
@@ -189,7 +189,7 @@ def _read(vehicles: Any, platforms: Any, sub_steps: Any) -> tuple[dict[str, argu
     if problems:
         raise InputError(problems)
     modelled = {name: {**spec, "model": MODELS[name]} if isinstance(spec, Mapping) else spec for name, spec in vehicles.items()}
-    read = arguments.read(modelled, platforms, {})
+    read = world_settings.read(modelled, platforms, {})
     return {spawn.name: spawn for spawn in read.vehicles}, list(read.platforms)
 
 

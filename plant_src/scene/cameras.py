@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..bullet import pybullet
+from ..physics.client import pybullet
 from .mission import Mission
 
 NEAR, FAR = 0.4, 900.0  # m

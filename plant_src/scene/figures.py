@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from cosim.errors import InputError
+from cosim.core.errors import InputError
 from cosim.results import Result
 
 from .cameras import UP

@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 
 from ..catalogue import VEHICLES as CATALOGUE
-from ..vehicles.airframe import Airframe, Rotor
+from ..vehicles.common.shapes import Body, Box, Quaternion, Vector
 from ..vehicles.crazyflie.parameters import AIRFRAME as CRAZYFLIE
-from ..vehicles.shapes import Body, Box, Quaternion, Vector
+from ..vehicles.multirotor.airframe import Airframe, Rotor
 from ..vehicles.survey_hexacopter.parameters import AIRFRAME as SURVEY_HEXACOPTER
 from .models import ALONG_X, BLACK, GREY, ORANGE, RED, SILVER, YELLOW, Part, ar_drone, mark, strider
 

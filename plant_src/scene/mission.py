@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from cosim.errors import InputError
+from cosim.core.errors import InputError
 from cosim.results import Result
 
 from ..catalogue import MODELS
 from ..kpis import touchdown_row
-from ..vehicles.shapes import Quaternion
+from ..vehicles.common.shapes import Quaternion
 
 APPROACH = 8.0  # s before the touchdown that belong to the landing
 

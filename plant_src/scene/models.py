@@ -13,7 +13,7 @@ import numpy as np
 
 from ..vehicles.ar_drone.geometry import EDGE, FEET_HEIGHT
 from ..vehicles.ar_drone.parameters import ROTORS
-from ..vehicles.shapes import Quaternion, Vector
+from ..vehicles.common.shapes import Quaternion, Vector
 from ..vehicles.strider import geometry as strider_geometry
 from ..vehicles.strider.parameters import DECK_TOP, DECK_X, DECK_Y
 

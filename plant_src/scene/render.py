@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from cosim.errors import InputError, did_you_mean
+from cosim.core.errors import InputError, did_you_mean
 
 from .cameras import CAMERAS, View
 from .land import add_land

@@ -7,8 +7,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from ..bullet import pybullet
-from ..vehicles.shapes import Quaternion, Vector
+from ..physics.client import pybullet
+from ..vehicles.common.shapes import Quaternion, Vector
 from .cameras import FAR, NEAR, View, Window
 from .models import Part
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..bullet import pybullet
 from ..catalogue import VEHICLES
-from ..reading import Reader
+from ..json_reader import Reader
+from ..physics.client import pybullet
 from ..scene.cameras import UP, View
 from ..scene.light import DEEP, HAZE, HORIZON, rays, sky
 from ..scene.looks import looks

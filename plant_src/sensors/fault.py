@@ -7,11 +7,11 @@ import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
-from cosim.component import Variable
-from cosim.errors import did_you_mean
-from cosim.units import parse
+from cosim.core.component import Variable
+from cosim.core.errors import did_you_mean
+from cosim.core.units import parse
 
-from ..reading import Reader
+from ..json_reader import Reader
 from .signals import SignalComponent, accept, flag, parameter, read_seed, real, seed_parameter
 
 #: what happens to the affected signals

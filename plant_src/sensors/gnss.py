@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..reading import Reader
+from ..json_reader import Reader
 from .noise import gauss_markov
 from .parameters import SATELLITE
 from .sampled import Measurement, SampledSensor, timing

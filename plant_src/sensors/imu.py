@@ -12,9 +12,9 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from cosim.component import Variable
+from cosim.core.component import Variable
 
-from ..reading import Reader
+from ..json_reader import Reader
 from .frames import Vector, halfway, to_body
 from .noise import Noise, gauss_markov
 from .parameters import INERTIAL, Numbers

@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..bullet import pybullet
 from ..catalogue import VEHICLES
-from ..reading import Reader
-from ..shadow import compound
-from ..vehicles.shapes import Box
+from ..json_reader import Reader
+from ..physics.body import compound
+from ..physics.client import pybullet
+from ..vehicles.common.shapes import Box
 from .frames import Vector, to_world
 from .sampled import Measurement, SampledSensor, timing
 from .signals import accept, flag, parameter, pose_inputs, read_seed, real, seed_parameter

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 
-from cosim.component import Variable
+from cosim.core.component import Variable
 
 from .signals import SignalComponent, parameter, real
 

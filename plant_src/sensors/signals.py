@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from cosim.component import DTYPES, Call, Causality, Component, Ports, Variability, Variable
-from cosim.errors import ComponentError, InputError, did_you_mean
-from cosim.units import parse
+from cosim.core.component import DTYPES, Call, Causality, Component, Ports, Variability, Variable
+from cosim.core.errors import ComponentError, InputError, did_you_mean
+from cosim.core.units import parse
 
-from ..reading import Reader
+from ..json_reader import Reader
 from .noise import Noise
 
 _FLOAT, _FLAG = DTYPES["Float64"], DTYPES["Boolean"]

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from cosim.simulate import simulate
-from plant_src.bullet import pybullet
+from cosim.engine.run_loop import simulate
+from plant_src.physics.client import pybullet
 
 
 class BulletCall(NamedTuple):

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from measure import Stopwatch
 
+from cosim.components.fmi import FmuFile, instantiate
+from cosim.core.system import Connection, Endpoint, System
 from cosim.engine import Kind, available
-from cosim.fmi import FmuFile, instantiate
-from cosim.simulate import Settings, simulate
-from cosim.system import Connection, Endpoint, System
+from cosim.engine.run_loop import Settings, simulate
 
 STEP = Fraction(1, 100)
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree
 
-from cosim.export.archive import content_token, write_archive
-from cosim.export.block import Block, BlockVariable
-from cosim.export.description import model_description, to_bytes
-from cosim.export.package import compile_binary, fmi_headers
+from cosim.export.fmu.archive import content_token, write_archive
+from cosim.export.fmu.block import Block, BlockVariable
+from cosim.export.fmu.model_description import model_description, to_bytes
+from cosim.export.fmu.package import compile_binary, fmi_headers
 
 PROGRAMS = Path(__file__).parent / "programs"
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from fmpy import extract, platform, platform_tuple, read_model_description, sharedLibraryExtension
 from lag import PROGRAMS
 
-from cosim.export.compiler import find_compiler
-from cosim.export.package import fmi_headers
+from cosim.export.fmu.compiler import find_compiler
+from cosim.export.fmu.package import fmi_headers
 
 
 class Limit:

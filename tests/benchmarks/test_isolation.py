@@ -18,11 +18,11 @@ from importer import STEP, executors
 from lag import lag_fmu
 from measure import ROUNDS, heading
 
+from cosim.components.fmi import FmuFile, Isolation, instantiate
+from cosim.core.system import Endpoint, System
+from cosim.core.time_grid import Grid
 from cosim.engine import Kind, Recorder, compile_plan, executor_kind
-from cosim.fmi import FmuFile, Isolation, instantiate
-from cosim.simulate import Run, Settings, simulate
-from cosim.system import Endpoint, System
-from cosim.timing import Grid
+from cosim.engine.run_loop import Run, Settings, simulate
 
 STEPS, BATCH, WIDTH, STARTS = 5_000, 50, 16, 20
 #: what is promised on a quiet machine: us per FMU and step over in process, ms to start

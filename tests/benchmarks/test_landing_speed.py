@@ -6,8 +6,8 @@ from time import perf_counter
 
 import pytest
 
-from cosim.sweep.local import LocalEngine
-from cosim.sweep.sweep import Sweep
+from cosim.studies.execution.local import LocalEngine
+from cosim.studies.sweep import Sweep
 
 pytestmark = pytest.mark.benchmark
 

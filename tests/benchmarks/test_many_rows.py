@@ -18,11 +18,11 @@ PROGRAM = """
 import resource, sys, time
 from fractions import Fraction
 from pathlib import Path
-from cosim.fmi import FmuFile, instantiate
+from cosim.components.fmi import FmuFile, instantiate
 from cosim.results.csv_files import write_csv
 from cosim.results.parquet_files import write_parquet
-from cosim.simulate import Settings, simulate
-from cosim.system import Endpoint, System
+from cosim.engine.run_loop import Settings, simulate
+from cosim.core.system import Endpoint, System
 steps, step = int(sys.argv[2]) - 1, Fraction(1, 100)
 outputs = {f"a.y{k}": Endpoint("a", f"y{k}") for k in range(1, int(sys.argv[3]) + 1)}
 system = System({"a": instantiate(FmuFile(Path(sys.argv[1])), "a")}, (), (("a",),))

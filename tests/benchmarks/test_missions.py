@@ -19,7 +19,7 @@ from measure import Stopwatch, compare, heading, show
 
 import cosim
 from cosim.engine import Kind
-from cosim.simulate import simulate
+from cosim.engine.run_loop import simulate
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 #: generous: times PyBullet's own calls

@@ -12,9 +12,9 @@ from busy import busy_fmu
 from importer import executors
 from measure import compare, heading, show
 
-from cosim.fmi import FmuFile, instantiate
-from cosim.simulate import Settings, simulate
-from cosim.system import Parallel, System
+from cosim.components.fmi import FmuFile, instantiate
+from cosim.core.system import Parallel, System
+from cosim.engine.run_loop import Settings, simulate
 
 LONG, STEPS = 1e-3, 200
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]

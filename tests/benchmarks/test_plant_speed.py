@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from measure import Row, compare, heading, show
 
-from cosim.component import Ports
+from cosim.core.component import Ports
 from cosim.engine.initialization import take_start_values
-from plant_src.bullet import pybullet
+from plant_src.physics.client import pybullet
 from plant_src.world import World
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]

@@ -8,14 +8,14 @@ from time import perf_counter
 import pytest
 
 import cosim
-from cosim.fmi import FmuFile
-from cosim.kpi import evaluate_kpis
+from cosim.components.fmi import FmuFile
+from cosim.engine.run_loop import simulation
 from cosim.results import Result
+from cosim.results.kpi import evaluate_kpis
 from cosim.scenario import assemble
-from cosim.scenario.tree import find, load
-from cosim.simulate import simulation
-from cosim.sweep.jobs import Job, Order
-from cosim.sweep.local import LocalEngine
+from cosim.scenario.nested_systems import find, load
+from cosim.studies.execution.job import Job, Order
+from cosim.studies.execution.local import LocalEngine
 
 pytestmark = pytest.mark.benchmark
 

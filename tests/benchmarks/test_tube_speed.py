@@ -8,9 +8,9 @@ from time import process_time
 import numpy as np
 import pytest
 
-from cosim.compare import Tolerance, compare
-from cosim.recording import Recording
+from cosim.core.recording import Recording
 from cosim.results import Result
+from cosim.results.comparison import Tolerance, compare
 
 pytestmark = pytest.mark.benchmark
 

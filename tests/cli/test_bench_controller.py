@@ -8,9 +8,9 @@ import subprocess
 import sys
 
 import pytest
-from faults.fault_fmu import FaultFmus, build_library
+from fault_fmu import FaultFmus, build_library
 
-from cosim import resources
+from cosim.core import resources
 
 ROOT = resources.root()
 MISSION = {

@@ -116,8 +116,8 @@ def test_a_failing_kpi_loses_nothing(tmp_path):
 FREED = """
 from pathlib import Path
 
-from cosim.component import Component
-from cosim.errors import ComponentError
+from cosim.core.component import Component
+from cosim.core.errors import ComponentError
 
 
 class Once(Component):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from cosim import resources
+from cosim.core import resources
 
 
 def cosim(*arguments):

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from cosim import __version__
-from cosim.cli.init import origin, requirement
+from cosim.cli.commands.init import origin, requirement
 
 
 def run(*command, cwd):

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import resources
 from cosim.cli import main
+from cosim.core import resources
 from cosim.report.scene import scene_of
 from cosim.results import Result
 

@@ -7,8 +7,8 @@ from zipfile import ZipFile
 
 import pytest
 
-from cosim import resources
-from cosim.fmi.preflight.validation import validate as examine
+from cosim.components.fmi.preflight.validation import validate as examine
+from cosim.core import resources
 
 FMUS = sorted(resources.root().glob("fmus/**/*.fmu"))
 

@@ -7,7 +7,7 @@ import pytest
 from fmpy.validation import validate_fmu
 
 import cosim
-from cosim import resources
+from cosim.core import resources
 
 ROOT = resources.root()
 FMU = ROOT / "fmus/c/speed_keeper.fmu"

@@ -14,8 +14,8 @@ from scipy.signal import butter, sosfilt, sosfilt_zi
 from scipy.spatial.transform import Rotation
 
 import cosim
-from cosim import resources
 from cosim.api import checks, execute
+from cosim.core import resources
 from cosim.results import Result
 
 GAINS = {

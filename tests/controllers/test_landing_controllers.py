@@ -7,7 +7,7 @@ import pytest
 from helpers import wire
 
 import cosim
-from cosim import resources
+from cosim.core import resources
 
 FMUS, SCENARIOS = (resources.root() / name for name in ("fmus", "scenarios"))
 HEAVE, OMEGA, SWAY = 0.25, 2.5, 0.2

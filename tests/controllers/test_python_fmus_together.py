@@ -9,8 +9,8 @@ import pytest
 from controller_fmu import Controller
 from fmpy import extract
 
-from cosim.errors import InputError
-from cosim.export.python_class import write_python_fmu
+from cosim.core.errors import InputError
+from cosim.export.foreign.python_class import write_python_fmu
 
 SOURCE = '''"""Answers with what its helper knows."""
 

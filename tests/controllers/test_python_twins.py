@@ -13,9 +13,9 @@ from controller_fmu import PERIOD, Controller
 from fmpy import extract
 
 import cosim
-from cosim import resources
-from cosim.component import Ports
-from cosim.python_component import load_component
+from cosim.components.python_class import load_component
+from cosim.core import resources
+from cosim.core.component import Ports
 
 ROOT = resources.root()
 SOURCES = ROOT / "controllers/python"

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import cosim
-from cosim import resources
+from cosim.core import resources
 
 ROOT = resources.root()
 SYSTEM = ROOT / "scenarios/systems/strider_autopilot.json"

@@ -1,8 +1,8 @@
 from fakes import Fake, gain, inputs, outputs
 from helpers import system
 
-from cosim.component import Variable
-from cosim.units import parse
+from cosim.core.component import Variable
+from cosim.core.units import parse
 
 
 def typed(causality, kind, **more):

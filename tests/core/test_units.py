@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from cosim.units import BASE, parse, product
+from cosim.core.units import BASE, parse, product
 
 
 @pytest.mark.parametrize(

@@ -9,15 +9,15 @@ import pytest
 from fakes import Fake
 from helpers import end
 
-from cosim.component import DTYPES, Variable
+from cosim.components.fmi import FmuFile, Isolation, instantiate
+from cosim.core.component import DTYPES, Variable
+from cosim.core.errors import ComponentError
+from cosim.core.system import Connection, Endpoint, Group, System, incompatibility
+from cosim.core.time_grid import exact
+from cosim.core.units import parse
 from cosim.engine import EXECUTORS, available
 from cosim.engine.parallel import Crew
-from cosim.errors import ComponentError
-from cosim.fmi import FmuFile, Isolation, instantiate
-from cosim.simulate import Settings, simulate
-from cosim.system import Connection, Endpoint, Group, System, incompatibility
-from cosim.timing import exact
-from cosim.units import parse
+from cosim.engine.run_loop import Settings, simulate
 
 pytestmark = pytest.mark.skipif(not available(), reason="the native executor was not built")
 
@@ -181,8 +181,8 @@ def test_values_that_nobody_reads_may_be_anything(kind):
 
 @pytest.mark.parametrize("kind", EXECUTORS)
 def test_many_rows_do_not_fit_into_one_chunk(kind, monkeypatch):
-    monkeypatch.setattr("cosim.engine.rows.CHUNK", 1000)
-    monkeypatch.setattr("cosim.engine.rows.LARGE", 0)
+    monkeypatch.setattr("cosim.process.run_files.row_store.CHUNK", 1000)
+    monkeypatch.setattr("cosim.process.run_files.row_store.LARGE", 0)
     count = Fake([Variable("y", causality="output")], lambda v, t, h: v.update(y=v["y"] + 1), start={"y": 0.0})
     outcome = simulate(System({"a": count}, (), (("a",),)), Settings(exact(0), exact(10000), exact(1), {"a.y": end("a.y")}))
     assert outcome.recording.columns["a.y"].tolist() == list(range(10001))

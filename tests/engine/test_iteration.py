@@ -8,15 +8,15 @@ from fakes import Fake, gain, inputs, integrator, outputs
 from helpers import run, system, wire
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 
-from cosim import resources
 from cosim.api import load
-from cosim.component import StepResult
+from cosim.components.python_class import PythonSlave
+from cosim.core import resources
+from cosim.core.component import StepResult
+from cosim.core.errors import ComponentError, InputError
+from cosim.core.system import Endpoint, Group, Iteration
+from cosim.core.time_grid import exact
 from cosim.engine import EXECUTORS
-from cosim.errors import ComponentError, InputError
-from cosim.python_component import PythonSlave
-from cosim.simulate import Settings, simulate
-from cosim.system import Endpoint, Group, Iteration
-from cosim.timing import exact
+from cosim.engine.run_loop import Settings, simulate
 
 TIGHT = Iteration(1e-13, 100)
 FMUS = resources.root() / "fmus"

@@ -5,9 +5,9 @@ import pytest
 from fakes import Fake
 from helpers import end, system
 
-from cosim.component import Variable
+from cosim.core.component import Variable
+from cosim.core.time_grid import Grid, exact
 from cosim.engine import compile_plan
-from cosim.timing import Grid, exact
 
 INT = np.dtype(np.int32)
 

@@ -7,9 +7,9 @@ import pytest
 from fakes import Fake, inputs, outputs
 from helpers import run
 
-from cosim.system import Connection, Endpoint, Group, System, members
-from cosim.timing import exact
-from cosim.units import parse
+from cosim.core.system import Connection, Endpoint, Group, System, members
+from cosim.core.time_grid import exact
+from cosim.core.units import parse
 
 UNITS = {name: parse(name) for name in ("rad", "deg", "m", "mm", "degC", "K")} | {"": None}
 STEPS = 12

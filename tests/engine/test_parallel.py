@@ -6,11 +6,11 @@ import pytest
 from busy import busy_fmu
 from helpers import end, system
 
+from cosim.components.fmi import FmuFile, instantiate
+from cosim.core.errors import ComponentError
+from cosim.core.time_grid import exact
 from cosim.engine.parallel import Crew
-from cosim.errors import ComponentError
-from cosim.fmi import FmuFile, instantiate
-from cosim.simulate import Event, Settings, simulate
-from cosim.timing import exact
+from cosim.engine.run_loop import Event, Settings, simulate
 
 pytestmark = pytest.mark.usefixtures("executor")
 

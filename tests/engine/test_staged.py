@@ -8,12 +8,12 @@ import pytest
 from fakes import Fake, clock, counter, gain, inputs, integrator, outputs
 from helpers import end, run, system
 
-from cosim.component import StepResult, Variable
-from cosim.errors import ComponentError
-from cosim.simulate import Settings, simulate
-from cosim.system import Group
-from cosim.timing import exact
-from cosim.units import parse
+from cosim.core.component import StepResult, Variable
+from cosim.core.errors import ComponentError
+from cosim.core.system import Group
+from cosim.core.time_grid import exact
+from cosim.core.units import parse
+from cosim.engine.run_loop import Settings, simulate
 
 pytestmark = pytest.mark.usefixtures("executor")
 

@@ -11,8 +11,8 @@ from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
 
-from cosim.export.block import Block, BlockVariable
-from cosim.export.package import write_fmu
+from cosim.export.fmu.block import Block, BlockVariable
+from cosim.export.fmu.package import write_fmu
 
 HEADER = """
 #include <stdbool.h>

@@ -11,15 +11,15 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
-from cosim.errors import InputError
+from cosim.core.errors import InputError
 from cosim.export.build import build, build_one, cached_fmu, read_manifest
-from cosim.export.check import check
+from cosim.export.build_check import check
 from cosim.export.sources import find_sources, snake_case, source_of, tool_version
 
 EQUATIONS = """
 from pathlib import Path
 
-from cosim.export.block import Block, BlockVariable
+from cosim.export.fmu.block import Block, BlockVariable
 
 from .parameters import GAIN
 

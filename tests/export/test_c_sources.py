@@ -13,11 +13,11 @@ from fmpy import extract, simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.validation import validate_fmu
 
-from cosim.errors import InputError
+from cosim.core.errors import InputError
+from cosim.core.resources import root
 from cosim.export.build import build, build_one, read_manifest
-from cosim.export.check import check
+from cosim.export.build_check import check
 from cosim.export.sources import find_sources
-from cosim.resources import root
 
 KEEPER = root() / "controllers/c/speed_keeper"
 

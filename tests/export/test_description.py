@@ -10,12 +10,12 @@ import pytest
 from fmpy import read_model_description
 from fmpy.model_description import read_build_description
 
-from cosim.errors import InputError
-from cosim.export.block import Block, BlockVariable
-from cosim.export.description import model_description
-from cosim.export.interface import check_block
-from cosim.fmi import FmuFile
-from cosim.units import KNOWN, parse
+from cosim.components.fmi import FmuFile
+from cosim.core.errors import InputError
+from cosim.core.units import KNOWN, parse
+from cosim.export.fmu.block import Block, BlockVariable
+from cosim.export.fmu.interface import check_block
+from cosim.export.fmu.model_description import model_description
 
 
 def variables(fmu):

@@ -13,13 +13,14 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from cosim.component import Variable
-from cosim.export import equations
-from cosim.export.block import Block
-from cosim.export.equations import ContinuousModel
-from cosim.units import parse
+from cosim.core import resources
+from cosim.core.component import Variable
+from cosim.core.units import parse
+from cosim.export.equations.fmu_code import as_block
+from cosim.export.equations.model import ContinuousModel, static_model
+from cosim.export.fmu.block import Block
 
-SHELL = Path(equations.__file__).parent / "shell"
+SHELL = resources.package_folder() / "export/shell"
 
 
 def oscillator() -> ContinuousModel:
@@ -77,15 +78,15 @@ class Compiled:
 
 @pytest.fixture
 def compiled(tmp_path: Path) -> Compiled:
-    return Compiled(equations.block(oscillator()), tmp_path)
+    return Compiled(as_block(oscillator()), tmp_path)
 
 
 def test_the_same_model_gives_the_same_text() -> None:
-    assert equations.block(oscillator()).files == equations.block(oscillator()).files
+    assert as_block(oscillator()).files == as_block(oscillator()).files
 
 
 def test_variables_lie_in_the_members_that_the_block_names() -> None:
-    members = {variable.name: variable.member for variable in equations.block(oscillator()).variables}
+    members = {variable.name: variable.member for variable in as_block(oscillator()).variables}
     assert members == {
         "stiffness": "parameter[0]",
         "initial.x": "parameter[1]",
@@ -127,7 +128,7 @@ def test_the_error_is_of_fourth_order(tmp_path: Path) -> None:
         model = oscillator()
         folder = tmp_path / str(sub_step)
         folder.mkdir()
-        compiled = Compiled(equations.block(ContinuousModel(**{**vars(model), "max_sub_step": sub_step})), folder)
+        compiled = Compiled(as_block(ContinuousModel(**{**vars(model), "max_sub_step": sub_step})), folder)
         compiled.initialize()
         compiled.step(1.0)
         return abs(compiled.model.output[0] - exact(1.0))
@@ -164,7 +165,7 @@ def test_projection_is_applied_after_each_sub_step(tmp_path: Path) -> None:
         lambda state, inputs, parameters: state[0],
         lambda state: state / ca.norm_2(state),
     )
-    compiled = Compiled(equations.block(model), tmp_path)
+    compiled = Compiled(as_block(model), tmp_path)
     compiled.initialize()
     compiled.step(1.0)
     assert math.hypot(*compiled.model.state) == pytest.approx(1.0, abs=1e-15)
@@ -179,8 +180,8 @@ def spring(tmp_path: Path) -> Compiled:
         Variable("force", causality="output", unit=parse("N")),
         Variable("pulls", "Boolean", "output", "discrete"),
     )
-    model = equations.static_model("spring", "Spring", variables, lambda x, k: ca.vertcat(-k * x, x > 0))
-    return Compiled(equations.block(model), tmp_path)
+    model = static_model("spring", "Spring", variables, lambda x, k: ca.vertcat(-k * x, x > 0))
+    return Compiled(as_block(model), tmp_path)
 
 
 def test_a_model_without_states_has_its_outputs_from_the_start(spring: Compiled) -> None:
@@ -244,7 +245,7 @@ OPERATIONS: list[tuple[ca.SX, Callable[[float, float], float]]] = [
 
 def test_exported_functions_compute_what_python_computes(tmp_path: Path) -> None:
     function = ca.Function("probe", [a, b], [ca.vertcat(*(expression for expression, _ in OPERATIONS))])
-    compiled = Compiled(equations.block(oscillator(), [function]), tmp_path)
+    compiled = Compiled(as_block(oscillator(), [function]), tmp_path)
     for x, y in ((0.7, 2.3), (-1.9, 0.4), (3.5, 3.5), (-2.0, -7.25)):
         found = compiled.call("probe", len(OPERATIONS), [x], [y])
         assert found == pytest.approx([float(python(x, y)) for _, python in OPERATIONS], rel=1e-15)
@@ -253,16 +254,16 @@ def test_exported_functions_compute_what_python_computes(tmp_path: Path) -> None
 def test_matrices_are_passed_by_columns(tmp_path: Path) -> None:
     matrix, vector = ca.SX.sym("m", 2, 2), ca.SX.sym("v", 2)
     function = ca.Function("multiply", [matrix, vector], [matrix @ vector])
-    compiled = Compiled(equations.block(oscillator(), [function]), tmp_path)
+    compiled = Compiled(as_block(oscillator(), [function]), tmp_path)
     assert compiled.call("multiply", 2, [1.0, 2.0, 3.0, 4.0], [10.0, 1.0]) == [13.0, 24.0]
 
 
 def test_structural_zeros_are_written(tmp_path: Path) -> None:
     function = ca.Function("sparse", [a], [ca.vertcat(a, 0, ca.SX(1, 1), a)])
-    compiled = Compiled(equations.block(oscillator(), [function]), tmp_path)
+    compiled = Compiled(as_block(oscillator(), [function]), tmp_path)
     assert compiled.call("sparse", 4, [2.0]) == [2.0, 0.0, 0.0, 2.0]
 
 
 def test_an_operation_without_counterpart_is_refused() -> None:
     with pytest.raises(ValueError, match=r"probe: CasADi operation .* cannot be written in C"):
-        equations.block(oscillator(), [ca.Function("probe", [a], [ca.erf(a)])])
+        as_block(oscillator(), [ca.Function("probe", [a], [ca.erf(a)])])

@@ -8,10 +8,10 @@ import pytest
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
-from cosim.component import Ports
-from cosim.errors import InputError
-from cosim.export.python_class import write_python_fmu
-from cosim.fmi import FmuFile, instantiate
+from cosim.components.fmi import FmuFile, instantiate
+from cosim.core.component import Ports
+from cosim.core.errors import InputError
+from cosim.export.foreign.python_class import write_python_fmu
 
 SOURCE = '''
 from types import SimpleNamespace

@@ -13,7 +13,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
-from cosim.export.package import write_fmu
+from cosim.export.fmu.package import write_fmu
 
 X = "vehicle.position.x"
 
@@ -300,7 +300,7 @@ def test_the_shells_compile_without_a_warning(block, version, tmp_path, monkeypa
 
 
 def test_the_sources_alone_build_the_same_binary(fmu, tmp_path):
-    from cosim.export.compiler import compile_library
+    from cosim.export.fmu.compiler import compile_library
 
     with ZipFile(fmu) as archive:
         archive.extractall(tmp_path)

@@ -10,7 +10,7 @@ from plant_fmu import PlantFmu
 from scipy.spatial.transform import Rotation
 from worlds import PLATFORM, PLATFORM_TOP, REST_HEIGHT, Trial, quadcopter
 
-from cosim.errors import InputError
+from cosim.core.errors import InputError
 from plant_src.world import World
 
 NAMES = ("xx", "yy", "zz", "xy", "xz", "yz")

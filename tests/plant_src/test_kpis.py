@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from mission_recording import SINK, STOP, TAKE_OFF, TOUCHDOWN, mission, replaced
 
-from cosim.errors import InputError
-from cosim.kpi import evaluate_kpis
+from cosim.core.errors import InputError
 from cosim.results import Result
+from cosim.results.kpi import evaluate_kpis
 from plant_src.kpis import final, landing, motors, tracking, waypoints
 
 DECK = {"vehicle": "plant.uav", "deck": "plant.usv.deck"}

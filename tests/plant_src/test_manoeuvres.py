@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import cosim
-from cosim import resources
-from cosim.errors import InputError
-from cosim.recording import Recording
+from cosim.core import resources
+from cosim.core.errors import InputError
+from cosim.core.recording import Recording
 from cosim.results import Result
 from plant_src.manoeuvres import initial_turning, stopping, turning_circle, zigzag
 

@@ -10,7 +10,7 @@ import pybullet
 import pytest
 from worlds import PLATFORM, Trial, quadcopter, vessel
 
-from cosim.errors import ComponentError, InputError
+from cosim.core.errors import ComponentError, InputError
 from plant_src.world import World
 
 UAV = quadcopter([0.0, 0.0, 2.0])

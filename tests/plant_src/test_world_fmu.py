@@ -16,7 +16,7 @@ from validation import Measured
 from worlds import Trial
 
 import cosim
-from cosim.export.python_class import write_python_fmu
+from cosim.export.foreign.python_class import write_python_fmu
 
 ROOT = Path(__file__).parents[2]
 DEMO = ROOT / "scenarios/demo1_box.json"

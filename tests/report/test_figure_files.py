@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from cosim.errors import ComponentError, InputError
-from cosim.recording import Recording
+from cosim.core.errors import ComponentError, InputError
+from cosim.core.recording import Recording
 from cosim.report.figures import STYLE, draw, draw_figures, save
 from cosim.results import Result
 

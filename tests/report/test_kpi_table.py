@@ -5,8 +5,8 @@ import math
 
 import pytest
 
-from cosim.kpi import evaluate_checks
 from cosim.report.tables import number_text, print_kpis
+from cosim.results.checks import evaluate_checks
 
 KPIS = {"landing.lateral_error": 0.0868369, "landing.landed_at_end": True, "waypoints.time[1]": math.nan, "landing.bounces": 2}
 UNITS = {"landing.lateral_error": "m", "waypoints.time[1]": "s"}

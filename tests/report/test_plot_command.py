@@ -7,8 +7,8 @@ from pathlib import Path
 from click.testing import CliRunner
 from test_runs import write
 
-from cosim.cli.plot import command
-from cosim.errors import InputError
+from cosim.cli.commands.plot import command
+from cosim.core.errors import InputError
 
 
 def plot(*arguments):

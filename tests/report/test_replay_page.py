@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cosim.recording import Recording
+from cosim.core.recording import Recording
 from cosim.report.diagram import WIDTH
 from cosim.report.html import write_report
 from cosim.report.replay import write_replay

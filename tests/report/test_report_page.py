@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from cosim import resources
 from cosim.api import load
-from cosim.cli.replay import command as replay
-from cosim.cli.report_page import command as report
-from cosim.cli.run import command as run
-from cosim.errors import InputError
-from cosim.recording import Recording
+from cosim.cli.commands.replay import command as replay
+from cosim.cli.commands.report import command as report
+from cosim.cli.commands.run import command as run
+from cosim.core import resources
+from cosim.core.errors import InputError
+from cosim.core.recording import Recording
 from cosim.report import pages
 from cosim.results import Result, write_run
 

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from cosim.errors import InputError
-from cosim.recording import Recording
+from cosim.core.errors import InputError
+from cosim.core.recording import Recording
 from cosim.report.runs import figures_of, read_run
 from cosim.results import Result, write_run
 

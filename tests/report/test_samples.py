@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 import pytest
 
-from cosim.recording import Recording
+from cosim.core.recording import Recording
 from cosim.report import samples
 from cosim.results import Result
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from cosim.api import load
-from cosim.errors import ComponentError, InputError
+from cosim.core.errors import ComponentError, InputError
+from cosim.core.resources import root
 from cosim.report.scene import scene_of
-from cosim.resources import root
 
 SHIPPED = sorted((root() / "scenarios").glob("*.json"))
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from cosim.errors import InputError
-from cosim.recording import Recording
+from cosim.core.errors import InputError
+from cosim.core.recording import Recording
 from cosim.report.figures import draw
 from cosim.report.timings import timings
 from cosim.results import Result

@@ -6,8 +6,8 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 
-from cosim.errors import CosimError, InputError
-from cosim.recording import Recording
+from cosim.core.errors import CosimError, InputError
+from cosim.core.recording import Recording
 from cosim.report.frames import Job, rendered
 from cosim.report.video import write_video
 from cosim.results import Result

@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from cosim.errors import InputError
-from cosim.recording import Recording
+from cosim.core.errors import InputError
+from cosim.core.recording import Recording
 from cosim.results.csv_files import read_csv, write_csv
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from cosim import kpis
-from cosim.kpi import kpi_senses, kpi_units
-from cosim.recording import Recording
+from cosim.core.recording import Recording
 from cosim.results import Result
+from cosim.results.kpi import kpi_senses, kpi_units
 
 TIME = np.arange(200_001) / 10_000  # 20 s
 TAU = 0.7

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import cosim
-from cosim.errors import ComponentError, InputError
-from cosim.kpi import evaluate_checks, evaluate_kpis, held_checks, kpi_units, units
-from cosim.recording import Recording
+from cosim.core.errors import ComponentError, InputError
+from cosim.core.recording import Recording
 from cosim.results import Result
+from cosim.results.checks import evaluate_checks, held_checks
+from cosim.results.kpi import evaluate_kpis, kpi_units, units
 
 RESULT = Result(Recording(np.array([0.0, 1.0, 2.0]), {"x": np.array([1.0, -4.0, 2.0])}, {"x": "m"}))
 

@@ -10,8 +10,8 @@ import sys
 import numpy as np
 import pytest
 
-from cosim.errors import InputError
-from cosim.recording import Recording
+from cosim.core.errors import InputError
+from cosim.core.recording import Recording
 from cosim.results import Result, mcap_files
 from cosim.results.mcap_files import poses, write_mcap
 

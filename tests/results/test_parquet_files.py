@@ -5,8 +5,8 @@ import sys
 import numpy as np
 import pytest
 
-from cosim.errors import InputError
-from cosim.recording import Recording
+from cosim.core.errors import InputError
+from cosim.core.recording import Recording
 from cosim.results import parquet_files
 from cosim.results.parquet_files import write_parquet
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.errors import InputError
-from cosim.kpi import held_checks
-from cosim.recording import Recording
+from cosim.core.errors import InputError
+from cosim.core.recording import Recording
 from cosim.results import Kpis, Result, write_run
+from cosim.results.checks import held_checks
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from cosim.api import load
-from cosim.errors import InputError
+from cosim.core.errors import InputError
 
 
 def scenario(folder, probe, **algorithm):

@@ -4,11 +4,11 @@ import pytest
 from test_refusals import refused
 
 import cosim
-from cosim.errors import ComponentError
+from cosim.core.errors import ComponentError
 
 OWN = """
-from cosim.component import Component, StepResult, Variable
-from cosim.units import parse
+from cosim.core.component import Component, StepResult, Variable
+from cosim.core.units import parse
 
 
 class Own(Component):
@@ -65,7 +65,7 @@ def test_a_sound_one_runs_with_what_it_does_not_need_left_out(folder, own):
         ("def get_outputs", "def outputs_of", 'it does not define "get_outputs"'),
         ("has_state = False", "has_state = True", 'it does not define "get_state"'),
         ("do_step(self, time, step_size)", "do_step(self, time)", '"do_step" does not take the arguments (time, step_size)'),
-        ('parse("N")', '"N"', "variable \"u\": unit is 'N', expected a cosim.units.Unit, such as parse('N')"),
+        ('parse("N")', '"N"', "variable \"u\": unit is 'N', expected a cosim.core.units.Unit, such as parse('N')"),
         ('"output", v', '"outptu", v', 'variable "y": causality is "outptu"; did you mean "output"?'),
         ('"continuous"', '"continous"', 'variable "y": variability is "continous"; did you mean "continuous"?'),
         ('Variable("y", ', 'Variable("u", ', 'variable "u" stands there 2 times'),

@@ -5,8 +5,8 @@ import pytest
 from helpers import run, system
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Integer, Real, String
 
-from cosim.errors import ComponentError
-from cosim.python_component import PythonSlave
+from cosim.components.python_class import PythonSlave
+from cosim.core.errors import ComponentError
 
 START = {Real: 0.0, Integer: 0, Boolean: False, String: ""}
 

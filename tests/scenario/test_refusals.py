@@ -5,8 +5,8 @@ import pytest
 from helpers import wire
 
 import cosim
-from cosim import resources
-from cosim.errors import did_you_mean
+from cosim.core import resources
+from cosim.core.errors import did_you_mean
 
 
 def lines(file, **more):
@@ -309,7 +309,7 @@ def test_a_name_is_the_name_of_a_folder(folder):
 
 
 FUNCTIONS = """
-from cosim.kpi import Prefix, Signal
+from cosim.results.kpi import Prefix, Signal
 
 def good(result, signal, limit=1.0): ...
 

@@ -4,7 +4,7 @@ import pytest
 from helpers import wire
 
 import cosim
-from cosim.timing import exact
+from cosim.core.time_grid import exact
 
 WHOLE_PLANT = """
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real

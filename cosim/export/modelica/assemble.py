@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from ...component import Causality, Variability
-from ..block import Block, BlockVariable
-from .constants import inline_constants
-from .emit import emit
-from .flat import Model, Variable, refuse
-from .folded import check_folding
-from .front import Sources, flatten
-from .header import members
-from .interpret import Interpreter
-from .matching import is_input
-from .reader import Reader
-from .states import with_states
+from ...core.component import Causality, Variability
+from ..fmu.block import Block, BlockVariable
+from .c_code.emit import emit
+from .c_code.header import members
+from .causality.continuous_states import with_states
+from .causality.interpreter import Interpreter
+from .causality.matching import is_input
+from .frontend.constants import inline_constants
+from .frontend.folded_branches import check_folding
+from .frontend.reader import Reader
+from .frontend.rumoca import Sources, flatten
+from .model.flat_model import Model, Variable, refuse
 
 _FMI_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 _DEFAULT_STEP = 0.01

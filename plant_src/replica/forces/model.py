@@ -6,12 +6,13 @@ from collections.abc import Callable, Sequence
 
 import casadi as ca
 
-from cosim.component import Variable
-from cosim.export.block import Block
-from cosim.export.equations import block, static_model
-from cosim.units import parse
+from cosim.core.component import Variable
+from cosim.core.units import parse
+from cosim.export.equations.fmu_code import as_block
+from cosim.export.equations.model import static_model
+from cosim.export.fmu.block import Block
 
-from ...vehicles.interface import scalar, vector
+from ...vehicles.common.interface import scalar, vector
 
 #: inputs: the vessel's motion as the bus has it, the paper's equation 11
 VESSEL = (
@@ -44,4 +45,4 @@ def force_model(
     identifier: str, description: str, variables: Sequence[Variable], loads: Callable[[ca.SX, ca.SX], ca.SX]
 ) -> Block:
     """The block of a force model; `loads` maps inputs and parameters to outputs, each in the order of `variables`."""
-    return block(static_model(identifier, description, variables, loads))
+    return as_block(static_model(identifier, description, variables, loads))

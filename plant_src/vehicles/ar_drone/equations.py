@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from cosim.export.block import Block
+from cosim.export.fmu.block import Block
 
-from .. import multirotor
+from ..multirotor import multirotor_equations
 from .parameters import AIRFRAME
 
 
 def block() -> Block:
     """The quadcopter in free flight."""
-    return multirotor.block(AIRFRAME, "AR.Drone 2.0 quadcopter in free flight")
+    return multirotor_equations.block(AIRFRAME, "AR.Drone 2.0 quadcopter in free flight")

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..shapes import Box, quaternion
+from ..common.shapes import Box, quaternion
 from .parameters import AIRFRAME, CENTRE_OF_MASS
 
 #: bottom of the motor cylinders, on which the vehicle stands, and top of the hull, from the origin of the model's frame (m)

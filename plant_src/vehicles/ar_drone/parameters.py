@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..airframe import Airframe, Rotor
+from ..multirotor.airframe import Airframe, Rotor
 
 #: body and four propellers [model]: 0.4038924 kg + 4 * 0.010 kg, as summed there (kg)
 MASS = 0.443892

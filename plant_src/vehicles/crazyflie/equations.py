@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from cosim.export.block import Block
+from cosim.export.fmu.block import Block
 
-from .. import multirotor
+from ..multirotor import multirotor_equations
 from .parameters import AIRFRAME
 
 
 def block() -> Block:
     """The nano quadcopter in free flight."""
-    return multirotor.block(AIRFRAME, "Crazyflie 2.x nano quadcopter in free flight")
+    return multirotor_equations.block(AIRFRAME, "Crazyflie 2.x nano quadcopter in free flight")

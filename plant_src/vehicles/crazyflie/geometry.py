@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..shapes import Box, standing_box
+from ..common.shapes import Box, standing_box
 from .parameters import AIRFRAME
 
 #: distance of the motor mounts, on which it stands, along x and y: the rotors' [pybullet-drones] (m)

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from ..airframe import Airframe, Effects, Rotor
+from ..multirotor.airframe import Airframe, Effects, Rotor
 
 #: with battery [pybullet-drones, bitcraze] (kg)
 MASS = 0.027

@@ -5,14 +5,16 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from cosim.export.block import Block
-from cosim.export.equations import ContinuousModel
-from cosim.export.equations import block as as_block
+from cosim.export.equations.fmu_code import as_block
+from cosim.export.equations.model import ContinuousModel
+from cosim.export.fmu.block import Block
 
-from .. import kinematics, shadow_floating, vessel, vessel_model
-from ..interface import AFLOAT_STATES
-from ..vessel import Frame, Hull, Named, Situation, at, shift
-from ..waves import Footprint
+from ..common import kinematics
+from ..common.interface import AFLOAT_STATES
+from ..vessel import floating_maps, vessel_equations
+from ..vessel import hull as vessel
+from ..vessel.hull import Frame, Hull, Named, Situation, at, shift
+from ..vessel.wave_loads import Footprint
 from . import hydrostatics
 from . import parameters as p
 from .geometry import BODY
@@ -35,7 +37,7 @@ def prepare(parameters: Named) -> Named:
     water = hydrostatics.hydrostatics(mass, centre)
     load = ca.vertcat(0, 0, -payload * p.GRAVITY)
     constants = {
-        **vessel_model.initial(parameters),
+        **vessel_equations.initial(parameters),
         "mass": mass,
         "centre": centre,
         "inertia": inertia,
@@ -51,7 +53,7 @@ def prepare(parameters: Named) -> Named:
         "payload_position": place,
         "propeller_time_constant": parameters["propeller_time_constant"],
         "wave.count": parameters["wave.count"],
-        "sea": vessel_model.sea_of(parameters, _footprint(water.footprint)),
+        "sea": vessel_equations.sea_of(parameters, _footprint(water.footprint)),
     }
     return constants | {"rest": _rest(constants)}
 
@@ -167,10 +169,10 @@ class SampledShafts(ContinuousModel):
         return ca.vertcat(end[:first], shafts + ca.fmin(1, ca.if_else(lag > 0, step / lag, 1)) * (commands - shafts))
 
 
-VESSEL = vessel_model.Vessel("otter", "Maritime Robotics Otter with a landing deck, afloat", VARIABLES, prepare, hull, SHAFTS)
+VESSEL = vessel_equations.Vessel("otter", "Maritime Robotics Otter with a landing deck, afloat", VARIABLES, prepare, hull, SHAFTS)
 
 
 def block() -> Block:
     """The Otter on open water."""
     model = VESSEL.model(SampledShafts, max_sub_step=0.01)
-    return as_block(model, shadow_floating.FloatingBody(model, VESSEL, BODY).functions())
+    return as_block(model, floating_maps.FloatingBody(model, VESSEL, BODY).functions())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..shapes import Body, Box
+from ..common.shapes import Body, Box
 from .parameters import (
     DECK_CENTRE,
     DECK_SIZE,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..vessel import shift
+from ..vessel.hull import shift
 from . import parameters as p
 
 

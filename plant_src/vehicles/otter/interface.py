@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from cosim.component import Variable
-from cosim.units import parse
+from cosim.core.component import Variable
+from cosim.core.units import parse
 
-from ..interface import AFLOAT, CONTACT, CURRENT, DECK, EXTERNAL_LOADS, MOTION, WAVE_GAIN, WAVES, WIND, initial
+from ..common.interface import AFLOAT, CONTACT, CURRENT, DECK, EXTERNAL_LOADS, MOTION, WAVE_GAIN, WAVES, WIND, initial
 
 PROPELLER_SPEED = Variable(
     "propeller_speed",

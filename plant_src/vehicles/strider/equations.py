@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import casadi as ca
 
-from cosim.export.block import Block
-from cosim.export.equations import ContinuousModel
-from cosim.export.equations import block as as_block
+from cosim.export.equations.fmu_code import as_block
+from cosim.export.equations.model import ContinuousModel
+from cosim.export.fmu.block import Block
 
-from .. import kinematics, shadow_maps
-from ..elementary import arctangent, sine_and_cosine, sine_of_quarter
+from ..common import contact_maps, kinematics
+from ..common.elementary_functions import arctangent, sine_and_cosine, sine_of_quarter
 from . import parameters as p
 from .geometry import DECK_CENTRE
 from .interface import STATES, VARIABLES
@@ -84,5 +84,5 @@ def block() -> Block:
         lambda state, inputs, parameters: rate(state, inputs),
         lambda state, inputs, parameters: ca.vertcat(observe(state), ca.SX.zeros(3)),
     )
-    shadow = shadow_maps.PlanarBody(model, p.MASS, p.INERTIA[2], p.CENTRE_OF_MASS_HEIGHT, observe)
+    shadow = contact_maps.PlanarBody(model, p.MASS, p.INERTIA[2], p.CENTRE_OF_MASS_HEIGHT, observe)
     return as_block(model, shadow.functions())

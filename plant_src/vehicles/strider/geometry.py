@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..shapes import Body, Box
+from ..common.shapes import Body, Box
 from .parameters import CENTRE_OF_MASS_HEIGHT, DECK_TOP, DECK_X, DECK_Y, INERTIA, MASS
 
 #: centre of the top of the landing deck (m)

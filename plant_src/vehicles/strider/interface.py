@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..interface import CONTACT, CURRENT, DECK, EXTERNAL_LOADS, MOTION, WIND, initial, scalar
+from ..common.interface import CONTACT, CURRENT, DECK, EXTERNAL_LOADS, MOTION, WIND, initial, scalar
 
 THRUST = scalar("thrust", "N", "thrust along the body's x axis, at the height and lateral position of the centre of mass")
 RUDDER_ANGLE = scalar("rudder_angle", "rad", "rudder deflection; positive: trailing edge and bow to starboard, yaw decreases")

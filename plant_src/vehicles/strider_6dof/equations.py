@@ -5,15 +5,15 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from cosim.export.block import Block
-from cosim.export.equations import block as as_block
+from cosim.export.equations.fmu_code import as_block
+from cosim.export.fmu.block import Block
 
-from .. import shadow_floating, vessel_model
 from ..strider.equations import air_drag, hull_loads, rudder_loads
 from ..strider.geometry import DECK_CENTRE
 from ..strider.parameters import CENTRE_OF_MASS_HEIGHT, INERTIA, MASS
-from ..vessel import Hull, Named, Situation, at
-from ..waves import Footprint
+from ..vessel import floating_maps, vessel_equations
+from ..vessel.hull import Hull, Named, Situation, at
+from ..vessel.wave_loads import Footprint
 from . import parameters as p
 from .geometry import BODY
 from .interface import VARIABLES
@@ -29,11 +29,11 @@ def prepare(parameters: Named) -> Named:
     """What the equations need of the parameters."""
     share = parameters["hydrodynamics"]
     return {
-        **vessel_model.initial(parameters),
+        **vessel_equations.initial(parameters),
         "hydrodynamics": share,
         "inverse": ca.inv(_RIGID_BODY + share * ca.SX(p.ADDED_MASS)),
         "wave.count": parameters["wave.count"],
-        "sea": vessel_model.sea_of(parameters, _FOOTPRINT),
+        "sea": vessel_equations.sea_of(parameters, _FOOTPRINT),
     }
 
 
@@ -100,10 +100,12 @@ def in_plane(load: ca.SX, height: float) -> ca.SX:
     return ca.vertcat(load[0:2], 0, -height * load[1], height * load[0], load[2])
 
 
-VESSEL = vessel_model.Vessel("strider_6dof", "Strider V1.0 catamaran afloat, in six degrees of freedom", VARIABLES, prepare, hull)
+VESSEL = vessel_equations.Vessel(
+    "strider_6dof", "Strider V1.0 catamaran afloat, in six degrees of freedom", VARIABLES, prepare, hull
+)
 
 
 def block() -> Block:
     """The catamaran on open water."""
     model = VESSEL.model()
-    return as_block(model, shadow_floating.FloatingBody(model, VESSEL, BODY).functions())
+    return as_block(model, floating_maps.FloatingBody(model, VESSEL, BODY).functions())

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from cosim.export.block import Block
+from cosim.export.fmu.block import Block
 
-from .. import multirotor
+from ..multirotor import multirotor_equations
 from .parameters import AIRFRAME
 
 
 def block() -> Block:
     """The survey hexacopter in free flight."""
-    return multirotor.block(AIRFRAME, "Survey hexacopter of the class of the Tarot FY680 in free flight")
+    return multirotor_equations.block(AIRFRAME, "Survey hexacopter of the class of the Tarot FY680 in free flight")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..shapes import Box, standing_box
+from ..common.shapes import Box, standing_box
 from .parameters import AIRFRAME
 
 #: distance of the landing skids' ends along x and y, assumed: the skids of this class of frame (m)

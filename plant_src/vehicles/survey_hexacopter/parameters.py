@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from ..airframe import Airframe, Effects, Rotor
+from ..multirotor.airframe import Airframe, Effects, Rotor
 
 #: of the motors from the middle [eagle] (m)
 ARM = 0.68 / 2

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.export.block import Block, BlockVariable
+from cosim.export.fmu.block import Block, BlockVariable
 from cosim.export.modelica import interpreter, load
-from cosim.export.modelica.interpret import Interpreter
+from cosim.export.modelica.causality.interpreter import Interpreter
 
 CTYPES = {"Float64": ctypes.c_double, "Int32": ctypes.c_int32, "Enumeration": ctypes.c_int32, "Boolean": ctypes.c_bool}
 GCC = ["gcc", "-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-pedantic", "-fPIC", "-shared"]

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from cosim.errors import InputError
-from cosim.export.modelica import front, load
+from cosim.core.errors import InputError
+from cosim.export.modelica import load
+from cosim.export.modelica.frontend import rumoca
 
 PACKAGE = """package Lib
   constant Real Ts = 0.01;
@@ -112,7 +113,7 @@ def test_a_missing_model_and_a_missing_file(folder, write):
 
 
 def test_another_version_of_the_front_end_is_refused(folder, monkeypatch):
-    monkeypatch.setattr(front, "RUMOCA_VERSION", "0.9.0")
+    monkeypatch.setattr(rumoca, "RUMOCA_VERSION", "0.9.0")
     with pytest.raises(InputError, match=r"rumoca 0.10.2 is installed, but only 0.9.0 is known to work"):
         load(folder / "Top.mo")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cosim.errors import InputError
+from cosim.core.errors import InputError
 from cosim.export.modelica import load
 
 TICKS = 500

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cosim.errors import InputError
+from cosim.core.errors import InputError
 from cosim.export.modelica import load
 
 CASES = {
@@ -149,8 +149,8 @@ end M;""")
 
 
 def test_a_for_equation_that_does_not_fit_its_placeholders_is_refused(write):
-    from cosim.export.modelica.front import flatten
-    from cosim.export.modelica.reader import Reader
+    from cosim.export.modelica.frontend.reader import Reader
+    from cosim.export.modelica.frontend.rumoca import flatten
 
     path = write("""model M
   output Real x[4];
@@ -167,8 +167,8 @@ end M;""")
 
 
 def test_unknown_json_is_refused_not_dropped():
-    from cosim.export.modelica.front import Sources
-    from cosim.export.modelica.reader import Reader
+    from cosim.export.modelica.frontend.reader import Reader
+    from cosim.export.modelica.frontend.rumoca import Sources
 
     reader = Reader({"enum_literal_ordinals": {}}, Sources.of([]))
     with pytest.raises(InputError, match="the expression Quantum is not supported"):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from cosim.errors import ComponentError
+from cosim.core.errors import ComponentError
 
 TICKS = 500
 

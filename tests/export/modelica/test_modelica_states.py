@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from cosim.errors import ComponentError
+from cosim.core.errors import ComponentError
 from cosim.export.modelica import load
 
 PENDULUM = """model Pendulum

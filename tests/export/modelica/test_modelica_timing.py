@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cosim.errors import ComponentError
+from cosim.core.errors import ComponentError
 
 COUNTER = """model Counter
   parameter Real Ts(unit = "s") = 0.01;

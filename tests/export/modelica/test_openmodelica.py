@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from cosim.errors import InputError
-from cosim.export.modelica.omc import export_with_omc
+from cosim.core.errors import InputError
+from cosim.export.modelica.frontend.openmodelica import export_with_omc
 
 MODEL = "model M\n  output Real x;\nequation\n  der(x) = 1;\nend M;\n"
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.component import Ports
+from cosim.core.component import Ports
 from plant_src.sensors.signals import SignalComponent
 
 STEP = 0.01  # s

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sensor_trial import SensorTrial, configured
 
-from cosim.errors import InputError
+from cosim.core.errors import InputError
 from plant_src.sensors.gnss import Gnss
 
 NOISES = ("horizontal_noise", "vertical_noise", "horizontal_drift", "vertical_drift", "velocity_noise")

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from sensor_trial import STEP, SensorTrial, configured, quaternion
 
-from cosim.errors import InputError
+from cosim.core.errors import InputError
 from plant_src.sensors.imu import Imu
 
 AXES = [*(f"acceleration.{axis}" for axis in "xyz"), *(f"rates.{axis}" for axis in "pqr")]

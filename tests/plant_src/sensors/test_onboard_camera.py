@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from sensor_trial import SensorTrial, configured
 
-from cosim.errors import InputError
+from cosim.core.errors import InputError
 from plant_src.sensors.camera import Camera
 
 WIDTH, HEIGHT, ANGLE = 160, 120, 0.8

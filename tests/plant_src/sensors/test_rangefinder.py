@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from sensor_trial import SensorTrial, configured, quaternion
 
-from cosim.errors import InputError
+from cosim.core.errors import InputError
 from plant_src.sensors.rangefinder import Rangefinder
 from plant_src.vehicles.strider.parameters import DECK_X
 from plant_src.world import World

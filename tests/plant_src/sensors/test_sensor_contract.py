@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from sensor_trial import SensorTrial, configured
 
-from cosim.errors import ComponentError, InputError
+from cosim.core.errors import ComponentError, InputError
 from plant_src.sensors.barometer import Barometer
 from plant_src.sensors.deck_tracker import DeckTracker
 from plant_src.sensors.fault import SignalFault

@@ -3,10 +3,10 @@
 import numpy as np
 
 import cosim
-from cosim.component import Component
-from cosim.simulate import Event, Settings, simulate
-from cosim.system import Connection, Endpoint, System
-from cosim.timing import exact
+from cosim.core.component import Component
+from cosim.core.system import Connection, Endpoint, System
+from cosim.core.time_grid import exact
+from cosim.engine.run_loop import Event, Settings, simulate
 from plant_src.sensors.fault import SignalFault
 from plant_src.sensors.gnss import Gnss
 from plant_src.sensors.navigation import Navigation

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sensor_trial import SensorTrial
 
-from cosim.errors import ComponentError, InputError
+from cosim.core.errors import ComponentError, InputError
 from plant_src.sensors.fault import SignalFault
 
 

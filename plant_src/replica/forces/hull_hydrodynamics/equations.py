@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from cosim.export.block import Block
+from cosim.export.fmu.block import Block
 
 from ....vehicles.strider import parameters as p
 from ..model import VESSEL, force_model, load, parameter, planar_velocity

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import casadi as ca
 
-from cosim.component import Variable
-from cosim.export.block import Block
-from cosim.units import parse
+from cosim.core.component import Variable
+from cosim.core.units import parse
+from cosim.export.fmu.block import Block
 
 from ....vehicles.ar_drone.parameters import THRUST_COEFFICIENT, TORQUE_COEFFICIENT
 from ..model import force_model, parameter

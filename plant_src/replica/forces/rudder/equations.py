@@ -10,9 +10,9 @@ import sys
 
 import casadi as ca
 
-from cosim.export.block import Block
+from cosim.export.fmu.block import Block
 
-from ....vehicles.interface import scalar, vector
+from ....vehicles.common.interface import scalar, vector
 from ....vehicles.strider import parameters as p
 from ..model import VESSEL, force_model, parameter, planar_velocity
 

@@ -1,0 +1,1 @@
+"""Commands of `cosim`, one file each."""

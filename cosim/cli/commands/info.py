@@ -1,0 +1,61 @@
+"""`cosim info`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ...core.component import Variable
+
+
+@click.command()
+@click.argument("fmu", type=click.Path(path_type=Path))
+@click.option("--locals", "with_locals", is_flag=True, help="List local variables too.")
+def command(fmu: Path, with_locals: bool) -> None:
+    """Print what FMU says about itself: version, capabilities, platforms and variables."""
+    from ...components.fmi import FmuFile
+
+    file = FmuFile(fmu)
+    about = file.description
+    experiment = about.default_experiment
+    abilities = {
+        "state can be saved and restored": about.has_state,
+        "one instance per process": about.only_once_per_process,
+        "needs an external tool": about.needs_execution_tool,
+    }
+    rows = {
+        "model": about.model_name,
+        "description": about.description,
+        "FMI version": f"{about.fmi_version} Co-Simulation",
+        "made by": about.generation_tool,
+        "platforms": ", ".join(about.platforms),
+        "step size": f"{float(experiment.step_size):g} s" if experiment.step_size else "",
+        "stop time": f"{float(experiment.stop_time):g} s" if experiment.stop_time else "",
+        "capabilities": ", ".join(name for name, has in abilities.items() if has),
+        "sha256": file.sha256,
+    }
+    for name, value in rows.items():
+        if value:
+            click.echo(f"{name:13} {value}")
+    groups = ["input", "output", "structuralParameter", "parameter", "calculatedParameter", *(["local"] if with_locals else [])]
+    for causality in groups:
+        _list(causality, [v for v in about.variables if v.causality == causality])
+
+
+def _list(causality: str, variables: list[Variable]) -> None:
+    if not variables:
+        return
+    click.echo(f"\n{causality}s ({len(variables)})")
+    width = min(40, max(len(variable.name) for variable in variables))
+    for variable in variables:
+        dimensions = f"[{','.join(map(str, variable.shape))}]" if variable.shape else ""
+        unit = variable.unit.name if variable.unit else "-"
+        start = "" if variable.start is None else f" = {_shortened(variable.start)}"
+        start += "".join(f", {number}: {name}" for name, number in variable.items).replace(", ", "; ", 1)
+        click.echo(f"  {variable.name:{width}} {variable.type + dimensions:12} {unit:8} {variable.description}{start}".rstrip())
+
+
+def _shortened(start: object) -> str:
+    text = str(start)
+    return text if len(text) <= 40 else text[:37] + "..."

@@ -1,0 +1,120 @@
+"""`cosim new`: a controller of one's own that runs at once, to be changed from there."""
+
+from __future__ import annotations
+
+import keyword
+import re
+import shlex
+import shutil
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from ...core import resources
+from ...core.errors import InputError, Problem, did_you_mean
+
+TEMPLATES = Path(__file__).parents[1] / "templates"
+#: what the templates are called: they are valid programs, in which a new controller's name replaces this one
+_SNAKE, _CAMEL = "speed_keeper", "SpeedKeeper"
+_TYPES = ("Real", "Integer", "Boolean", "String")
+_PICTURES, _PLANT = "pictures.py", "fmus/strider.fmu"
+
+
+@dataclass(frozen=True, slots=True)
+class Language:
+    """Where a language's template lies, and what in it a scenario (`key`: `component`) and `cosim build` have to name."""
+
+    folder: Path
+    key: str
+    component: str
+    source: str
+
+
+LANGUAGES = {
+    "python": Language(TEMPLATES / "python", "python", f"{_SNAKE}.py:{_CAMEL}", f"{_SNAKE}.py"),
+    "modelica": Language(TEMPLATES / "modelica", "modelica", f"{_CAMEL}.mo:{_CAMEL}", f"{_CAMEL}.mo"),
+    "c": Language(resources.root() / "controllers/c" / _SNAKE, "fmu", f"{_SNAKE}.fmu", "."),
+}
+
+
+@click.group()
+def command() -> None:
+    """Begin something of your own."""
+
+
+@command.command()
+@click.argument("name")
+@click.option("--language", required=True, help=f"{', '.join(LANGUAGES)}.")
+@click.option("--directory", type=click.Path(path_type=Path), default=Path(), help="Where the folder NAME goes; default: here.")
+@click.option("--force", is_flag=True, help="Overwrite files.")
+def controller(name: str, language: str, directory: Path, force: bool) -> None:
+    """Make the folder NAME with a vessel autopilot and a scenario in which it keeps a speed and a course.
+
+    The scenario checks that it does. Change the controller from there, and run the scenario again.
+    """
+    if language not in LANGUAGES:
+        raise InputError(f'there is no language "{language}"{did_you_mean(language, LANGUAGES)}')
+    chosen = LANGUAGES[language]
+    template = _template(chosen)
+    names = _names(name, template.values())
+    folder = directory / names[_SNAKE]
+    files = {folder / _replaced(file, names): _replaced(text, names) for file, text in template.items()}
+    files[folder / f"{names[_SNAKE]}.json"] = _scenario(chosen, names)
+    files[folder / _PICTURES] = (TEMPLATES / "vessel" / _PICTURES).read_text()
+    _write(files, folder / _PLANT, force)
+    _say_what_is_next(chosen, folder, names)
+
+
+def _template(language: Language) -> dict[str, str]:
+    """The files of a template: name -> text."""
+    return {path.name: path.read_text() for path in sorted(language.folder.iterdir()) if path.is_file()}
+
+
+def _names(name: str, texts: Iterable[str]) -> dict[str, str]:
+    """The template's names -> the controller's, as a file and as a class. Refuses names that some language cannot take."""
+    from ...export.sources import snake_case
+
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        raise InputError(f'"{name}" is no name of a controller: expected a letter, then letters, digits and underscores')
+    snake = snake_case(name)
+    camel = "".join(word[:1].upper() + word[1:] for word in snake.split("_"))
+    taken = {*_TYPES, *(word for text in texts for word in re.findall(r"\w+", text))} - {_CAMEL}
+    modules = {*sys.stdlib_module_names, "pythonfmu", Path(_PICTURES).stem}
+    if camel in taken or snake in modules or keyword.iskeyword(snake) or keyword.iskeyword(camel):
+        raise InputError(f'"{name}" means something else already; choose another name')
+    return {_SNAKE: snake, _CAMEL: camel}
+
+
+def _replaced(text: str, names: Mapping[str, str]) -> str:
+    return re.sub("|".join(names), lambda match: names[match[0]], text)
+
+
+def _scenario(language: Language, names: Mapping[str, str]) -> str:
+    marks = {"SOURCE": language.key, "FILE": _replaced(language.component, names)}
+    return _replaced((TEMPLATES / "scenario.json").read_text(), {**names, **marks})
+
+
+def _write(files: Mapping[Path, str], plant: Path, force: bool) -> None:
+    present = [path for path in (*files, plant) if path.exists()]
+    if present and not force:
+        raise InputError([Problem("exists; --force overwrites it", str(path)) for path in present])
+    for path, text in files.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        click.echo(path)
+    plant.parent.mkdir(exist_ok=True)
+    shutil.copyfile(resources.root() / _PLANT, plant)
+    click.echo(plant)
+
+
+def _say_what_is_next(language: Language, folder: Path, names: Mapping[str, str]) -> None:
+    name = names[_SNAKE]
+    run = shlex.join(["cosim", "run", str(folder / f"{name}.json")])
+    source, fmu = folder / _replaced(language.source, names), folder / f"{name}.fmu"
+    build = shlex.join(["cosim", "build", str(source), "--output", str(fmu)])
+    click.echo(
+        f"\nBuild and run it:\n  {build}\n  {run}" if language.key == "fmu" else f"\nRun it:\n  {run}\nAs an FMU:\n  {build}"
+    )

@@ -1,0 +1,50 @@
+"""`cosim plot`: pictures of finished runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..progress import progress_bar
+
+FORMATS = ("png", "svg")
+
+
+@click.command()
+@click.argument("results", nargs=-1, required=True, metavar="RESULT...", type=click.Path(path_type=Path))
+@click.option("--output-dir", type=click.Path(path_type=Path), help="Where pictures go; default: beside the result.")
+@click.option("--format", "formats", multiple=True, type=click.Choice(FORMATS), default=FORMATS, help="Default: both.")
+@click.option("--timings", is_flag=True, help="Also draw the real-time factors of all RESULTs side by side.")
+@click.option("--video", is_flag=True, help='Also render a video of each run, CAMERA.mp4 (extra "video").')
+@click.option("--camera", default="chase", help="Where the video is seen from: overview, chase (default), deck or landing.")
+def command(
+    results: tuple[Path, ...], output_dir: Path | None, formats: tuple[str, ...], timings: bool, video: bool, camera: str
+) -> None:
+    """Draw the figures of RESULTs again: folders that `cosim run` wrote.
+
+    Each figure of the scenario becomes NAME.png and NAME.svg, with the numbers behind it in NAME.csv. With several RESULTs,
+    each has a folder of its own in the output directory; the figure of --timings stands beside these folders.
+    """
+    from ...report.figures import draw_figures
+    from ...report.runs import figures_of, read_run
+    from ...report.timings import timings as draw_timings
+    from ...report.video import write_video
+
+    suffixes = [f".{name}" for name in formats]
+    runs = {directory: read_run(directory) for directory in results}
+    for directory, result in runs.items():
+        target = directory if output_dir is None else output_dir / directory.name if len(runs) > 1 else output_dir
+        _report(draw_figures(result, figures_of(result), target, suffixes, numbers=True))
+        if video:
+            with progress_bar(f"{camera}.mp4") as progress:
+                file = write_video(result, target / f"{camera}.mp4", camera, progress=progress)
+            _report([file])
+    if timings:
+        figure = ("timings", draw_timings, {"others": list(runs.values())[1:]})
+        _report(draw_figures(next(iter(runs.values())), [figure], output_dir or results[0].parent, suffixes, numbers=True))
+
+
+def _report(files: list[Path]) -> None:
+    for path in files:
+        click.echo(path)

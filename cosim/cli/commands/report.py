@@ -1,0 +1,31 @@
+"""`cosim report`: the page about a finished run, made again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("result", type=click.Path(path_type=Path))
+@click.option("--output-file", type=click.Path(path_type=Path), help="Default: report.html in the folder of RESULT.")
+@click.option("--open", "shall_open", is_flag=True, help="Show the page in the browser.")
+def command(result: Path, output_file: Path | None, shall_open: bool) -> None:
+    """Make the page about RESULT again, a folder that `cosim run` wrote: KPIs, figures, system, 3-D replay.
+
+    The page is one file and needs no network.
+    """
+    from ...report.figures import draw, svg
+    from ...report.html import write_report
+    from ...report.runs import figures_of, read_run
+    from ...results.checks import evaluate_checks
+
+    run, target = read_run(result), output_file or result / "report.html"
+    checks = run.metadata.get("scenario", {}).get("checks", [])
+    outcomes = evaluate_checks(run.kpis, [check for check in checks if check["kpi"] in run.kpis])
+    pictures = {name: svg(draw(run, name, function, arguments)) for name, function, arguments in figures_of(run)}
+    write_report(run, outcomes, pictures, target)
+    click.echo(target)
+    if shall_open:
+        click.launch(str(target.absolute()))

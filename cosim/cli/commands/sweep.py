@@ -1,0 +1,120 @@
+"""`cosim sweep`: a scenario, run at every point of a design."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ...core.errors import CosimError, InputError
+from .. import study_options
+
+if TYPE_CHECKING:
+    from ...studies.execution.run_store import Ledger
+    from ...studies.summary.files import Summary
+    from ...studies.summary.statistics import Group
+    from ...studies.sweep import Sweep
+
+#: so many groups and causes are printed; the files hold all of them
+_SHOWN = 20
+
+
+@click.command()
+@click.argument("sweep")
+@click.option("--output-dir", type=click.Path(path_type=Path), help="Where results go; default: runs/NAME.")
+@click.option("--parquet", is_flag=True, help="Write table.parquet too (extra `parquet`).")
+@click.option("--replays", is_flag=True, help="Write the 3-D replay of one run of every cell of the maps, too.")
+@study_options.options
+def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, **where: Any) -> int:
+    """Run SWEEP, a JSON file or the name of a shipped sweep.
+
+    Every run has a child process of its own. Writes table.csv (one row per run), aggregates.csv, success.csv, failures.csv,
+    sweep.json, sweep.html and maps of success to the output directory. A sweep that was interrupted or killed goes on where it
+    was when it is called again. Exit code 0: all runs were made; 1: some failed; 2: the sweep was refused; 130: interrupted,
+    what was finished is written.
+    """
+    from ...results.parquet_files import require_parquet
+    from ...studies.sweep import Sweep
+
+    if parquet:
+        require_parquet()
+    read = Sweep.of(sweep)
+    folder = output_dir or Path("runs") / read.read.spec.name
+    with study_options.ledger(folder, where.pop("retry_failed")) as ledger:
+        return _run(read, ledger, folder, parquet, replays, **where)
+
+
+def _run(
+    sweep: Sweep, ledger: Ledger, folder: Path, parquet: bool, replays: bool, workers: int | None, scheduler: str | None
+) -> int:
+    from ...process.supervisor import polite_ends
+    from ...studies.summary.files import write
+
+    began, interrupted = time.monotonic(), False
+    done = sum(key in ledger for key in sweep.keys)
+    if done < len(sweep):
+        try:
+            with (
+                polite_ends(),
+                study_options.progress(len(sweep)) as progress,
+                study_options.engine(sweep.study, workers, scheduler) as engine,
+            ):
+                progress.begin(done)
+                sweep.run(ledger, engine, progress)
+        except KeyboardInterrupt:
+            interrupted = True
+        except CosimError as error:
+            if error.exit_code != InputError.exit_code:
+                write(sweep, ledger, folder, parquet)
+            raise
+    if not interrupted:
+        sweep.check_names(ledger)
+    summary = write(sweep, ledger, folder, parquet)
+    _draw(sweep, ledger, summary, folder, replays and not interrupted, workers)
+    _print(sweep, summary)
+    made = f"{summary.finished - done} made now in {study_options.duration(time.monotonic() - began)}"
+    click.echo(f"{summary.finished} of {len(sweep)} runs, {made}, {summary.failed} failed; table.csv and others in {folder}")
+    if interrupted:
+        raise KeyboardInterrupt
+    return 1 if summary.failed else 0
+
+
+def _draw(sweep: Sweep, ledger: Ledger, summary: Summary, folder: Path, replays: bool, workers: int | None) -> None:
+    """Maps, replays of their cells, and the page."""
+    from ...studies.summary.page import write_page
+    from ...studies.summary.replays import write_replays
+    from ...studies.summary.success_map import success_maps
+
+    maps = success_maps(sweep, sweep.rows(ledger))
+    if replays:
+        runs = [cell.shown.number for each in maps for cell in each.cells.values() if cell.shown]
+        for run, cause in write_replays(sweep, runs, folder, workers or study_options.processors()).items():
+            click.echo(f"no replay of run {run}: {cause}", err=True)
+    write_page(sweep, summary, maps, folder)
+
+
+def _print(sweep: Sweep, summary: Summary) -> None:
+    if not summary.groups:
+        return
+    numbers = summary.groups[0].statistics()
+    kpis = [[name, *(f"{found[key]:.4g}" for key in ("mean", "std", "min", "median", "max"))] for name, found in numbers]
+    if kpis:
+        study_options.print_table(["KPI", "mean", "std", "min", "median", "max"], kpis)
+    if sweep.criteria or summary.failed:
+        study_options.print_table(
+            ["runs", "n", "success", "95 % interval"], [_success(group) for group in summary.groups[:_SHOWN]]
+        )
+        if summary.groups[0].distinct < summary.groups[0].runs:
+            click.echo(
+                f"{summary.groups[0].distinct} of {summary.groups[0].runs} runs are distinct; intervals are those of so many"
+            )
+    for cause, count, first in summary.causes[:_SHOWN]:
+        click.echo(f"{count} failed, the first is run {first}: {cause}", err=True)
+
+
+def _success(group: Group) -> list[str]:
+    label = ", ".join(f"{name} = {value}" for name, value in group.labels.items()) or "all"
+    low, high = group.interval
+    return [label, str(group.runs), f"{100 * group.rate:.1f} %", f"{100 * low:.1f} ... {100 * high:.1f} %"]

@@ -1,0 +1,85 @@
+"""`cosim tune`: the parameters that make a KPI small."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ...core.errors import CosimError, InputError
+from .. import study_options
+
+if TYPE_CHECKING:
+    from ...studies.execution.run_store import Ledger
+    from ...studies.tune import Trial, Tuning
+
+
+@click.command()
+@click.argument("tuning", metavar="TUNE")
+@click.option("--output-dir", type=click.Path(path_type=Path), help="Where results go; default: runs/NAME.")
+@study_options.options
+def command(tuning: str, output_dir: Path | None, **where: Any) -> int:
+    """Search as TUNE says, a JSON file or the name of a shipped one.
+
+    Writes trials.csv (every point that was tried) and best.json to the output directory. A tuning that was interrupted or killed
+    goes on where it was when it is called again. Exit code 0: a point was found; 1: a run failed at every point; 2: refused;
+    3: no point keeps the constraints, or none has a value; 130: interrupted.
+    """
+    from ...studies.tune import Tuning
+
+    read = Tuning.of(tuning)
+    folder = output_dir or Path("runs") / read.spec.name
+    with study_options.ledger(folder, where.pop("retry_failed")) as ledger:
+        return _run(read, ledger, folder, **where)
+
+
+def _run(tuning: Tuning, ledger: Ledger, folder: Path, workers: int | None, scheduler: str | None) -> int:
+    from ...process.supervisor import polite_ends
+    from ...studies.summary.tuning_files import write
+
+    try:
+        with (
+            polite_ends(),
+            study_options.progress(_most(tuning)) as progress,
+            study_options.engine(tuning.study, workers, scheduler) as engine,
+        ):
+            tuning.run(ledger, engine, progress)
+    except (CosimError, KeyboardInterrupt) as error:
+        if tuning.trials and not isinstance(error, InputError):
+            write(tuning, folder)
+        raise
+    best = write(tuning, folder)
+    _print(tuning, best, folder)
+    return 0 if best.feasible else 1 if best.failure else 3
+
+
+def _most(tuning: Tuning) -> int:
+    """Runs at most."""
+    method = tuning.spec.method
+    whole = method.population * (method.generations + 1) if method.kind == "differential_evolution" else method.evaluations
+    return whole * len(tuning.spec.cases)
+
+
+def _print(tuning: Tuning, best: Trial, folder: Path) -> None:
+    from ...studies.summary.files import run_command
+
+    first = tuning.trials[0]
+    rows = [[name, f"{first.parameters[name]:.6g}", f"{value:.6g}"] for name, value in best.parameters.items()]
+    rows.append([tuning.objective.text, f"{first.value:.6g}", f"{best.value:.6g}"])
+    study_options.print_table(["", "start", "best"], rows)
+    if not best.feasible:
+        click.echo(_shortcoming(tuning, best), err=True)
+    settings = {**tuning.spec.settings, **tuning.spec.cases[0], **tuning.settings(best.parameters)}
+    click.echo(f"{len(tuning.trials)} points tried; trials.csv and best.json in {folder}")
+    click.echo(run_command(tuning.read.scenario, settings))
+
+
+def _shortcoming(tuning: Tuning, best: Trial) -> str:
+    """What is wrong with every point, the best one included."""
+    if best.failure:
+        return f"a run failed at every point, the first time: {best.failure}"
+    if not best.value < math.inf:
+        return f"the value of {tuning.objective.text} is {best.value:g} at every point"
+    return f"no point keeps the constraints: the best violates them by {best.violation:.3g}"

@@ -1,0 +1,138 @@
+"""What `cosim sweep` and `cosim tune` have in common: engines and progress."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from ..studies.execution.job import Record
+    from ..studies.execution.run_store import Ledger
+    from ..studies.study import Laboratory, Study
+
+#: without a terminal a line of progress is printed so often (s)
+_LINE = 30.0
+
+_workers = click.option(
+    "--workers", type=click.IntRange(min=1), help="Runs at a time on this machine; default: one per processor."
+)
+_scheduler = click.option(
+    "--scheduler", metavar="tcp://HOST:PORT", help="Run on the Dask cluster of this scheduler (extra `cluster`)."
+)
+_retry = click.option("--retry-failed", is_flag=True, help="Run again what failed in an earlier call.")
+
+
+def options(command: Callable[..., int]) -> Callable[..., int]:
+    """Where runs are made."""
+    return _workers(_scheduler(_retry(command)))
+
+
+def ledger(folder: Path, retry: bool) -> Ledger:
+    """The finished runs of a folder; says how many of them cannot be read."""
+    from ..results.files import prepare
+    from ..studies.execution.run_store import Ledger
+
+    prepare(folder)
+    found = Ledger(folder, retry)
+    if found.unreadable:
+        click.echo(f"unreadable lines in {found.path}, whose runs are made again: {found.unreadable}", err=True)
+    return found
+
+
+def engine(study: Study, workers: int | None, scheduler: str | None) -> Laboratory:
+    """The engine that the options ask for."""
+    if scheduler is None:
+        from ..studies.execution.local import LocalEngine
+
+        return LocalEngine(study.order, workers or processors())
+    if workers is not None:
+        raise click.UsageError("--workers counts processes of this machine, a --scheduler has its own")
+    from ..studies.cluster import ClusterEngine
+
+    return ClusterEngine(study, scheduler)
+
+
+def processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Progress:
+    """Counts runs, and says now and then how many there are, how many a second, and how long the rest takes."""
+
+    def __init__(self, total: int, show: Callable[[str, int], None]):
+        self._total, self._show, self._began = total, show, time.monotonic()
+        self.made = self.failed = self._before = 0
+
+    def begin(self, done: int) -> None:
+        """So many were there already."""
+        self._before = done
+
+    def __call__(self, record: Record) -> None:
+        self.made += 1
+        self.failed += bool(record.failure)
+        self._show(self.text(time.monotonic() - self._began), self._before + self.made)
+
+    def text(self, seconds: float) -> str:
+        """ "120 of 1000 runs, 3 failed, 7.5 per second, 2 min left"."""
+        done = self._before + self.made
+        rate = self.made / max(seconds, 1e-9)
+        left = duration((self._total - done) / rate) if rate else "?"
+        failed = f", {self.failed} failed" if self.failed else ""
+        return f"{done} of {self._total} runs{failed}, {rate:.3g} per second, {left} left"
+
+
+def duration(seconds: float) -> str:
+    """ "45 s", "12 min" or "3.5 h"."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
+
+
+@contextmanager
+def progress(total: int) -> Iterator[Progress]:
+    """A bar on a terminal, lines elsewhere."""
+    if not sys.stderr.isatty():
+        yield Progress(total, _Lines())
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn
+    from rich.progress import Progress as Bar
+
+    with Bar(BarColumn(), TextColumn("{task.description}"), console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=total)
+        yield Progress(total, lambda text, done: bar.update(task, completed=done, description=text))
+
+
+class _Lines:
+    def __init__(self) -> None:
+        self._last = time.monotonic()
+
+    def __call__(self, text: str, done: int) -> None:
+        if time.monotonic() - self._last > _LINE:
+            self._last = time.monotonic()
+            click.echo(text, err=True)
+
+
+def print_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """A table whose first column is text, the others numbers."""
+    from rich import box
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    for i, name in enumerate(header):
+        table.add_column(name, justify="right" if i else "left", overflow="fold")
+    for row in rows:
+        table.add_row(*map(escape, row))
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = 200
+    console.print(table, "")

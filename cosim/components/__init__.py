@@ -1,0 +1,1 @@
+"""Sources of components: FMUs, Python classes, input tables."""

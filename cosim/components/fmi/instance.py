@@ -1,0 +1,283 @@
+"""An instance of an FMU as a component.
+
+FMPy loads the library and walks the life cycle; on the hot path the C functions are called directly, with arguments that
+were made beforehand (FMPy's own methods cost 3 to 30 times as much).
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping, Sequence
+from copy import copy
+from itertools import groupby
+from math import isnan, nan
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+
+from ...core import component_log
+from ...core.component import GOOD, Access, Call, Component, Ports, StepResult, Variable
+from ...core.errors import ComponentError, InputError
+from ...process import float_mode
+from ...process.containment import contained
+from ...process.journal import calling
+from .c_functions import DOUBLE, POINTER, SIZE, Functions, address
+from .file import FmuFile
+
+STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
+OK, WARNING, DISCARD, ERROR, FATAL = range(5)
+
+
+class FmuInstance(Component):
+    """What FMI 2.0 and 3.0 have in common. Subclasses name the C functions and lay out their arguments."""
+
+    binds_everything = False
+    #: prefix of the C functions
+    prefix: str
+    major: int
+    #: cosim type -> the part of fmi*Get..., fmi*Set... after Get and Set
+    accessors: Mapping[str, str]
+
+    def __init__(self, file: FmuFile, instance_name: str, logging_on: bool):
+        self.name, self._file, self.code = instance_name, file, file
+        self.description = file.description
+        self.variables = self.description.variables
+        self.has_state = self.description.has_state
+        self._by_name = {variable.name: variable for variable in self.variables}
+        self._message = ""
+        self._clock = ctypes.c_double()
+        #: instantiated, and neither freed nor corrupt
+        self._alive, self._holds_folder = False, False
+        #: the deadline of calls that are not steps
+        self._kind = "initialization"
+        self._logging_on = logging_on
+        self._fmu: Any = None
+        file.check_platform()
+
+    # -- what differs between the FMI versions -------------------------------------------------------------------------
+
+    def _slave(self, **arguments: Any) -> Any:
+        raise NotImplementedError
+
+    def _instantiate(self) -> None:
+        raise NotImplementedError
+
+    def _texts(self, reference: int, count: int) -> Sequence[bytes | None]:
+        """The values of a string variable; None for null pointers."""
+        raise NotImplementedError
+
+    def _binaries(self, reference: int, count: int) -> list[bytes]:
+        """The values of a binary variable, which only FMI 3.0 knows."""
+        raise NotImplementedError
+
+    #: the C function that makes an instance
+    _instantiation: str
+
+    def _step_calls(self, step_size: Any, seconds: float) -> list[Call]:
+        """doStep from the time in `self._clock`."""
+        raise NotImplementedError
+
+    # -- life cycle ----------------------------------------------------------------------------------------------------
+
+    def _start(self) -> None:
+        """Load the library and instantiate the FMU. Raises InputError or ComponentError."""
+        folder = self._file.acquire()
+        self._holds_folder = True
+        with contained(self.name), calling(self.name, "loading the binary", "load"):
+            self._fmu = self._load(folder)
+        with contained(self.name), calling(self.name, self._instantiation, "load"):
+            self._instantiate()
+        self._alive = True
+        self._handle: int = self._fmu.component
+        self._do_step = self._fmu.functions[f"{self.prefix}DoStep"]
+        self._instance = POINTER(self._handle)
+        self._clock, self._step_size = ctypes.c_double(), ctypes.c_double()
+        self._steps = self._step_calls(self._step_size, 0.0)
+
+    def _load(self, folder: Path) -> Any:
+        """FMPy's object for this instance: a copy of one that is made once for all instances, which takes milliseconds."""
+        if self._file.library is None:
+            self._file.library = self._open(folder)
+            self._file.library.functions = Functions(self._file.library.dll)
+        fmu = copy(self._file.library)
+        fmu.instanceName = self.name
+        return fmu
+
+    def _open(self, folder: Path) -> Any:
+        description = self.description
+        try:
+            fmu = self._slave(guid=description.token, modelIdentifier=description.identifier, unzipDirectory=str(folder))
+        except Exception as error:
+            reason = str(error).replace(f"{folder}/", "")
+            raise InputError(f'the binary of "{self._file.path}" cannot be loaded: {reason}') from None
+        for function in fmu._functions.values():
+            if function.restype is ctypes.c_int:
+                function.errcheck = _not_negative
+        return fmu
+
+    def call(self, function: str, *arguments: Any, no_answer: int | None = None) -> Any:
+        """Call one of FMPy's methods, or a C function by its whole name.
+
+        A bad status becomes a ComponentError with the FMU's own last message, but for the status that means `no_answer`: None.
+        """
+        from fmpy.fmi1 import FMICallException
+
+        name = function if function.startswith(self.prefix) else self.prefix + function[0].upper() + function[1:]
+        with calling(self.name, name, self._kind, self._clock.value):
+            try:
+                result = getattr(self._fmu, function)(*arguments)
+            except FMICallException as error:
+                if error.status == no_answer:
+                    return None
+                self.fail(error.function, error.status)
+        self._look_at_float_mode(name)
+        return result
+
+    def _look_at_float_mode(self, function: str) -> None:
+        if float_mode.changed() or float_mode.traps():
+            raise ComponentError(self.name, function, float_mode.REASON, self._clock.value)
+
+    def fail(self, function: str, status: int, more: str = "") -> NoReturn:
+        """Raise the error for a status; `more` is said at its end.
+
+        After fatal nothing of any instance of this FMU may be called (FMI 3.0 section 2.2.3).
+        """
+        self._file.corrupt = self._file.corrupt or status == FATAL
+        label = STATUS[status] if 0 <= status < len(STATUS) else "not defined by FMI"
+        reason = f"status {status} ({label})" + (f": {self._message}" if self._message else "") + more
+        raise ComponentError(self.name, function, reason, None if isnan(self._clock.value) else self._clock.value)
+
+    def log(self, status: int, text: bytes | None) -> None:
+        """A message from the FMU: kept as the reason of a later failure, and passed on to the user."""
+        self._message = (text or b"").decode("utf-8", "replace").strip()
+        level = (
+            component_log.INFO if status == OK else component_log.WARNING if status in (WARNING, DISCARD) else component_log.ERROR
+        )
+        component_log.message(self.name, level, self._message)
+
+    @property
+    def corrupt(self) -> bool:
+        """A fatal error was reported by an instance of this FMU."""
+        return self._file.corrupt
+
+    def exit_initialization_mode(self) -> None:
+        self.call("exitInitializationMode")
+        self._kind = "step"
+
+    def terminate(self) -> None:
+        self._kind, self._clock = "end", ctypes.c_double(nan)  # the simulation is over: its time says nothing any more
+        if not self._file.corrupt:
+            self.call("terminate")
+
+    def free(self) -> None:
+        if self._alive and not self._file.corrupt:
+            with calling(self.name, f"{self.prefix}FreeInstance", "end"):
+                getattr(self._fmu, f"{self.prefix}FreeInstance")(self._handle)
+        self._alive = False
+        if self._holds_folder:
+            self._holds_folder = False
+            with calling(self.name, "unloading the binary", "end"):
+                self._file.release()
+
+    # -- access off the hot path ---------------------------------------------------------------------------------------
+
+    def set(self, name: str, value: Any) -> None:
+        variable = self._by_name[name]
+        values = list(np.ravel(value)) if variable.shape else [value]
+        self.call(f"set{self.accessors[variable.type]}", [self.description.references[name]], values)
+
+    def get(self, name: str) -> Any:
+        variable = self._by_name[name]
+        reference, count = self.description.references[name], len(variable.slots)
+        values: Sequence[Any]
+        if variable.type == "String":
+            values = [self._text(name, text) for text in self._texts(reference, count)]
+        elif variable.type == "Binary":
+            values = self._binaries(reference, count)
+        else:
+            values = self.call(f"get{self.accessors[variable.type]}", [reference], *((count,) if variable.shape else ()))
+        return values if variable.shape else values[0]
+
+    def _text(self, name: str, text: bytes | None) -> str:
+        if text is None:
+            reason = f'the value of "{name}" is a null pointer, expected a text'
+            raise ComponentError(self.name, f"{self.prefix}GetString", reason, self._clock.value)
+        return text.decode("utf-8", "replace")
+
+    # -- the hot path --------------------------------------------------------------------------------------------------
+
+    def bind(self, inputs: Ports, outputs: Ports) -> None:
+        self._start()
+        self._sets, self._gets = self._calls("Set", inputs), self._calls("Get", outputs)
+
+    def _calls(self, verb: str, ports: Ports) -> list[Call]:
+        """One call for each run of variables with the same accessor; strings and binaries go one by one."""
+        calls: list[Call] = []
+        move = self._set_object if verb == "Set" else self._get_object
+        for dtype, array in ports.arrays.items():
+            place = 0
+            own = [variable for variable in ports.variables if variable.dtype == dtype]
+            for accessor, run in groupby(own, lambda variable: self.accessors[variable.type]):
+                variables = list(run)
+                size = sum(len(variable.slots) for variable in variables)
+                if dtype.hasobject:
+                    name = f"{self.prefix}{verb}{accessor}"
+                    calls += [Call(move, (v.name, array, place + i), name) for i, v in enumerate(variables)]
+                else:
+                    calls.append(self._access(f"{self.prefix}{verb}{accessor}", variables, array[place : place + size]))
+                place += size
+        return calls
+
+    def _set_object(self, name: str, array: np.ndarray, index: int) -> int:
+        self.set(name, array[index])
+        return OK
+
+    def _get_object(self, name: str, array: np.ndarray, index: int) -> int:
+        array[index] = self.get(name)
+        return OK
+
+    def _access(self, function: str, variables: Sequence[Variable], values: np.ndarray) -> Call:
+        references = (ctypes.c_uint32 * len(variables))(*(self.description.references[v.name] for v in variables))
+        bound = self._fmu.functions[function]
+        pointers = (self._handle, ctypes.addressof(references), values.ctypes.data)
+        arguments: tuple[Any, ...] = (self._instance, POINTER(pointers[1]), SIZE(len(variables)), POINTER(pointers[2]))
+        if self.major > 2:
+            arguments += (SIZE(len(values)),)
+        native = Access(self.major, address(bound), *pointers[:2], len(variables), pointers[2], len(values))
+        return Call(bound, arguments, function, native, (references, values))
+
+    def turn(self, clock: ctypes.c_double, step_size: float) -> Sequence[Call]:
+        self._clock = clock
+        return [*self._sets, *self._step_calls(DOUBLE(step_size), step_size), *self._gets]
+
+    def set_inputs(self) -> None:
+        self._make(self._sets)
+
+    def do_step(self, time: float, step_size: float) -> StepResult | None:
+        self._clock.value, self._step_size.value = time, step_size
+        return self._make(self._steps)
+
+    def get_outputs(self) -> None:
+        self._make(self._gets)
+
+    def _make(self, calls: Sequence[Call]) -> StepResult | None:
+        for call in calls:
+            with calling(self.name, call.name, self._kind, self._clock.value):
+                status = call.function(*call.arguments)
+            if status not in GOOD:
+                return self.failed(call.name, status)
+            self._look_at_float_mode(call.name)
+        return None
+
+    def failed(self, name: str, status: int) -> StepResult:
+        self.fail(name, status)
+
+
+def _not_negative(status: int, function: Any, _: Any) -> int:
+    """FMPy alone would take negative numbers for good statuses."""
+    from fmpy.fmi1 import FMICallException
+
+    if status < 0:
+        raise FMICallException(function.__name__, status)
+    return status

@@ -1,0 +1,125 @@
+"""Rules about the model as a whole: what it is called, what it offers, its units, types and default experiment."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator
+
+from ....core.units import BASE
+from .findings import DESCRIPTION, Finding, Rule
+from .model_description import Model, UnitDefinition
+from .values import real, value
+
+_ROOT = "FMI 2.0.5 section 2.2.1, FMI 3.0.2 section 2.4.1"
+_INTERFACE = "FMI 2.0.5 section 4.3.1, FMI 3.0.2 sections 2.4.2 and 4.4"
+_UNITS = "FMI 2.0.5 section 2.2.2, FMI 3.0.2 section 2.4.3"
+_TYPES = "FMI 2.0.5 section 2.2.3, FMI 3.0.2 section 2.4.4"
+_CATEGORIES = "FMI 2.0.5 section 2.2.4, FMI 3.0.2 section 2.4.5"
+_EXPERIMENT = "FMI 2.0.5 section 2.2.5, FMI 3.0.2 section 2.4.6"
+
+NAME = Rule("model.name", _ROOT, "warning")
+TOKEN = Rule("model.token", _ROOT)
+INTERFACE = Rule("model.co-simulation", _INTERFACE)
+IDENTIFIER = Rule("model.identifier", _INTERFACE)
+UNIT_NAME = Rule("unit.unique", _UNITS)
+UNIT_BASE = Rule("unit.base", _UNITS)
+TYPE_NAME = Rule("type.unique", _TYPES)
+TYPE_KIND = Rule("type.kind", _TYPES, "warning")
+ITEMS = Rule("type.items", _TYPES)
+EXPERIMENT_VALUE = Rule("experiment.value", _EXPERIMENT)
+EXPERIMENT = Rule("experiment.order", _EXPERIMENT, "warning")
+CATEGORIES = Rule("categories.unique", _CATEGORIES, "warning")
+
+_C_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+def check_names(model: Model) -> Iterator[Finding]:
+    line = model.lines[""]
+    attribute = "guid" if model.major == 2 else "instantiationToken"
+    if not model.root.get(attribute):
+        yield TOKEN(f"lacks the attribute {attribute}", DESCRIPTION, line)
+    if not model.root.get("modelName"):
+        yield NAME("lacks the attribute modelName", DESCRIPTION, line)
+    if model.interface is None:
+        yield INTERFACE("offers no Co-Simulation interface", DESCRIPTION, line)
+        return
+    line = model.lines["CoSimulation"]
+    identifier = model.interface.get("modelIdentifier", "")
+    if not _C_IDENTIFIER.fullmatch(identifier):
+        yield IDENTIFIER(f'found modelIdentifier "{identifier}", expected a C identifier', DESCRIPTION, line)
+
+
+def check_units(model: Model) -> Iterator[Finding]:
+    for name, place in _twice((unit.name, unit.line) for unit in model.units):
+        yield UNIT_NAME(f'the unit "{name}" is defined twice', DESCRIPTION, place)
+    for unit in model.units:
+        yield from _wrong_base(unit)
+
+
+def _wrong_base(unit: UnitDefinition) -> Iterator[Finding]:
+    for name, text in (unit.base or {}).items():
+        try:
+            good = int(text) is not None if name in BASE else math.isfinite(real(text))
+        except ValueError:
+            good = False
+        if not good or (name == "factor" and real(text) == 0):
+            kind = "an integer" if name in BASE else "a finite number, a factor not 0"
+            yield UNIT_BASE(f'unit "{unit.name}": found {name}="{text}", expected {kind}', DESCRIPTION, unit.line)
+
+
+def check_types(model: Model) -> Iterator[Finding]:
+    for name, place in _twice((definition.name, definition.line) for definition in model.types):
+        yield TYPE_NAME(f'the type "{name}" is defined twice', DESCRIPTION, place)
+    for definition in model.types:
+        if not definition.kind:
+            yield TYPE_KIND(f'the type "{definition.name}" is of no kind that FMI knows', DESCRIPTION, definition.line)
+        for what, words in (("item", [item[0] for item in definition.items]), ("value", [item[1] for item in definition.items])):
+            for word, _ in _twice((word, 0) for word in words):
+                text = f'the {what} "{word}" of enumeration "{definition.name}" stands twice'
+                yield ITEMS(text, DESCRIPTION, definition.line)
+        for name, word in definition.items:
+            try:
+                value(word, "Int64")
+            except ValueError:
+                text = f'the item "{name}" of enumeration "{definition.name}" is "{word}", expected an integer'
+                yield ITEMS(text, DESCRIPTION, definition.line)
+        if definition.kind == "Enumeration" and not definition.items:
+            yield TYPE_KIND(f'the enumeration "{definition.name}" has no items', DESCRIPTION, definition.line)
+
+
+def check_experiment(model: Model) -> Iterator[Finding]:
+    line = model.lines.get("DefaultExperiment", 0)
+    numbers: dict[str, float] = {}
+    for name in ("startTime", "stopTime", "stepSize", "tolerance"):
+        if (text := model.experiment.get(name)) is None:
+            continue
+        try:
+            numbers[name] = real(text)
+        except ValueError:
+            numbers[name] = math.nan
+        if not math.isfinite(numbers[name]):
+            yield EXPERIMENT_VALUE(f'found {name}="{text}", expected a finite number', DESCRIPTION, line)
+    start, stop = numbers.get("startTime", 0.0), numbers.get("stopTime", math.inf)
+    if stop <= start:
+        yield EXPERIMENT(f"found stopTime {stop:g}, expected more than the startTime {start:g}", DESCRIPTION, line)
+    for name in ("stepSize", "tolerance"):
+        if numbers.get(name, 1.0) <= 0:
+            yield EXPERIMENT(f"found {name} {numbers[name]:g}, expected more than 0", DESCRIPTION, line)
+
+
+def check_categories(model: Model) -> Iterator[Finding]:
+    for name, _ in _twice((name, 0) for name in model.categories):
+        yield CATEGORIES(f'the log category "{name}" stands twice', DESCRIPTION, model.lines["LogCategories"])
+
+
+def _twice(names: Iterable[tuple[str, int]]) -> Iterator[tuple[str, int]]:
+    """Those that were there before."""
+    seen: set[str] = set()
+    for name, place in names:
+        if name in seen:
+            yield name, place
+        seen.add(name)
+
+
+CHECKS = (check_names, check_units, check_types, check_experiment, check_categories)

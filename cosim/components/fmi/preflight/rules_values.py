@@ -1,0 +1,151 @@
+"""Rules about values: start values, limits and the sizes of arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Iterator, Mapping, Sequence
+
+from .findings import DESCRIPTION, Finding, Rule
+from .limits import Limits
+from .model_description import Model, ModelVariable
+from .values import real, value
+
+_START = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.5"
+_DIMENSION = "FMI 3.0.2 section 2.4.7.2"
+
+MISSING = Rule("start.missing", _START)
+UNWANTED = Rule("start.unwanted", _START, "warning")
+VALUE = Rule("start.value", _START)
+FINITE = Rule("start.finite", _START)
+INFINITE = Rule("start.infinite", _START, "warning")
+RANGE = Rule("start.range", _START)
+OWN_RANGE = Rule("start.own-range", _START, "warning")
+COUNT = Rule("start.count", "FMI 3.0.2 section 2.4.7.5")
+LIMIT = Rule("variable.limits", _START)
+LIMIT_VALUE = Rule("variable.limit-value", _START, "warning")
+DIMENSION = Rule("variable.dimension", _DIMENSION)
+SIZE = Rule("variable.size", "limits")
+
+_TEXTS = ("String", "Binary", "Clock", "")
+
+
+def check_starts(model: Model) -> Iterator[Finding]:
+    for variable in model.variables:
+        if variable.kind not in ("Clock", ""):
+            yield from _wrong_presence(variable)
+        if variable.kind not in _TEXTS:
+            yield from _wrong_values(variable)
+
+
+def _wrong_presence(variable: ModelVariable) -> Iterator[Finding]:
+    initial, causality = variable.initial, variable.causality
+    if not variable.starts and (initial in ("exact", "approx") or causality == "input"):
+        why = "inputs" if causality == "input" else f'initial="{initial}"'
+        yield _at(MISSING, variable, f"has no start value, which is needed for {why}")
+    if variable.starts is not None and (initial == "calculated" or causality == "independent"):
+        why = "it is independent" if causality == "independent" else 'initial="calculated"'
+        yield _at(UNWANTED, variable, f"has a start value, but {why}")
+
+
+def _wrong_values(variable: ModelVariable) -> Iterator[Finding]:
+    low, high = yield from _limits(variable)
+    for word in variable.starts or ():
+        try:
+            number = value(word, variable.kind)
+        except ValueError:
+            text = f'start value "{" ".join(variable.starts or ())}" of {variable} is no {variable.kind}'
+            yield VALUE(text, DESCRIPTION, variable.line)
+            return
+        if not math.isfinite(number):
+            harmless = math.isinf(number) and variable.causality not in ("input", "output")
+            yield _at(INFINITE if harmless else FINITE, variable, f"found start value {word}, expected a finite number")
+        elif not low <= number <= high:
+            yield _at(_range_rule(variable), variable, f"found start value {word}, expected {low:g} to {high:g}")
+    yield from _wrong_items(variable)
+
+
+def _limits(variable: ModelVariable) -> Generator[Finding, None, tuple[float, float]]:
+    """Returns (min, max), infinite where there is none that can be read."""
+    limits = {"min": -math.inf, "max": math.inf}
+    for name in limits:
+        if (text := variable.attribute(name)) is None or variable.kind == "Boolean":
+            continue
+        limit = read_limit(text)
+        if limit is None:
+            yield _at(LIMIT_VALUE, variable, f'found {name}="{text}", expected a number')
+        else:
+            limits[name] = limit
+    if limits["min"] > limits["max"]:
+        yield _at(LIMIT, variable, f"min {limits['min']:g} is above max {limits['max']:g}")
+        return -math.inf, math.inf
+    return limits["min"], limits["max"]
+
+
+def read_limit(text: str) -> float | None:
+    """A limit, also of integers, where tools write more than their range; None when it is none that can be read."""
+    try:
+        limit = real(text.strip())
+    except ValueError:
+        return None
+    return None if math.isnan(limit) else limit
+
+
+def _range_rule(variable: ModelVariable) -> Rule:
+    """Only what comes from outside has to keep to the limits; what an FMU sets itself it will know how to use."""
+    return RANGE if variable.causality in ("input", "parameter", "structuralParameter") else OWN_RANGE
+
+
+def _wrong_items(variable: ModelVariable) -> Iterator[Finding]:
+    if variable.kind == "Enumeration" and variable.declared and variable.declared.items:
+        values = {item[1].strip() for item in variable.declared.items}
+        for word in variable.starts or ():
+            if word not in values:
+                text = f'found start value {word}, expected an item of "{variable.declared.name}"'
+                yield _at(_range_rule(variable), variable, text)
+
+
+def check_dimensions(model: Model, limits: Limits) -> Iterator[Finding]:
+    for variable in model.variables:
+        if not variable.dimensions:
+            shape: Sequence[int] | None = ()
+        else:
+            shape = yield from _shape(model, variable)
+        if shape is None:
+            continue
+        size = math.prod(shape)
+        if size > limits.array:
+            yield _at(SIZE, variable, f"has {size} elements, expected at most {limits.array}")
+        elif variable.starts and len(variable.starts) not in (1, size):
+            yield _at(COUNT, variable, f"found {len(variable.starts)} start values, expected {size}")
+
+
+def _shape(model: Model, variable: ModelVariable) -> Generator[Finding, None, Sequence[int] | None]:
+    """Returns the sizes, or None when one of them is unknown."""
+    sizes = [dimension_size(model, dimension) for dimension in variable.dimensions]
+    for size, dimension in zip(sizes, variable.dimensions, strict=True):
+        if size is None or size < 1:
+            found = " ".join(f'{name}="{text}"' for name, text in dimension.items()) or "nothing"
+            text = f"found a dimension with {found}, expected start > 0 or the reference of a structural parameter that is"
+            yield _at(DIMENSION, variable, text)
+    good = [size for size in sizes if size]
+    return good if len(good) == len(sizes) else None
+
+
+def dimension_size(model: Model, dimension: Mapping[str, str]) -> int | None:
+    """The size of a dimension before anything is set; None when it is not said clearly."""
+    reference, text = dimension.get("valueReference"), dimension.get("start")
+    if (reference is None) == (text is None):
+        return None
+    if reference is not None:
+        source = model.by_reference.get(reference.strip())
+        if source is None or source.dimensions or source.causality != "structuralParameter" or len(source.starts or ()) != 1:
+            return None
+        text = (source.starts or ("",))[0]
+    try:
+        return int(value((text or "").strip(), "UInt64"))
+    except ValueError:
+        return None
+
+
+def _at(rule: Rule, variable: ModelVariable, text: str) -> Finding:
+    return rule(f"{variable}: {text}", DESCRIPTION, variable.line)

@@ -1,0 +1,23 @@
+"""Locations of the files that cosim ships (scenarios, FMUs, plant and controller sources) and of its cache."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+
+def package_folder() -> Path:
+    """Return the folder of the installed package `cosim`."""
+    return Path(__file__).resolve().parents[1]
+
+
+def root() -> Path:
+    """Return the folder of scenarios, FMUs, plant and controller sources: the installed bundle, else the checkout."""
+    bundle = package_folder() / "_bundle"
+    return bundle if bundle.is_dir() else package_folder().parent
+
+
+def cache_directory() -> Path:
+    """The per-user folder for things that can be made again (XDG_CACHE_HOME/cosim, else ~/.cache/cosim)."""
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "cosim"

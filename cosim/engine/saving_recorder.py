@@ -1,0 +1,67 @@
+"""Texts of rows while a run goes on: numbers lie in a file of rows anyway, texts are written beside it whenever they change."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..core.system import Endpoint
+from ..process.run_files.folder import HEADER_FILE, ROWS_FILE, TEXTS_FILE
+from . import Recorder
+from .executor import Executor
+from .plan import Plan
+
+
+class SavingRecorder(Recorder):
+    """A recorder whose rows, texts among them, outlive the process in `folder` (see `unfinished`).
+
+    A line of the file of texts is JSON: the number of a row, and the texts that are others from this row on.
+    """
+
+    def __init__(self, plan: Plan, columns: Mapping[str, Endpoint], every: int, folder: Path):
+        super().__init__(plan, columns, every, folder / ROWS_FILE)
+        slots = {name: plan.signals.places[endpoint] for name, endpoint in columns.items()}
+        self._cells = [(name, plan.signals.arrays[s.dtype], s.offset) for name, s in slots.items() if s.dtype.hasobject]
+        self._saved: dict[str, Any] = dict.fromkeys((name for name, _, _ in self._cells), "")
+        self._file = (folder / TEXTS_FILE).open("wb", buffering=0)
+        if self._cells:
+            self._text_keepers.append(self._save)
+
+    def _save(self, row: int) -> None:
+        """In one write without a buffer, which nothing that kills this process can take back."""
+        texts = {name: array[place] for name, array, place in self._cells}
+        if changed := {name: text for name, text in texts.items() if text != self._saved[name]}:
+            self._saved |= changed
+            os.write(self._file.fileno(), json.dumps([row, changed], default=_hex).encode() + b"\n")
+
+
+def _hex(value: bytes) -> dict[str, str]:
+    return {"bytes": value.hex()}
+
+
+def write_header(folder: Path, executor: Executor) -> None:
+    """Describe the run that is about to step."""
+    recorder, grid = executor.recorder, executor.plan.grid
+    dtype = recorder.store.dtype
+    columns = [
+        {
+            "name": name,
+            "dtype": dtype[name].str,
+            "offset": dtype.fields[name][1],  # type: ignore[index]
+            "boolean": recorder.variables[name].type == "Boolean",
+            "unit": recorder.units[name],
+        }
+        for name in dtype.names or ()
+    ]
+    header = {
+        **grid.integers,
+        "every": recorder.every,
+        "row_size": dtype.itemsize,
+        "columns": columns,
+        "calls": executor.calls,
+        "texts": [(i, name) for i, name in enumerate(recorder.variables) if name not in (dtype.names or ())],
+    }
+    (folder / HEADER_FILE).write_text(json.dumps(header), encoding="utf-8")

@@ -1,0 +1,70 @@
+"""Whether `fmus/` is what its sources say: what `cosim build --check` does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from ..core.errors import CosimError, Problem
+from .behaviour import compare
+from .build import file_hash, fmu_files, read_manifest
+from .sources import Source, export, find_sources
+
+
+def check(root: Path) -> list[Problem]:
+    """Whether `fmus/` is what its sources say: hashes agree with the manifest, and rebuilt FMUs behave as the present ones."""
+    manifest, sources = read_manifest(root), find_sources(root)
+    problems = _orphans(root, manifest, sources)
+    sound = []
+    for source in sources:
+        found = _stale(root, manifest, source)
+        problems += found
+        if not found:
+            sound.append(source)
+    return problems + _changed_behaviour(root, sound)
+
+
+def _orphans(root: Path, manifest: Mapping[str, Any], sources: Sequence[Source]) -> list[Problem]:
+    expected = {path for source in sources for path in fmu_files(source, root).values()}
+    present = set((root / "fmus").rglob("*.fmu"))
+    listed = {root / fmu for entry in manifest.values() for fmu in entry["fmus"]}
+    return [Problem("belongs to no source", path.relative_to(root).as_posix()) for path in sorted((present | listed) - expected)]
+
+
+def _stale(root: Path, manifest: Mapping[str, Any], source: Source) -> list[Problem]:
+    """What the manifest says about a source and is no longer true."""
+    entry = manifest.get(source.key)
+    if entry is None:
+        return [Problem("has no FMU; run `cosim build`", source.path.relative_to(root).as_posix())]
+    problems = []
+    for name, recorded in entry["sources"].items():
+        if not (root / name).is_file() or file_hash(root / name) != recorded:
+            problems.append(Problem(f'changed since "{source.key}" was built; run `cosim build`', name))
+    for path in fmu_files(source, root).values():
+        name = path.relative_to(root).as_posix()
+        if not path.is_file():
+            problems.append(Problem("is missing; run `cosim build`", name))
+        elif file_hash(path) != entry["fmus"].get(name):
+            problems.append(Problem("is not the file that `cosim build` wrote", name))
+    return problems
+
+
+def _changed_behaviour(root: Path, sources: Sequence[Source]) -> list[Problem]:
+    problems: list[Problem] = []
+    present: list[Path] = []
+    rebuilt: list[Path] = []
+    with TemporaryDirectory(prefix="cosim-check-") as temporary:
+        for source in sources:
+            again = fmu_files(source, Path(temporary))
+            try:
+                export(source, again)
+            except CosimError as error:
+                problems.append(Problem(f"cannot be built any more: {error}", source.path.relative_to(root).as_posix()))
+                continue
+            present += fmu_files(source, root).values()
+            rebuilt += again.values()
+        for path, difference in compare(present, rebuilt).items():
+            problems.append(Problem(f"differs from a rebuild: {difference}", path.relative_to(temporary).as_posix()))
+    return problems

@@ -1,0 +1,1 @@
+"""CasADi equations exported as FMUs."""

@@ -1,0 +1,232 @@
+"""Export of a continuous model as a `Block`: generated functions and the C code of the block interface around them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import casadi as ca
+
+from ...core.component import Variable
+from ..fmu.block import Block, BlockVariable
+from .c_code import callees, definition
+from .model import ContinuousModel
+
+
+def as_block(model: ContinuousModel, exported: Sequence[ca.Function] = ()) -> Block:
+    """The model as a block of C code, with further functions exported from its binary; equal models give equal text."""
+    return Block(
+        model.identifier,
+        model.description,
+        [_block_variable(variable, member) for variable, member in _members(model)],
+        model.step_size,
+        {"model.h": _header(model), "model.c": _source(model, exported)},
+        model.resources,
+    )
+
+
+def _members(model: ContinuousModel) -> Iterator[tuple[Variable, str]]:
+    """Every variable with the member of `Model` where its first element lies."""
+    filled: dict[str, int] = {}
+    for variable in model.variables:
+        array = "flag" if variable.type == "Boolean" else variable.causality
+        first = filled.get(array, 0)
+        filled[array] = first + len(variable.slots)
+        yield variable, f"{array}[{first}]"
+
+
+def _block_variable(variable: Variable, member: str) -> BlockVariable:
+    return BlockVariable(
+        variable.name,
+        member,
+        variable.type,
+        variable.causality,
+        variable.variability,
+        variable.start,
+        variable.unit.name if variable.unit else "",
+        variable.shape,
+        variable.description,
+        variable.minimum,
+        variable.maximum,
+    )
+
+
+def _header(model: ContinuousModel) -> str:
+    flags = model.flags()
+    sizes = {
+        "parameter": len(model.slots("parameter")),
+        "constant": model.constant_symbols().numel() if model.constants else 0,
+        "input": len(model.slots("input")),
+        "state": len(model.states),
+        "output": len(flags) - sum(flags),
+    }
+    members = [f"double {name}[{size}]" for name, size in sizes.items() if size]
+    if any(flags):
+        members.append(f"bool flag[{sum(flags)}]")
+    lines = "\n".join(f"    {member};" for member in members)
+    return f"/* {model.description} */\n#include <stdbool.h>\n\ntypedef struct {{\n{lines}\n}} Model;\n"
+
+
+def _source(model: ContinuousModel, exported: Sequence[ca.Function]) -> str:
+    """The text of model.c."""
+    own = _functions(model)
+    functions = [*callees([*own, *exported], model.callees).values()]
+    functions += [definition("static", function) for function in own]
+    functions += [definition("MODEL_EXPORT", function) for function in exported]
+    return "\n".join([_INCLUDES, *functions, _interface(model)])
+
+
+def _functions(model: ContinuousModel) -> list[ca.Function]:
+    parameters, constants = ca.SX.sym("parameters", len(model.slots("parameter"))), model.constant_symbols()
+    inputs = ca.SX.sym("inputs", len(model.slots("input")))
+    state = ca.SX.sym("state", len(model.states))
+    step = ca.SX.sym("step")
+    outputs = ca.vertsplit(model.outputs(state, inputs, constants))
+    flags = model.flags()
+    numbers = ca.vertcat(*(y for y, flag in zip(outputs, flags, strict=True) if not flag))
+    truths = ca.vertcat(*(y for y, flag in zip(outputs, flags, strict=True) if flag))
+    observe = ca.Function("observe", [state, inputs, constants], [numbers, truths])
+    if not model.states:
+        return [observe]
+    prepare = [ca.Function("prepare", [parameters], [model.constants(parameters)])] if model.constants else []
+    return [
+        *prepare,
+        ca.Function("initial_state", [constants], [model.initial_state(constants)]),
+        ca.Function("sub_step", [state, inputs, constants, step], [model.advance(state, inputs, constants, step)]),
+        observe,
+    ]
+
+
+def _interface(model: ContinuousModel) -> str:
+    """The functions of the block's interface; they call `observe` and, with states, `initial_state` and `sub_step`."""
+    messages = ",\n".join(f'    "the state {name} is not finite"' for name in model.states)
+    member = {kind: f"m->{kind}" if model.slots(kind) else "NULL" for kind in ("parameter", "input")}
+    flags = sum(model.flags())
+    numbers = "m->output" if flags < len(model.flags()) else "NULL"
+    return (_WITH_STATES if model.states else _WITHOUT_STATES) % {
+        "messages": messages,
+        "states": len(model.states),
+        "state": "m->state" if model.states else "NULL",
+        "constant": "m->constant" if model.constants else member["parameter"],
+        "prepare": _PREPARE if model.constants else "",
+        "input": member["input"],
+        "output": numbers,
+        "flag_slots": max(flags, 1),
+        "take_flags": f"    for (int i = 0; i < {flags}; ++i) m->flag[i] = flags[i] != 0;\n" if flags else "",
+        "starts": _starts(model),
+        "max_sub_step": repr(model.max_sub_step),
+    }
+
+
+def _starts(model: ContinuousModel) -> str:
+    """Assignments of the start values that differ from zero; the rest of the structure is cleared before."""
+    lines = []
+    for kind in ("parameter", "input"):
+        values = [start for v in model.variables if v.causality == kind for start in _start(v)]
+        lines += [f"    m->{kind}[{k}] = {value!r};\n" for k, value in enumerate(values) if value != 0]
+    return "".join(lines)
+
+
+def _start(variable: Variable) -> Sequence[float]:
+    count = math.prod(variable.shape)
+    if variable.start is None:
+        return [0.0] * count
+    return [float(value) for value in variable.start] if variable.shape else [float(variable.start)]
+
+
+_INCLUDES = """#include <math.h>
+#include <stddef.h>
+
+#include "export.h"
+#include "model.h"
+"""
+
+_PUBLISH = """static void publish(Model *m)
+{
+    double flags[%(flag_slots)d];
+    const double *in[] = {%(state)s, %(input)s, %(constant)s};
+    double *out[] = {%(output)s, flags};
+    observe(in, out);
+%(take_flags)s}
+
+"""
+
+_START = """void model_start(Model *m)
+{
+    *m = (Model){0};
+%(starts)s}
+
+void model_parameters(Model *m)
+{
+    (void)m; /* nothing depends on parameters before initialization */
+}
+
+"""
+
+_FAILURES = """static const char *const FAILURES[] = {
+%(messages)s
+};
+
+"""
+
+_FAILURE = """static const char *failure(const Model *m)
+{
+    for (int i = 0; i < %(states)d; ++i)
+        if (!isfinite(m->state[i])) return FAILURES[i];
+    return NULL;
+}
+
+"""
+
+_PREPARE = """    {
+        const double *parameters[] = {m->parameter};
+        double *constants[] = {m->constant};
+        prepare(parameters, constants);
+    }
+"""
+
+_ADVANCE = """const char *model_initialize(Model *m, double time)
+{
+    const double *in[] = {%(constant)s};
+    double *out[] = {m->state};
+    (void)time;
+%(prepare)s    initial_state(in, out);
+    publish(m);
+    return failure(m);
+}
+
+const char *model_step(Model *m, double time, double step_size)
+{
+    const long count = (long)fmax(1.0, ceil(step_size / %(max_sub_step)s - 1e-9));
+    const double sub_step_size = step_size / (double)count;
+    double next[%(states)d];
+    const double *in[] = {m->state, %(input)s, %(constant)s, &sub_step_size};
+    double *out[] = {next};
+    (void)time;
+    for (long k = 0; k < count; ++k) {
+        sub_step(in, out);
+        for (int i = 0; i < %(states)d; ++i) m->state[i] = next[i];
+    }
+    publish(m);
+    return failure(m);
+}
+"""
+
+_EVALUATE = """const char *model_initialize(Model *m, double time)
+{
+    (void)time;
+    publish(m);
+    return NULL;
+}
+
+const char *model_step(Model *m, double time, double step_size)
+{
+    (void)time;
+    (void)step_size;
+    publish(m);
+    return NULL;
+}
+"""
+
+_WITH_STATES = _FAILURES + _PUBLISH + _FAILURE + _START + _ADVANCE
+_WITHOUT_STATES = _PUBLISH + _START + _EVALUATE

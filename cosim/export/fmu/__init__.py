@@ -1,0 +1,1 @@
+"""Parts that every exported FMU has: model description, C interface, archive."""

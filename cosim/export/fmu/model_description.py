@@ -1,0 +1,224 @@
+"""Block -> modelDescription.xml for FMI 2.0 and 3.0, and buildDescription.xml for FMI 3.0."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+from xml.etree import ElementTree
+
+from ...core import units
+from .block import Block, BlockVariable
+from .interface import Row, rows, starts
+
+Element = ElementTree.Element
+ERRORS = {"name": "logStatusError", "description": "why a call failed"}
+_FMI2_TYPES = {"Float64": "Real", "Int32": "Integer"}
+
+
+def model_description(block: Block, fmi_version: int, token: str, c_files: Sequence[str]) -> bytes:
+    """The XML text that describes the FMU of a block; `c_files` are the sources that have to be compiled."""
+    return to_bytes((_fmi2 if fmi_version == 2 else _fmi3)(block, token, c_files))
+
+
+def build_description(block: Block, c_files: Sequence[str]) -> bytes:
+    """How the sources of an FMI 3.0 FMU are built (FMI 3.0 section 2.5.2)."""
+    root = Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = _add(root, "BuildConfiguration", modelIdentifier=block.identifier)
+    file_set = _add(configuration, "SourceFileSet", language="C11")
+    for name in c_files:
+        _add(file_set, "SourceFile", name=name)
+    return to_bytes(root)
+
+
+def to_bytes(root: Element) -> bytes:
+    """An indented XML document; the same tree gives the same bytes."""
+    ElementTree.indent(root)
+    text = ElementTree.tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
+
+
+# -- FMI 2.0 ---------------------------------------------------------------------------------------------------------------
+
+
+def _fmi2(block: Block, token: str, c_files: Sequence[str]) -> Element:
+    root = _root(block, "2.0", guid=token)
+    interface = _add(
+        root,
+        "CoSimulation",
+        modelIdentifier=block.identifier,
+        canHandleVariableCommunicationStepSize=True,
+        canNotUseMemoryManagementFunctions=True,
+        canGetAndSetFMUstate=True,
+        canSerializeFMUstate=True,
+    )
+    files = _add(interface, "SourceFiles")
+    for name in c_files:
+        _add(files, "File", name=name)
+    table = rows(block, 2)
+    _common_parts(root, block, 2)
+    variables = _add(root, "ModelVariables")
+    for reference, row in enumerate(table):
+        _fmi2_variable(variables, reference, row.variable, _declared_types(block))
+    structure = _add(root, "ModelStructure")
+    for name, unknowns in (("Outputs", _outputs(table)), ("InitialUnknowns", _initial_unknowns(table))):
+        if unknowns:
+            group = _add(structure, name)
+            for reference in unknowns:
+                _add(group, "Unknown", index=reference + 1)
+    return root
+
+
+def _fmi2_variable(parent: Element, reference: int, variable: BlockVariable, declared: dict[Any, str]) -> None:
+    scalar = _add(parent, "ScalarVariable", **_identity(reference, variable))
+    _add(scalar, _FMI2_TYPES.get(variable.type, variable.type), **_typed(variable, declared))
+
+
+# -- FMI 3.0 ---------------------------------------------------------------------------------------------------------------
+
+
+def _fmi3(block: Block, token: str, c_files: Sequence[str]) -> Element:
+    root = _root(block, "3.0", instantiationToken=token)
+    _add(
+        root,
+        "CoSimulation",
+        modelIdentifier=block.identifier,
+        canHandleVariableCommunicationStepSize=True,
+        canGetAndSetFMUState=True,
+        canSerializeFMUState=True,
+    )
+    table = rows(block, 3)
+    _common_parts(root, block, 3)
+    variables = _add(root, "ModelVariables")
+    time = {"name": "time", "valueReference": 0, "causality": "independent", "variability": "continuous", "unit": "s"}
+    _add(variables, "Float64", **time)
+    for reference, row in enumerate(table, start=1):
+        attributes = _identity(reference, row.variable) | _typed(row.variable, _declared_types(block))
+        element = _add(variables, row.variable.type, **attributes)
+        for size in row.variable.shape:
+            _add(element, "Dimension", start=size)
+    structure = _add(root, "ModelStructure")
+    for name, unknowns in (("Output", _outputs(table)), ("InitialUnknown", _initial_unknowns(table))):
+        for reference in unknowns:
+            _add(structure, name, valueReference=reference + 1)
+    return root
+
+
+# -- what both have in common ----------------------------------------------------------------------------------------------
+
+
+def _root(block: Block, fmi_version: str, **token: str) -> Element:
+    return _with(
+        Element("fmiModelDescription"),
+        fmiVersion=fmi_version,
+        modelName=block.identifier,
+        **token,
+        description=block.description or None,
+        generationTool="cosim",
+        variableNamingConvention="structured",
+    )
+
+
+def _common_parts(root: Element, block: Block, fmi_version: int) -> None:
+    names = {variable.unit for variable in block.variables if variable.type == "Float64" and variable.unit}
+    add_units(root, names | {"s"} if fmi_version == 3 else names)
+    _add_enumerations(root, block, fmi_version)
+    _add(_add(root, "LogCategories"), "Category", **ERRORS)
+    _add(root, "DefaultExperiment", stepSize=block.step_size)
+
+
+def add_units(root: Element, names: Iterable[str]) -> None:
+    if not names:
+        return
+    definitions = _add(root, "UnitDefinitions")
+    for name in sorted(names):
+        unit = units.parse(name)
+        exponents = {base: exponent for base, exponent in zip(units.BASE, unit.exponents, strict=True) if exponent}
+        scale = {"factor": unit.factor if unit.factor != 1 else None, "offset": unit.offset or None}
+        _add(_add(definitions, "Unit", name=name), "BaseUnit", **exponents, **scale)
+
+
+def _declared_types(block: Block) -> dict[Any, str]:
+    """Enumerations by their literals; each is named after the first variable that has it."""
+    names: dict[Any, str] = {}
+    for variable in block.variables:
+        if variable.enumeration:
+            names.setdefault(variable.enumeration, f"{variable.name}_type")
+    return names
+
+
+def _add_enumerations(root: Element, block: Block, fmi_version: int) -> None:
+    declared = _declared_types(block)
+    if not declared:
+        return
+    definitions = _add(root, "TypeDefinitions")
+    for literals, name in declared.items():
+        if fmi_version == 2:
+            enumeration = _add(_add(definitions, "SimpleType", name=name), "Enumeration")
+        else:
+            enumeration = _add(definitions, "EnumerationType", name=name)
+        for value, (literal, description) in enumerate(literals, start=1):
+            _add(enumeration, "Item", name=literal, value=value, description=description or None)
+
+
+def _identity(reference: int, variable: BlockVariable) -> dict[str, Any]:
+    return {
+        "name": variable.name,
+        "valueReference": reference,
+        "description": variable.description or None,
+        "causality": variable.causality,
+        "variability": variable.variability,
+        "initial": _initial(variable),
+    }
+
+
+def _initial(variable: BlockVariable) -> str | None:
+    if variable.causality == "input":
+        return None
+    return "exact" if variable.causality == "parameter" or variable.variability == "constant" else "calculated"
+
+
+def _typed(variable: BlockVariable, declared: dict[Any, str]) -> dict[str, Any]:
+    number = float if variable.type == "Float64" else int
+    literals = len(variable.enumeration)
+    minimum, maximum = (1, literals) if literals else (variable.minimum, variable.maximum)
+    known_before = _initial(variable) != "calculated"
+    return {
+        "declaredType": declared.get(variable.enumeration),
+        "unit": variable.unit or None if variable.type == "Float64" else None,
+        "min": None if minimum is None else number(minimum),
+        "max": None if maximum is None else number(maximum),
+        "start": " ".join(_text(_cast(variable, value)) for value in starts(variable)) if known_before else None,
+    }
+
+
+def _cast(variable: BlockVariable, value: Any) -> Any:
+    return {"Float64": float, "Boolean": bool}.get(variable.type, int)(value)
+
+
+def _outputs(table: Sequence[Row]) -> list[int]:
+    return [reference for reference, row in enumerate(table) if row.variable.causality == "output"]
+
+
+def _initial_unknowns(table: Sequence[Row]) -> list[int]:
+    return [
+        reference
+        for reference, (variable, _) in enumerate(table)
+        if variable.causality in ("output", "calculatedParameter") and _initial(variable) == "calculated"
+    ]
+
+
+def _add(parent: Element, tag: str, **attributes: Any) -> Element:
+    return _with(ElementTree.SubElement(parent, tag), **attributes)
+
+
+def _with(element: Element, **attributes: Any) -> Element:
+    for name, value in attributes.items():
+        if value is not None:
+            element.set(name, _text(value))
+    return element
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(value) if isinstance(value, float) else str(value)

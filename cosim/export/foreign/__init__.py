@@ -1,0 +1,1 @@
+"""Python classes and C sources packed as FMUs."""

@@ -1,0 +1,143 @@
+"""A file with a PythonFMU class -> .fmu, with the description completed and the same bytes for the same source.
+
+PythonFMU knows FMI 2.0 only. Its own builder does the work, in a process of its own because it imports into this one.
+The FMU's state is what the class registers as variables: register internal states as `local` variables.
+
+All Python FMUs of a process share one interpreter and one table of modules. So the source becomes a package whose name is a
+hash of all contents, and the siblings it imports its members: FMUs with modules of the same name do not meet.
+"""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Mapping
+from hashlib import sha256
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from xml.etree import ElementTree
+from zipfile import ZipFile
+
+from ...core.errors import InputError, Problem
+from ..fmu.archive import content_token, write_archive
+from ..fmu.model_description import Element, add_units, to_bytes
+from ..fmu.validation import DESCRIPTION, validate
+from .relative_imports import with_relative_imports
+
+#: makes a module the package of the files beside it
+_PACKAGE = "__path__, __package__ = [__import__('os').path.dirname(__file__)], __name__  # inserted by cosim"
+
+
+def write_python_fmu(source: Path, target: Path) -> Path:
+    """Write the FMI 2.0 FMU of the one `Fmi2Slave` class in `source` to `target`.
+
+    It contains the source, the files of its folder that it imports relatively (`from .pid import Pid`), the JSON file of the
+    same name beside it if there is one, PythonFMU itself and its binaries for linux64 and win64; the host needs Python, and what
+    the source imports else. A variable with an attribute
+    `unit` writes it itself (`to_xml`); the definitions of units are added. Raises InputError when the class cannot be exported
+    or its variables make no valid description.
+    """
+    files = _build(source)
+    root = ElementTree.fromstring(files[DESCRIPTION])  # noqa: S314 - just written by PythonFMU
+    _complete(root)
+    root.set("guid", content_token([to_bytes(root), *(files[name] for name in sorted(files) if name != DESCRIPTION)]))
+    files[DESCRIPTION] = to_bytes(root)
+    validate(files[DESCRIPTION], source)
+    return write_archive(files, target)
+
+
+def source_files(source: Path) -> list[Path]:
+    """The files that go into the FMU."""
+    data = source.resolve().with_suffix(".json")
+    return [*with_relative_imports(source), *([data] if data.is_file() else [])]
+
+
+def _build(source: Path) -> dict[str, bytes]:
+    """The members of the FMU as PythonFMU's builder makes it."""
+    modules = _modules(source)
+    with TemporaryDirectory(prefix="cosim-build-") as folder, TemporaryDirectory(prefix="cosim-build-") as target:
+        loader, files = _stage(modules, source.stem, Path(folder))
+        command = [sys.executable, "-m", "pythonfmu", "build", "-f", loader, "-d", target, "--handle-state", *files]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+        built = list(Path(target).glob("*.fmu"))
+        if done.returncode or not built:
+            reason = (done.stderr.strip() or "PythonFMU built nothing").splitlines()[-1]
+            raise InputError(Problem(f"cannot be exported: {reason}", str(source)))
+        with ZipFile(built[0]) as archive:
+            return {name: archive.read(name) for name in archive.namelist()}
+
+
+def _modules(source: Path) -> dict[Path, bytes]:
+    """The files of a source, by their paths from its folder."""
+    folder = source.resolve().parent
+    try:
+        files = sorted(file.resolve() for file in source_files(source))
+    except SyntaxError as error:
+        raise InputError(Problem(f"cannot be exported: {error}", str(source))) from None
+    outside = [file for file in files if not file.is_relative_to(folder)]
+    if outside:
+        reason = "is imported, but an FMU holds only what lies in the folder of its source"
+        raise InputError([Problem(reason, str(file)) for file in outside])
+    return {file.relative_to(folder): file.read_bytes() for file in files}
+
+
+def _stage(modules: Mapping[Path, bytes], name: str, folder: Path) -> tuple[str, list[str]]:
+    """Write the modules, and the source once more as their package; returns the name of that and what else goes into the FMU."""
+    package = f"{name}_{sha256(repr(sorted(modules.items())).encode()).hexdigest()[:12]}"
+    for path, content in modules.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_bytes(content)
+    (folder / f"{package}.py").write_text(_as_package(modules[Path(f"{name}.py")].decode()))
+    return f"{package}.py", sorted({path.parts[0] for path in modules})
+
+
+def _as_package(text: str) -> str:
+    """A source whose relative imports work although PythonFMU imports it alone: the line goes behind `from __future__`."""
+    future = [node for node in ast.parse(text).body if isinstance(node, ast.ImportFrom) and node.module == "__future__"]
+    line = future[-1].end_lineno or 0 if future else 0
+    lines = text.splitlines()
+    return "\n".join([*lines[:line], _PACKAGE, *lines[line:], ""])
+
+
+def _complete(root: Element) -> None:
+    """What FMI 2.0 demands and PythonFMU leaves out; the date goes, because it would make every build different."""
+    root.attrib.pop("generationDateAndTime", None)
+    root.set("guid", "")
+    _define_units(root)
+    unknowns = []
+    for index, variable in enumerate(root.iter("ScalarVariable"), start=1):
+        if "variability" not in variable.attrib:
+            _set_default_variability(variable)
+        if _is_initial_unknown(variable.attrib):
+            unknowns.append(index)
+    structure = root.find("ModelStructure")
+    if unknowns and structure is not None:
+        group = ElementTree.SubElement(structure, "InitialUnknowns")
+        for index in unknowns:
+            ElementTree.SubElement(group, "Unknown", index=str(index))
+
+
+def _define_units(root: Element) -> None:
+    """`UnitDefinitions` stands behind `CoSimulation`."""
+    names = {real.get("unit", "") for real in root.iter("Real")} - {""}
+    add_units(root, names)
+    if names:
+        definitions = root[-1]
+        root.remove(definitions)
+        root.insert([child.tag for child in root].index("CoSimulation") + 1, definitions)
+
+
+def _set_default_variability(variable: Element) -> None:
+    """FMI's default "continuous" is legal for Real variables that are no parameters only."""
+    if "arameter" in variable.get("causality", "local"):
+        variable.set("variability", "fixed")
+    elif variable.find("Real") is None:
+        variable.set("variability", "discrete")
+
+
+def _is_initial_unknown(attributes: Mapping[str, str]) -> bool:
+    if attributes.get("causality") == "calculatedParameter":
+        return True
+    known = attributes.get("variability") == "constant" or attributes.get("initial") == "exact"
+    return attributes.get("causality") == "output" and not known

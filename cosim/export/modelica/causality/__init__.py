@@ -1,0 +1,1 @@
+"""Order of computation: matching, sorting, clocks, states, parameter roles."""

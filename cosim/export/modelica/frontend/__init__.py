@@ -1,0 +1,1 @@
+"""Reading of Modelica files into a flat model."""

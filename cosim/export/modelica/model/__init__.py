@@ -1,0 +1,1 @@
+"""The flat model as data, and its evaluation."""

@@ -1,0 +1,165 @@
+"""Evaluates expressions and executes statements of a flat model in plain Python."""
+
+from __future__ import annotations
+
+import operator
+from collections import ChainMap
+from collections.abc import Mapping, MutableMapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from . import flat_model
+from .arithmetic import BUILTINS, OPERATORS, Failure, checked, each, matrix_product, plain
+from .flat_model import Body, Expression, Function, Local
+
+DTYPES = {"Real": np.float64, "Integer": np.int64, "Enumeration": np.int64, "Boolean": np.bool_}
+
+
+def typed(value: Any, kind: str, shape: tuple[int, ...]) -> Any:
+    """The value as a variable of this type and shape holds it: a Python scalar or a numpy array of its own."""
+    if shape:
+        return np.array(np.broadcast_to(np.asarray(value, DTYPES[kind]), shape))
+    return float(value) if kind == "Real" else bool(value) if kind == "Boolean" else int(value)
+
+
+@dataclass
+class Evaluator:
+    """`values` are the variables that can be seen, `memory` their values before the event, `flags` the due(k) and risen(k)."""
+
+    functions: Mapping[str, Function]
+    values: MutableMapping[str, Any]
+    memory: MutableMapping[str, Any] = field(default_factory=dict)
+    flags: dict[tuple[str, int], bool] = field(default_factory=dict)
+    held: dict[int, bool] = field(default_factory=dict)
+
+    # statements
+
+    def run(self, body: Body) -> None:
+        for statement in body:
+            getattr(self, f"_{type(statement).__name__.lower()}")(statement)
+
+    def _assign(self, node: flat_model.Assign) -> None:
+        self._store(node.target, self(node.value))
+
+    def _store(self, target: flat_model.Name | flat_model.Index, value: Any) -> None:
+        name = flat_model.base_name(target)
+        old = self.values[name]
+        if isinstance(target, flat_model.Index):
+            old[self._places(target, old.shape)] = value
+        elif isinstance(old, np.ndarray):
+            old[...] = value
+        else:
+            self.values[name] = type(old)(value)
+
+    def _multiassign(self, node: flat_model.MultiAssign) -> None:
+        for target, value in zip(node.targets, self._invoke(node.call), strict=False):
+            self._store(target, value)
+
+    def _ifstatement(self, node: flat_model.IfStatement) -> None:
+        self.run(next((body for condition, body in node.branches if self(condition)), node.otherwise))
+
+    def _for(self, node: flat_model.For) -> None:
+        hidden = self.values.get(node.index)
+        for index in self._range(node.range):
+            self.values[node.index] = int(index)
+            self.run(node.body)
+        self.values.pop(node.index, None)
+        if hidden is not None:
+            self.values[node.index] = hidden
+
+    def _assert(self, node: flat_model.Assert) -> None:
+        if not self(node.condition):
+            raise Failure(node.message, node.where)
+
+    def _watch(self, node: flat_model.Watch) -> None:
+        holds = bool(self(node.condition))
+        self.flags["risen", node.index] = holds and not self.held.get(node.index, True)
+        self.held[node.index] = holds
+
+    # expressions
+
+    def __call__(self, node: Expression) -> Any:
+        return getattr(self, f"_{type(node).__name__.lower()}")(node)
+
+    def _literal(self, node: flat_model.Literal) -> Any:
+        return float(node.value) if node.type == "Real" else node.value
+
+    def _name(self, node: flat_model.Name) -> Any:
+        return self.values[node.name]
+
+    def _array(self, node: flat_model.Array) -> np.ndarray:
+        return np.array([self(element) for element in node.elements])
+
+    def _range(self, node: flat_model.Range) -> np.ndarray:
+        step = self(node.step) if node.step else 1
+        return np.arange(self(node.start), self(node.stop) + (1 if step > 0 else -1), step)
+
+    def _if(self, node: flat_model.If) -> Any:
+        return self(next((value for condition, value in node.branches if self(condition)), node.otherwise))
+
+    def _unary(self, node: flat_model.Unary) -> Any:
+        value = self(node.operand)
+        return each(operator.not_, value) if node.operator == "not" else each(lambda x: checked(-x), value)
+
+    def _binary(self, node: flat_model.Binary) -> Any:
+        if node.operator == "and":
+            return bool(self(node.left)) and bool(self(node.right))
+        if node.operator == "or":
+            return bool(self(node.left)) or bool(self(node.right))
+        left, right = self(node.left), self(node.right)
+        if node.operator == "*" and isinstance(left, np.ndarray) and isinstance(right, np.ndarray):
+            return matrix_product(left, right)
+        if node.operator == "^" and node.right == flat_model.Literal(2, "Integer"):
+            return each(lambda x: float(x) * float(x), left)
+        return each(OPERATORS[node.operator.removeprefix(".")], left, right)
+
+    def _index(self, node: flat_model.Index) -> Any:
+        base = self(node.base)
+        return plain(base[self._places(node, base.shape)])
+
+    def _places(self, node: flat_model.Index, shape: tuple[int, ...]) -> tuple[Any, ...]:
+        return tuple(self._place(s, n, node) for s, n in zip(node.subscripts, shape, strict=False))
+
+    def _place(self, subscript: Expression | flat_model.Colon, size: int, node: flat_model.Index) -> Any:
+        if isinstance(subscript, flat_model.Colon):
+            return slice(None)
+        index = self(subscript)
+        if not all(1 <= k <= size for k in np.atleast_1d(index)):
+            label = node.base.name if isinstance(node.base, flat_model.Name) else "array"
+            raise Failure(f"{label}: subscript outside 1..{size}", node.where)
+        return index - 1
+
+    def _call(self, node: flat_model.Call) -> Any:
+        return self._invoke(node)[0]
+
+    def _invoke(self, node: flat_model.Call) -> list[Any]:
+        function, arguments = self.functions[node.function], [self(argument) for argument in node.arguments]
+        inside = Evaluator(self.functions, {})
+        for local, value in zip(function.inputs, arguments, strict=True):
+            inside.values[local.name] = typed(value, local.type, np.shape(value))
+        for local in (*function.outputs, *function.locals):
+            inside._declare(local)
+        inside.run(function.body)
+        return [inside.values[local.name] for local in function.outputs]
+
+    def _declare(self, local: Local) -> None:
+        shape = tuple(int(self(d)) for d in local.dimensions if d is not None)
+        self.values[local.name] = typed(self(local.default) if local.default is not None else 0, local.type, shape)
+
+    def _builtin(self, node: flat_model.Builtin) -> Any:
+        if node.name in ("due", "risen"):
+            return self.flags[node.name, node.arguments[0].value]  # type: ignore[union-attr, index]
+        if node.name in ("pre", "edge", "change"):
+            return self._remembered(node)
+        if node.name == "smooth":
+            return self(node.arguments[1])
+        return BUILTINS[node.name](*map(self, node.arguments))
+
+    def _remembered(self, node: flat_model.Builtin) -> Any:
+        before = Evaluator(self.functions, ChainMap(self.memory, self.values))(node.arguments[0])
+        if node.name == "pre":
+            return before
+        now = self(node.arguments[0])
+        return (now and not before) if node.name == "edge" else now != before

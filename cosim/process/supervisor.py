@@ -1,0 +1,300 @@
+"""Runs a function in a child process and says what became of it: whatever foreign code does there, this process survives.
+
+The child notes in a journal in shared memory what it is doing, so a crash, an exit or a hang is attributed to the component
+and function that were called, at no cost per step. The rows it records lie in a file.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import mmap
+import os
+import resource
+import select
+import signal
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..core.errors import ComponentError, one_of
+from . import journal as journals
+from .journal import CALL, CHANGES, CODE, ROWS, STEPS, Journal, Phase
+from .run_files.csv_writer import LiveCsv
+from .run_files.folder import read_header
+from .sandbox.process import detach, lower
+from .standard_streams import outlasting
+from .temporary_folders import run_folder
+
+#: the supervisor looks after the child this often (s)
+LOOK = 0.05
+
+#: after an interrupt the child has this long to come to an end (s)
+PATIENCE = 3.0
+
+#: so much of what components print is passed on (bytes)
+LARGEST_OUTPUT = 1 << 16
+
+#: a supervised run may have so much memory of its own (bytes); files of rows do not count
+MEMORY = 4 << 30
+
+#: orphans of orphans are looked for so often
+_GENERATIONS = 10
+
+_POLITE = (signal.SIGTERM, signal.SIGHUP)
+_PR_SET_CHILD_SUBREAPER = 36
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of the child: its exit code, or the failure that ended it; `rows` were recorded.
+
+    `warning`: something failed when all results had been written. `interrupted`: the user ended a child that could not end in
+    order. `journal` is what the child left.
+    """
+
+    code: int
+    rows: int
+    journal: Journal
+    failure: ComponentError | None = None
+    warning: str = ""
+    interrupted: bool = False
+
+
+def possible() -> bool:
+    """Whether this process can fork, and prints to files that a child can share (those of a test or a notebook are none)."""
+    try:
+        return hasattr(os, "fork") and sys.stdout.fileno() >= 0 and sys.stderr.fileno() >= 0
+    except (OSError, AttributeError):
+        return False
+
+
+def supervised(entry: Callable[[], int], beside: Callable[[Journal], AbstractContextManager[object]] = nullcontext) -> Outcome:
+    """Run `entry` in a child process that keeps a journal (see `journal.current`); it returns an exit code and never raises.
+
+    `beside` is what this process does meanwhile, from the birth of the child to its end.
+    """
+    journal = Journal(mmap.mmap(-1, journals.SIZE))
+    _adopt_orphans()
+    with run_folder() as folder, polite_ends():
+        sys.stdout.flush()
+        sys.stderr.flush()
+        reader, writer = os.pipe()
+        supervisor = os.getpid()
+        child = os.fork()
+        if child == 0:
+            os.close(reader)
+            _be_the_child(entry, journal, writer, folder, supervisor)
+        os.close(writer)
+        with beside(journal):
+            return _Supervisor(child, journal, reader).watch()
+
+
+@contextmanager
+def polite_ends() -> Iterator[None]:
+    """Within the block a closed terminal, or a service manager that ends the run, counts as an interrupt by the user."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    former = {number: signal.signal(number, signal.default_int_handler) for number in _POLITE}
+    try:
+        yield
+    finally:
+        for number, handler in former.items():
+            signal.signal(number, handler)
+
+
+def _adopt_orphans() -> None:
+    """Processes that lose their parent below us become our children, so that they can be found and ended."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1)
+
+
+# -- in the child ------------------------------------------------------------------------------------------------------------
+
+
+def _be_the_child(entry: Callable[[], int], journal: Journal, foreign_output: int, temporary: str, supervisor: int) -> None:
+    code = 70
+    try:
+        _detach(foreign_output, supervisor)
+        tempfile.tempdir = os.environ["TMPDIR"] = temporary
+        journals.keep(journal)
+        code = entry()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        journal[CODE] = code
+        journal.enter(Phase.DONE)
+    finally:
+        os._exit(code)  # foreign code has no say in the end of the process
+
+
+def _detach(foreign_output: int, supervisor: int) -> None:
+    """A session of its own that ends with the supervisor, nothing to read, and a pipe for what foreign code prints.
+
+    Memory is limited, so that a component that never has enough ends alone, and core files are not written.
+    """
+    detach(supervisor)
+    lower(resource.RLIMIT_DATA, MEMORY)
+    lower(resource.RLIMIT_CORE, 0)
+    sys.stdout, sys.stderr = outlasting(sys.stdout, apart=True), outlasting(sys.stderr, apart=True)
+    os.dup2(foreign_output, 1)
+    os.dup2(foreign_output, 2)
+    os.close(foreign_output)
+
+
+# -- in the supervisor -------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class _Supervisor:
+    child: int
+    journal: Journal
+    reader: int
+    _seen: tuple[int, ...] = ()
+    _since: float = field(default_factory=time.monotonic)
+    _interrupted: float = 0.0
+    _foreign_bytes: int = 0
+    _hang: str = ""
+    #: what the journal said when it was looked at last
+    _last: bytes = b""
+
+    def watch(self) -> Outcome:
+        """Until the child has ended."""
+        os.set_blocking(self.reader, False)
+        process = os.pidfd_open(self.child) if hasattr(os, "pidfd_open") else -1
+        poll = select.poll()
+        for descriptor in (self.reader, process):
+            if descriptor >= 0:
+                poll.register(descriptor, select.POLLIN)
+        csv = LiveCsv(self.journal)
+        try:
+            status = self._wait(poll, csv)
+        finally:
+            self._end_all()
+            self._pass_on()
+            os.close(self.reader)
+            if process >= 0:
+                os.close(process)
+        return self._outcome(status)
+
+    def _wait(self, poll: select.poll, csv: LiveCsv) -> int:
+        while True:
+            try:
+                poll.poll(LOOK * 1000)
+                self._pass_on()
+                pid, status = os.waitpid(self.child, os.WNOHANG)
+                if pid:
+                    return status
+                self._look()
+                csv.update()
+            except KeyboardInterrupt:
+                self._interrupt()
+
+    def _look(self) -> None:
+        """End a child that takes longer than it may, or whose journal was overwritten."""
+        journal, now = self.journal, time.monotonic()
+        if not journal.sound:
+            os.kill(self.child, signal.SIGKILL)
+            return
+        self._last = journal.contents()
+        deadline = journal.deadline  # before `seen`: a deadline that is newer than `seen` would be another call's
+        seen = journal[CHANGES], journal[STEPS], journal[CALL]
+        if seen != self._seen:
+            self._seen, self._since = seen, now
+        elif now - self._since > deadline:
+            self._hang = f"did not return within {deadline:g} s"
+            os.kill(self.child, signal.SIGKILL)
+        if self._interrupted and now - self._interrupted > PATIENCE:
+            os.kill(self.child, signal.SIGKILL)
+
+    def _interrupt(self) -> None:
+        """The first interrupt asks the child to end, the second one does not ask."""
+        with suppress(ProcessLookupError):
+            os.kill(self.child, signal.SIGKILL if self._interrupted else signal.SIGINT)
+        self._interrupted = self._interrupted or time.monotonic()
+
+    def _end_all(self) -> None:
+        """Processes that the child has left behind end with it, also those that left its session."""
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(self.child, signal.SIGKILL)
+        for _ in range(_GENERATIONS):
+            orphans = _children()
+            if not orphans:
+                return
+            for orphan in orphans:
+                with suppress(ProcessLookupError, ChildProcessError):
+                    os.kill(orphan, signal.SIGKILL)
+                    os.waitpid(orphan, 0)
+
+    def _pass_on(self) -> None:
+        """What foreign code printed goes to standard error, up to a limit."""
+        for _ in range(64):
+            try:
+                data = os.read(self.reader, 1 << 16)
+            except BlockingIOError:
+                return
+            if not data:
+                return
+            room = LARGEST_OUTPUT - self._foreign_bytes
+            self._foreign_bytes += len(data)
+            if room > 0:
+                sys.stderr.write(data[:room].decode("utf-8", "replace"))
+                sys.stderr.flush()
+
+    def _outcome(self, status: int) -> Outcome:
+        if (more := self._foreign_bytes - LARGEST_OUTPUT) > 0:
+            sys.stderr.write(f"\n... components printed {more} bytes more\n")
+        journal = self.journal
+        if not journal.sound:
+            journal.restore(self._last)
+            return Outcome(1, journal[ROWS], journal, self._suspicion("it wrote over memory of the process that is not its own"))
+        code, rows, phase = journal[CODE], journal[ROWS], journal.phase
+        if phase == Phase.DONE:
+            return Outcome(code, rows, journal)
+        if self._interrupted:
+            return Outcome(130, rows, journal, interrupted=True)
+        failure = self._failure(self._hang or ending(status))
+        if phase == Phase.LEAVING:
+            return Outcome(code, rows, journal, warning=f"{failure}; all results were written before")
+        return Outcome(1, rows, journal, failure)
+
+    def _failure(self, reason: str) -> ComponentError:
+        """The failure of whatever was going on."""
+        journal = self.journal
+        header = read_header(journal.folder)
+        if journal.phase == Phase.STEPPING and header:
+            number, time = journal[CALL], header.seconds(journal[STEPS])
+            component, function = header.calls[number] if 0 <= number < len(header.calls) else ("the run", "moving values")
+            return ComponentError(component, function, reason, time)
+        if journal.phase in (Phase.CALLING, Phase.LEAVING):
+            activity = journal.activity()
+            moment = None if activity.time != activity.time else activity.time
+            return ComponentError(activity.component, activity.function, reason, moment)
+        return self._suspicion(f"{reason}, while no component was being called")
+
+    def _suspicion(self, reason: str) -> ComponentError:
+        """The failure of a component that cannot be told from the others."""
+        header = read_header(self.journal.folder)
+        names = dict.fromkeys(component for component, _ in header.calls) if header else {}
+        return ComponentError(one_of(names) if names else "cosim", "the run", reason)
+
+
+def _children() -> list[int]:
+    try:
+        return [int(word) for word in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()]
+    except OSError:
+        return []
+
+
+def ending(status: int) -> str:
+    """How a process ended, in words."""
+    if os.WIFSIGNALED(status):
+        number = os.WTERMSIG(status)
+        name = signal.Signals(number).name if number in set(signal.Signals) else "unknown"
+        text = f"the process was ended by signal {number} ({name}, {(signal.strsignal(number) or '').lower()})"
+        return f"{text}: out of memory, or killed from outside" if number == signal.SIGKILL else text
+    return f"it ended the process with exit code {os.WEXITSTATUS(status)}"

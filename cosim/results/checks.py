@@ -1,0 +1,64 @@
+"""Checks of KPIs against the limits that a scenario states."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple
+
+from ..core.errors import InputError, Problem, did_you_mean
+
+Number = float | int | bool
+
+LIMITS: Mapping[str, Callable[[Any, Any], bool]] = {"min": operator.ge, "max": operator.le, "equals": operator.eq}
+
+
+class CheckOutcome(NamedTuple):
+    """A check as the scenario states it, the value that was found, and whether it is within the limits."""
+
+    check: Mapping[str, Any]
+    value: Number
+    passed: bool
+
+    @property
+    def limits(self) -> str:
+        """The limits in words: "max 0.1"."""
+        return ", ".join(f"{key} {str(limit).lower()}" for key, limit in self.check.items() if key != "kpi")
+
+    def __str__(self) -> str:
+        value = str(self.value).lower() if isinstance(self.value, bool) else f"{self.value:.6g}"
+        return f"{self.check['kpi']} is {value}, expected {self.limits}"
+
+
+def evaluate_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, Any]]) -> list[CheckOutcome]:
+    """Hold `kpis` against checks such as {"kpi": "landing.lateral_error", "max": 0.1}; limits: "min", "max", "equals".
+
+    NaN keeps no limit. Raises InputError for KPIs that were not evaluated and limits that do not exist.
+    """
+    checks = list(checks)
+    if problems := [problem for check in checks for problem in _check_problems(kpis, check)]:
+        raise InputError(problems)
+    return [_outcome(check, kpis[check["kpi"]]) for check in checks]
+
+
+def held_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, Any]]) -> list[CheckOutcome]:
+    """As `evaluate_checks`, but a check of a KPI that was not evaluated is one that is not met: its value is NaN."""
+    checks = list(checks)
+    return evaluate_checks({**{check["kpi"]: math.nan for check in checks}, **kpis}, checks)
+
+
+def _check_problems(kpis: Mapping[str, Number], check: Mapping[str, Any]) -> list[Problem]:
+    name, limits = check["kpi"], [key for key in check if key != "kpi"]
+    where = f'check of "{name}"'
+    problems = [Problem(f'unknown limit "{key}"{did_you_mean(key, LIMITS)}', where) for key in limits if key not in LIMITS]
+    if name not in kpis:
+        problems.append(Problem(f"no such KPI{did_you_mean(name, kpis)}", where))
+    if not limits:
+        problems.append(Problem(f"no limit given, expected one of {', '.join(LIMITS)}", where))
+    return problems
+
+
+def _outcome(check: Mapping[str, Any], value: Number) -> CheckOutcome:
+    passed = all(LIMITS[key](value, limit) for key, limit in check.items() if key != "kpi")
+    return CheckOutcome(check, value, passed)

@@ -1,0 +1,175 @@
+"""JSON files that know where everything stands.
+
+Strict JSON: duplicate keys, NaN and Infinity, and numbers too large for a double are problems, all of them reported with
+line and column; everything else is read as usual.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from json.decoder import scanstring  # type: ignore[attr-defined]
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import InputError, Problem
+from ..core.paths import open_text
+
+Path_ = tuple["str | int", ...]
+_SPACE = re.compile(r"[ \t\r\n]*")
+_LITERAL = re.compile(r"-?Infinity|NaN|true|false|null|-?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][-+]?\d+)?")
+#: neither file names nor UTF-8 can hold these
+_UNUSABLE = re.compile("[\0\ud800-\udfff]")
+#: characters
+_LONGEST_NUMBER = 1000
+_NAME = re.compile(r"[A-Za-z_]\w*")
+
+
+@dataclass
+class Document:
+    """A JSON value, and the offset in the text of everything in it."""
+
+    file: Path
+    text: str
+    value: Any = None
+    offsets: dict[Path_, int] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+
+    def where(self, path: Sequence[str | int]) -> str:
+        """ "file:line:column: $.json.path" of the deepest part of `path` that exists."""
+        known = tuple(path)
+        while known and known not in self.offsets:
+            known = known[:-1]
+        return f"{self.position(self.offsets.get(known, 0))}: {json_path(path)}"
+
+    def position(self, offset: int) -> str:
+        """ "file:line:column" of an offset in the text."""
+        line = bisect_right(self._lines, offset)
+        return f"{self.file}:{line}:{offset - self._lines[line - 1] + 1}"
+
+    @cached_property
+    def _lines(self) -> list[int]:
+        """Where each line begins."""
+        return [0, *(match.end() for match in re.finditer("\n", self.text))]
+
+
+def json_path(path: Sequence[str | int]) -> str:
+    """ "$.components.uav" or "$.stages[0]" for a sequence of keys and indices."""
+    return "$" + "".join(_step(key) for key in path)
+
+
+def _step(key: str | int) -> str:
+    if isinstance(key, int):
+        return f"[{key}]"
+    return f".{key}" if _NAME.fullmatch(key) else f"[{json.dumps(key)}]"
+
+
+def read_document(file: Path) -> Document:
+    """Read a JSON file. Raises InputError when there is no such file or when it is not JSON at all."""
+    try:
+        with open_text(file, encoding="utf-8") as opened:
+            text = opened.read()
+    except OSError as error:
+        raise InputError(f'cannot read "{file}": {error.strerror}') from None
+    except UnicodeDecodeError as error:
+        raise InputError(f'"{file}" is not UTF-8 text: {error.reason} at byte {error.start}') from None
+    document = Document(file, text)
+    reader = _Reader(document)
+    document.value, end = reader.value(_skip(text, 0), ())
+    if _skip(text, end) != len(text):
+        raise reader.error(_skip(text, end), "expected the end of the file")
+    return document
+
+
+def _skip(text: str, offset: int) -> int:
+    match = _SPACE.match(text, offset)
+    return match.end() if match else offset
+
+
+class _Reader:
+    """Recursive descent over JSON text; every method returns (value, offset behind it)."""
+
+    def __init__(self, document: Document):
+        self.document, self.text = document, document.text
+
+    def error(self, offset: int, message: str) -> InputError:
+        self.document.offsets.setdefault((), 0)
+        return InputError(f"{self.document.position(offset)}: {message}")
+
+    def value(self, offset: int, path: Path_) -> tuple[Any, int]:
+        self.document.offsets[path] = offset
+        if len(path) > 100:
+            raise self.error(offset, "nested more than 100 levels deep")
+        match self.text[offset : offset + 1]:
+            case "{":
+                return self.object(offset, path)
+            case "[":
+                return self.array(offset, path)
+            case '"':
+                return self.string(offset)
+        return self.literal(offset, path)
+
+    def object(self, offset: int, path: Path_) -> tuple[dict[str, Any], int]:
+        result: dict[str, Any] = {}
+        offset = _skip(self.text, offset + 1)
+        while self.text[offset : offset + 1] != "}":
+            if result:
+                offset = self.expect(offset, ",", "}")
+            if self.text[offset : offset + 1] != '"':
+                raise self.error(offset, 'expected a key in double quotes or "}"')
+            begin = offset
+            key, offset = self.string(offset)
+            offset = self.expect(_skip(self.text, offset), ":")
+            value, offset = self.value(offset, (*path, key))
+            if key in result:
+                self.document.offsets[(*path, key)] = begin
+                self.problem((*path, key), "duplicate key")
+            self.document.offsets[(*path, key)] = begin
+            result[key] = value
+            offset = _skip(self.text, offset)
+        return result, offset + 1
+
+    def array(self, offset: int, path: Path_) -> tuple[list[Any], int]:
+        result: list[Any] = []
+        offset = _skip(self.text, offset + 1)
+        while self.text[offset : offset + 1] != "]":
+            if result:
+                offset = self.expect(offset, ",", "]")
+            value, offset = self.value(offset, (*path, len(result)))
+            result.append(value)
+            offset = _skip(self.text, offset)
+        return result, offset + 1
+
+    def expect(self, offset: int, *symbols: str) -> int:
+        if self.text[offset : offset + 1] != symbols[0]:
+            raise self.error(offset, f"expected {' or '.join(map(repr, symbols))}")
+        return _skip(self.text, offset + 1)
+
+    def string(self, offset: int) -> tuple[str, int]:
+        try:
+            text, end = scanstring(self.text, offset + 1, True)
+        except json.JSONDecodeError as error:
+            raise self.error(error.pos, error.msg) from None
+        if found := _UNUSABLE.search(text):
+            message = f"the character U+{ord(found.group()):04X} is not allowed"
+            self.document.problems.append(Problem(message, self.document.position(offset)))
+        return _UNUSABLE.sub("\N{REPLACEMENT CHARACTER}", text), end
+
+    def literal(self, offset: int, path: Path_) -> tuple[Any, int]:
+        match = _LITERAL.match(self.text, offset)
+        if match is None:
+            raise self.error(offset, "expected a JSON value")
+        word = match.group()
+        value = json.loads(word) if len(word) <= _LONGEST_NUMBER else math.inf
+        if isinstance(value, float) and not math.isfinite(value):
+            self.problem(path, f"{word:.40} is not allowed, expected a finite number")
+            value = 0.0
+        return value, match.end()
+
+    def problem(self, path: Path_, message: str) -> None:
+        self.document.problems.append(Problem(message, self.document.where(path)))

@@ -1,0 +1,142 @@
+"""From JSON to a spec, collecting every problem: wrong parts are reported and cut out, and the rest is read on."""
+
+from __future__ import annotations
+
+import copy
+import json
+import types
+import typing
+from collections.abc import Sequence
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from ..core.errors import Problem, did_you_mean
+from .json_document import Document
+from .schema import CUT, SystemSpec
+
+S = TypeVar("S", bound=SystemSpec)
+
+#: what stands in for missing or wrong keys of the root, so that the rest can be read
+_STAND_INS: dict[str, Any] = {"name": "unnamed", "stop_time": 1, "step_size": 1, "components": {}}
+
+
+class Validated(NamedTuple, Generic[S]):
+    """The spec in a document without its wrong parts, what is wrong, and the root keys that were refused or are missing."""
+
+    spec: S
+    problems: list[Problem]
+    refused: set[str]
+
+
+def validate(document: Document, kind: type[S]) -> Validated[S]:
+    """Read a document as a spec, whatever is wrong with it."""
+    value = copy.deepcopy(document.value)
+    problems = list(document.problems)
+    refused: set[str] = set()
+    if not isinstance(value, dict):
+        problems.append(Problem(f"expected an object, found {_shown(value)}", document.where(())))
+        value = {}
+    first = True
+    while True:
+        try:
+            return Validated(kind.model_validate(value), problems, refused)
+        except ValidationError as error:
+            if first:  # later ones are consequences of cutting
+                problems += refusals(kind, document, error)
+            for detail in error.errors(include_url=False):
+                path = _path(detail)
+                refused |= {str(key) for key in path[:1] if len(path) == 1}
+                if detail["type"] == "extra_forbidden":
+                    _remove(value, path)
+                else:
+                    _cut(kind, value, path[:-1] if detail["type"] == "missing" and len(path) > 1 else path)
+            first = False
+
+
+def refusals(kind: type[BaseModel], document: Document, error: ValidationError) -> list[Problem]:
+    """What a schema has found wrong in a document, each with its place there."""
+    details = [(_path(detail), detail) for detail in error.errors(include_url=False)]
+    return [Problem(_message(kind, path, detail), document.where(path)) for path, detail in details]
+
+
+def _path(detail: Any) -> tuple[str | int, ...]:
+    return tuple(key for key in detail["loc"] if key != "[key]")
+
+
+def _message(kind: type[BaseModel], path: Sequence[str | int], detail: Any) -> str:
+    found = _shown(detail["input"])
+    match detail["type"]:
+        case "extra_forbidden":
+            return f"unknown key{did_you_mean(str(path[-1]), _keys(kind, path[:-1]))}"
+        case "missing":
+            return f'the key "{path[-1]}" is missing'
+        case "value_error":
+            return f"{detail['ctx']['error']}; found {found}"
+        case "string_pattern_mismatch":
+            return f"expected a name of letters, digits and underscores; found {found}"
+    return f"{detail['msg'].replace('Input should be', 'expected')}; found {found}"
+
+
+def _shown(value: Any) -> str:
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _remove(value: Any, path: Sequence[str | int]) -> None:
+    """Remove a key that should not be there, unless what it was in has been removed already."""
+    for key in path[:-1]:
+        if value is CUT or not (key in value if isinstance(value, dict) else key in range(len(value))):
+            return
+        value = value[key]
+    if isinstance(value, dict):
+        value.pop(path[-1], None)
+
+
+def _cut(kind: Any, value: Any, path: Sequence[str | int]) -> None:
+    """Remove the element at `path`; what must be there gets a stand-in."""
+    root = value
+    for key in path[:-1]:
+        if value is CUT or not (key in value if isinstance(value, dict) else key in range(len(value))):
+            return
+        value, kind = value[key], _inner(kind, key)
+    last = path[-1]
+    if value is root and last in _STAND_INS:
+        value[last] = copy.deepcopy(_STAND_INS[str(last)])
+    elif isinstance(value, dict):
+        value.pop(last, None)
+    elif isinstance(value, list) and last in range(len(value)):
+        if _model(_inner(kind, last)):
+            value[int(last)] = CUT
+        else:
+            del value[int(last)]
+
+
+def _keys(kind: Any, path: Sequence[str | int]) -> list[str]:
+    """The keys that the schema knows at a path."""
+    for key in path:
+        kind = _inner(kind, key)
+    kind = _model(kind)
+    return [field.alias or name for name, field in kind.model_fields.items()] if kind else []
+
+
+def _inner(kind: Any, key: str | int) -> Any:
+    if model := _model(kind):
+        return next((f.annotation for n, f in model.model_fields.items() if key in (n, f.alias)), None)
+    for option in _options(kind):
+        if typing.get_origin(option) in (dict, list):
+            return typing.get_args(option)[-1]
+    return None
+
+
+def _model(kind: Any) -> type[BaseModel] | None:
+    return next((o for o in _options(kind) if isinstance(o, type) and issubclass(o, BaseModel)), None)
+
+
+def _options(kind: Any) -> list[Any]:
+    """The members of a union, annotations removed."""
+    if typing.get_origin(kind) is typing.Annotated:
+        return _options(typing.get_args(kind)[0])
+    if typing.get_origin(kind) in (typing.Union, types.UnionType):
+        return [option for member in typing.get_args(kind) for option in _options(member)]
+    return [kind]

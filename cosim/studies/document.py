@@ -1,0 +1,112 @@
+"""Reading the files of `cosim sweep` and `cosim tune`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from pydantic import ValidationError
+
+from ..core import paths, resources
+from ..core.errors import InputError, Problem, did_you_mean
+from ..scenario.json_document import Document, json_path, read_document
+from ..scenario.nested_systems import find, pointer_keys
+from ..scenario.validation import refusals
+from .schema import StudySpec
+
+S = TypeVar("S", bound=StudySpec)
+
+_FOLDER = Path("scenarios") / "sweeps"
+
+
+@dataclass(frozen=True)
+class Read(Generic[S]):
+    """A sweep or tuning file and what it says."""
+
+    spec: S
+    document: Document
+
+    @property
+    def scenario(self) -> Path:
+        """The scenario's file."""
+        near = self.document.file.parent / self.spec.scenario
+        return near if paths.is_file(near) else find(self.spec.scenario)
+
+    def located(self, problems: Iterable[Problem], settings: Mapping[str, Any]) -> list[Problem]:
+        """Problems of a run with these settings, at the places in this file that make them, as far as a setting does."""
+        return list(dict.fromkeys(replace(problem, where=self._place(problem.where, settings)) for problem in problems))
+
+    def _place(self, where: str, settings: Mapping[str, Any]) -> str:
+        _, quote, name = where.partition('setting "')
+        if quote:
+            return self._made(name.removesuffix('"'), settings) or where
+        position, _, path = where.partition(": $")
+        if Path(position.rsplit(":", 2)[0]).name != self.scenario.name:
+            return where
+        pointers = {each: _json_path(each) for each in settings if each.startswith("/")}
+        above = [each for each, start in pointers.items() if _within(path, start)]
+        if above:
+            nearest = max(above, key=lambda each: len(pointers[each]))
+            return self._made(nearest, settings, path.removeprefix(pointers[nearest])) or where
+        below = [place for each, start in pointers.items() if _within(start, path) and (place := self._made(each, settings))]
+        return f"{below[0]}, in {where}" if len(below) == 1 else where
+
+    def _made(self, name: str, settings: Mapping[str, Any], part: str = "") -> str:
+        """Where this file makes a setting, or a part of it; "" where it does not."""
+        found = [path for path in self._places() if self._makes(path, name, settings)]
+        return self.document.where(found[-1]) + (part if found[-1][-1] == name else "") if found else ""
+
+    def _makes(self, path: tuple[str | int, ...], name: str, settings: Mapping[str, Any]) -> bool:
+        """Whether a place in this file is where a setting is made: a key with its value, or a text of "set"."""
+        value = _at(self.document.value, path)
+        return value == name or (path[-1] == name and value == settings.get(name))
+
+    def _places(self) -> Iterable[tuple[str | int, ...]]:
+        """Paths in the file that may name settings, in their order."""
+        for path in sorted(self.document.offsets, key=lambda path: self.document.offsets[path]):
+            if path and ("set" in path or "settings" in path or "levels" in path or "cases" in path):
+                yield path
+
+
+def _json_path(pointer: str) -> str:
+    """A JSON pointer as places are written, without "$"."""
+    return json_path([int(key) if key.isdigit() else key for key in pointer_keys(pointer)])[1:]
+
+
+def _within(path: str, start: str) -> bool:
+    return path == start or path.startswith((f"{start}.", f"{start}["))
+
+
+def _at(value: object, path: tuple[str | int, ...]) -> object:
+    for key in path:
+        value = value[key]  # type: ignore[index]
+    return value
+
+
+def read(file: str | Path, kind: type[S]) -> Read[S]:
+    """A sweep or tuning from a file, or a shipped one by its name. Raises InputError with everything that is wrong."""
+    document = read_document(_find(file))
+    try:
+        spec = kind.model_validate(document.value)
+    except ValidationError as error:
+        raise InputError([*document.problems, *refusals(kind, document, error)]) from None
+    if document.problems:
+        raise InputError(document.problems)
+    found = Read(spec, document)
+    try:
+        found.scenario  # noqa: B018
+    except InputError as error:
+        raise InputError([replace(problem, where=document.where(("scenario",))) for problem in error.problems]) from None
+    return found
+
+
+def _find(file: str | Path) -> Path:
+    path = Path(file)
+    if path.suffix == ".json" or paths.is_file(path):
+        return path
+    names = sorted(each.stem for each in (resources.root() / _FOLDER).glob("*.json"))
+    if str(file) not in names:
+        raise InputError(f'no file and no shipped sweep "{file}"{did_you_mean(str(file), names)}')
+    return resources.root() / _FOLDER / f"{file}.json"

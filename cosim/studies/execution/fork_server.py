@@ -1,0 +1,134 @@
+"""Warm process that forks all runs of a sweep on one machine: `python -m cosim.studies.execution.fork_server DESCRIPTOR`.
+
+It has imported everything, read the scenario once, unpacked its FMUs and let classes of components prepare what they can (by a
+function `warm`, where they have one); it has never loaded a binary or started a thread. For every descriptor it is sent it forks
+a lane: a process that answers one job after the other, each with a child process of its own.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import socket
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from signal import SIGKILL
+from typing import Any
+
+from ...components.fmi import FmuFile
+from ...components.python_class import load_object
+from ...core.errors import CosimError
+from ...process.sandbox.process import detach, threads
+from ...process.temporary_folders import run_folder
+from ...scenario import load
+from ...scenario.functions import function_problem, load_function
+from ...scenario.nested_systems import Scenario
+from .job import Job, Order
+from .run import Prepared, Replay, supervised_check, supervised_run
+
+#: what a run imports on its way
+_MODULES = (
+    "fmpy.fmi1",
+    "fmpy.fmi2",
+    "fmpy.fmi3",
+    "cosim.components.fmi.isolated.remote",
+    "cosim.engine.native_executor",
+    "numpy.random",
+)
+
+
+def serve(control: socket.socket) -> None:
+    """Fork lanes until whoever started this process is gone."""
+    if not (message := control.recv(1 << 16)):
+        return
+    request = json.loads(message)
+    order = Order(Path(request["scenario"]), Path(request["root"]), request["deadline"], tuple(request["fmus"]))
+    with run_folder() as folder:
+        tempfile.tempdir = os.environ["TMPDIR"] = folder
+        for module in _MODULES:
+            import_module(module)
+        prepared = {} if request["cold"] else dict(_warm(order))
+        gc.freeze()
+        control.sendall(b"warm" if request["cold"] or threads() == 1 else b"cold")
+        lanes: list[int] = []
+        try:
+            while descriptors := socket.recv_fds(control, 16, 1)[1]:
+                lanes.append(_fork(control, descriptors[0], order, prepared))
+                os.close(descriptors[0])
+        finally:
+            for lane in lanes:
+                with suppress(ProcessLookupError, ChildProcessError):
+                    os.kill(lane, SIGKILL)
+                    os.waitpid(lane, 0)
+
+
+def _warm(order: Order) -> Iterator[tuple[Path, FmuFile]]:
+    """Import what the scenario uses as it stands in its file, unpack all FMUs; what is wrong with them, the runs will say."""
+    with suppress(CosimError):
+        _import(load(order.scenario))
+    for path in order.fmus:
+        with suppress(CosimError):
+            file = FmuFile(order.root / path)
+            if not file.description.only_once_per_process:
+                file.acquire()
+                yield (order.root / path).resolve(), file
+
+
+def _import(scenario: Scenario) -> None:
+    for node, name in scenario.root.leaves():
+        reference = node.spec.components[name].python
+        if reference and (warm := getattr(load_object(reference, node.folder), "warm", None)):
+            warm()
+    for kpi in (*scenario.spec.kpis, *scenario.spec.figures):
+        function_problem(kpi, scenario.root.folder)
+    for kpi in scenario.spec.kpis:
+        load_function(kpi.python, scenario.root.folder)
+
+
+def _fork(control: socket.socket, descriptor: int, order: Order, prepared: Prepared) -> int:
+    template = os.getpid()
+    child = os.fork()
+    if child:
+        return child
+    try:
+        control.close()
+        detach(template)
+        _quiet()
+        _answer_all(socket.socket(fileno=descriptor), order, prepared)
+    finally:
+        os._exit(0)
+
+
+def _quiet() -> None:
+    """What is printed here goes to a file without a name."""
+    with tempfile.TemporaryFile("ab") as file:
+        os.dup2(file.fileno(), 1)
+        os.dup2(file.fileno(), 2)
+
+
+def _answer_all(client: socket.socket, order: Order, prepared: Prepared) -> None:
+    with client.makefile("rb") as requests:
+        for line in requests:
+            client.sendall((_answer(json.loads(line), order, prepared) + "\n").encode())
+
+
+def _answer(request: dict[str, Any], order: Order, prepared: Prepared) -> str:
+    job = Job(request["key"], request["settings"])
+    if not request["check"]:
+        replay = Replay(**request["replay"]) if "replay" in request else None
+        return supervised_run(order, job, prepared, replay).to_json()
+    try:
+        found = supervised_check(order, job, prepared)
+    except CosimError as error:
+        return json.dumps([(str(error), "")])
+    return json.dumps([(problem.message, problem.where) for problem in found])
+
+
+if __name__ == "__main__":
+    with suppress(ConnectionError):  # it was interrupted while this process warmed up
+        serve(socket.socket(fileno=int(sys.argv[1])))

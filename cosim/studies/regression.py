@@ -1,0 +1,161 @@
+"""One scenario of `cosim regress`: its run, and what is to be said about it."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..core.errors import CosimError, InputError
+from ..core.paths import open_text
+
+if TYPE_CHECKING:
+    from ..results import Result
+    from ..results.comparison import Comparison, Tolerance
+
+
+#: what a scenario expects of its run
+EXPECTATIONS = ("checks", "reference")
+
+
+def holds(file: Path, *groups: Sequence[str]) -> bool:
+    """Whether a JSON file has one key at least of each group; yes when it cannot be read: running it says why."""
+    try:
+        with open_text(file, encoding="utf-8") as stream:
+            content = json.load(stream)
+    except (OSError, ValueError, RecursionError):
+        return True
+    return isinstance(content, dict) and all(any(content.get(key) for key in group) for group in groups)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one scenario: `code` as of `cosim run`, what was done, what is wrong, and `seconds` of wall time."""
+
+    name: str
+    code: int
+    summary: str = ""
+    details: tuple[str, ...] = ()
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class Regression:
+    """A scenario file, the folder that its results go to, and whether its reference is to be written from them."""
+
+    file: Path
+    directory: Path
+    update: bool
+
+    def outcome(self) -> Outcome:
+        """Run the scenario in a process of its own, as anybody would, and look at what it wrote."""
+        began = time.perf_counter()
+        return replace(self._outcome(), seconds=time.perf_counter() - began)
+
+    def _outcome(self) -> Outcome:
+        command = [sys.executable, "-m", "cosim", "run", str(self.file), "--no-report", "--output-dir", str(self.directory)]
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)  # noqa: S603
+        if done.returncode < 0:
+            return Outcome(self.file.stem, 1, "did not run to its end", (f"cosim run: ended by signal {-done.returncode}",))
+        if done.returncode not in (0, 3):
+            return Outcome(self.file.stem, done.returncode, "did not run to its end", tuple(done.stderr.splitlines()))
+        try:
+            run = _Run.read(self.file, self.directory)
+            return self._updated(run) if self.update else self._compared(run)
+        except CosimError as error:
+            return Outcome(self.file.stem, error.exit_code, "cannot be compared", tuple(str(error).splitlines()))
+
+    def _compared(self, run: _Run) -> Outcome:
+        failed, summary = run.failed_checks(), f"{len(run.checks)} checks"
+        if run.scenario.get("reference"):
+            comparison = run.compared()
+            summary += f", {len(comparison.verdicts)} signals"
+            if not comparison.passed:
+                failed += [*str(comparison).splitlines(), *run.changes(), f"see {run.draw(comparison, self.directory)}"]
+        return Outcome(self.file.stem, 3 if failed else 0, summary, tuple(failed))
+
+    def _updated(self, run: _Run) -> Outcome:
+        from ..results.comparison.reference import write_reference
+
+        if failed := run.failed_checks():
+            return Outcome(self.file.stem, 3, "a failed run becomes no reference", tuple(failed))
+        written = write_reference(run.result, run.path, run.tolerances)
+        size = run.path.stat().st_size / 1000
+        return Outcome(self.file.stem, 0, f"{len(written)} signals, {len(written.time)} rows, {size:.0f} kB in {run.path}")
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A result, the scenario that it came from (as it was run), and the folder of that scenario's file."""
+
+    result: Result
+    scenario: Mapping[str, Any]
+    folder: Path
+
+    @classmethod
+    def read(cls, file: Path, directory: Path) -> _Run:
+        from ..report.runs import read_run
+
+        result = read_run(directory)
+        return cls(result, result.metadata["scenario"], file.parent)
+
+    @property
+    def checks(self) -> list[dict[str, Any]]:
+        return self.scenario.get("checks", [])
+
+    def failed_checks(self) -> list[str]:
+        from ..results.checks import evaluate_checks
+
+        kpis = {name: math.nan if value is None else value for name, value in self.result.kpis.items()}
+        return [str(outcome) for outcome in evaluate_checks(kpis, self.checks) if not outcome.passed]
+
+    @property
+    def path(self) -> Path:
+        return self.folder / self.scenario["reference"]["file"]
+
+    @cached_property
+    def tolerances(self) -> dict[str, Tolerance]:
+        from ..results.comparison import Tolerance
+
+        return {pattern: Tolerance(**tolerance) for pattern, tolerance in self.scenario["reference"]["tolerances"].items()}
+
+    @cached_property
+    def reference(self) -> Result:
+        from ..results import Result
+
+        if not self.path.is_file():
+            raise InputError(f'the reference "{self.path}" does not exist: `cosim regress --update` writes it')
+        return Result.from_csv(self.path)
+
+    def compared(self) -> Comparison:
+        from ..results.comparison import compare
+
+        return compare(self.result, self.reference, self.tolerances)
+
+    def changes(self) -> Iterator[str]:
+        """What is no longer as it was when the reference was made."""
+        from ..results.comparison.reference import changes
+
+        try:
+            made_by = json.loads(self.path.with_suffix(".json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return
+        if found := changes(made_by, self.result.metadata):
+            yield f"changed since the reference was made: {', '.join(found)}"
+
+    def draw(self, comparison: Comparison, directory: Path) -> Path:
+        """The worst signals in their tubes, as a file in `directory`."""
+        from ..report.figures import draw, save
+        from ..report.tubes import tubes
+
+        arguments = {"reference": self.reference, "tolerances": self.tolerances, "comparison": comparison}
+        path = directory / "tubes.png"
+        save(draw(self.result, "tubes", tubes, arguments), path)
+        return path

@@ -1,0 +1,300 @@
+"""The formats of `cosim sweep` and `cosim tune`; `cosim schema --sweep` and `--tune` print them as JSON Schema."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, Field, StringConstraints, model_validator
+
+from ..core.errors import did_you_mean
+from ..scenario.schema import CheckSpec, Names, Spec
+from .setting_conflicts import set_once
+
+#: distribution -> its arguments; `min` and `max` of truncated_normal may be left out
+DISTRIBUTIONS = {
+    "uniform": ("min", "max"),
+    "normal": ("mean", "std"),
+    "truncated_normal": ("mean", "std", "min", "max"),
+    "lognormal": ("median", "sigma"),
+    "triangular": ("min", "mode", "max"),
+    "exponential": ("mean",),
+    "weibull": ("shape", "scale"),
+}
+_OPTIONAL = {"truncated_normal": {"min", "max"}}
+_POSITIVE = ("std", "sigma", "median", "shape", "scale")
+#: what makes the levels of a factor
+_LEVELS = ("values", "range", "distribution", "levels")
+#: quantiles in the aggregates
+QUANTILES = {"min": 0.0, "q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95, "max": 1.0}
+#: columns that stand beside factors, and beside the parameters of a tuning, in some file
+TABLE = ("run", "seed", "status", "passed", "failure", "output", "command")
+AGGREGATES = ("kpi", "count", "mean", "std", *QUANTILES)
+SUCCESS = ("runs", "distinct", "failed", "passed", "rate", "low", "high")
+TRIALS = ("value", "violation", "failure")
+
+
+def _no_column(*names: str) -> AfterValidator:
+    def check(value: str) -> str:
+        if value in names:
+            raise ValueError(f"expected a name other than those of columns: {', '.join(dict.fromkeys(names))}")
+        return value
+
+    return AfterValidator(check)
+
+
+Paths = Annotated[Names, Field(min_length=1)]
+Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_. ]*$"), _no_column(*TABLE, *AGGREGATES, *SUCCESS)]
+Scale = Literal["linear", "log"]
+
+
+def _ordered(low: float | None, high: float | None) -> None:
+    if low is not None and high is not None and not low < high:
+        raise ValueError('expected "min" to be less than "max"')
+
+
+def _logarithmic(scale: Scale, low: float) -> None:
+    if scale == "log" and low <= 0:
+        raise ValueError('a logarithmic scale needs a positive "min"')
+
+
+class RangeSpec(Spec):
+    """Evenly spread values from `min` to `max`; `count` of them in a full factorial design."""
+
+    min: float
+    max: float
+    count: int | None = Field(None, ge=2)
+    scale: Scale = "linear"
+
+    @model_validator(mode="after")
+    def _possible(self) -> RangeSpec:
+        _ordered(self.min, self.max)
+        _logarithmic(self.scale, self.min)
+        return self
+
+
+class DistributionSpec(Spec):
+    """A distribution of values; in a full factorial design the medians of `count` equally likely parts."""
+
+    kind: Literal["uniform", "normal", "truncated_normal", "lognormal", "triangular", "exponential", "weibull"]
+    min: float | None = None
+    max: float | None = None
+    mean: float | None = None
+    std: float | None = None
+    median: float | None = None
+    sigma: float | None = Field(None, description="standard deviation of the logarithm")
+    mode: float | None = None
+    shape: float | None = None
+    scale: float | None = None
+    count: int | None = Field(None, ge=1)
+
+    @model_validator(mode="after")
+    def _complete(self) -> DistributionSpec:
+        known, given = DISTRIBUTIONS[self.kind], self.arguments
+        if unknown := [name for name in given if name not in known]:
+            raise ValueError(f'"{self.kind}" has no "{unknown[0]}"{did_you_mean(unknown[0], known)}')
+        if missing := [name for name in known if name not in given and name not in _OPTIONAL.get(self.kind, ())]:
+            raise ValueError(f'"{self.kind}" needs {", ".join(missing)}')
+        if small := [name for name in _POSITIVE if given.get(name, 1.0) <= 0]:
+            raise ValueError(f'expected a positive "{small[0]}"')
+        if self.kind == "exponential" and given["mean"] <= 0:
+            raise ValueError('expected a positive "mean"')
+        _ordered(self.min, self.max)
+        if self.mode is not None and not given["min"] <= self.mode <= given["max"]:
+            raise ValueError('expected "mode" between "min" and "max"')
+        return self
+
+    @property
+    def arguments(self) -> dict[str, float]:
+        """What was given of the distribution's own numbers."""
+        return {name: value for name, value in self.model_dump(exclude={"kind", "count"}).items() if value is not None}
+
+
+class FactorSpec(Spec):
+    """What varies: paths as of `--set` and the values that they take, or named levels that set several things at once."""
+
+    name: Label
+    set: Paths | None = Field(None, description="variable or JSON pointer; of several, all get the same value")
+    values: list[Any] | None = Field(None, min_length=1)
+    range: RangeSpec | None = None
+    distribution: DistributionSpec | None = None
+    levels: dict[str, dict[str, Any]] | None = Field(None, min_length=1, description="label -> settings")
+    integer: bool = Field(False, description="values of a range or distribution are rounded")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> FactorSpec:
+        given = [name for name in _LEVELS if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"expected exactly one of {', '.join(_LEVELS)}; found {' and '.join(given) or 'none'}")
+        if (self.levels is None) == (self.set is None):
+            raise ValueError('expected "set" beside values, range or distribution, and not beside levels')
+        return self
+
+    def settings(self) -> Iterator[tuple[str, Any]]:
+        """What it may set, with the values that are known; without any the value None."""
+        for level in (self.levels or {}).values():
+            yield from level.items()
+        yield from ((path, value) for path in self.set or () for value in self.values or (None,))
+
+
+class SeedsSpec(Spec):
+    """Replications: every point is run with each of `count` seeds, the same ones for all points."""
+
+    set: Paths
+    first: int = 1
+    count: int = Field(ge=1)
+
+
+class MapSpec(Spec):
+    """A map of success over two factors; panels side by side (`columns`) and below each other (`rows`) are for further ones."""
+
+    x: str
+    y: str
+    columns: str | None = None
+    rows: str | None = None
+    titles: dict[str, str] = Field({}, description='factor -> how readers call it, such as "wind (m/s)"; empty: nothing is said')
+
+    @property
+    def factors(self) -> list[str]:
+        """Names of the factors that tell cells apart, panels first."""
+        return [name for name in (self.rows, self.columns, self.y, self.x) if name is not None]
+
+    @model_validator(mode="after")
+    def _different(self) -> MapSpec:
+        _unique("axes of a map", self.factors)
+        return self
+
+
+class DesignSpec(Spec):
+    """How points are chosen: all combinations, or `runs` samples."""
+
+    kind: Literal["full_factorial", "latin_hypercube", "sobol"] = "full_factorial"
+    runs: int | None = Field(None, ge=1)
+    seed: int = Field(1, ge=0)
+
+    @model_validator(mode="after")
+    def _sized(self) -> DesignSpec:
+        if (self.kind == "full_factorial") != (self.runs is None):
+            raise ValueError('expected "runs" with latin_hypercube and sobol, and not with full_factorial')
+        if self.kind == "sobol" and self.runs and self.runs & (self.runs - 1):
+            near = 2 ** round(math.log2(self.runs))
+            raise ValueError(f'a Sobol sequence is balanced for powers of two only, expected for example "runs": {near}')
+        return self
+
+
+class StudySpec(Spec):
+    """What sweeps and tunings have in common: a scenario, changes to it that all runs share, and a run's deadline."""
+
+    schema_: str | None = Field(None, alias="$schema")
+    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$")]
+    description: str = ""
+    scenario: str = Field(description="path relative to this file, or the name of a shipped scenario")
+    settings: dict[str, Any] = Field({}, description="changes to the scenario as of `--set`")
+    deadline: float | None = Field(None, gt=0, description="wall time a run may take (s)")
+
+
+class SweepSpec(StudySpec):
+    """A sweep: factors, a design, seeds, and what counts as success."""
+
+    factors: list[FactorSpec] = []
+    design: DesignSpec = DesignSpec(kind="full_factorial", runs=None, seed=1)
+    seeds: SeedsSpec | None = None
+    success: list[CheckSpec] | None = Field(None, description="limits on KPIs; default: the checks of the scenario")
+    by: list[Names] = Field([], description="factors, or lists of factors, whose levels are told apart in the aggregates")
+    maps: list[MapSpec] = Field([], description="maps of success, as figures and in sweep.html")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> SweepSpec:
+        names = [factor.name for factor in self.factors]
+        _unique("factors", names)
+        seeds = [("seed", [(path, None) for path in self.seeds.set])] if self.seeds else []
+        set_once(self.settings, [*((factor.name, factor.settings()) for factor in self.factors), *seeds])
+        if not names and self.seeds is None:
+            raise ValueError('expected "factors", "seeds" or both')
+        for name in (name for group in self.by for name in group):
+            if name not in (*names, "seed"):
+                raise ValueError(f'"by" names no factor "{name}"{did_you_mean(name, [*names, "seed"])}')
+        for each in self.maps:
+            _mapped(each, self)
+        if self.design.kind == "full_factorial":
+            for factor in self.factors:
+                part = factor.range or factor.distribution
+                if part and part.count is None:
+                    raise ValueError(f'the factor "{factor.name}" needs a "count" in a full factorial design')
+        return self
+
+
+class ParameterSpec(Spec):
+    """What a tuning may change, and within which bounds."""
+
+    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$"), _no_column(*TRIALS)]
+    set: Paths
+    min: float
+    max: float
+    start: float | None = None
+    scale: Scale = "linear"
+
+    @model_validator(mode="after")
+    def _possible(self) -> ParameterSpec:
+        _ordered(self.min, self.max)
+        _logarithmic(self.scale, self.min)
+        if self.start is not None and not self.min <= self.start <= self.max:
+            raise ValueError('expected "start" between "min" and "max"')
+        return self
+
+
+class MethodSpec(Spec):
+    """The optimizer and what it may cost."""
+
+    kind: Literal["differential_evolution", "nelder_mead", "powell"] = "differential_evolution"
+    population: int = Field(16, ge=5, description="points per generation (differential_evolution)")
+    generations: int = Field(20, ge=1, description="generations after the first (differential_evolution)")
+    evaluations: int = Field(200, ge=1, description="points at most (nelder_mead, powell)")
+    seed: int = Field(1, ge=0)
+
+
+class TuneSpec(StudySpec):
+    """A tuning: the expression of KPIs that shall become small, the parameters, and what must hold."""
+
+    parameters: list[ParameterSpec] = Field(min_length=1)
+    minimize: str = Field(description='arithmetic over KPIs and parameters, such as "landing.lateral_error + 0.1 * gain"')
+    constraints: list[str] = Field([], description='comparisons of such expressions, such as "heading.overshoot <= 0.1"')
+    cases: list[dict[str, Any]] = Field([{}], min_length=1, description="each point is run with each of these settings")
+    over_cases: Literal["mean", "max"] = "mean"
+    method: MethodSpec = MethodSpec(population=16, generations=20, evaluations=200, seed=1)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> TuneSpec:
+        _unique("parameters", [parameter.name for parameter in self.parameters])
+        cases = [setting for case in self.cases for setting in case.items()]
+        parameters = [(each.name, [(path, None) for path in each.set]) for each in self.parameters]
+        set_once(self.settings, [("cases", cases), *parameters])
+        return self
+
+
+def _unique(what: str, names: Iterable[str]) -> None:
+    names = list(names)
+    if twice := [name for i, name in enumerate(names) if name in names[:i]]:
+        raise ValueError(f'two {what} are called "{twice[0]}"')
+
+
+def _mapped(map_: MapSpec, sweep: SweepSpec) -> None:
+    """Raises ValueError when a factor of a map does not exist or has no levels."""
+    known = [each.name for each in sweep.factors if _has_labels(each, sweep.design.kind != "full_factorial")]
+    known += ["seed"] if sweep.seeds else []
+    for name in map_.factors:
+        if name not in known:
+            raise ValueError(f'"maps" names no factor with levels "{name}"{did_you_mean(name, known)}')
+
+
+def _has_labels(factor: FactorSpec, sampled: bool) -> bool:
+    """Whether a factor has levels that can stand at an axis."""
+    if factor.values is not None:
+        return not any(isinstance(value, list | dict) for value in factor.values)
+    return factor.levels is not None or not sampled
+
+
+def json_schema(kind: type[BaseModel]) -> dict[str, Any]:
+    """JSON Schema (2020-12) of a sweep or tuning file."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **kind.model_json_schema(by_alias=True)}

@@ -1,0 +1,1 @@
+"""Tables, statistics, figures and pages about the runs of a study."""

@@ -1,0 +1,110 @@
+"""What many runs say together: distributions of KPIs and rates of success, over all runs and by the levels of factors."""
+
+from __future__ import annotations
+
+import json
+import math
+from array import array
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..design import Design
+from ..schema import QUANTILES
+from ..sweep import Row
+from .table import Rows
+
+#: quantile of the normal distribution for intervals of 95 %
+_Z = 1.959963984540054
+
+
+class Interval(NamedTuple):
+    """Of a share: both ends."""
+
+    low: float
+    high: float
+
+
+def wilson(successes: float, count: int) -> Interval:
+    """Wilson's score interval (95 %) of a share (E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), 209-212)."""
+    if count == 0:
+        return Interval(0.0, 1.0)
+    share, z2 = successes / count, _Z * _Z
+    center = (share + z2 / (2 * count)) / (1 + z2 / count)
+    half = _Z / (1 + z2 / count) * math.sqrt(share * (1 - share) / count + z2 / (4 * count * count))
+    return Interval(0.0 if successes == 0 else center - half, 1.0 if successes == count else center + half)
+
+
+@dataclass
+class Group:
+    """Runs that share the labels of some factors, and the finite values of their KPIs.
+
+    `distinct` counts a run that several points have once: it says nothing new the second time.
+    """
+
+    labels: Mapping[str, Any]
+    runs: int = 0
+    distinct: int = 0
+    failed: int = 0
+    passed: int = 0
+    kpis: dict[str, array[float]] = field(default_factory=dict)
+    _shared: set[str] = field(default_factory=set)
+
+    def add(self, row: Row) -> None:
+        self.runs += 1
+        self.distinct += row.record.key not in self._shared
+        if row.shared:
+            self._shared.add(row.record.key)
+        self.failed += bool(row.record.failure)
+        self.passed += row.passed
+        for name, value in row.record.kpis.items():
+            values = self.kpis.setdefault(name, array("d"))
+            if math.isfinite(value):
+                values.append(value)
+
+    @property
+    def rate(self) -> float:
+        """Share of successes in all runs; a run that failed is none."""
+        return self.passed / self.runs
+
+    @property
+    def interval(self) -> Interval:
+        """Of the rate, as many runs as are distinct having been made."""
+        return wilson(self.passed * self.distinct / self.runs, self.distinct)
+
+    def statistics(self) -> Iterator[tuple[str, dict[str, float]]]:
+        """(KPI, statistics) of each KPI: number of finite values, their mean, standard deviation (n - 1) and quantiles."""
+        for name, column in self.kpis.items():
+            values = np.frombuffer(column, np.float64) if column else np.array([math.nan])
+            quantiles = dict(zip(QUANTILES, np.quantile(values, list(QUANTILES.values())).tolist(), strict=True))
+            spread = float(values.std(ddof=1)) if len(column) > 1 else math.nan
+            yield name, {"count": len(column), "mean": float(values.mean()), "std": spread, **quantiles}
+
+
+def groupings(design: Design, by: Iterable[Sequence[str]]) -> list[tuple[str, ...]]:
+    """All runs together, every factor with levels alone, and what else was asked for."""
+    single = [(factor.name,) for factor in design.factors if factor.grid and (factor.listed or design.samples is None)]
+    return list(dict.fromkeys([(), *single, *map(tuple, by)]))
+
+
+def groups(rows: Rows, names: Sequence[str]) -> list[Group]:
+    """Runs grouped by the labels of these factors, in the order in which they appear."""
+    found: dict[str, Group] = {}
+    for row in rows():
+        labels = {name: row.point.labels[name] for name in names}
+        found.setdefault(json.dumps(labels), Group(labels)).add(row)
+    return list(found.values())
+
+
+def causes(rows: Iterable[Row]) -> list[tuple[str, int, int]]:
+    """(cause, number of runs, first run) of failures, the most frequent first."""
+    counts: Counter[str] = Counter()
+    first: dict[str, int] = {}
+    for row in rows:
+        if row.record.failure:
+            counts[row.record.failure] += 1
+            first.setdefault(row.record.failure, row.run)
+    return [(cause, count, first[cause]) for cause, count in counts.most_common()]

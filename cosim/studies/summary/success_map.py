@@ -1,0 +1,120 @@
+"""Maps of success: shares of successes over two factors, in panels by up to two further ones."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any, NamedTuple
+
+from ..design import Design
+from ..schema import MapSpec
+from ..sweep import Row, Sweep
+from .statistics import Interval, wilson
+
+#: the name of a map, with a number behind it where there are several
+MAP = "success_map"
+
+
+class Run(NamedTuple):
+    """What a map knows of a run; `value` is that of the KPI which ranks successes, `key` is the same for the same run."""
+
+    number: int
+    passed: bool
+    value: float
+    key: str
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Runs that share their labels."""
+
+    labels: Mapping[str, Any]
+    runs: Sequence[Run]
+    #: the KPI which ranks successes; empty: none does
+    kpi: str = ""
+
+    @property
+    def passed(self) -> int:
+        return sum(run.passed for run in self.runs)
+
+    @property
+    def share(self) -> float:
+        """Of successes; NaN without runs."""
+        return self.passed / len(self.runs) if self.runs else math.nan
+
+    @property
+    def interval(self) -> Interval:
+        """Of the share, as many runs as are distinct having been made."""
+        distinct = len({run.key for run in self.runs})
+        return wilson(self.passed * distinct / max(1, len(self.runs)), distinct)
+
+    @cached_property
+    def shown(self) -> Run | None:
+        """The run to show: the first that is no success, else the median one."""
+        if lost := [run for run in self.runs if not run.passed]:
+            return lost[0]
+        ranked = sorted(self.runs, key=lambda run: (run.value, run.number))
+        return ranked[(len(ranked) - 1) // 2] if ranked else None
+
+    @property
+    def why(self) -> str:
+        """Why this run is shown."""
+        if self.passed < len(self.runs):
+            return "the first that is no success"
+        return f"the median of {self.kpi}" if self.kpi else "the middle one"
+
+
+@dataclass(frozen=True)
+class SuccessMap:
+    """A map with its cells; one is there for every combination of levels, also where nothing has been run."""
+
+    name: str
+    spec: MapSpec
+    levels: Mapping[str, Sequence[Any]]
+    #: by the labels of the spec's factors, as JSON: Python takes 1, 1.0 and true for the same
+    cells: Mapping[str, Cell]
+
+    def along(self, factor: str | None) -> Sequence[Any]:
+        """Labels along an axis; one None where the map has no such factor."""
+        return self.levels[factor] if factor is not None else [None]
+
+    def cell(self, row: Any, column: Any, y: Any, x: Any) -> Cell:
+        """By labels; None for what the map does not tell apart."""
+        spec = self.spec
+        axes = zip((spec.rows, spec.columns, spec.y, spec.x), (row, column, y, x), strict=True)
+        return self.cells[_key(label for factor, label in axes if factor is not None)]
+
+    def title(self, factor: str) -> str:
+        return self.spec.titles.get(factor, factor)
+
+
+def success_maps(sweep: Sweep, rows: Iterable[Row]) -> list[SuccessMap]:
+    """The maps that a sweep asks for, of its finished runs."""
+    specs, kpi = sweep.read.spec.maps, ranking(sweep.criteria)
+    found: list[dict[str, list[Run]]] = [{} for _ in specs]
+    for row in rows if specs else ():
+        run = Run(row.run, row.passed, float(row.record.kpis.get(kpi, math.nan)), sweep.keys[row.run])
+        for spec, cells in zip(specs, found, strict=True):
+            cells.setdefault(_key(row.point.labels[name] for name in spec.factors), []).append(run)
+    names = [MAP if len(specs) == 1 else f"{MAP}_{i + 1}" for i in range(len(specs))]
+    return [_map(*each, sweep.design, kpi) for each in zip(names, specs, found, strict=True)]
+
+
+def ranking(criteria: Iterable[Mapping[str, Any]]) -> str:
+    """The first KPI that has a limit; empty: none has."""
+    return next((check["kpi"] for check in criteria if "min" in check or "max" in check), "")
+
+
+def _key(labels: Iterable[Any]) -> str:
+    return json.dumps(list(labels))
+
+
+def _map(name: str, spec: MapSpec, runs: Mapping[str, Sequence[Run]], design: Design, kpi: str) -> SuccessMap:
+    levels = {factor: design.labels(factor) for factor in spec.factors}
+    places = product(*levels.values())
+    cells = {_key(place): Cell(dict(zip(levels, place, strict=True)), runs.get(_key(place), ()), kpi) for place in places}
+    return SuccessMap(name, spec, levels, cells)

@@ -1,0 +1,80 @@
+"""The table of a sweep: one row per finished run, in the order of the design, the same however and wherever they were run."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from ...results.files import replacing
+from ..sweep import Row
+
+#: reads all rows anew: they are never all in memory
+Rows = Callable[[], Iterable[Row]]
+
+_ROWS_AT_A_TIME = 10_000
+
+
+def header(factors: Sequence[str], kpis: Sequence[str]) -> list[str]:
+    """Names of the columns."""
+    return ["run", *factors, "status", "passed", *kpis, "failure"]
+
+
+def values(row: Row, factors: Sequence[str], kpis: Sequence[str]) -> list[Any]:
+    """The row's values by column; None where a run has none."""
+    record = row.record
+    return [
+        row.run,
+        *(row.point.labels[name] for name in factors),
+        "failed" if record.failure else "ok",
+        row.passed,
+        *(record.kpis.get(name) for name in kpis),
+        record.failure,
+    ]
+
+
+def write_csv(rows: Rows, factors: Sequence[str], kpis: Sequence[str], path: Path) -> None:
+    """Booleans as 0 and 1, numbers that round-trip, nan and inf as such, nothing where a run has no value."""
+    write_rows(header(factors, kpis), (values(row, factors, kpis) for row in rows()), path)
+
+
+def write_rows(names: Sequence[str], lines: Iterable[Sequence[Any]], path: Path) -> None:
+    """A CSV file, whole or not at all. Raises InputError or OutputError."""
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(names)
+        writer.writerows([cell(value) for value in line] for line in lines)
+
+
+def cell(value: Any) -> Any:
+    """A value as it stands in a CSV file."""
+    if isinstance(value, bool):
+        return int(value)
+    return json.dumps(value) if isinstance(value, list | dict) else value
+
+
+def write_parquet(rows: Rows, factors: Sequence[str], kpis: Sequence[str], path: Path) -> None:
+    """The same table as Parquet (extra `parquet`): KPIs as doubles, factors too where all their labels are numbers."""
+    import pyarrow as pa
+    from pyarrow.parquet import ParquetWriter
+
+    texts = {name for row in rows() for name, label in row.point.labels.items() if not isinstance(label, int | float)}
+    kinds = {"run": pa.int64(), "status": pa.string(), "passed": pa.bool_(), "failure": pa.string()}
+    names = header(factors, kpis)
+    schema = pa.schema([(name, kinds.get(name) or (pa.string() if name in texts else pa.float64())) for name in names])
+    with replacing(path) as temporary, ParquetWriter(temporary, schema) as writer:
+        lines = (values(row, factors, kpis) for row in rows())
+        while batch := list(islice(lines, _ROWS_AT_A_TIME)):
+            writer.write_batch(pa.record_batch(list(_columns(batch, schema)), schema=schema))
+
+
+def _columns(batch: list[list[Any]], schema: Any) -> Iterator[Any]:
+    import pyarrow as pa
+
+    for field, column in zip(schema, zip(*batch, strict=True), strict=True):
+        text, number = field.type == pa.string(), field.type == pa.float64()
+        plain = [str(cell(v)) if text else float(v) if number and v is not None else v for v in column]
+        yield pa.array(plain, field.type)

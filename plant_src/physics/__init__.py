@@ -1,0 +1,1 @@
+"""The Bullet side of the world: bodies, contacts, clearance."""

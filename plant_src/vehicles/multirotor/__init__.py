@@ -1,0 +1,1 @@
+"""Parts of multirotors: airframe, interface, equations, ground effect."""

@@ -1,0 +1,1 @@
+"""Parts of floating vessels: hull, wave loads, equations."""

@@ -1,0 +1,137 @@
+"""Bad FMUs, each made from a good one by one change."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from zipfile import ZipFile
+
+import pytest
+
+from cosim.components.fmi import FmuFile
+from cosim.components.fmi.preflight import Finding
+from cosim.components.fmi.preflight.validation import validate
+from cosim.core.errors import InputError
+
+
+def contents(fmu: Path) -> dict[str, bytes]:
+    with ZipFile(fmu) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+@dataclass(frozen=True)
+class Member:
+    """A member of an archive that may lie about itself: `local` and `central` replace fields of its two headers."""
+
+    name: str | bytes
+    content: bytes = b""
+    deflated: bool = True
+    local: Mapping[str, Any] = field(default_factory=dict)
+    central: Mapping[str, Any] = field(default_factory=dict)
+    behind: bytes = b""
+    #: None: has a place of its own; otherwise where its header is said to be
+    offset: int | None = None
+
+    @property
+    def raw_name(self) -> bytes:
+        return self.name.encode() if isinstance(self.name, str) else self.name
+
+    @cached_property
+    def data(self) -> bytes:
+        if not self.deflated:
+            return self.content
+        engine = zlib.compressobj(9, zlib.DEFLATED, -15)
+        return engine.compress(self.content) + engine.flush()
+
+    def fields(self) -> dict[str, Any]:
+        return {
+            "flags": 0x800,
+            "method": 8 if self.deflated else 0,
+            "crc": zlib.crc32(self.content),
+            "compressed": len(self.data),
+            "size": len(self.content),
+            "name": self.raw_name,
+            "extra": b"",
+            "mode": 0o100644,
+        }
+
+    def local_header(self) -> bytes:
+        f = self.fields() | self.local
+        head = struct.pack(
+            "<4s5H3L2H",
+            b"PK\3\4",
+            20,
+            f["flags"],
+            f["method"],
+            0,
+            33,
+            f["crc"],
+            f["compressed"],
+            f["size"],
+            len(f["name"]),
+            len(f["extra"]),
+        )
+        return head + f["name"] + f["extra"]
+
+    def central_header(self, offset: int) -> bytes:
+        f = self.fields() | self.central
+        numbers = (0x314, 20, f["flags"], f["method"], 0, 33, f["crc"], f["compressed"], f["size"])
+        lengths = (len(f["name"]), len(f["extra"]), 0, 0, 0)
+        return struct.pack("<4s6H3L5H2L", b"PK\1\2", *numbers, *lengths, f["mode"] << 16, offset) + f["name"] + f["extra"]
+
+
+def pack(members: Iterable[Member], comment: bytes = b"", count: int | None = None, front: bytes = b"") -> bytes:
+    """An archive as bytes."""
+    body, table, number = bytearray(front), bytearray(), 0
+    for member in members:
+        table += member.central_header(len(body) if member.offset is None else member.offset)
+        number += 1
+        if member.offset is None:
+            body += member.local_header() + member.data + member.behind
+    number = number if count is None else count
+    end = struct.pack("<4s4H2LH", b"PK\5\6", 0, 0, number, number, len(table), len(body), len(comment))
+    return bytes(body + table + end + comment)
+
+
+def members(files: Mapping[str, bytes]) -> list[Member]:
+    return [Member(name, content) for name, content in files.items()]
+
+
+def changed(member: Member, **headers: Any) -> Member:
+    """The member with the same fields changed in both of its headers."""
+    return replace(member, local=headers, central=headers)
+
+
+def found(path: Path) -> list[Finding]:
+    return list(validate(path))
+
+
+def refusal(path: Path) -> str:
+    """What cosim says when the FMU is to be run; every line names the file."""
+    file = FmuFile(path)
+    with pytest.raises(InputError) as error:
+        _ = file.description
+        file.acquire()
+    lines = str(error.value).splitlines()
+    assert all(line.startswith((f'"{path}": ', f'FMU "{path}" ')) for line in lines), lines
+    assert all(line.isprintable() for line in lines)
+    return str(error.value)
+
+
+def with_description(text: str, files: Mapping[str, bytes], folder: Path) -> Path:
+    """The FMU with another modelDescription.xml."""
+    path = folder / "bad.fmu"
+    path.write_bytes(pack(members({**files, "modelDescription.xml": text.encode()})))
+    return path
+
+
+def with_change(old: str, new: str, files: Mapping[str, bytes], folder: Path) -> Path:
+    """The FMU with one change in its modelDescription.xml."""
+    text = files["modelDescription.xml"].decode()
+    assert old in text
+    return with_description(text.replace(old, new, 1), files, folder)

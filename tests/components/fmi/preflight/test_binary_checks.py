@@ -1,0 +1,196 @@
+"""Libraries that cannot run here: said in words, before the loader sees them."""
+
+import shutil
+import struct
+import subprocess
+import sys
+
+import fmpy
+import pytest
+from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi3 import FMU3Slave
+from fmu_corpus import found, members, pack, refusal
+
+from cosim.components.fmi import FmuFile
+from cosim.components.fmi.preflight import elf
+from cosim.components.fmi.preflight.binary import REQUIRED
+from cosim.components.fmi.preflight.platform import Machine, this_machine
+from cosim.core import resources
+from cosim.export.fmu.compiler import find_compiler
+
+LIBRARY = f"binaries/{fmpy.platform}/probe.so"
+FMUS = sorted(resources.root().glob("fmus/**/*.fmu"))
+linux = pytest.mark.skipif(sys.platform != "linux" or struct.calcsize("P") != 8, reason="needs 64-bit ELF libraries")
+pytestmark = linux
+
+
+def patched(offset, form, value):
+    """The library with a number in its header replaced."""
+
+    def change(library):
+        content = bytearray(library)
+        struct.pack_into(form, content, offset, value)
+        return bytes(content)
+
+    return change
+
+
+def segment(kind, field, value):
+    """The library with a field of its first program header of a kind replaced."""
+
+    def change(library):
+        table, size, count = struct.unpack_from("<Q", library, 32)[0], 56, struct.unpack_from("<H", library, 56)[0]
+        place = next(table + i * size for i in range(count) if struct.unpack_from("<L", library, table + i * size)[0] == kind)
+        return patched(place + field, "<Q", value)(library)
+
+    return change
+
+
+def renamed(library):
+    """A library that exports a misspelt function."""
+    return library.replace(b"fmi2DoStep\0", b"fmi2DoSteq\0")
+
+
+DAMAGED = {
+    "empty": (lambda library: b"", "is no ELF file"),
+    "text": (lambda library: b"hello", "is no ELF file"),
+    "Windows": (lambda library: b"MZ" + library[2:], "is no ELF file"),
+    "cut in the header": (lambda library: library[:40], "is cut: its header is incomplete"),
+    "cut in the middle": (lambda library: library[: len(library) // 2], "is cut: "),
+    "cut after the header": (lambda library: library[:64], "is cut: "),
+    "ARM": (patched(18, "<H", 40), "is made for ARM, 64 bit, little-endian; this machine is"),
+    "aarch64": (patched(18, "<H", 183), "is made for aarch64, 64 bit"),
+    "unknown machine": (patched(18, "<H", 9999), "is made for machine 9999"),
+    "32 bit": (patched(4, "<B", 1), "is made for x86_64, 32 bit"),
+    "big-endian": (patched(5, "<B", 2), "64 bit, big-endian"),
+    "bad class": (patched(4, "<B", 7), "has a damaged ELF header"),
+    "executable": (patched(16, "<H", 2), "type 2, expected a shared library"),
+    "object file": (patched(16, "<H", 1), "type 1, expected a shared library"),
+    "no segments": (patched(56, "<H", 0), "has no segments to load"),
+    "segments beyond": (patched(32, "<Q", 1 << 40), "is cut: it refers to byte"),
+    "segment too long": (segment(1, 32, 1 << 40), "is cut: a segment ends at byte"),
+    "dynamic table beyond": (segment(2, 8, 1 << 40), "is cut: a segment ends at byte"),
+    "dynamic table elsewhere": (segment(2, 8, 0), "has no table of symbols"),
+}
+
+
+def compiled(folder, name, code, *options):
+    """A shared library made of C code."""
+    (folder / f"{name}.c").write_text(code)
+    library = folder / f"{name}.so"
+    subprocess.run([*find_compiler(), "-shared", "-fPIC", folder / f"{name}.c", *options, "-o", library], check=True)
+    return library
+
+
+@pytest.fixture
+def fmu(good, tmp_path):
+    """Makes the good FMU with another library, or with the library under another name."""
+
+    def make(library, name=LIBRARY):
+        path = tmp_path / "bad.fmu"
+        files = {"modelDescription.xml": good[2]["modelDescription.xml"], name: library}
+        path.write_bytes(pack(members(files)))
+        return path
+
+    return make
+
+
+@pytest.mark.parametrize("case", DAMAGED)
+def test_damaged_and_foreign_libraries_are_refused(case, good, fmu):
+    change, words = DAMAGED[case]
+    path = fmu(change(good[2][LIBRARY]))
+    assert f'"{path}": {LIBRARY}: the library cannot be loaded: it ' in refusal(path)
+    assert [(f.rule.name, words in f.message) for f in found(path)] == [("binary.format", True)]
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.3, 0.6, 0.9])
+def test_a_cut_library_never_reaches_the_loader(share, good, fmu):
+    library = good[2][LIBRARY]
+    findings = found(fmu(library[: int(share * len(library))]))
+    assert {f.rule.name for f in findings} <= {"binary.format", "binary.functions"}
+    assert findings or share == 0.9
+
+
+def test_a_missing_function_is_named(good, fmu):
+    path = fmu(renamed(good[2][LIBRARY]))
+    assert "the library does not export fmi2DoStep [binary.functions" in refusal(path)
+
+
+def test_many_missing_functions_are_counted(fmu, tmp_path):
+    text = refusal(fmu(compiled(tmp_path, "empty", "int unrelated(void) { return 0; }\n").read_bytes()))
+    assert "does not export fmi2CancelStep, " in text
+    assert f"and {len(REQUIRED[2]) - 5} more" in text
+
+
+def test_hidden_and_undefined_functions_do_not_count(tmp_path):
+    source = (
+        '__attribute__((visibility("hidden"))) int a(void){return 0;} extern int b(void); int c(void){return b();} static int d;'
+    )
+    for style in ("gnu", "sysv", "both"):
+        library = compiled(tmp_path, style, source + "int *e(void){return &d;}", f"-Wl,--hash-style={style}")
+        assert {"a", "b", "c", "d", "e"} & elf.read_library(library.read_bytes(), this_machine().architecture).exports == {
+            "c",
+            "e",
+        }
+
+
+@pytest.mark.parametrize("path", FMUS, ids=lambda path: str(path.relative_to(resources.root())))
+def test_exports_are_those_that_the_linkers_tools_see(path):
+    """`nm` of binutils is the reference; it comes with every C compiler."""
+    file = FmuFile(path)
+    folder = file.acquire()
+    (library,) = (folder / "binaries").glob(f"*linux*/{file.description.identifier}.so")
+    listed = subprocess.run(
+        [shutil.which("nm"), "-D", "--defined-only", library], capture_output=True, text=True, check=True
+    ).stdout
+    names = {row.split()[-1].partition("@")[0] for row in listed.splitlines()}
+    assert elf.read_library(library.read_bytes(), this_machine().architecture).exports == names
+    file.release()
+
+
+@pytest.mark.parametrize(("version", "slave", "prefix"), [(2, FMU2Slave, "fmi2"), (3, FMU3Slave, "fmi3")])
+def test_the_required_functions_are_those_that_are_bound(version, slave, prefix):
+    assert {name for name in dir(slave) if name.startswith(prefix)} == REQUIRED[version]
+
+
+def test_a_missing_dependency_is_a_warning(good, fmu, tmp_path):
+    compiled(tmp_path, "libnowhere", "int other(void) { return 1; }\n")
+    user = compiled(tmp_path, "user", "extern int other(void); int use(void) { return other(); }\n", f"-L{tmp_path}", "-lnowhere")
+    findings = found(fmu(user.read_bytes()))
+    assert [(f.rule.name, f.rule.severity) for f in findings] == [("binary.functions", "error"), ("binary.needed", "warning")]
+    assert "needs the library libnowhere.so, which this machine does not seem to have" in findings[1].message
+
+
+def test_another_platform_is_told_with_what_is_there(fmu):
+    path = fmu(b"MZ", "binaries/win64/probe.dll")
+    this = this_machine()
+    assert f"has no binary for {this.tuple_name} ({this.name}); it has: win64" in refusal(path)
+    assert FmuFile(path).description.platforms == ["win64"]
+
+
+def test_sources_alone_are_no_binary(fmu):
+    assert "it has: c-code" in refusal(fmu(b"int x;", "sources/model.c"))
+
+
+def test_the_library_bears_the_name_of_the_model(good, fmu):
+    path = fmu(good[2][LIBRARY], LIBRARY.replace("probe", "other"))
+    words = f"the library cannot be loaded: {LIBRARY} does not exist; there is: {LIBRARY.replace('probe', 'other')}"
+    assert words in refusal(path)
+
+
+def test_this_machine_is_called_as_fmpy_calls_it():
+    assert (this_machine().name, this_machine().tuple_name) == (fmpy.platform, fmpy.platform_tuple)
+    assert this_machine().suffix == fmpy.sharedLibraryExtension
+
+
+@pytest.mark.parametrize(
+    ("machine", "names"),
+    [
+        (Machine("windows", "x86_64", ".dll"), ("win64", "x86_64-windows")),
+        (Machine("windows", "x86", ".dll"), ("win32", "x86-windows")),
+        (Machine("darwin", "aarch64", ".dylib"), ("darwin64", "aarch64-darwin")),
+        (Machine("linux", "x86", ".so"), ("linux32", "x86-linux")),
+    ],
+)
+def test_other_machines_have_the_names_of_the_standard(machine, names):
+    assert (machine.folder(2), machine.folder(3)) == names

@@ -1,0 +1,144 @@
+"""macOS libraries are read on any machine; those that FMPy brings along are real ones."""
+
+import random
+import struct
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmu_corpus import members, pack
+
+from cosim.components.fmi.preflight import LIMITS, examine, macho, open_file
+from cosim.components.fmi.preflight.archive import Archive
+from cosim.components.fmi.preflight.binary import REQUIRED, check_binary
+from cosim.components.fmi.preflight.library import Damaged
+from cosim.components.fmi.preflight.platform import Machine
+
+FMPY = Path(fmpy.__file__).parent
+MACHINES = {"aarch64": "x86_64", "x86_64": "aarch64"}
+
+
+@pytest.fixture(scope="module", params=sorted(MACHINES))
+def architecture(request):
+    return request.param
+
+
+def container(architecture):
+    """An FMU's library for one architecture."""
+    return (FMPY / f"container_fmu/binaries/{architecture}-darwin/container_fmu.dylib").read_bytes()
+
+
+@pytest.fixture
+def library(architecture):
+    return container(architecture)
+
+
+def without_commands(library, kinds):
+    """The library with these commands for the loader replaced by ones that nobody knows."""
+    content, place = bytearray(library), 32
+    for _ in range(struct.unpack_from("<L", library, 16)[0]):
+        command, size = struct.unpack_from("<2L", library, place)
+        if command in kinds:
+            struct.pack_into("<L", content, place, 0x7F)
+        place += size
+    return bytes(content)
+
+
+def patched(offset, form, value):
+    def change(library):
+        content = bytearray(library)
+        struct.pack_into(form, content, offset, value)
+        return bytes(content)
+
+    return change
+
+
+def both():
+    """A universal file of both libraries."""
+    parts = [container(architecture) for architecture in sorted(MACHINES)]
+    offsets = [4096, 4096 + len(parts[0])]
+    entries = zip((macho.MACHINES[a] for a in sorted(MACHINES)), offsets, parts, strict=True)
+    head = b"\xca\xfe\xba\xbe" + struct.pack(">L", 2)
+    head += b"".join(struct.pack(">5L", machine, 0, offset, len(part), 12) for machine, offset, part in entries)
+    return head.ljust(4096, b"\0") + parts[0] + parts[1]
+
+
+def test_a_real_library_exports_what_fmi_demands(library, architecture):
+    exports = macho.read_library(library, architecture).exports
+    assert REQUIRED[2] | REQUIRED[3] <= exports
+
+
+def test_symbols_and_tree_of_exports_say_the_same(library, architecture):
+    """Two tables of one library, made by the linker for different readers."""
+    symbols = macho.read_library(without_commands(library, macho._TREES), architecture).exports
+    tree = macho.read_library(without_commands(library, {macho._SYMBOLS}), architecture).exports
+    assert symbols == tree == macho.read_library(library, architecture).exports
+
+
+def test_of_a_universal_library_the_right_part_is_read(library, architecture):
+    assert macho.read_library(both(), architecture) == macho.read_library(library, architecture)
+    real = (FMPY / "logging/darwin64/logging.dylib").read_bytes()
+    assert macho.read_library(real, architecture).exports == {"addLoggerProxy"}
+
+
+def test_a_missing_function_is_named(library, architecture):
+    changed = without_commands(library, macho._TREES).replace(b"_fmi2DoStep\0", b"_fmi2DoSteq\0")
+    assert REQUIRED[2] - macho.read_library(changed, architecture).exports == {"fmi2DoStep"}
+
+
+DAMAGED = {
+    "empty": (lambda library: b"", "is no macOS library"),
+    "ELF": (lambda library: b"\x7fELF" + library[4:], "is no macOS library"),
+    "only a magic number": (lambda library: library[:4], "is cut: it refers to byte 4, but has 4"),
+    "cut": (lambda library: library[: len(library) // 2], "is cut: a segment ends at byte"),
+    "32 bit": (lambda library: b"\xce\xfa\xed\xfe" + library[4:], "is made for 32 bit"),
+    "unknown machine": (patched(4, "<L", 99), "is made for machine 0x63"),
+    "program": (patched(12, "<L", 2), "is of type 2, expected a dynamic library"),
+    "object file": (patched(12, "<L", 1), "is of type 1"),
+    "command of no size": (patched(36, "<L", 0), "has damaged commands for the loader"),
+    "command beyond": (patched(36, "<L", 2**31), "has damaged commands for the loader"),
+    "more commands": (patched(16, "<L", 10**6), "has damaged commands for the loader"),
+    "universal, cut": (lambda library: both()[:9000], "is cut: the part for"),
+    "universal, for nobody": (lambda library: both()[:4] + bytes(8), "is made for nothing"),
+    "universal, countless": (lambda library: both()[:4] + b"\xff" * 4, "claims 4294967295 architectures"),
+}
+
+
+@pytest.mark.parametrize("case", DAMAGED)
+def test_damaged_libraries_are_told(case, library, architecture):
+    change, words = DAMAGED[case]
+    with pytest.raises(Damaged, match=words):
+        macho.read_library(change(library), architecture)
+
+
+def test_another_architecture_is_told(library, architecture):
+    other = MACHINES[architecture]
+    with pytest.raises(Damaged, match=f"is made for {architecture}; this machine is {other}"):
+        macho.read_library(library, other)
+
+
+@pytest.mark.parametrize("content", [b"\xcf\xfa\xed\xfe", None], ids=["damaged", "good"])
+def test_an_fmu_is_examined_for_a_mac(content, good, tmp_path, library, architecture):
+    """By what is in the library, not by its name."""
+    machine = Machine("darwin", architecture, ".dylib")
+    files = {"modelDescription.xml": good[2]["modelDescription.xml"], "binaries/darwin64/probe.dylib": content or library}
+    path = tmp_path / "mac.fmu"
+    path.write_bytes(pack(members(files)))
+    with open_file(path) as file:
+        findings = list(check_binary(Archive(file, LIMITS), examine(path).model, machine, LIMITS))
+    assert [finding.rule.name for finding in findings] == (["binary.format"] if content else [])
+
+
+def test_mutants_are_read_or_damaged(library, architecture):
+    draw = random.Random(1)  # noqa: S311 - mutants have to come back the same
+    outcomes = set()
+    for _ in range(300):
+        content = bytearray(library)
+        for _ in range(4):
+            content[draw.randrange(4096)] = draw.randrange(256)
+        try:
+            outcomes.add(type(macho.read_library(bytes(content), architecture)))
+        except Damaged as damage:
+            assert str(damage).startswith(("is ", "has "))
+            outcomes.add(Damaged)
+    assert len(outcomes) == 2

@@ -1,0 +1,123 @@
+"""Runs that keep pace with the clock on the wall."""
+
+import os
+import signal
+import time
+from fractions import Fraction
+from threading import Timer
+
+import numpy as np
+import pytest
+from fakes import Fake, counter, outputs
+from helpers import end, system
+
+import cosim.engine.pacer
+from cosim.core.errors import InputError, LateError
+from cosim.core.time_grid import Grid, exact
+from cosim.engine.pacer import Pacer
+from cosim.engine.run_loop import Settings, simulate
+
+pytestmark = pytest.mark.usefixtures("executor")
+
+
+def paced(component, stop, factor=1.0, **more):
+    columns = {"a.y": end("a.y")}
+    settings = Settings(Fraction(0), exact(stop), exact("0.01"), columns, real_time=factor, **more)
+    return simulate(system({"a": component}), settings)
+
+
+def slow(seconds, steps):
+    """Takes so long (s) in each of its first steps."""
+
+    def step(values, t, h):
+        values["y"] += 1
+        if values["y"] <= steps:
+            time.sleep(seconds)
+
+    return Fake(outputs("y"), step)
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock of our own: sleeping takes exactly as long as was asked for."""
+
+    class Clock:
+        now, slept = 7_000_000_000, []
+
+        def sleep(self, seconds):
+            self.slept.append(seconds)
+            self.now += round(seconds * 1e9)
+
+        def monotonic_ns(self):
+            return self.now
+
+    own = Clock()
+    own.slept = []
+    monkeypatch.setattr(cosim.engine.pacer, "time", own)
+    return own
+
+
+def test_a_run_takes_as_long_as_it_simulates():
+    run = paced(counter(), "0.3")
+    assert 0.3 <= run.loop_seconds < 3
+    assert paced(counter(), "0.3", factor=10.0).loop_seconds < run.loop_seconds
+
+
+def test_pace_changes_no_result():
+    fast, real = (paced(counter(), "0.2", factor) for factor in (None, 20.0))
+    assert real.recording.columns["a.y"].tolist() == fast.recording.columns["a.y"].tolist()
+    assert fast.real_time is None
+
+
+def test_deadlines_do_not_drift(clock):
+    pacer = Pacer(Grid.of(Fraction(0), Fraction(10**6), Fraction(1, 60)), 1.0, "warn")
+    pacer.start()
+    for n in range(1, 6001):
+        clock.now += 1_000_000  # every step takes 1 ms
+        pacer.wait(n)
+    assert clock.now - 7_000_000_000 == pytest.approx(100e9, abs=1)
+
+
+def test_lateness_is_measured_and_caught_up(clock):
+    pacer = Pacer(Grid.of(Fraction(0), Fraction(1), Fraction(1, 100)), 2.0, "warn")
+    pacer.start()
+    for n in range(1, 101):
+        clock.now += 12_000_000 if n == 10 else 1_000_000
+        pacer.wait(n)
+    found = pacer.statistics()
+    # one step of 12 ms in a slot of 5 ms is 7 ms late, the next ones need 1 ms each: 3 ms late, then in time
+    lateness = np.array([0.007, 0.003] + [0.0] * 98)
+    assert (found["factor"], found["steps"], found["late_steps"]) == (2.0, 100, 2)
+    assert found["max_lateness"] == pytest.approx(0.007)
+    assert found["mean_lateness"] == pytest.approx(lateness.mean())
+    assert found["lateness_99_percent"] == pytest.approx(np.percentile(lateness, 99))
+
+
+def test_falling_behind_is_said_once(caplog):
+    run = paced(slow(0.03, 5), "0.2")
+    assert run.failure is None
+    (said,) = [text for text in caplog.messages if text.startswith("real time: ")]
+    assert said.startswith("real time: t = 0.01 s was reached 0.")
+    assert "late, more than one step (0.01 s)" in said
+    assert run.real_time["late_steps"] >= 5
+    assert 0.02 < run.real_time["max_lateness"] < 5
+
+
+def test_falling_behind_may_end_the_run():
+    run = paced(slow(0.05, 100), "1", late="fail")
+    assert isinstance(run.failure, LateError)
+    assert str(run.failure).startswith("too slow for 1 times real time: t = 0.01 s was reached")
+    assert run.recording.columns["a.y"].tolist() == [0, 1]
+
+
+def test_an_interrupt_does_not_wait_for_the_clock():
+    Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    run = paced(counter(), "0.1", factor=0.001)  # 10 s per step
+    assert isinstance(run.failure, KeyboardInterrupt)
+    assert run.loop_seconds < 8
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0, float("inf"), float("nan")])
+def test_a_factor_that_is_no_pace_is_refused(factor):
+    with pytest.raises(InputError, match="expected a positive factor for real time, found"):
+        paced(counter(), "0.1", factor)

@@ -1,0 +1,47 @@
+"""The catalogue says of each model what its equations say."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import casadi as ca
+import pytest
+from fmpy import read_model_description
+
+from cosim.core import resources
+from plant_src.catalogue import MODELS, VEHICLES
+from plant_src.vehicles.common.interface import SURROUNDINGS
+from plant_src.vehicles.multirotor import multirotor_equations
+
+ALL = pytest.mark.parametrize("name", MODELS)
+
+
+def equations(name: str) -> Any:
+    return importlib.import_module(f"plant_src.vehicles.{name}.equations")
+
+
+@ALL
+def test_the_fmu_has_the_variables_of_the_catalogue(name: str) -> None:
+    description = read_model_description(str(resources.root() / "fmus" / f"{name}.fmu"))
+    expected = {slot: variable.causality for variable in MODELS[name].interface for slot in variable.slots}
+    assert {variable.name: variable.causality for variable in description.modelVariables} == expected
+
+
+@ALL
+def test_surroundings_come_last_among_the_inputs(name: str) -> None:
+    inputs = [variable.name in SURROUNDINGS for variable in MODELS[name].interface if variable.causality == "input"]
+    assert inputs == sorted(inputs)
+
+
+@pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.constants is not None])
+def test_the_number_of_constants_is_that_of_the_equations(name: str) -> None:
+    model, module = MODELS[name], equations(name)
+    constants = multirotor_equations.constants if model.airframe else module.VESSEL.constants
+    assert constants(ca.SX.sym("parameters", len(model.slots("parameter")))).numel() == model.constants
+
+
+def test_strider_moves_in_the_plane_unless_told_otherwise() -> None:
+    assert [model.name for model in VEHICLES["strider"].values()] == ["strider", "strider_6dof"]
+    assert next(iter(VEHICLES["strider"])) == "planar"
+    assert list(VEHICLES["otter"]) == ["6dof"]

@@ -1,0 +1,119 @@
+"""What hulls feel of waves: limits of long and short waves, and the arithmetic behind."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from floating_reference import felt
+from validation import Measured
+from worlds import Trial, vessel
+
+from plant_src.environment import sea
+from plant_src.environment.sea import Sea
+from plant_src.vehicles.common import elementary_functions
+from plant_src.vehicles.strider_6dof import parameters as p
+from plant_src.vehicles.vessel import wave_loads
+
+VESSELS = [{"model": "strider", "motion": "6dof"}, {"model": "otter", "parameters": {"payload_mass": 0.0}}]
+
+
+def swell(height: float, period: float, direction: float = 0.0) -> dict[str, Any]:
+    """Nearly regular waves: one component."""
+    waves = {"significant_height": height, "peak_period": period, "direction": direction, "components": 1}
+    return {"seed": 1, "waves": waves}
+
+
+@pytest.mark.parametrize("vehicle", VESSELS)
+@pytest.mark.parametrize("direction", [0.0, 1.2])
+def test_long_waves_carry_the_hull(vehicle: dict[str, Any], direction: float, measured: Measured) -> None:
+    """It rises with the water and lies on its slopes: waves of 150 m and more."""
+    trial = Trial({"usv": {**vehicle, "position": [0.0, 0.0]}}, environment=swell(0.5, 10.0, direction))
+    calm = Trial({"usv": {**vehicle, "position": [0.0, 0.0]}})
+    rise, water, heel = [], [], []
+    for _ in range(300):
+        trial.step(10)
+        rise.append(trial["usv.position.z"] - calm["usv.position.z"])
+        water.append(trial["usv.wave.elevation"])
+        heel.append([trial["usv.attitude.roll"], trial["usv.attitude.pitch"] - calm["usv.attitude.pitch"]])
+    late = slice(100, None)  # after a start from rest in calm water
+    assert np.ptp(water[late]) > 0.1
+    error, case = np.abs(np.array(rise) - water)[late].max() / np.ptp(water), vehicle["model"]
+    measured(
+        "Waves", "heave beside waves of 150 m, share of their height", error, 0.0, "1", "rides on them", within=0.05, case=case
+    )
+    (wave,) = zip(*sea(swell(0.5, 10.0, direction)), strict=True)
+    slope = wave[0] * wave[2]
+    steepest = np.abs(heel[late]).max(axis=0)
+    encounter = direction - trial["usv.attitude.yaw"]
+    assert steepest == pytest.approx(slope * np.abs([np.sin(encounter), np.cos(encounter)]), abs=0.05 * slope)
+
+
+def test_short_waves_pass_under_the_hull() -> None:
+    """Waves of 0.4 m length, half that of the hull, leave it within a fiftieth of their height."""
+    trial = Trial({"usv": vessel([0.0, 0.0], motion="6dof")}, environment=swell(0.1, 0.5))
+    heights = [trial.step()["usv.position.z"] for _ in range(500)]
+    assert np.ptp(heights) < 0.002
+
+
+def test_gain_scales_the_waves() -> None:
+    trials = [Trial({"usv": vessel([0.0, 0.0], motion="6dof")}, environment=swell(0.02, 3.0)) for _ in range(2)]
+    trials[1]["environment.wave_gain"] = 0.5
+    full, half = (np.array([trial.step()["usv.position.z"] for _ in range(300)]) - p.CENTRE_OF_MASS_HEIGHT for trial in trials)
+    assert half == pytest.approx(full / 2, abs=0.01 * np.abs(full).max())
+
+
+def test_the_hull_feels_what_linear_theory_says(measured: Measured) -> None:
+    """Against the functions of numpy: elevation, slopes, velocity, acceleration."""
+    random, count = np.random.default_rng(1), 5
+    frequency = random.uniform(1.0, 7.0, count)
+    components = Sea(random.uniform(0, 0.1, count), frequency, frequency**2 / 9.81, *random.uniform(-3, 3, (2, count)))
+    footprint = wave_loads.Footprint(
+        *(ca.SX(x) for x in (p.LONGITUDINAL_MOMENT / p.WATERPLANE_AREA, p.TRANSVERSE_MOMENT / p.WATERPLANE_AREA, p.DRAUGHT))
+    )
+    columns = [
+        ca.SX([*column, *np.zeros(64 - count)])
+        for column in (getattr(components, name) for name in ("amplitude", "frequency", "direction", "phase"))
+    ]
+    heading = ca.SX(np.cos(0.7)), ca.SX(np.sin(0.7))
+    water = wave_loads.water(
+        ca.SX([3.0, -2.0]), heading, ca.SX(11.0), footprint, ca.SX(count), wave_loads.table(footprint, *columns)
+    )
+    for found, expected in zip(vars(water).values(), felt(components, 3.0, -2.0, 0.7, 11.0), strict=True):
+        values = ca.evalf(found).full().ravel()
+        measured("Waves", "what the hull feels of them", values, expected, "m, 1, m/s, m/s2", "linear theory", relative=1e-11)
+
+
+def test_sine_and_cosine_are_those_of_numpy() -> None:
+    angles = np.random.default_rng(2).uniform(-1e5, 1e5, 5000)
+    sine, cosine = computed(elementary_functions.sine_and_cosine, angles)
+    assert np.abs(sine - np.sin(angles)).max() < 1e-13
+    assert np.abs(cosine - np.cos(angles)).max() < 1e-13
+
+
+def test_the_sine_of_a_share_of_a_right_angle_is_that_of_numpy() -> None:
+    shares = np.random.default_rng(2).uniform(-1, 1, 5000)
+    (found,) = computed(lambda share: (elementary_functions.sine_of_quarter(share),), shares)
+    assert np.abs(found - np.sin(np.pi / 2 * shares)).max() < 1e-15
+
+
+@pytest.mark.parametrize("x", [0.0, 1e-12, 0.2, 1.0, 5.0])
+def test_the_arctangent_is_that_of_numpy(x: float) -> None:
+    y = np.concatenate([[0.0, x, -x, 1e-300], np.random.default_rng(2).uniform(-2, 2, 5000)])
+    (found,) = computed(lambda y: (elementary_functions.arctangent(y, ca.SX(x)),), y)
+    assert np.abs(found - np.arctan2(y, x)).max() < 1e-15
+
+
+def test_the_exponential_is_that_of_numpy() -> None:
+    numbers = np.random.default_rng(2).uniform(-3, 3, 5000)
+    (found,) = computed(lambda x: (elementary_functions.exponential(x),), numbers)
+    assert found == pytest.approx(np.exp(numbers), rel=1e-13)
+
+
+def computed(expression: Any, values: np.ndarray) -> list[np.ndarray]:
+    x = ca.SX.sym("x")
+    function = ca.Function("f", [x], list(expression(x)))
+    results = function(ca.DM(values).T)
+    return [np.array(result).ravel() for result in (results if isinstance(results, tuple) else (results,))]

@@ -1,0 +1,64 @@
+"""Where rows lie: in memory, in the file that was asked for, or in one that nobody sees."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from fakes import counter
+from helpers import end, system
+
+from cosim.engine.run_loop import Settings, simulate
+from cosim.process.run_files.row_store import read_rows
+from cosim.results.csv_files import read_csv, write_csv
+
+pytestmark = pytest.mark.usefixtures("executor")
+STEPS = 3000
+
+
+def recorded(every=1, **more):
+    columns = {"a.y": end("a.y"), "a.n": end("a.n")}
+    interval = Fraction(every, 100)
+    settings = Settings(Fraction(0), Fraction(STEPS, 100), Fraction(1, 100), columns, interval, **more)
+    return simulate(system({"a": counter()}), settings).recording
+
+
+@pytest.fixture
+def small_chunks(monkeypatch):
+    for name, value in (("CHUNK", 1000), ("PIECE", 7), ("LARGE", 0)):
+        monkeypatch.setattr(f"cosim.process.run_files.row_store.{name}", value)
+
+
+def test_many_rows_are_kept_in_a_file_and_are_the_same(small_chunks):
+    recording = recorded()
+    assert isinstance(recording.columns["a.y"].base, np.memmap)
+    assert isinstance(recording.time, np.memmap)
+    assert recording.time.tolist() == [n / 100 for n in range(STEPS + 1)]
+    assert recording.columns["a.y"].tolist() == list(range(STEPS + 1))
+    assert recording.columns["a.n"].tolist() == list(range(STEPS + 1))
+
+
+def test_sparse_rows_of_many_have_their_times(small_chunks):
+    recording = recorded(every=3)
+    assert recording.time.tolist() == [n / 100 for n in range(0, STEPS + 1, 3)]
+    assert recording.columns["a.y"].tolist() == list(range(0, STEPS + 1, 3))
+
+
+def test_rows_lie_in_the_file_that_was_asked_for(tmp_path):
+    recording = recorded(rows_file=tmp_path / "rows")
+    dtype = np.dtype([("y", np.float64), ("n", np.int32), ("gap", np.int32)])
+    assert read_rows(tmp_path / "rows", dtype, STEPS + 1)["n"].tolist() == recording.columns["a.n"].tolist()
+
+
+def test_csv_is_written_from_a_file_of_rows(small_chunks, tmp_path):
+    recording = recorded()
+    write_csv(recording, tmp_path / "result.csv")
+    again = read_csv(tmp_path / "result.csv")
+    assert again.time.tolist() == recording.time.tolist()
+    assert again.columns["a.y"].tolist() == recording.columns["a.y"].tolist()
+
+
+def test_no_signals_make_rows_without_bytes(tmp_path):
+    settings = Settings(Fraction(0), Fraction(1), Fraction(1, 100), rows_file=tmp_path / "rows")
+    recording = simulate(system({"a": counter()}), settings).recording
+    assert len(recording.time) == 101
+    assert not recording.columns

@@ -1,0 +1,144 @@
+"""What steers a run between its macro steps, and what hands out its rows, each alone."""
+
+import json
+from fractions import Fraction
+from multiprocessing import Pipe
+
+import numpy as np
+import pytest
+from fakes import Fake, inputs, outputs
+from helpers import end, system
+
+import cosim.report.live.feed
+from cosim.core.component import Variable
+from cosim.core.errors import ComponentError
+from cosim.core.time_grid import Grid
+from cosim.engine.run_loop import Event, Settings, simulate
+from cosim.process.run_files.folder import Column, Header
+from cosim.report.live.control import Control
+from cosim.report.live.feed import Feed
+
+STEP = Fraction(1, 60)
+GRID = Grid.of(Fraction(0), Fraction(1), STEP)
+
+
+class Steered:
+    """y adds k in every step; before the step after n of them, `commands[n]` come in."""
+
+    def __init__(self, commands, refuse=None, speed=None):
+        self.commands, self.refuse = commands, refuse
+        self.here, there = Pipe()
+        gain = Variable("k", causality="parameter", variability="tunable", start=1.0, minimum=0.0, maximum=9.0)
+        self.fake = Fake([gain, *inputs("u"), *outputs("y")], self.step, start={"k": 1.0})
+        self.fake.set = self.set
+        self.system = system({"a": self.fake})
+        self.control = Control(there, self.system, GRID, speed, {"rows": 61})
+        self.count = 0
+        self.here.send_bytes(b"{}")
+        self.send()
+
+    def set(self, name, value):
+        if value == self.refuse:
+            raise ComponentError("a", "set", "it does not like it")
+        self.fake.values[name] = value
+
+    def send(self):
+        for message in self.commands.get(self.count, []):
+            self.here.send_bytes(json.dumps(message).encode())
+
+    def step(self, values, time, step_size):
+        values["y"] += values["k"]
+        self.count += 1
+        self.send()
+
+    def run(self, events=(), control=True):
+        columns = {"y": end("a.y")}
+        settings = Settings(Fraction(0), Fraction(1), STEP, columns, events=events, control=self.control if control else None)
+        return simulate(self.system, settings)
+
+    def said(self):
+        messages = []
+        while self.here.poll():
+            messages.append(json.loads(self.here.recv_bytes()))
+        return messages
+
+
+def change(value, name="a.k"):
+    return {"command": "set", "name": name, "value": value}
+
+
+@pytest.mark.usefixtures("executor")
+def test_a_value_acts_in_the_step_after_it_came():
+    run = Steered({0: [change(2.0)], 7: [change(5)]})
+    values = run.run().recording.columns["y"]
+    assert values[:10].tolist() == [0, 2, 4, 6, 8, 10, 12, 14, 19, 24]
+
+
+@pytest.mark.usefixtures("executor")
+def test_what_was_set_is_told_as_events_at_exactly_that_time():
+    """Seven sixtieths of a second have no decimal text."""
+    run = Steered({0: [change(2.0)], 6: [change(4.0)], 7: [change(5)]})
+    values = run.run().recording.columns["y"]
+    events = run.control.end()
+    assert [event["time"] for event in events] == [0.0, 0.1, "7/60"]
+    repeated = [Event(Fraction(str(e["time"])), {"a": {"k": e["set"]["a.k"]}}) for e in events]
+    assert Steered({}).run(repeated, control=False).recording.columns["y"].tolist() == values.tolist()
+
+
+def test_pausing_holds_the_run_until_it_may_step_or_go_on():
+    run = Steered({3: [{"command": "pause"}, {"command": "step"}, {"command": "step"}], 5: [{"command": "resume"}]})
+    assert run.run().macro_steps == 60
+    _, pause, step, more, resume = run.said()
+    assert [answer["time"] for answer in (pause, step, more)] == [3 / 60] * 3
+    assert (resume["time"], pause["paused"], more["paused"], resume["paused"]) == (5 / 60, True, True, False)
+
+
+def test_the_beginning_says_what_can_be_set():
+    run = Steered({})
+    run.run()
+    about, *rest = run.said()
+    assert rest == []
+    gain, free = about["about"]["adjustable"]
+    assert (gain["name"], gain["value"], gain["minimum"], gain["maximum"]) == ("a.k", 1.0, 0.0, 9.0)
+    assert free["name"] == "a.u"
+
+
+def test_a_component_that_refuses_a_value_ends_the_run_as_at_an_event():
+    run = Steered({4: [change(3.0)]}, refuse=3.0)
+    outcome = run.run()
+    assert (str(outcome.failure), outcome.macro_steps) == ("a: set failed: it does not like it", 4)
+    assert run.said()[-1]["error"] == "a: set failed: it does not like it"
+    assert run.control.end() == []
+
+
+@pytest.mark.parametrize("value", [9.5, -1, True, "2", [1.0], None, 10**400])
+def test_a_value_that_is_none_for_the_variable_changes_nothing(value):
+    run = Steered({4: [change(value)]})
+    assert run.run().recording.columns["y"][-1] == 60
+    assert '"k"' in run.said()[-1]["error"]
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    """A folder with 101 rows of an unfinished run: a number, an integer and a Boolean."""
+    dtype = np.dtype([("x", "<f8"), ("n", "<i4"), ("b", "|b1")], align=True)
+    rows = np.zeros(101, dtype)
+    rows["x"], rows["n"], rows["b"] = np.arange(101) ** 2, np.arange(101), np.arange(101) % 2
+    rows.tofile(tmp_path / "rows")
+    columns = [Column(name, dtype[name].str, dtype.fields[name][1], name == "b", "") for name in dtype.names]
+    return tmp_path, Header(0, 1, 100, 2, dtype.itemsize, columns, [], [])
+
+
+def test_rows_come_as_columns_of_floats(recorded):
+    feed = Feed(*recorded, expected=101)
+    assert (feed.available(0), feed.available(101), feed.capacity) == (0, 101, 101)
+    time, x, n, b = np.frombuffer(feed.read(10, 3), "<f4").reshape(4, 3)
+    assert time == pytest.approx([0.2, 0.22, 0.24])
+    assert (x.tolist(), n.tolist(), b.tolist()) == ([100, 121, 144], [10, 11, 12], [0, 1, 0])
+
+
+def test_rows_of_long_runs_are_thinned(recorded, monkeypatch):
+    monkeypatch.setattr(cosim.report.live.feed, "MOST_VALUES", 4 * 26)
+    feed = Feed(*recorded, expected=101)
+    assert (feed.stride, feed.available(1), feed.available(9), feed.capacity) == (4, 1, 3, 26)
+    assert np.frombuffer(feed.read(1, 25), "<f4").reshape(4, 25)[2].tolist() == list(range(4, 101, 4))

@@ -1,0 +1,149 @@
+"""What a comparison says: which signals fail, why, which of them first."""
+
+import numpy as np
+import pytest
+
+from cosim.core.recording import Recording
+from cosim.results import Result
+from cosim.results.comparison import Tolerance, compare
+
+TIME = np.arange(101) / 10
+EXACT = {"*": Tolerance()}
+
+
+def recorded(time=TIME, units=None, **columns):
+    columns = {name.replace("__", "."): np.asarray(values) for name, values in columns.items()}
+    return Result(Recording(np.asarray(time, dtype=float), columns, {**dict.fromkeys(columns, ""), **(units or {})}))
+
+
+REFERENCE = recorded(a__x=np.sin(TIME), a__y=TIME, b__x=TIME > 5)
+
+
+def changed(**columns):
+    return recorded(**{**{name.replace(".", "__"): REFERENCE[name] for name in REFERENCE}, **columns})
+
+
+def failures(result, tolerances=EXACT, reference=REFERENCE):
+    return [str(verdict) for verdict in compare(result, reference, tolerances).failures]
+
+
+def test_a_run_is_equal_to_itself():
+    comparison = compare(REFERENCE, REFERENCE, EXACT)
+    assert comparison.passed
+    assert str(comparison) == "all 3 signals stay in their tubes"
+
+
+def test_the_message_says_which_left_first_when_and_by_how_much():
+    late, early = np.where(TIME >= 7, 0.5, 0), np.where(TIME >= 3, 0.25, 0) + np.where(TIME == 4, 0.5, 0)
+    result = recorded(units={"a.y": "m"}, a__x=-late, a__y=TIME + early)
+    reference = recorded(a__x=np.zeros(101), a__y=TIME)
+    first = "t = 3 s: 3.25 m is 0.05 m above 3.2 m; at most 0.55 m outside, at t = 4 s; 71 of 101 points outside"
+    second = "t = 7 s: -0.5 is 0.3 below -0.2; at most 0.3 outside, at t = 7 s; 31 of 101 points outside"
+    assert str(compare(result, reference, {"*": Tolerance(absolute=0.2)})).splitlines() == [
+        "2 of 2 signals fail",
+        f"a.y leaves its tube at {first}",
+        f"a.x leaves its tube at {second}",
+    ]
+
+
+def test_a_missing_signal_fails():
+    less = recorded(a__x=np.sin(TIME), b__x=TIME > 5)
+    assert failures(less) == ['a.y is missing; did you mean "a.x"?']
+
+
+def test_a_signal_that_the_reference_does_not_know_is_no_failure():
+    assert compare(changed(c=TIME), REFERENCE, EXACT).passed
+
+
+@pytest.mark.parametrize(("start", "stop"), [(1, 101), (0, 100)])
+def test_a_short_result_fails(start, stop):
+    short = recorded(TIME[start:stop], a__x=np.sin(TIME[start:stop]))
+    (failure,) = failures(short, {"a.x": Tolerance(9, 9, 9)})
+    assert failure == f"a.x covers {TIME[start]:g} s to {TIME[stop - 1]:g} s only, the reference 0 s to 10 s"
+
+
+def test_a_longer_result_is_compared_where_the_reference_is():
+    longer = np.arange(-50, 151) / 10
+    result = recorded(longer, a__y=np.clip(longer, 0, 10) + (longer > 12))
+    assert compare(result, REFERENCE, {"a.y": Tolerance()}).passed
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_what_is_not_finite_fails_however_wide_the_tube(value):
+    spoilt = np.where(TIME == 4.2, value, TIME)
+    wide = {"*": Tolerance(1e300, 1, 100)}
+    assert failures(changed(a__y=spoilt), wide) == [f"a.y is {value} at t = 4.2 s in the result"]
+    assert failures(REFERENCE, wide, changed(a__y=spoilt)) == [f"a.y is {value} at t = 4.2 s in the reference"]
+
+
+def test_what_is_not_finite_before_the_reference_begins_does_not_matter():
+    longer = np.arange(-50, 101) / 10
+    assert compare(recorded(longer, a__y=np.where(longer < 0, np.nan, longer)), REFERENCE, {"a.y": Tolerance(1e-9)}).passed
+
+
+def test_what_is_not_finite_is_found_between_rows_too():
+    """The reference begins between a row that is NaN and one that is not."""
+    result = recorded([-0.05, 0.05, 10], a__y=[np.nan, 0.05, 10])
+    assert failures(result, {"a.y": Tolerance(9, 9, 9)}) == ["a.y is nan at t = 0 s in the result"]
+
+
+def test_the_last_pattern_counts():
+    result = changed(a__x=np.sin(TIME) + 0.1, a__y=TIME + 0.1)
+    general_first = {"*": Tolerance(), "a.*": Tolerance(0.2), "*.y": Tolerance(0.05)}
+    assert [verdict.signal for verdict in compare(result, REFERENCE, general_first).failures] == ["a.y"]
+
+
+def test_signals_without_a_pattern_are_not_compared():
+    assert compare(changed(a__x=np.cos(TIME)), REFERENCE, {"*.y": Tolerance()}).passed
+
+
+def test_a_pattern_without_a_signal_fails():
+    assert failures(REFERENCE, {"a.x": Tolerance(), "a.z": Tolerance()}) == [
+        '"a.z" matches no signal of the reference; did you mean "a.y"?'
+    ]
+
+
+def test_a_time_tolerance_forgives_a_late_switch():
+    late = changed(b__x=TIME > 5.3)
+    assert compare(late, REFERENCE, {"*": Tolerance(time=0.3)}).passed
+    assert failures(late, {"*": Tolerance(time=0.1)})[0].startswith("b.x leaves its tube at t = 5.2 s: 0 is 1 below 1;")
+
+
+def test_a_coarse_result_misses_nothing():
+    peak = recorded(x=np.where(TIME == 5.5, 1.0, 0.0))
+    coarse = recorded(TIME[::10], x=np.zeros(11))
+    (failure,) = failures(coarse, {"x": Tolerance(0.5)}, peak)
+    assert failure.startswith("x leaves its tube at t = 5.5 s: 0 is 0.5 below 0.5")
+
+
+def test_texts_have_to_be_equal():
+    phases = np.array(["climb"] * 50 + ["land"] * 51, dtype=object)
+    reference = recorded(phase=phases)
+    assert compare(recorded(phase=phases), reference, EXACT).passed
+    late = np.roll(phases, 1)
+    late[0] = "climb"
+    assert failures(recorded(phase=late), EXACT, reference) == ['phase is "climb" at t = 5 s, expected "land"']
+    assert failures(recorded(phase=TIME), EXACT, reference) == ["phase holds text in the reference, and numbers in the other"]
+
+
+def test_texts_count_between_the_rows_of_the_reference_too():
+    phases = np.array(["climb"] * 50 + ["hover"] * 3 + ["climb"] * 48, dtype=object)
+    ends = recorded(TIME[[0, -1]], phase=np.array(["climb", "climb"], dtype=object))
+    assert failures(recorded(phase=phases), EXACT, ends) == ['phase is "hover" at t = 5 s, expected "climb"']
+    assert failures(ends, EXACT, recorded(phase=phases)) == ['phase is "climb" at t = 5 s, expected "hover"']
+
+
+def test_nothing_to_compare_does_not_pass():
+    empty = recorded([], a__x=[], a__y=[], b__x=[])
+    assert failures(empty) == ["the result has no rows"]
+    assert failures(REFERENCE, EXACT, empty) == ["the reference has no rows"]
+    assert not compare(REFERENCE, recorded(), EXACT).passed
+    assert str(compare(REFERENCE, REFERENCE, {})) == "nothing was compared"
+    assert not compare(REFERENCE, REFERENCE, {}).passed
+
+
+def test_the_worst_signal_is_the_one_farthest_out_of_its_own_tube():
+    result = changed(a__x=np.sin(TIME) + 0.3, a__y=TIME + 0.5)
+    comparison = compare(result, REFERENCE, {"a.x": Tolerance(0.1), "a.y": Tolerance(0.4), "b.x": Tolerance(1)})
+    assert [verdict.signal for verdict in comparison.worst] == ["a.x", "a.y", "b.x"]
+    assert [verdict.excess for verdict in comparison.worst] == pytest.approx([2, 0.25, -1])

@@ -1,0 +1,89 @@
+"""References: few rows of a run that describe it all, and what made it."""
+
+import json
+
+import numpy as np
+import pytest
+
+from cosim.core.errors import CheckError
+from cosim.core.recording import Recording
+from cosim.results import Result
+from cosim.results.comparison import Tolerance, compare
+from cosim.results.comparison.reference import changes, thinned, write_reference
+
+TIME = np.arange(2001) / 100
+SWITCH = TIME >= 7.77
+METADATA = {"name": "swing", "versions": {"numpy": "2"}, "machine": {"system": "Linux"}, "sha256": {"a.fmu": "12"}, "timing": 3}
+
+
+def swing(**columns):
+    columns = {"a.x": np.sin(TIME) * np.exp(-TIME / 5), "a.on": SWITCH, "b": np.cos(9 * TIME), **columns}
+    return Result(Recording(TIME, columns, dict.fromkeys(columns, "m")), metadata=METADATA)
+
+
+TOLERANCES = {"a.x": Tolerance(absolute=0.01), "a.on": Tolerance(time=0.1)}
+
+
+def test_few_rows_describe_the_run_closely():
+    reference = thinned(swing(), TOLERANCES)
+    assert list(reference) == ["a.x", "a.on"]
+    assert len(reference.time) < 120
+    assert (reference.time[0], reference.time[-1]) == (0, 20)
+    assert compare(swing(), reference, {name: part.scaled(0.25) for name, part in TOLERANCES.items()}).passed
+
+
+def test_rows_are_close_where_something_happens():
+    time = thinned(swing(), TOLERANCES).time
+    before, after = time[time < 7.77][-1], time[time >= 7.77][0]
+    assert after - before <= 0.05
+    assert np.diff(time).max() == pytest.approx(0.64)
+
+
+def test_without_a_tolerance_every_row_that_matters_is_kept():
+    assert len(thinned(swing(), {"b": Tolerance()}).time) == 2001
+
+
+def test_texts_are_kept_where_they_change():
+    phases = np.where(SWITCH, "land", "climb").astype(object)
+    reference = thinned(swing(phase=phases), {"phase": Tolerance()})
+    assert next(iter(reference.time[reference["phase"] == "land"])) == 7.77
+
+
+def test_the_same_run_writes_the_same_bytes(tmp_path):
+    for name in ("first", "second"):
+        write_reference(swing(), tmp_path / f"{name}.csv", TOLERANCES)
+    for suffix in (".csv", ".json"):
+        assert (tmp_path / f"first{suffix}").read_bytes() == (tmp_path / f"second{suffix}").read_bytes()
+    about = json.loads((tmp_path / "first.json").read_text())
+    assert about == {
+        **{key: METADATA[key] for key in ("name", "versions", "machine", "sha256")},
+        "signals": 2,
+        "rows": about["rows"],
+    }
+
+
+def test_what_is_written_is_what_was_recorded(tmp_path):
+    run = swing()
+    write_reference(run, tmp_path / "r.csv", TOLERANCES)
+    read = Result.from_csv(tmp_path / "r.csv")
+    rows = np.flatnonzero(np.isin(TIME, read.time))
+    assert np.array_equal(read["a.x"], run["a.x"][rows])
+
+
+@pytest.mark.parametrize(
+    ("run", "tolerances", "reason"),
+    [
+        (swing(c=np.where(TIME == 3, np.nan, 0)), {"c": Tolerance(1)}, "c is nan at t = 3 s"),
+        (swing(), {"a.x": Tolerance(1), "a.z": Tolerance(1)}, '"a.z" matches no signal'),
+    ],
+)
+def test_what_cannot_be_met_becomes_no_reference(run, tolerances, reason, tmp_path):
+    with pytest.raises(CheckError, match=reason):
+        write_reference(run, tmp_path / "r.csv", tolerances)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_changes_name_what_is_different():
+    later = {"versions": {"numpy": "3"}, "machine": {"system": "Linux"}, "sha256": {"a.fmu": "13", "b.py": "7"}}
+    assert changes(METADATA, METADATA) == []
+    assert changes(METADATA, later) == ["numpy 2 -> 3", "a.fmu", "b.py"]

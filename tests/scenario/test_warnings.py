@@ -1,0 +1,55 @@
+"""Scenarios that can run, though something in them is probably a mistake."""
+
+import pytest
+from helpers import wire
+
+import cosim
+from cosim.core import resources
+from cosim.scenario.warnings import doubts
+
+SHIPPED = sorted((resources.root() / "scenarios").glob("*.json"))
+BOTH = [wire("plant.ship", "pilot.vehicle"), wire("pilot.motor", "plant.ship.motor")]
+
+
+def doubted(file):
+    assembly = cosim.load(file)
+    try:
+        return [str(problem).partition(": $.")[2] for problem in doubts(assembly)]
+    finally:
+        assembly.free()
+
+
+def ship(folder, connections, parameters=(), **more):
+    components = {"plant": folder.block("Plant"), "pilot": folder.block("Controller", parameters=dict(parameters))}
+    return doubted(folder.scenario(components, connections, **more))
+
+
+@pytest.mark.parametrize(
+    ("left", "line"),
+    [
+        (0, "nothing feeds or sets plant.ship.motor[1] and 1 more input, but there is an output pilot.motor[1]"),
+        (1, "nothing feeds or sets pilot.vehicle.position.x, but there is an output plant.ship.position.x"),
+    ],
+)
+def test_a_forgotten_connection_shows_by_names_that_fit(folder, left, line):
+    assert ship(folder, [BOTH[left]]) == [f"connections: {line}: is a connection missing?"]
+
+
+def test_inputs_that_are_set_or_that_no_output_fits_are_no_mistake(folder):
+    assert ship(folder, BOTH) == []
+    assert ship(folder, BOTH[1:], {"vehicle.position.x": 1.0}) == []
+    assert ship(folder, BOTH[1:], events=[{"time": 1, "set": {"pilot.vehicle.position.x": 1.0}}]) == []
+
+
+def test_an_event_after_the_end_and_a_reference_that_is_not_there(folder):
+    late = {"events": [{"time": 4, "set": {"pilot.offset": 1.0}}]}
+    missing = {"reference": {"file": "run.csv", "tolerances": {"*": {"absolute": 0.1}}}}
+    assert ship(folder, BOTH, **late, **missing) == [
+        'reference.file: file "run.csv" does not exist: `cosim regress --update` writes it',
+        "events[0]: this event does not happen: 4 s is after the stop time 3 s",
+    ]
+
+
+@pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
+def test_nothing_shipped_is_doubted(file):
+    assert doubted(file) == []

@@ -1,0 +1,26 @@
+"""The lag that crashes on order, for sweeps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fault_fmu import build_library
+from lag_sweeps import Lag, Make
+
+
+@pytest.fixture(scope="session")
+def make_lag(tmp_path_factory: pytest.TempPathFactory) -> Make:
+    """A new folder with the lag and its scenario."""
+    library: Path = build_library(2, tmp_path_factory.mktemp("library"))
+
+    def make(**more: Any) -> Lag:
+        return Lag.made(tmp_path_factory.mktemp("lag"), library, **more)
+
+    return make
+
+
+@pytest.fixture
+def lag(make_lag: Make) -> Lag:
+    return make_lag()

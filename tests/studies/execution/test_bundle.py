@@ -1,0 +1,21 @@
+"""The files that runs depend on."""
+
+import pytest
+
+from cosim.studies.execution.bundle import bundle
+
+
+def files(lag, settings):
+    return set(bundle(lag.folder / "lag.json", [settings]).files)
+
+
+@pytest.mark.parametrize("settings", [{"/components/lag/parameters": {"fault": "table.txt"}}, {"lag.fault": "table.txt"}])
+def test_a_file_that_a_parameter_names_belongs_to_them(lag, settings):
+    (lag.folder / "table.txt").write_text("1")
+    assert files(lag, settings) == {"lag.json", "lag.fmu", "table.txt"}
+
+
+@pytest.mark.parametrize("text", ["word " * 200, "..", "x" * 5000, "loop"])
+def test_other_texts_do_not(lag, text):
+    (lag.folder / "loop").symlink_to("loop")
+    assert files(lag, {"lag.fault": text}) == {"lag.json", "lag.fmu"}

@@ -1,0 +1,89 @@
+"""The file of finished runs."""
+
+import pytest
+
+from cosim.core.errors import InputError
+from cosim.studies.execution.job import Job, Record, key
+from cosim.studies.execution.run_store import FILE, Ledger
+
+KEYS = [key("scenario", {"run": run}) for run in range(4)]
+
+
+def filled(folder, *records):
+    with Ledger(folder) as ledger:
+        for record in records:
+            ledger.add(record)
+    return folder / FILE
+
+
+def test_records_are_found_again(tmp_path):
+    records = [
+        Record(KEYS[0], {"a": 0.1, "b": True, "c": float("inf")}, seconds=1.5),
+        Record(KEYS[1], failure="no", output="x\ny"),
+    ]
+    filled(tmp_path, *records)
+    with Ledger(tmp_path) as ledger:
+        assert [ledger[key] for key in KEYS[:2]] == records
+        assert [key in ledger for key in KEYS] == [True, True, False, False]
+
+
+def test_a_line_that_was_not_finished_is_cut_off(tmp_path):
+    file = filled(tmp_path, Record(KEYS[0], {"a": 1.0}), Record(KEYS[1], {"a": 2.0}))
+    whole = file.read_bytes()
+    for length in range(len(whole) - 1, whole.index(b"\n"), -7):
+        file.write_bytes(whole[:length])
+        filled(tmp_path, Record(KEYS[1], {"a": 3.0}))
+        with Ledger(tmp_path) as ledger:
+            assert [ledger[key].kpis["a"] for key in KEYS[:2]] == [1.0, 3.0]
+
+
+@pytest.mark.parametrize("line", [b"\0" * 20, b"{", b'{"key": "zz"}', b'{"key": "00", "kpis": 3}', b"[1]", b"\xff"])
+def test_a_line_that_cannot_be_read_costs_no_other_one(tmp_path, line):
+    file = filled(tmp_path, Record(KEYS[0], {"a": 1.0}))
+    file.write_bytes(file.read_bytes() + line + b"\n")
+    filled(tmp_path, Record(KEYS[1], {"a": 2.0}))
+    with Ledger(tmp_path) as ledger:
+        assert [ledger[key].kpis["a"] for key in KEYS[:2]] == [1.0, 2.0]
+        assert ledger.unreadable == 1
+
+
+@pytest.mark.parametrize("content", [b"notes\nof mine\n", b"notes", b'{"time": 1}\n'])
+def test_a_foreign_file_is_left_alone(tmp_path, content):
+    (tmp_path / FILE).write_bytes(content)
+    with pytest.raises(InputError, match="is no file of finished runs"):
+        Ledger(tmp_path)
+    assert (tmp_path / FILE).read_bytes() == content
+
+
+def test_of_a_first_line_nothing_may_be_left(tmp_path):
+    (tmp_path / FILE).write_bytes(b'{"key": "0123')
+    filled(tmp_path, Record(KEYS[0]))
+    with Ledger(tmp_path) as ledger:
+        assert KEYS[0] in ledger
+
+
+def test_jobs_are_asked_for_once(tmp_path):
+    filled(tmp_path, Record(KEYS[0]))
+    with Ledger(tmp_path) as ledger:
+        jobs = [Job(KEYS[n], {}) for n in (0, 1, 2, 1)]
+        assert [job.key for job in ledger.open_jobs(jobs)] == [KEYS[1], KEYS[2]]
+
+
+def test_failures_are_open_when_they_are_to_be_tried_again(tmp_path):
+    filled(tmp_path, Record(KEYS[0], {"a": 1}), Record(KEYS[1], failure="no"))
+    with Ledger(tmp_path, retry=True) as ledger:
+        assert [key in ledger for key in KEYS[:2]] == [True, False]
+        ledger.add(Record(KEYS[1], {"a": 2}))
+    with Ledger(tmp_path) as ledger:
+        assert ledger[KEYS[1]] == Record(KEYS[1], {"a": 2})
+
+
+def test_a_folder_has_one_sweep_at_a_time(tmp_path):
+    with Ledger(tmp_path), pytest.raises(InputError, match="another sweep is writing to"):
+        Ledger(tmp_path)
+    Ledger(tmp_path).__enter__().__exit__()
+
+
+def test_a_key_depends_on_files_and_settings_and_not_on_their_order():
+    assert key("a", {"x": 1, "y": 2}) == key("a", {"y": 2, "x": 1})
+    assert len({key("a", {"x": 1}), key("b", {"x": 1}), key("a", {"x": 2}), key("a", {"z": 1})}) == 4

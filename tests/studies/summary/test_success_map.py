@@ -1,0 +1,180 @@
+"""Maps of success: their cells from known runs, what is drawn of them, and what is refused."""
+
+import json
+import math
+import re
+from itertools import combinations
+
+import pytest
+from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_hex
+from matplotlib.patches import Rectangle
+from matplotlib.text import Text
+
+from cosim.core.errors import InputError
+from cosim.report.figures import style, svg
+from cosim.studies.execution.job import Record
+from cosim.studies.summary.statistics import wilson
+from cosim.studies.summary.success_map import success_maps
+from cosim.studies.summary.success_map_figure import draw_map
+from cosim.studies.sweep import Row, Sweep
+
+SPEED = {"name": "speed", "set": "usv.speed_command", "values": [0.5, 1.0]}
+CONTROLLER = {"name": "controller", "levels": {"old": {}, "new": {"uav.vtol.landing_time": 8.0}}}
+SEEDS = {"set": "/components/plant/arguments/environment/seed", "count": 3}
+LIMIT = {"kpi": "landing.lateral_error", "max": 0.1}
+
+
+def sweep_of(folder, **more):
+    content = {"name": "s", "scenario": "demo1_box", "factors": [CONTROLLER, SPEED], "seeds": SEEDS, "success": [LIMIT]}
+    content = {**content, "maps": [{"x": "speed", "y": "controller"}], **more}
+    (folder / "s.json").write_text(json.dumps(content))
+    return Sweep.of(folder / "s.json")
+
+
+def rows(sweep, errors):
+    """Runs with these lateral errors; None is a run that crashed."""
+    for run, error in errors.items():
+        record = Record(str(run), {} if error is None else {"landing.lateral_error": error}, "crashed" if error is None else "")
+        yield Row(run, sweep.design[run], record, error is not None and error <= 0.1)
+
+
+#: the runs of (old, 0.5), (old, 1.0) and (new, 0.5); those of (new, 1.0) are not made yet
+ERRORS = {0: 0.03, 1: 0.01, 2: 0.02, 3: 0.05, 4: 0.3, 5: None, 6: 0.2, 7: 0.2, 8: 0.4}
+
+
+@pytest.fixture
+def success_map(tmp_path):
+    sweep = sweep_of(tmp_path)
+    (found,) = success_maps(sweep, rows(sweep, ERRORS))
+    return found
+
+
+def test_shares_are_those_of_the_runs_of_a_cell(success_map):
+    shares = {(*cell.labels.values(),): (cell.passed, len(cell.runs)) for cell in success_map.cells.values()}
+    assert shares == {("old", 0.5): (3, 3), ("old", 1.0): (1, 3), ("new", 0.5): (0, 3), ("new", 1.0): (0, 0)}
+    assert math.isnan(success_map.cell(None, None, "new", 1.0).share)
+
+
+def test_a_run_without_success_is_shown_before_all_others(success_map):
+    cell = success_map.cell(None, None, "old", 1.0)
+    assert (cell.shown.number, cell.why) == (4, "the first that is no success")
+
+
+def test_of_successes_the_median_one_is_shown(success_map):
+    cell = success_map.cell(None, None, "old", 0.5)
+    assert (cell.shown.number, cell.why) == (2, "the median of landing.lateral_error")
+
+
+def test_nothing_is_shown_where_nothing_was_run(success_map):
+    assert success_map.cell(None, None, "new", 1.0).shown is None
+
+
+def test_panels_tell_further_factors_apart(tmp_path):
+    sweep = sweep_of(tmp_path, maps=[{"x": "speed", "y": "seed", "columns": "controller"}, {"x": "seed", "y": "speed"}])
+    panels, flat = success_maps(sweep, rows(sweep, ERRORS))
+    assert [each.name for each in (panels, flat)] == ["success_map_1", "success_map_2"]
+    assert panels.along("seed") == [1, 2, 3]
+    assert [run.number for run in panels.cell(None, "old", 2, 1.0).runs] == [4]
+    assert [run.number for run in flat.cell(None, None, 0.5, 3).runs] == [2, 8]
+
+
+def test_a_run_that_several_points_have_counts_once_in_intervals(tmp_path):
+    twice = {"one": {"uav.vtol.landing_time": 8.0}, "other": {"uav.vtol.landing_time": 8.0}}
+    more = {"name": "more", "levels": twice}
+    factors = [SPEED, CONTROLLER | {"levels": {"old": {}}}, more]
+    sweep = sweep_of(tmp_path, factors=factors, seeds=None)
+    (found,) = success_maps(sweep, rows(sweep, {0: 0.01, 1: 0.01}))
+    cell = found.cell(None, None, "old", 0.5)
+    assert (cell.share, cell.interval) == (1.0, wilson(1, 1))
+
+
+def test_levels_that_are_nothing_or_equal_in_python_have_cells_of_their_own(tmp_path):
+    speeds = SPEED | {"set": "/components/usv/period", "values": [None, 1, 1.0]}
+    sweep = sweep_of(tmp_path, factors=[CONTROLLER, speeds], seeds=None)
+    (found,) = success_maps(sweep, rows(sweep, dict(enumerate([0.1, 0.2, 0.3]))))
+    assert [[run.number for run in found.cell(None, None, "old", x).runs] for x in found.along("speed")] == [[0], [1], [2]]
+    draw_map(found)
+
+
+def squares(figure):
+    """Colour of each cell by its place in the first panel."""
+    patches = [patch for patch in figure.axes[0].patches if isinstance(patch, Rectangle)]
+    return {(patch.get_x() + 0.5, patch.get_y() + 0.5): to_hex(patch.get_facecolor()) for patch in patches}
+
+
+def test_colours_say_the_share_and_grey_that_nothing_is_known(success_map):
+    colours = squares(draw_map(success_map))
+    shades = colormaps["cividis"]
+    assert colours == {(0, 0): to_hex(shades(1.0)), (1, 0): to_hex(shades(1 / 3)), (0, 1): to_hex(shades(0.0)), (1, 1): "#eeeeee"}
+
+
+def test_text_says_how_many_runs_and_how_sure(success_map):
+    texts = [text.get_text() for text in draw_map(success_map).axes[0].texts]
+    assert texts == ["100 %", "3/3\n44–100 %", "33 %", "1/3\n6–79 %", "0 %", "0/3\n0–56 %"]
+
+
+def test_cells_too_small_for_text_have_none(tmp_path):
+    sweep = sweep_of(tmp_path, factors=[CONTROLLER, SPEED | {"values": list(range(60))}])
+    (found,) = success_maps(sweep, rows(sweep, dict.fromkeys(range(len(sweep)), 0.01)))
+    assert not draw_map(found).axes[0].texts
+
+
+WORDS = {"name": "landing controller", "levels": {"inverse kinematics": {}, "incremental nonlinear dynamic inversion": {}}}
+STEPS = SPEED | {"values": [0.0137 * i for i in range(40)]}
+MANY = {"name": "sensor", "levels": {f"sensor_number_{i}": {} for i in range(16)}}
+CROWDED = {
+    "long names up": ([WORDS, SPEED], {"x": "speed", "y": "landing controller"}),
+    "long names along": ([WORDS, SPEED], {"x": "landing controller", "y": "speed"}),
+    "many numbers along": ([WORDS, STEPS], {"x": "speed", "y": "landing controller"}),
+    "many numbers up": ([STEPS, MANY], {"x": "sensor", "y": "speed", "columns": "seed"}),
+    "long names of columns": ([WORDS, SPEED], {"x": "speed", "y": "seed", "columns": "landing controller"}),
+    "long names of many columns": ([MANY, SPEED], {"x": "speed", "y": "seed", "columns": "sensor"}),
+    "long names of rows": ([WORDS, SPEED], {"x": "speed", "y": "seed", "rows": "landing controller"}),
+    "long titles": ([WORDS, SPEED], {"x": "speed", "y": "landing controller", "titles": {"speed": "speed " * 12}}),
+}
+
+
+@pytest.mark.parametrize("name", CROWDED)
+def test_texts_lie_inside_the_figure_and_beside_each_other(tmp_path, name):
+    factors, spec = CROWDED[name]
+    (found,) = success_maps(sweep_of(tmp_path, factors=factors, maps=[spec]), [])
+    with style():
+        figure = draw_map(found)
+        FigureCanvasAgg(figure).draw()
+        texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text()]
+        places = {text: text.get_window_extent() for text in texts}
+    for text, place in places.items():
+        assert figure.bbox.containsx(place.x0) and figure.bbox.containsx(place.x1), text
+        assert figure.bbox.containsy(place.y0) and figure.bbox.containsy(place.y1), text
+    for (one, place), (other, other_place) in combinations(places.items(), 2):
+        assert not place.overlaps(other_place), (one, other)
+
+
+def test_in_svg_every_cell_with_a_run_is_a_link(success_map):
+    text = svg(draw_map(success_map, lambda cell: f"run-{cell.shown.number}" if cell.shown else ""))
+    assert re.findall('xlink:href="(run[^"]*)"', text) == ["run-2", "run-4", "run-6"]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"maps": [{"x": "sped", "y": "controller"}]}, ['"maps" names no factor with levels "sped"', 'did you mean "speed"?']),
+        ({"maps": [{"x": "speed", "y": "speed"}]}, ["$.maps[0]", 'two axes of a map are called "speed"']),
+        ({"factors": [CONTROLLER, SPEED | {"values": [[1, 2]]}]}, ['"maps" names no factor with levels "speed"']),
+        ({"maps": [{"x": "speed"}]}, ["$.maps[0]", '"y"']),
+        (
+            {
+                "factors": [CONTROLLER, {"name": "speed", "set": "a.b", "range": {"min": 0.0, "max": 1.0}}],
+                "design": {"kind": "sobol", "runs": 4},
+            },
+            ['"maps" names no factor with levels "speed"'],
+        ),
+    ],
+)
+def test_maps_of_factors_that_have_no_levels_are_refused(tmp_path, content, words):
+    with pytest.raises(InputError) as refusal:
+        sweep_of(tmp_path, **content)
+    for word in words:
+        assert word in str(refusal.value)

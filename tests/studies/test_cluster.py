@@ -1,0 +1,121 @@
+"""`cosim sweep --scheduler` on a real scheduler with workers on loopback."""
+
+from __future__ import annotations
+
+import shutil
+import time
+
+import pytest
+from clusters import Cluster, cluster
+from lag_sweeps import SEGV, alive, descendants
+
+import cosim
+from cosim.core.resources import root
+
+pytest.importorskip("distributed")
+
+LEVELS = {f"run {run}": {"lag.y_start": 1 + run / 100, "lag.fault": SEGV if run == 3 else ""} for run in range(8)}
+FACTORS = [{"name": "level", "levels": LEVELS}]
+#: runs of about a tenth of a second
+SLOW = {
+    "factors": [{"name": "start", "set": "lag.y_start", "values": [1 + run / 10 for run in range(30)]}],
+    "settings": {"/stop_time": 100, "/record/interval": 1},
+}
+
+
+@pytest.fixture(scope="session")
+def two_workers(tmp_path_factory):
+    with cluster(tmp_path_factory.mktemp("cluster")) as made:
+        yield made
+
+
+def test_a_cluster_makes_the_same_bytes_from_files_that_it_was_sent(lag, two_workers):
+    sweep = lag.write(factors=FACTORS)
+    local = lag.call("sweep", sweep, "--output-dir", "local")
+    away = lag.call("sweep", sweep, "--scheduler", two_workers.address, "--output-dir", "cluster")
+    assert (local.code, away.code) == (1, 1), away.err
+    for name in ("table.csv", "aggregates.csv", "success.csv"):
+        assert (lag.folder / "local" / name).read_bytes() == (lag.folder / "cluster" / name).read_bytes(), name
+    shipped = list(two_workers.folder.glob("scratch/**/trees/*/lag.fmu"))
+    assert {file.read_bytes() for file in shipped} == {(lag.folder / "lag.fmu").read_bytes()}
+
+
+def test_what_cannot_be_set_is_refused_before_anything_runs(lag, two_workers):
+    sweep = lag.write(factors=[{"name": "T", "set": "lag.Tau", "values": [1.0]}])
+    done = lag.call("sweep", sweep, "--scheduler", two_workers.address)
+    assert done.code == 2
+    assert "$.factors[0].set" in done.err
+    assert 'component "lag" has no variable "Tau"' in done.err
+    assert lag.records() == []
+
+
+def test_absolute_paths_are_refused(make_lag, two_workers):
+    lag = make_lag()
+    place = {"/components/lag/fmu": str(lag.folder / "lag.fmu")}
+    sweep = lag.write(factors=[{"name": "fmu", "levels": {"here": place}}])
+    done = lag.call("sweep", sweep, "--scheduler", two_workers.address)
+    assert done.code == 2
+    assert "cannot be shipped to a cluster" in done.err
+
+
+def test_where_no_scheduler_is_nothing_is_run(lag, monkeypatch):
+    monkeypatch.setattr("cosim.studies.cluster._PATIENCE", 1.0)
+    done = lag.call("sweep", lag.write(factors=FACTORS), "--scheduler", "tcp://127.0.0.1:9")
+    assert done.code == 2
+    assert 'no Dask scheduler answers at "tcp://127.0.0.1:9"' in done.err
+
+
+@pytest.mark.long
+def test_a_worker_with_another_cosim_is_refused(lag, tmp_path):
+    shutil.copytree(root() / "cosim", tmp_path / "other" / "cosim", ignore=shutil.ignore_patterns("__pycache__", "_bundle"))
+    with (tmp_path / "other/cosim/__init__.py").open("a") as file:
+        file.write('\n__version__ = "0.0.9"\n')
+    with cluster(tmp_path, workers=0) as made:
+        made.workers.append(made.worker(PYTHONPATH=str(tmp_path / "other")))
+        done = lag.call("sweep", lag.write(factors=FACTORS), "--scheduler", made.address)
+    assert done.code == 2
+    assert "has cosim 0.0.9 (" in done.err
+    assert f"expected {cosim.__version__} (" in done.err
+
+
+def begin(lag, made: Cluster):
+    """A sweep on a cluster, with some runs finished."""
+    process = lag.start("sweep", lag.write(**SLOW), "--scheduler", made.address)
+    end = time.monotonic() + 60
+    while len(lag.records()) < 3:
+        assert process.poll() is None and time.monotonic() < end, (made.folder / "log").read_text()
+        time.sleep(0.02)
+    return process
+
+
+@pytest.mark.long
+def test_killed_workers_are_replaced(lag, tmp_path):
+    with cluster(tmp_path) as made:
+        process = begin(lag, made)
+        victim, below = made.workers[0], descendants(made.workers[0].pid)
+        victim.kill()
+        victim.wait()
+        made.workers.append(made.worker())
+        _, err = process.communicate(timeout=120)
+        assert process.returncode == 0, err
+        assert not any("failure" in record for record in lag.records())
+        assert len({record["key"] for record in lag.records()}) == len(lag.records()) == 30
+        assert not any(map(alive, below))
+
+
+@pytest.mark.long
+def test_after_the_scheduler_was_killed_another_one_finishes_the_sweep(lag, tmp_path):
+    (tmp_path / "first").mkdir()
+    (tmp_path / "second").mkdir()
+    with cluster(tmp_path / "first") as made:
+        process = begin(lag, made)
+        made.scheduler.kill()
+        _, err = process.communicate(timeout=120)
+        assert process.returncode == 1
+        assert "the connection to the scheduler" in err
+        before = lag.records()
+        assert 3 <= len(before) < 30
+    with cluster(tmp_path / "second") as made:
+        assert lag.call("sweep", "sweep.json", "--scheduler", made.address).code == 0
+    assert lag.records()[: len(before)] == before
+    assert len({record["key"] for record in lag.records()}) == len(lag.records()) == 30

@@ -1,0 +1,85 @@
+"""Arithmetic over KPIs."""
+
+import math
+import re
+
+import pytest
+
+from cosim.studies.objective import constraint, expression
+
+VALUES = {"landing.error": 0.5, "waypoints.time[2]": 8.0, "gain": 3.0, "flown": True, "lost": math.nan}
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("landing.error", 0.5),
+        ("2 * landing.error + waypoints.time[2] / 4 - -gain", 6.0),
+        ("2 + 3 * gain ** 2", 29.0),
+        ("max(gain, 5) - min(gain, 5, 1) + abs(-2)", 6.0),
+        ("sqrt(16) + log(exp(1))", 5.0),
+        ("1 - flown", 0.0),
+    ],
+)
+def test_arithmetic(text, value):
+    assert expression(text)(VALUES) == pytest.approx(value)
+
+
+@pytest.mark.parametrize("text", ["1 / (gain - 3)", "sqrt(-gain)", "log(0)", "1e300 ** 2", "(-8) ** 0.5", "missing + 1"])
+def test_what_has_no_value_is_nan(text):
+    assert math.isnan(expression(text)(VALUES))
+
+
+@pytest.mark.parametrize("text", ["max(0, lost)", "min(lost, 1)", "lost ** 0", "1 ** lost", "min(1, max(lost, 2))"])
+def test_a_part_without_a_value_leaves_the_whole_without(text):
+    """Python's own functions lose sight of NaN, some depending on the order."""
+    assert math.isnan(expression(text)(VALUES))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("__import__('os').system('true')", "means nothing here"),
+        ("().__class__", "means nothing here"),
+        ("gain if gain else 1", "means nothing here"),
+        ("[gain]", "means nothing here"),
+        ("'text'", "means nothing here"),
+        ("True", "means nothing here"),
+        ("lambda: 1", "means nothing here"),
+        ("gain // 2", "means nothing here"),
+        ("maxi(gain, 1)", 'unknown function "maxi"; did you mean "max"?'),
+        ("max(*gain)", "means nothing here"),
+        ("abs(gain, 2)", '"abs" takes 1 argument, found 2'),
+        ("min(gain)", '"min" takes 2 arguments or more, found 1'),
+        ("log(gain, 2, 3)", '"log" takes 1 or 2 arguments, found 3'),
+        ("gain +", "is no expression"),
+        ("(" * 300 + "1" + ")" * 300, "is no expression"),
+        ("1 + " * 400 + "1", "at most 1000 characters"),
+    ],
+)
+def test_anything_else_is_refused(text, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        expression(text)
+
+
+def test_unknown_names_come_with_the_nearest():
+    assert expression("gian + 1").unknown(VALUES) == 'no KPI or parameter "gian"; did you mean "gain"?'
+    assert expression("gain + landing.error").unknown(VALUES) == ""
+
+
+@pytest.mark.parametrize(
+    ("text", "violation"), [("gain <= 3", 0.0), ("gain <= 2.5", 0.5), ("gain >= 5 * landing.error", 0.0), ("gain + 1 >= 6", 2.0)]
+)
+def test_constraints_say_by_how_much_they_are_not_met(text, violation):
+    assert constraint(text).violation(VALUES) == violation
+
+
+@pytest.mark.parametrize("text", ["log(0) <= 1", "min(1, lost) <= 1"])
+def test_a_side_without_a_value_violates_without_limit(text):
+    assert constraint(text).violation(VALUES) == math.inf
+
+
+@pytest.mark.parametrize("text", ["gain", "gain < 3", "1 <= gain <= 2", "gain == 3"])
+def test_other_comparisons_are_refused(text):
+    with pytest.raises(ValueError, match="expected a comparison with <= or >="):
+        constraint(text)

@@ -1,0 +1,34 @@
+"""Every shipped sweep and tuning can be run: it is read, and its first run assembled."""
+
+import json
+
+import pytest
+
+from cosim.core import resources
+from cosim.scenario import assemble
+from cosim.studies.sweep import Sweep
+from cosim.studies.tune import Tuning
+
+FILES = sorted(resources.root().glob("scenarios/sweeps/*.json"))
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_a_shipped_file_can_be_run(file):
+    if "minimize" in json.loads(file.read_text()):
+        tuning = Tuning.of(file.stem)
+        study, settings = (
+            tuning.study,
+            {**tuning.spec.cases[0], **tuning.settings({p.name: p.min for p in tuning.spec.parameters})},
+        )
+    else:
+        sweep = Sweep.of(file.stem)
+        study, settings = sweep.study, next(iter(sweep.design)).settings
+        assert sweep.criteria
+    assert str(study.bundle.scenario) in study.bundle.files
+    assembly = assemble(study.read.scenario, study.job(settings).settings)
+    assert assembly.kpis()
+    assembly.free()
+
+
+def test_there_are_some():
+    assert {file.stem for file in FILES} >= {"demo1_landing", "strider_heading_gains"}

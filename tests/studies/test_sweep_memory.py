@@ -1,0 +1,51 @@
+"""The memory of a sweep does not grow with its runs."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+from lag_sweeps import descendants
+
+from cosim.studies.execution.job import Record
+from cosim.studies.execution.run_store import Ledger
+from cosim.studies.sweep import Sweep
+
+pytestmark = [pytest.mark.long, pytest.mark.timeout(1800)]
+RUNS, LAST = 100_000, 100
+
+
+def proportional_kilobytes(processes):
+    """Memory of processes, where what several share counts once."""
+    total = 0
+    for process in processes:
+        try:
+            lines = Path(f"/proc/{process}/smaps_rollup").read_text().splitlines()
+        except OSError:  # it has just ended
+            continue
+        total += sum(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
+    return total
+
+
+def test_100_000_runs_take_less_than_300_megabytes(lag):
+    """Of all runs the last 100 are made; the records of the others, as long as real ones, are there already."""
+    half = {"range": {"min": 1.0, "max": 2.0, "count": RUNS // 2}}
+    sweep = lag.write(factors=[{"name": "y", "set": "lag.y_start", **half}, {"name": "T", "set": "lag.T", "values": [0.5, 1.0]}])
+    folder = lag.folder / "runs/sweep"
+    folder.mkdir(parents=True)
+    with Ledger(folder) as ledger:
+        for number, job in enumerate(Sweep.of(sweep).jobs()):
+            if number < RUNS - LAST:
+                ledger.add(Record(job.key, {"end.value": 0.8 + 1e-6 * number}, seconds=0.0123))
+    process = lag.start("sweep", sweep, "--workers", 2)
+    most = 0
+    while process.poll() is None:
+        most = max(most, proportional_kilobytes([process.pid, *descendants(process.pid)]))
+        time.sleep(0.5)
+    out, err = process.communicate()
+    assert process.returncode == 0, err
+    assert f"{RUNS} of {RUNS} runs, {LAST} made now" in out
+    print(f"\n{most / 1000:.0f} MB at most")
+    assert 0 < most < 300_000
+    assert len(list(folder.iterdir())) == 6

@@ -1,0 +1,212 @@
+"""Sweeps and tunings that cannot be: every problem at once, with its place and the nearest name."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from cosim.cli import cli
+from cosim.core.errors import InputError
+from cosim.studies.document import read
+from cosim.studies.schema import SweepSpec, TuneSpec
+from cosim.studies.tune import Tuning
+
+FACTOR = {"name": "f", "set": "a.b", "values": [1]}
+PARAMETER = {"name": "p", "set": "a.b", "min": 0.0, "max": 1.0}
+
+
+def problems(folder, kind, content):
+    """What is said about a file whose scenario is a shipped one."""
+    file = folder / "study.json"
+    file.write_text(json.dumps({"name": "s", "scenario": "demo1_box", **content}))
+    with pytest.raises(InputError) as refusal:
+        Tuning.of(file) if kind is TuneSpec else read(file, kind)
+    return [str(problem).removeprefix(str(file)) for problem in refusal.value.problems]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"factors": [FACTOR], "scenario": "demo1_bax"}, ["$.scenario", 'did you mean "demo1_box"?']),
+        ({"factors": [FACTOR], "desing": {}}, ["$.desing", 'did you mean "design"?']),
+        ({}, ['expected "factors", "seeds" or both']),
+        ({"factors": [FACTOR, FACTOR]}, ['two factors are called "f"']),
+        ({"factors": [FACTOR, FACTOR | {"name": "g"}]}, ['both "f" and "g" set "a.b"']),
+        ({"factors": [FACTOR | {"set": []}]}, ["$.factors[0].set", "at least 1 item"]),
+        ({"factors": [FACTOR], "by": ["g"]}, ['"by" names no factor "g"', "valid: f, seed"]),
+        ({"factors": [FACTOR | {"range": {"min": 0.0, "max": 1.0}}]}, ["$.factors[0]", "found values and range"]),
+        ({"factors": [{"name": "f", "set": "a.b"}]}, ["$.factors[0]", "found none"]),
+        ({"factors": [{"name": "f", "values": [1]}]}, ["$.factors[0]", 'expected "set"']),
+        ({"factors": [FACTOR | {"name": "status"}]}, ["$.factors[0].name", "expected a name other than"]),
+        ({"factors": [FACTOR | {"name": "q05"}]}, ["$.factors[0].name", "expected a name other than"]),
+        ({"factors": [FACTOR | {"name": "rate"}]}, ["$.factors[0].name", "expected a name other than"]),
+        ({"factors": [{"name": "f", "set": "a", "range": {"min": 1.0, "max": 1.0}}]}, ["$.factors[0].range", "less than"]),
+        ({"factors": [{"name": "f", "set": "a", "range": {"min": 0.0, "max": 1.0}}]}, ['the factor "f" needs a "count"']),
+        (
+            {"factors": [{"name": "f", "set": "a", "range": {"min": 0.0, "max": 1.0, "scale": "log", "count": 2}}]},
+            ["a logarithmic scale needs a positive"],
+        ),
+        ({"factors": [{"name": "f", "set": "a", "distribution": {"kind": "normal", "mean": 0.0}}]}, ['"normal" needs std']),
+        (
+            {"factors": [{"name": "f", "set": "a", "distribution": {"kind": "normal", "mean": 0.0, "sigma": 1.0}}]},
+            ['"normal" has no "sigma"', "valid: mean, std"],
+        ),
+        ({"factors": [FACTOR], "design": {"kind": "sobol", "runs": 100}}, ["$.design", '"runs": 128']),
+        ({"factors": [FACTOR], "design": {"kind": "latin_hypercube"}}, ["$.design", 'expected "runs"']),
+        ({"factors": [FACTOR], "seeds": {"set": "/seed", "count": 0}}, ["$.seeds.count", "found 0"]),
+        ({"factors": [FACTOR], "deadline": -1}, ["$.deadline", "found -1"]),
+    ],
+)
+def test_a_sweep_is_refused_with_its_place(tmp_path, content, words):
+    (line,) = problems(tmp_path, SweepSpec, content)
+    assert all(word in line for word in words), line
+
+
+B = "/components/a/parameters/b"
+
+
+@pytest.mark.parametrize(
+    ("factors", "common", "words"),
+    [
+        ({"f": "a.b", "g": B}, {}, 'both "f" and "g" set the same thing, as "a.b" and as "/components/a/parameters/b"'),
+        ({"f": "stop_time", "g": "/stop_time"}, {}, 'both "f" and "g" set the same thing'),
+        ({"f": B}, {"a.b": 7}, 'both the settings and "f" set the same thing'),
+        ({"f": "a.b", "g": {"/components/a": {"parameters": {"b": 1}}}}, {}, 'both "f" and "g" set the same thing'),
+        ({"f": B, "g": "/components/a"}, {}, '"/components/a" of "g" replaces "/components/a/parameters/b" of "f"'),
+        ({"f": "/components/a"}, {B: 7}, '"/components/a" of "f" replaces "/components/a/parameters/b" of the settings'),
+    ],
+)
+def test_what_would_have_no_effect_is_refused(tmp_path, factors, common, words):
+    (line,) = problems(tmp_path, SweepSpec, {"factors": varied(factors), "settings": common})
+    assert words in line
+
+
+@pytest.mark.parametrize(
+    ("factors", "common"),
+    [
+        ({"f": "a.b"}, {"a.b": 7}),
+        ({"f": "a.b"}, {B: 7}),
+        ({"f": {"/record": {"interval": 1}}}, {"/record": {"signals": ["*"]}}),
+        ({"f": {"/components/a": {"parameters": {"b": 1, "c": 2}}}}, {"a.b": 7}),
+        ({"f": "/components/a", "g": B}, {}),
+        ({"f": "/components/a", "g": "a.b"}, {"/components": {}}),
+        ({"f": "a.b", "g": "a.c.b", "h": "/components/a/arguments/b"}, {}),
+    ],
+)
+def test_what_is_changed_further_is_not(tmp_path, factors, common):
+    (tmp_path / "s.json").write_text(
+        json.dumps({"name": "s", "scenario": "demo1_box", "factors": varied(factors), "settings": common})
+    )
+    read(tmp_path / "s.json", SweepSpec)
+
+
+def varied(factors):
+    """Factors that set a path, or that have a level with settings."""
+    return [
+        FACTOR | {"name": name, "set": what} if isinstance(what, str) else {"name": name, "levels": {"x": what}}
+        for name, what in factors.items()
+    ]
+
+
+def test_everything_that_is_wrong_is_said_at_once(tmp_path):
+    found = problems(
+        tmp_path, SweepSpec, {"factors": [{"name": "f"}, FACTOR | {"values": []}], "dedline": 1, "design": {"kind": "grid"}}
+    )
+    assert [line.split(": ")[1] for line in found] == ["$.factors[0]", "$.factors[1].values", "$.design.kind", "$.dedline"]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"minimize": "1 +", "parameters": [PARAMETER]}, ["$.minimize", "is no expression"]),
+        ({"minimize": "k", "parameters": [PARAMETER], "constraints": ["k < 1"]}, ["$.constraints[0]", "<= or >="]),
+        ({"minimize": "k", "parameters": [PARAMETER | {"start": 2.0}]}, ["$.parameters[0]", 'expected "start" between']),
+        ({"minimize": "k", "parameters": []}, ["$.parameters"]),
+        ({"minimize": "k", "parameters": [PARAMETER | {"name": "value"}]}, ["$.parameters[0].name", "expected a name other"]),
+        ({"minimize": "k", "parameters": [PARAMETER], "cases": [{}, {"a.b": 1}]}, ['both "cases" and "p" set "a.b"']),
+        ({"minimize": "k", "parameters": [PARAMETER], "method": {"kind": "magic"}}, ["$.method.kind", "magic"]),
+    ],
+)
+def test_a_tuning_is_refused_with_its_place(tmp_path, content, words):
+    (line,) = problems(tmp_path, TuneSpec, content)
+    assert all(word in line for word in words), line
+
+
+def test_what_cannot_be_set_is_found_before_anything_runs(lag):
+    """Three levels are wrong in three ways."""
+    wrong = [{"name": "T", "set": "lag.Tau", "values": [1.0]}, {"name": "y", "set": "lag.y_start", "values": [1.0, "high"]}]
+    levels = {"one": {"/components/lga/fmu": "x.fmu"}, "two": {}}
+    done = lag.call("sweep", lag.write(factors=[*wrong, {"name": "l", "levels": levels}]))
+    lines = done.err.splitlines()
+    assert (done.code, len(lines)) == (2, 3), done.err
+    for words in (
+        ("$.factors[0].set", '"Tau"; valid: u, y_start, T'),
+        ("$.factors[1].set", 'found "high"'),
+        ("$.factors[2]", "components/lga"),
+    ):
+        assert any(all(word in line for word in words) for line in lines), done.err
+    assert lag.records() == []
+
+
+def test_what_a_pointer_sets_wrongly_has_its_place_in_the_sweep_file(lag):
+    """Of two levels the second is wrong, of a setting that is an object a part."""
+    levels = {"good": {"/components/lag/fmu": "lag.fmu"}, "bad": {"/components/lag/fmu": "lga.fmu"}}
+    factors = [{"name": "fmu", "levels": levels}, {"name": "step", "set": "/step_size", "values": [0.01, -1]}]
+    common = {"/record": {"signals": ["lag.y", "lag.yy"]}}
+    lines = lag.call("sweep", lag.write(factors=factors, settings=common)).err.splitlines()
+    places = {line.split(": ")[1].partition(", in ")[0] for line in lines if line.startswith(str(lag.folder / "sweep.json"))}
+    assert len(lines) == 3, lines
+    assert places == {
+        '$.factors[0].levels.bad["/components/lag/fmu"]',
+        "$.factors[1].set",
+        '$.settings["/record"].signals[1]',
+    }
+
+
+def test_criteria_about_kpis_that_do_not_exist_end_the_sweep_at_its_first_runs(lag):
+    factors = [{"name": "y", "set": "lag.y_start", "values": list(range(50))}]
+    done = lag.call("sweep", lag.write(factors=factors, success=[{"kpi": "end.valeu", "max": 1.0}]))
+    assert done.code == 2
+    assert 'no such KPI; did you mean "end.value"?' in done.err
+    assert len(lag.records()) < 50
+
+
+def test_a_factor_is_not_called_like_a_kpi(lag):
+    """Which KPIs there are is known after a run."""
+    done = lag.call("sweep", lag.write(factors=[{"name": "end.value", "set": "lag.y_start", "values": [1, 2]}]))
+    assert done.code == 2
+    assert '$.factors[0].name: expected a name other than that of the KPI "end.value"' in done.err
+
+
+def test_so_they_do_when_all_runs_are_there(lag):
+    factors = [{"name": "y", "set": "lag.y_start", "values": [1, 2]}]
+    for _ in range(2):
+        assert lag.call("sweep", lag.write(factors=factors, success=[{"kpi": "end.valeu", "max": 1.0}])).code == 2
+    assert len(lag.records()) == 2
+
+
+def test_a_file_that_cannot_be_imported_is_named(lag):
+    (lag.folder / "broken.py").write_text("import no_such_module\n\ndef f(result):\n    return {}\n")
+    kpis = [{"name": "k", "python": "broken.py:f"}]
+    factors = [{"name": "y", "set": "lag.y_start", "values": [1.0]}]
+    lag.call("sweep", lag.write(factors=factors, settings={"/kpis": kpis}))
+    assert "No module named 'no_such_module'" in lag.table()[0]["failure"]
+
+
+def test_a_component_that_ends_the_process_as_it_is_imported_fails_its_own_runs(lag):
+    """The template, which imports in advance what the scenario names, does without."""
+    (lag.folder / "deadly.py").write_text("import os\nos.abort()\n")
+    content = json.loads((lag.folder / "lag.json").read_text())
+    content["components"]["deadly"] = {"python": "deadly.py:Component"}
+    (lag.folder / "lag.json").write_text(json.dumps(content))
+    good = {"/components/deadly": {"fmu": "lag.fmu"}}
+    lag.call("sweep", lag.write(factors=[{"name": "level", "levels": {"good": good}}]))
+    assert [row["status"] for row in lag.table()] == ["ok"], lag.done
+
+
+def test_schemas_are_printed():
+    for option, key in (("--sweep", "factors"), ("--tune", "minimize")):
+        done = CliRunner().invoke(cli, ["schema", option])
+        assert key in json.loads(done.output)["properties"]

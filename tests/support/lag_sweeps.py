@@ -1,0 +1,97 @@
+"""Sweeps over a lag that crashes on order."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from fault_fmu import FaultFmus
+
+from cosim.cli import cli, guarded
+
+KPIS = [{"name": "end", "python": "cosim.kpis:final", "arguments": {"signal": "lag.y"}}]
+SEGV = "DoStep 6 segv"
+
+
+@dataclass(frozen=True)
+class Done:
+    """Exit code and output of a command."""
+
+    code: int
+    out: str
+    err: str
+
+
+@dataclass
+class Lag:
+    """A folder with a scenario around the FMU, and commands in it; `done` is what came of the last one."""
+
+    folder: Path
+    done: Done | None = None
+
+    @classmethod
+    def made(cls, folder: Path, library: Path, **more: Any) -> Lag:
+        """`more` replaces keys of the scenario."""
+        FaultFmus({2: library}, folder)(2)
+        content = {"name": "lag", "stop_time": 0.1, "step_size": 0.01, "components": {"lag": {"fmu": "lag.fmu"}}}
+        content |= {"record": {"signals": ["lag.y"]}, "kpis": KPIS, **more}
+        (folder / "lag.json").write_text(json.dumps(content))
+        return cls(folder)
+
+    def write(self, name: str = "sweep", **content: Any) -> Path:
+        """A sweep or tuning file of the scenario."""
+        file = self.folder / f"{name}.json"
+        file.write_text(json.dumps({"name": name, "scenario": "lag.json", **content}))
+        return file
+
+    def call(self, *words: object) -> Done:
+        """A command in this process: the imports are done."""
+        out, err = StringIO(), StringIO()
+        with chdir(self.folder), redirect_stdout(out), redirect_stderr(err):
+            code = guarded(lambda: cli.main([*map(str, words)], standalone_mode=False))
+        self.done = Done(code, out.getvalue(), err.getvalue())
+        return self.done
+
+    def start(self, *words: object) -> subprocess.Popen[str]:
+        """A command that goes on in a process of its own while the test does something to it."""
+        command = [sys.executable, "-m", "cosim", *map(str, words)]
+        return subprocess.Popen(command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    def table(self, folder: str = "runs/sweep", file: str = "table.csv") -> list[dict[str, str]]:
+        with (self.folder / folder / file).open(newline="") as text:
+            return list(csv.DictReader(text))
+
+    def records(self, folder: str = "runs/sweep") -> list[dict[str, Any]]:
+        """What the ledger holds; none while there is none."""
+        file = self.folder / folder / "journal.jsonl"
+        lines = file.read_bytes().split(b"\n")[:-1] if file.exists() else []
+        return [json.loads(line) for line in lines]
+
+
+Make = Callable[..., Lag]
+
+
+def descendants(process: int) -> list[int]:
+    """Ids of all processes below one, the nearest first."""
+    found = []
+    for path in Path(f"/proc/{process}/task").glob("*/children"):
+        for child in map(int, path.read_text().split()):
+            found += [child, *descendants(child)]
+    return found
+
+
+def alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

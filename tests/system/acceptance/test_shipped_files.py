@@ -1,0 +1,104 @@
+"""Everything that is shipped works and is what its description says."""
+
+import json
+from zipfile import ZipFile
+
+import numpy as np
+import pytest
+from helpers import run, system
+
+import cosim
+from cosim.api import checks, execute
+from cosim.components.fmi import FmuFile, instantiate
+from cosim.core import resources
+from cosim.core.system import Endpoint
+from cosim.core.time_grid import exact
+from cosim.engine.run_loop import Settings, simulate
+
+FMUS = sorted(resources.root().glob("fmus/**/*.fmu"))
+SCENARIOS = sorted(resources.root().glob("scenarios/*.json"))
+SYSTEMS = sorted(resources.root().glob("scenarios/systems/*.json"))
+
+
+def label(path):
+    return str(path.relative_to(resources.root()))
+
+
+@pytest.mark.parametrize("path", FMUS, ids=label)
+def test_fmpy_finds_no_problem(path):
+    from fmpy.validation import validate_fmu
+
+    assert validate_fmu(str(path)) == []
+
+
+@pytest.mark.parametrize("path", FMUS, ids=label)
+def test_start_values_are_those_of_the_description(path):
+    component = instantiate(FmuFile(path), "fmu")
+    seen = {}
+
+    class Look:
+        def __getattr__(self, name):
+            return getattr(component, name)
+
+        def exit_initialization_mode(self):
+            seen.update({v.name: (component.get(v.name), v.start) for v in component.variables if v.start is not None})
+            component.exit_initialization_mode()
+
+    run(system({"fmu": Look()}), 0.01, 0.01)
+    assert {name: tuple(np.atleast_1d(found)) for name, (found, _) in seen.items()} == {
+        name: tuple(np.atleast_1d(start)) for name, (_, start) in seen.items()
+    }
+
+
+@pytest.mark.parametrize("path", FMUS, ids=label)
+def test_fmus_are_finite_and_repeat_themselves(path):
+    first = outputs_over_a_second(path)
+    assert np.isfinite(first).all()
+    assert np.array_equal(first, outputs_over_a_second(path))
+
+
+def outputs_over_a_second(path):
+    file = FmuFile(path)
+    names = [slot for v in file.description.variables if v.causality == "output" for slot in v.slots]
+    columns = {name: Endpoint("fmu", name) for name in names}
+    outcome = simulate(system({"fmu": instantiate(file, "fmu")}), Settings(exact(0), exact(1), exact(0.01), columns))
+    assert outcome.failure is None
+    return np.array([outcome.recording.columns[name].astype(float) for name in names])
+
+
+@pytest.mark.parametrize("path", FMUS, ids=label)
+def test_sources_are_inside(path):
+    names = ZipFile(path).namelist()
+    assert any(name.startswith("sources/") and name.endswith(".c") for name in names) or f"resources/{path.stem}.py" in names
+
+
+def test_the_manifest_lists_exactly_the_fmus():
+    manifest = json.loads((resources.root() / "fmus/manifest.json").read_text())
+    listed = {fmu for entry in manifest.values() for fmu in entry["fmus"]}
+    assert listed == {label(path) for path in FMUS}
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=label)
+def test_scenarios_run_for_two_seconds(path):
+    result = cosim.run(path, stop_time=2)
+    assert result.time[-1] == 2.0
+    for name in result:
+        if result[name].dtype.kind == "f":
+            assert np.isfinite(result[name]).all(), name
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=label)
+def test_scenarios_meet_their_checks(path):
+    assembly = cosim.load(path)
+    outcomes = checks(assembly, execute(assembly))
+    assert outcomes
+    assert [(outcome.check, outcome.value) for outcome in outcomes if not outcome.passed] == []
+
+
+@pytest.mark.parametrize("path", [*SCENARIOS, *SYSTEMS], ids=label)
+def test_scenarios_satisfy_the_published_schema(path):
+    import jsonschema
+
+    from cosim.scenario import json_schema
+
+    jsonschema.validate(json.loads(path.read_text()), json_schema(nested=path.parent.name == "systems"))

@@ -1,0 +1,154 @@
+"""Runs commands of cosim in processes that have everything imported already: `python -m cosim` without its first second.
+
+Reads a JSON object a line (see `Runner.cosim`) and answers {"code", "seconds", "processes"}: the exit code as subprocess has it,
+the wall time, and the ids of processes that were left behind (they are ended; orphans fall to this process). Outside sandboxes
+the file "changes" of the folder says what the command changed in its process.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import gc
+import json
+import locale
+import os
+import signal
+import sys
+import tempfile
+import time
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from cosim.cli import main
+from cosim.engine import Kind, executor_kind, run_loop
+from cosim.process.sandbox import Settings, enter, interpreter_folders
+
+PRELOADED = (
+    "api",
+    "components.fmi",
+    "components.input_table",
+    "report.tables",
+    "report.figures",
+    "scenario.nested_systems",
+    "cli.commands.run",
+    "cli.commands.simulate",
+)
+PR_SET_CHILD_SUBREAPER = 36
+
+
+def serve() -> dict[str, Any] | None:
+    """Answer requests until the input ends; in a child that is to run a command, return the request."""
+    for line in sys.stdin:
+        request = json.loads(line)
+        began = time.monotonic()
+        child = os.fork()
+        if child == 0:
+            prepare(**request)
+            return dict(request)
+        code = outcome(child, began + request["limit"])
+        answer = {"code": code, "seconds": time.monotonic() - began, "processes": end_orphans()}
+        print(json.dumps(answer), flush=True)
+    return None
+
+
+def prepare(folder: str, stdin: str, executor: Kind, **_: Any) -> None:
+    os.setsid()
+    os.chdir(folder)
+    os.environ["TMPDIR"], tempfile.tempdir = str(Path(folder, "tmp")), None
+    run_loop.executor_kind = lambda kind: executor_kind(executor)
+    for number, name, flags in ((0, stdin, os.O_RDWR), (1, "stdout", os.O_WRONLY), (2, "stderr", os.O_WRONLY)):
+        file = os.open(name, flags | os.O_CREAT, 0o666)
+        os.dup2(file, number)
+        os.close(file)
+
+
+def outcome(child: int, limit: float) -> int:
+    """Exit code of the child, which is killed when it has not ended by the limit."""
+    while True:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
+            return os.waitstatus_to_exitcode(status)
+        if time.monotonic() > limit:
+            os.kill(child, signal.SIGKILL)
+        time.sleep(0.005)
+
+
+def children() -> list[int]:
+    return [int(word) for word in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()]
+
+
+def end_orphans(grace: float = 0.2) -> list[int]:
+    """Ids of processes that are still there `grace` s after the command; they are ended, generation after generation."""
+    left, latest = [], time.monotonic() + grace
+    while found := children():
+        for process in found:
+            if os.waitpid(process, os.WNOHANG) == (0, 0) and time.monotonic() > latest:
+                os.kill(process, signal.SIGKILL)
+                os.waitpid(process, 0)
+                left.append(process)
+        time.sleep(0.005)
+    return left
+
+
+def end(request: dict[str, Any]) -> None:
+    """Run the command and end like an interpreter, but for taking its modules apart, which takes longer than the command."""
+    code = 0
+    try:
+        confined(**request) if request["sandbox"] else observed(request["arguments"])
+    except SystemExit as ended:
+        code = ended.code if isinstance(ended.code, int) else 1
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
+def state() -> dict[str, Any]:
+    """What belongs to the whole process and no FMU may change."""
+    own = ctypes.CDLL(None)
+    own.getenv.restype = own.setlocale.restype = ctypes.c_char_p
+    mask = os.umask(0)
+    os.umask(mask)
+    return {
+        "folder": str(Path.cwd()),
+        "umask": mask,
+        "locale": str(own.setlocale(locale.LC_ALL, None)),
+        "environment": [str(own.getenv(name)) for name in (b"HOME", b"PATH")],
+        "signals": [str(signal.getsignal(number)) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGCHLD)],
+        "ignored": [line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("SigIgn")],
+        "rounding": [own.fegetround(), own.fegetexcept()],
+        "flush to zero": 1e-310 * float("0.5") == 0.0,
+        "descriptors": sorted(path.name for path in Path("/proc/self/fd").iterdir()),
+        "threads": len(list(Path("/proc/self/task").iterdir())),
+    }
+
+
+def confined(arguments: list[str], sandbox: dict[str, Any], **_: Any) -> None:
+    """The command in a process that reads what Python needs and the folder, and writes only to the listed folders."""
+    places = {"readable": (*interpreter_folders(), Path.cwd()), "writable": tuple(map(Path, sandbox.pop("writable")))}
+    enter(Settings(**places, **sandbox, confine="required"))
+    main(arguments)
+
+
+def observed(arguments: list[str]) -> None:
+    """The command as `python -m cosim` runs it, and a report of what it changed."""
+    before, report = state(), Path("changes").absolute()
+    try:
+        main(arguments)
+    finally:
+        after = state()
+        report.write_text("\n".join(f"{name}: {before[name]} -> {after[name]}" for name in before if before[name] != after[name]))
+
+
+if __name__ == "__main__":
+    ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    for module in PRELOADED:
+        import_module(f"cosim.{module}")
+    for module in ("fmpy.fmi2", "fmpy.fmi3", "rich.console", "rich.table", "email.parser"):
+        import_module(module)
+    gc.freeze()
+    request = serve()
+    if request:
+        end(request)

@@ -1,0 +1,223 @@
+"""FMUs in processes of their own: nothing that one of them does reaches the importer, which has no supervisor here."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from call_rules import calls, violations
+from fault_fmu import COUNT, FaultFmus, lag_output, scenario
+from fault_runs import Outcome, Runner
+from test_fault_crashes import ALL, CRASHES, DEADLINES, EXIT, FAILED, LATE, SIGNAL, SLACK, T5, Case, check, table
+
+from cosim.process.sandbox import available, landlock
+
+needs_landlock = pytest.mark.skipif(
+    available().landlock < landlock.NETWORK_VERSION, reason="this kernel cannot confine files and network (Linux 6.7)"
+)
+needs_bubblewrap = pytest.mark.skipif(not available().bubblewrap, reason="no bubblewrap that works")
+
+
+def run(runner: Runner, folder: Path, components: dict[str, Any], *words: str, **more: Any) -> Outcome:
+    """A run without supervisor whose components are in processes of their own."""
+    conditions = {name: more.pop(name) for name in ("limit", "stdin", "executor") if name in more}
+    apart = {name: {"fmu": str(fmu), "isolation": "fmu"} for name, fmu in components.items()}
+    file = scenario(folder, next(iter(components.values())), components=apart, **more)
+    words = ("run", str(file), "--output-dir", "out", "--no-report", "--isolation", "none", *words)
+    return runner.cosim(folder, *words, **conditions)
+
+
+@CRASHES
+def test_a_crash_is_named_and_the_importer_goes_on(fmus, runner, tmp_path, case, version):
+    check(run(runner, tmp_path, {"lag": fmus(version, case.order)}), case, version)
+
+
+@table(
+    Case("DoStep 6 loop", T5 + LATE),
+    Case("DoStep 6 sleep", T5 + LATE),
+    Case("EnterInitializationMode 1 loop", FAILED, rows=0),
+    Case("Instantiate 1 sleep", FAILED, rows=0),
+    Case("load 1 loop", LATE, rows=0),
+    Case("Terminate 1 loop", "{f}", code=0, rows=ALL),
+    Case("FreeInstance 1 loop", "{f}", code=0, rows=ALL),
+)
+def test_a_hang_ends_at_its_deadline(fmus, runner, tmp_path, case, version):
+    done = run(runner, tmp_path, {"lag": fmus(version, case.order)}, deadlines=DEADLINES, limit=20)
+    check(done, case, version)
+    assert done.seconds < 0.5 + 0.5 + SLACK
+
+
+@table(
+    Case("DoStep 6 change_folder", code=0, rows=ALL),
+    Case("DoStep 6 change_environment", code=0, rows=ALL),
+    Case("DoStep 6 ignore_interrupts", code=0, rows=ALL),
+    Case("DoStep 6 round_up", T5 + "changed the floating-point mode"),
+    Case("DoStep 6 flush_to_zero", T5 + "changed the floating-point mode"),
+    Case("DoStep 6 fp_traps", T5 + "changed the floating-point mode"),
+    Case("DoStep 6 thread", code=0, rows=ALL),
+    Case("DoStep 6 close_output", code=0, rows=ALL),
+    Case("DoStep 6 log_thread", code=0, rows=ALL),
+    Case("DoStep 6 flood_stdout", code=0, rows=ALL),
+    Case("DoStep 6 flood_stderr", code=0, rows=ALL),
+    Case("DoStep 6 read_stdin", code=0, rows=ALL),
+    Case("DoStep 6 fork", code=0, rows=ALL),
+    Case("DoStep 6 close_all", code=0, rows=ALL),
+)
+def test_what_an_fmu_does_to_its_process_stays_there(fmus, runner, tmp_path, case, version):
+    done = run(runner, tmp_path, {"lag": fmus(version, case.order)}, deadlines={"step": 3.0})
+    check(done, case, version)
+    assert len(done.err) < 100_000
+
+
+def test_memory_is_limited(fmus, runner, tmp_path, version):
+    """2 GiB; the order is to take as much as there is."""
+    done = run(runner, tmp_path, {"lag": fmus(version, "DoStep 6 memory")}, limit=30)
+    (line,) = fmus.lines("memory")
+    assert 1024 < int(line.split()[1]) <= 2048
+    assert len(done.rows) in (6, ALL)
+
+
+def test_open_files_are_limited(fmus, runner, tmp_path, version):
+    run(runner, tmp_path, {"lag": fmus(version, "DoStep 6 open_files")})
+    (line,) = fmus.lines("files")
+    assert 50 < int(line.split()[1]) < 256
+
+
+def test_a_daemon_ends_with_the_supervised_run(fmus, runner, tmp_path, version):
+    done = run(runner, tmp_path, {"lag": fmus(version, "DoStep 6 daemon")}, "--isolation", "fmu")
+    assert fmus.lines("child")
+    assert (done.processes, len(done.rows)) == ([], ALL)
+
+
+def test_the_others_end_in_order(fmus, runner, tmp_path, version):
+    """One of three instances crashes; the others are freed, and all rows before are those of a good run."""
+    components = dict.fromkeys(("first", "second", "third"), fmus(version))
+    done = run(runner, tmp_path, components, "--set", "second.fault=DoStep 6 segv")
+    assert done.code == 1
+    assert f"second: fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.err
+    assert [row["first.y"] for row in done.rows] == [lag_output(n) for n in range(6)]
+    assert {who for who, what in calls(fmus.lines()) if what == "FreeInstance"} == {"first", "third"}
+    assert (done.processes, done.changes, done.temporaries) == ([], [], [])
+
+
+@pytest.mark.parametrize("order", ["GetReal 9 discard", "DoStep 3 error", "DoStep 3 fatal", "EnterInitializationMode 1 fatal"])
+def test_nothing_forbidden_follows_a_bad_status(fmus, runner, tmp_path, version, order):
+    function, _, status = order.split()
+    names = {"GetReal": "GetFloat64"} if version == 3 else {}
+    done = run(runner, tmp_path, {"lag": fmus(version, order)})
+    assert done.code == 1
+    assert f"lag: fmi{version}{names.get(function, function)} failed at t = " in done.err
+    assert f"status {['warning', 'discard', 'error', 'fatal'].index(status) + 1} ({status})" in done.err
+    assert violations(fmus.lines()) == []
+
+
+def test_fatal_of_one_instance_is_the_end_of_all_instances(fmus, runner, tmp_path, version):
+    """So the standard wants it: those in other processes, too."""
+    components = dict.fromkeys(("lag", "twin"), fmus(version))
+    assert run(runner, tmp_path, components, "--set", "lag.fault=DoStep 3 fatal").code == 1
+    assert violations(fmus.lines()) == []
+
+
+def test_messages_are_cut_and_counted(fmus, runner, tmp_path, version):
+    done = run(runner, tmp_path, {"lag": fmus(version, "DoStep 1 log_20000")})
+    assert (done.code, len(done.rows)) == (0, ALL), done.err[-1000:]
+    assert 100 < done.err.count("again") < 10_000
+    assert "messages of components were not shown" in done.err
+
+
+@pytest.mark.parametrize(("what", "words"), [("exit_0", EXIT), ("error", "status 3"), ("negative", "status -1")])
+def test_the_other_executor_does_the_same(fmus, runner, tmp_path, version, what, words):
+    done = run(runner, tmp_path, {"lag": fmus(version, f"DoStep 6 {what}")}, executor="python")
+    assert f"lag: fmi{version}DoStep failed at t = 0.05 s: {words}" in done.err
+    assert (done.code, len(done.rows)) == (1, 6)
+
+
+def test_one_fmu_alone(fmus, runner, tmp_path, version):
+    done = runner.simulate(tmp_path, fmus(version, "DoStep 6 segv"), "--isolation", "fmu")
+    assert (done.code, len(done.rows)) == (1, 6), done.err
+    assert f"fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.err
+
+
+def may_leave_network() -> bool:
+    """Whether a process may have a network of its own."""
+    child = os.fork()
+    if child == 0:
+        os._exit(min(1, abs(ctypes.CDLL(None).unshare(0x50000000))))
+    return os.waitpid(child, 0)[1] == 0
+
+
+@dataclass(frozen=True)
+class Loud(FaultFmus):
+    """FMUs that record their calls where a sandbox lets them: on what they print."""
+
+    @property
+    def calls(self) -> Path:
+        return Path("/dev/stderr")
+
+
+@needs_landlock
+class TestSandbox:
+    @pytest.fixture
+    def confined(self, fmus, runner, tmp_path, version):
+        """Runs an FMU with an order, with or without sandbox."""
+        loud = Loud(fmus.libraries, fmus.folder)
+        return lambda order, *words: run(runner, tmp_path, {"lag": loud(version, order)}, *words)
+
+    def test_a_good_fmu_notices_nothing(self, confined):
+        done = confined("- 1 error", "--sandbox")
+        assert (done.code, len(done.rows)) == (0, COUNT + 1), done.err
+        assert [row["lag.y"] for row in done.rows] == [lag_output(n) for n in range(COUNT + 1)]
+
+    @pytest.mark.parametrize(("words", "written"), [((), True), (("--sandbox",), False)], ids=["free", "sandbox"])
+    def test_it_writes_to_no_folder_of_others(self, confined, tmp_path, words, written):
+        done = confined("DoStep 6 write_here", *words)
+        assert f"file fault_was_here {int(written)}" in done.err
+        assert (tmp_path / "fault_was_here").exists() is written
+        assert len(done.rows) == ALL
+
+    def test_it_writes_to_its_temporary_folder_which_goes_with_it(self, confined):
+        done = confined("DoStep 6 write_temporary", "--sandbox")
+        assert "fault_was_here 1" in done.err
+        assert (done.code, done.temporaries) == (0, [])
+
+    @pytest.mark.parametrize(("words", "answer"), [((), "Connection refused"), (("--sandbox",), "Permission denied")])
+    def test_it_opens_no_connection(self, confined, words, answer):
+        done = confined("DoStep 6 tcp", *words)
+        assert f"connect -1 {answer}" in done.err
+        assert done.code == 0
+
+    @needs_bubblewrap
+    @pytest.mark.parametrize(
+        ("order", "words"),
+        [
+            ("DoStep 6 write_here", "file fault_was_here 0"),
+            ("DoStep 6 write_temporary", "fault_was_here 1"),
+            ("DoStep 6 tcp", "connect -1 Permission denied"),
+            ("DoStep 6 udp", "connect -1 Network is unreachable"),
+            ("DoStep 6 daemon", "child "),
+            ("DoStep 6 processes", "process [1-9] child of [1-9]\n"),
+        ],
+    )
+    def test_strictly_it_has_neither_files_nor_network_nor_other_processes(self, confined, tmp_path, order, words):
+        done = confined(order, "--sandbox", "strict", "--isolation", "run")
+        assert re.search(words, done.err)
+        assert (done.code, len(done.rows), done.processes, done.temporaries) == (0, ALL, [], [])
+        assert not (tmp_path / "fault_was_here").exists()
+
+    @needs_bubblewrap
+    def test_strictly_a_crash_is_named_and_the_rows_are_kept(self, confined, version):
+        done = confined("DoStep 6 segv", "--sandbox", "strict", "--isolation", "run")
+        assert f"lag: fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.err
+        assert (done.code, len(done.rows), done.processes, done.temporaries) == (1, 6, [], [])
+
+    @pytest.mark.skipif(not may_leave_network(), reason="user namespaces are forbidden here")
+    @pytest.mark.parametrize(("words", "answer"), [((), "0 Success"), (("--sandbox",), "-1 Network is unreachable")])
+    def test_it_sends_nothing_by_udp(self, confined, words, answer):
+        done = confined("DoStep 6 udp", *words)
+        assert f"connect {answer}" in done.err
+        assert done.code == 0

@@ -1,0 +1,153 @@
+"""Layers: imports point down only, between folders and between files, and what may not be imported early."""
+
+import ast
+import subprocess
+import sys
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+#: folders and modules of `cosim` from the bottom to the top
+LAYERS = (
+    "core",
+    "process",
+    "results",
+    "kpis",
+    "components",
+    "engine",
+    "export",
+    "scenario",
+    "report",
+    "api",
+    "studies",
+    "cli",
+    "__main__",
+    "pytest_plugin",
+)
+
+#: folders and modules of `plant_src` from the bottom to the top
+PLANT_LAYERS = (
+    "json_reader",
+    "vehicles",
+    "placement",
+    "catalogue",
+    "physics",
+    "environment",
+    "world_settings",
+    "deck_frame",
+    "kpis",
+    "manoeuvres",
+    "scene",
+    "figures",
+    "sensors",
+    "world",
+    "world_fmu",
+    "replica",
+)
+
+
+def module_name(path):
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def sources(package):
+    """Python files and stubs of extensions, without those that are shipped as data."""
+    return sorted(
+        path for path in (ROOT / package).rglob("*.py*") if not {"_bundle", "templates", "__pycache__"} & set(path.parts)
+    )
+
+
+MODULES = {
+    module_name(path): path for package in ("cosim", "plant_src") for path in sources(package) if path.suffix in (".py", ".pyi")
+}
+
+
+def runtime_nodes(tree):
+    """Nodes of a module, functions included, without those for type checking only."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
+            continue
+        yield node
+        yield from runtime_nodes(node)
+
+
+def imported(name):
+    """Modules of this project that a module imports anywhere, or names in a string such as "cosim.engine.plan"."""
+    path = MODULES[name]
+    package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
+    for node in runtime_nodes(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            module = ".".join([*base, *(node.module or "").split(".")]).strip(".")
+            for alias in node.names:
+                yield f"{module}.{alias.name}" if f"{module}.{alias.name}" in MODULES else module
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.Constant) and node.value in MODULES and "." in str(node.value):
+            yield node.value
+
+
+GRAPH = {name: {other for other in imported(name) if other in MODULES} - {name} for name in MODULES}
+
+
+def layer(name):
+    return name.split(".")[1]
+
+
+@pytest.mark.parametrize(("package", "layers"), [("cosim", LAYERS), ("plant_src", PLANT_LAYERS)])
+def test_imports_between_folders_point_down(package, layers):
+    upward = [
+        f"{name} imports {other}"
+        for name, others in GRAPH.items()
+        for other in sorted(others)
+        if name.startswith(f"{package}.") and other.startswith(f"{package}.") and layer(name) != layer(other)
+        if layers.index(layer(name)) < layers.index(layer(other))
+    ]
+    assert upward == []
+
+
+def test_no_files_import_each_other_in_a_cycle():
+    graph = {name: others for name, others in GRAPH.items() if name != "cosim"}
+    try:
+        list(TopologicalSorter(graph).static_order())
+    except CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
+
+
+def test_cosim_knows_no_vehicle_and_no_bullet():
+    for path in sources("cosim"):
+        tree = ast.parse(path.read_text())
+        modules = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+        modules |= {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+        assert not {"pybullet", "plant_src"} & {module.split(".")[0] for module in modules}, path
+
+
+def test_only_fmi_components_and_export_use_fmpy():
+    users = {layer(module_name(path)) for path in sources("cosim") if "fmpy" in path.read_text() and imports(path, "fmpy")}
+    assert users <= {"components", "export"}
+
+
+def imports(path, package):
+    nodes = list(ast.walk(ast.parse(path.read_text())))
+    plain = any(a.name.split(".")[0] == package for n in nodes if isinstance(n, ast.Import) for a in n.names)
+    return plain or any((n.module or "").split(".")[0] == package for n in nodes if isinstance(n, ast.ImportFrom) and not n.level)
+
+
+def test_only_cli_and_report_print():
+    for path in sources("cosim"):
+        calls = [n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Call)]
+        if any(getattr(call.func, "id", "") == "print" for call in calls):
+            assert layer(module_name(path)) in ("cli", "report"), path
+
+
+HEAVY = ("numpy", "scipy", "matplotlib", "fmpy", "pybullet", "pydantic", "rich", "casadi", "rumoca", "jinja2")
+
+
+@pytest.mark.parametrize("statement", ["import cosim", "from cosim.cli import cli; cli(['--help'], standalone_mode=False)"])
+def test_importing_and_helping_load_nothing_heavy(statement):
+    code = f"import sys; {statement}; print(*(m for m in {HEAVY!r} if m in sys.modules), file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.split() == []
