@@ -14,7 +14,7 @@ from .compiler import compile_library
 from .interface import c_table, check_block
 from .model_description import build_description, model_description
 
-SHELL = Path(__file__).parent / "shell"
+SHELL = Path(__file__).parents[1] / "shell"
 _SHELL_FILES = {2: ("fmi2.c", "common.h", "export.h"), 3: ("fmi3.c", "common.h", "export.h")}
 _FMI_HEADERS = {
     2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
