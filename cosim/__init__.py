@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CheckError", "ComponentError", "CosimError", "InputError", "Result", "__version__", "load", "run"]
 
-_HOMES = {"load": "api", "run": "api", "Result": "results"} | {
+_PUBLIC_NAMES = {"load": "api", "run": "api", "Result": "results"} | {
     name: "core.errors" for name in ("CheckError", "ComponentError", "CosimError", "InputError")
 }
 
@@ -28,6 +28,6 @@ def __dir__() -> list[str]:
 
 def __getattr__(name: str) -> Any:
     """Import public names when they are first used, so that `import cosim` costs nothing."""
-    if name not in _HOMES:
+    if name not in _PUBLIC_NAMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    return getattr(import_module(f".{_PUBLIC_NAMES[name]}", __name__), name)

@@ -14,14 +14,14 @@ from typing import Any, Literal
 
 from .core.errors import ComponentError, CosimError, InputError, Problem
 from .core.version import __version__
-from .engine.pacer import Late
-from .engine.run_loop import Observer, Run, simulation
+from .engine.pacer import LatePolicy
+from .engine.run_loop import Observer, SimulationOutcome, simulating
 from .process.run_files.folder import write_metadata
 from .results import Kpis, Result
-from .results.checks import CheckOutcome, evaluate_checks, held_checks
+from .results.checks import CheckOutcome, evaluate_all_checks, evaluate_checks
 from .results.kpi import evaluate_kpis, kpi_senses, kpi_units
-from .scenario import Assembly, assemble
-from .scenario.overview import overview
+from .scenario import PreparedRun, prepare
+from .scenario.overview import describe_system
 
 #: packages whose versions can change a result
 _PACKAGES = ("numpy", "scipy", "fmpy", "pybullet", "pybullet-arm64", "pythonfmu")
@@ -34,10 +34,10 @@ def load(
     stop_time: float | str | None = None,
     step_size: float | str | None = None,
     real_time: float | None = None,
-    late: Late = "warn",
+    late: LatePolicy = "warn",
     isolation: Literal["fmu", "none"] = "none",
     sandbox: bool = False,
-) -> Assembly:
+) -> PreparedRun:
     """A scenario, read, wired and checked, ready to run once.
 
     `scenario` is a path, or the name of a shipped scenario. `parameters` sets variables ("uav.vtol.landing_time") or, by
@@ -48,7 +48,7 @@ def load(
     """
     times = {"/stop_time": stop_time, "/step_size": step_size}
     settings = {**{key: value for key, value in times.items() if value is not None}, **(parameters or {})}
-    assembly = assemble(scenario, settings, apart=isolation == "fmu", sandbox=sandbox)
+    assembly = prepare(scenario, settings, isolate_fmus=isolation == "fmu", sandbox=sandbox)
     return replace(assembly, settings=replace(assembly.settings, real_time=real_time, late=late))
 
 
@@ -59,7 +59,7 @@ def run(
     stop_time: float | str | None = None,
     step_size: float | str | None = None,
     real_time: float | None = None,
-    late: Late = "warn",
+    late: LatePolicy = "warn",
     isolation: Literal["fmu", "none"] = "none",
     sandbox: bool = False,
     observers: Sequence[Observer] = (),
@@ -91,25 +91,25 @@ class Execution:
 
 
 @contextmanager
-def executed(assembly: Assembly, observers: Sequence[Observer] = ()) -> Iterator[Execution]:
+def executing(assembly: PreparedRun, observers: Sequence[Observer] = ()) -> Iterator[Execution]:
     """Simulate an assembled scenario and evaluate its KPIs; when the block is left, the components are terminated and freed.
 
     Raises ComponentError at the end when a component fails to terminate.
     """
     began = time.perf_counter()
-    metadata = _metadata(assembly)
+    metadata = _run_metadata(assembly)
     write_metadata(metadata)
-    with simulation(assembly.system, assembly.settings, observers) as outcome:
-        timing = {**_added(assembly.timing, outcome.timing), "simulate_seconds": time.perf_counter() - began}
-        result = Result(outcome.recording, timing=timing, metadata={**metadata, **_ending(outcome)})
-        yield Execution(result, outcome.failure) if outcome.failure else _with_kpis(result, assembly)
+    with simulating(assembly.system, assembly.settings, observers) as outcome:
+        timing = {**_add_timings(assembly.timing, outcome.timing), "simulate_seconds": time.perf_counter() - began}
+        result = Result(outcome.recording, timing=timing, metadata={**metadata, **_outcome_metadata(outcome)})
+        yield Execution(result, outcome.failure) if outcome.failure else _evaluate_run(result, assembly)
 
 
-def execute(assembly: Assembly, observers: Sequence[Observer] = ()) -> Result:
+def execute(assembly: PreparedRun, observers: Sequence[Observer] = ()) -> Result:
     """Simulate an assembled scenario and evaluate its KPIs; see `run`."""
     execution = None
     try:
-        with executed(assembly, observers) as execution:
+        with executing(assembly, observers) as execution:
             pass
     except ComponentError as error:  # while terminating
         if execution:
@@ -121,38 +121,38 @@ def execute(assembly: Assembly, observers: Sequence[Observer] = ()) -> Result:
     return execution.result
 
 
-def _added(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, float]:
+def _add_timings(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, float]:
     return {part: first.get(part, 0.0) + second.get(part, 0.0) for part in {**first, **second}}
 
 
-def _with_kpis(result: Result, assembly: Assembly) -> Execution:
+def _evaluate_run(result: Result, assembly: PreparedRun) -> Execution:
     """The result with all KPIs; when some fail, the others are there all the same."""
     kpis = Kpis()
     failures: list[BaseException] = []
     functions = assembly.kpis()
     for i, kpi in enumerate(functions):
         try:
-            with _placed(assembly, "kpis", i):
+            with _adding_location(assembly, "kpis", i):
                 kpis.update(evaluate_kpis(result, [kpi]))
         except (CosimError, KeyboardInterrupt) as error:
             failures.append(error)
     about = {"kpi_units": kpi_units(functions, kpis, result.units), "kpi_senses": kpi_senses(functions, kpis)}
-    held = held_checks(kpis, assembly.checks)
+    held = evaluate_all_checks(kpis, assembly.checks)
     evaluated = replace(result, kpis=kpis, metadata={**result.metadata, **about}, checks=held)
     return Execution(evaluated, failures[0] if failures else None)
 
 
-def checks(assembly: Assembly, result: Result) -> list[CheckOutcome]:
+def evaluate_scenario_checks(assembly: PreparedRun, result: Result) -> list[CheckOutcome]:
     """The scenario's checks held against a result. Raises InputError for those of KPIs that it does not have."""
     outcomes = []
     for i, check in enumerate(assembly.checks):
-        with _placed(assembly, "checks", i):
+        with _adding_location(assembly, "checks", i):
             outcomes += evaluate_checks(result.kpis, [check])
     return outcomes
 
 
 @contextmanager
-def _placed(assembly: Assembly, *path: str | int) -> Iterator[None]:
+def _adding_location(assembly: PreparedRun, *path: str | int) -> Iterator[None]:
     """What is refused in this block gets its place in the scenario file."""
     try:
         yield
@@ -160,35 +160,35 @@ def _placed(assembly: Assembly, *path: str | int) -> Iterator[None]:
         raise InputError([Problem(str(problem), assembly.root.where(*path)) for problem in error.problems]) from error
 
 
-def _metadata(assembly: Assembly) -> dict[str, Any]:
+def _run_metadata(assembly: PreparedRun) -> dict[str, Any]:
     """What describes a run before it has begun."""
     return {
         "name": assembly.spec.name,
         "scenario": assembly.document.value,
         "scenario_file": str(assembly.document.file.resolve()),
-        "system": overview(assembly),
-        "versions": {"cosim": __version__, "python": platform.python_version(), **_versions()},
+        "system": describe_system(assembly),
+        "versions": {"cosim": __version__, "python": platform.python_version(), **_package_versions()},
         "machine": {"system": platform.system(), "machine": platform.machine()},
         "sha256": {name: sha256(file.read_bytes()).hexdigest() for name, file in assembly.files().items()},
     }
 
 
-def _ending(outcome: Run) -> dict[str, Any]:
+def _outcome_metadata(outcome: SimulationOutcome) -> dict[str, Any]:
     """How a run has ended."""
     termination = outcome.termination
     return {
         "macro_steps": outcome.macro_steps,
         "real_time": outcome.real_time,
         "terminated_by": {"component": termination.component, "time": termination.time} if termination else None,
-        "failure": "interrupted" if isinstance(outcome.failure, KeyboardInterrupt) else _text(outcome.failure),
+        "failure": "interrupted" if isinstance(outcome.failure, KeyboardInterrupt) else _failure_text(outcome.failure),
     }
 
 
-def _text(failure: BaseException | None) -> str | None:
+def _failure_text(failure: BaseException | None) -> str | None:
     return None if failure is None else str(failure) or type(failure).__name__
 
 
-def _versions() -> dict[str, str]:
+def _package_versions() -> dict[str, str]:
     found = {}
     for package in _PACKAGES:
         try:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .results import Result
-from .results.kpi import Signal, better, first_time, units
+from .results.kpi import Signal, better, first_crossing_time, units
 
 FOREVER = math.inf
 
@@ -26,8 +26,8 @@ def rms(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
     """Root of the mean squared error over time."""
-    time, error = _error(result, signal, target, start, stop)
-    return {"value": math.sqrt(_mean(time, error**2))}
+    time, error = _control_error(result, signal, target, start, stop)
+    return {"value": math.sqrt(_time_average(time, error**2))}
 
 
 @units(value="{signal}")
@@ -35,7 +35,7 @@ def mean(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
     """Mean error over time."""
-    return {"value": _mean(*_error(result, signal, target, start, stop))}
+    return {"value": _time_average(*_control_error(result, signal, target, start, stop))}
 
 
 @units(value="{signal}")
@@ -43,7 +43,7 @@ def maximum(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
     """Largest error, with its sign: the largest value of the signal where there is no target."""
-    _, error = _error(result, signal, target, start, stop)
+    _, error = _control_error(result, signal, target, start, stop)
     return {"value": float(error.max()) if error.size else math.nan}
 
 
@@ -52,7 +52,7 @@ def minimum(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
     """Smallest error, with its sign."""
-    _, error = _error(result, signal, target, start, stop)
+    _, error = _control_error(result, signal, target, start, stop)
     return {"value": float(error.min()) if error.size else math.nan}
 
 
@@ -62,14 +62,14 @@ def peak(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
     """Largest error without its sign."""
-    _, error = _error(result, signal, target, start, stop)
+    _, error = _control_error(result, signal, target, start, stop)
     return {"value": float(np.abs(error).max()) if error.size else math.nan}
 
 
 @units(value="{signal}")
 def final(result: Result, signal: Signal, target: Signal | float = 0.0, stop: float = FOREVER) -> dict[str, float]:
     """Error in the last row."""
-    _, error = _error(result, signal, target, -FOREVER, stop)
+    _, error = _control_error(result, signal, target, -FOREVER, stop)
     return {"value": float(error[-1]) if error.size else math.nan}
 
 
@@ -79,8 +79,8 @@ def iae(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
     """Integral of the absolute error, in the signal's unit times s."""
-    time, error = _error(result, signal, target, start, stop)
-    return {"value": _integral(time, np.abs(error))}
+    time, error = _control_error(result, signal, target, start, stop)
+    return {"value": _integrate(time, np.abs(error))}
 
 
 @better(value="lower")
@@ -89,8 +89,8 @@ def ise(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
     """Integral of the squared error, in the signal's unit squared times s."""
-    time, error = _error(result, signal, target, start, stop)
-    return {"value": _integral(time, error**2)}
+    time, error = _control_error(result, signal, target, start, stop)
+    return {"value": _integrate(time, error**2)}
 
 
 @better(value="lower")
@@ -99,8 +99,8 @@ def itae(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
     """Integral of the absolute error times the time since the first row, in the signal's unit times s2."""
-    time, error = _error(result, signal, target, start, stop)
-    return {"value": _integral(time, (time - time[:1]) * np.abs(error))}
+    time, error = _control_error(result, signal, target, start, stop)
+    return {"value": _integrate(time, (time - time[:1]) * np.abs(error))}
 
 
 @better(value="lower")
@@ -109,9 +109,9 @@ def energy(
     result: Result, effort: Signal, flow: Signal | float = 1.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
     """Integral of effort times flow (J): of force (N) and speed (m/s), torque (N.m) and rate (rad/s), or of a power (W) alone."""
-    rows = _rows(result, start, stop)
+    rows = _row_slice(result, start, stop)
     power = result[effort].astype(np.float64) * (result[flow] if isinstance(flow, str) else flow)
-    return {"value": _integral(result.time[rows], power[rows])}
+    return {"value": _integrate(result.time[rows], power[rows])}
 
 
 @better(value="lower")
@@ -124,7 +124,7 @@ def saturation_share(
     stop: float = FOREVER,
 ) -> dict[str, float]:
     """Share of the time (1) with the signal at `lower` or below or at `upper` or above; each row's value holds until the next."""
-    rows = _rows(result, start, stop)
+    rows = _row_slice(result, start, stop)
     time, values = result.time[rows], result[signal][rows]
     if len(time) < 2 or time[-1] == time[0]:
         return {"value": math.nan}
@@ -140,10 +140,10 @@ def time_to_reach(
     result: Result, signal: Signal, level: float, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
     """Time (s) from the first row until the signal first is at `level` or has crossed it, whichever side it came from."""
-    rows = _rows(result, start, stop)
+    rows = _row_slice(result, start, stop)
     time, values = result.time[rows], result[signal][rows].astype(np.float64)
     side = -1.0 if values.size and values[0] > level else 1.0
-    return {"value": first_time(time, side * values, side * level) - (time[0] if time.size else 0.0)}
+    return {"value": first_crossing_time(time, side * values, side * level) - (time[0] if time.size else 0.0)}
 
 
 @better(value="lower")
@@ -162,8 +162,8 @@ def rise_time(
 
     The way goes from `initial`, without one the value of the first row, to `target`, without one the value of the last row.
     """
-    step = _step(result, signal, start, stop, initial, target)
-    return {"value": first_time(step.time, step.share, high) - first_time(step.time, step.share, low)}
+    step = _step_response(result, signal, start, stop, initial, target)
+    return {"value": first_crossing_time(step.time, step.fraction, high) - first_crossing_time(step.time, step.fraction, low)}
 
 
 @better(value="lower")
@@ -176,7 +176,7 @@ def overshoot(
     target: float | None = None,
 ) -> dict[str, float]:
     """How far a step response goes beyond its target at most, as a share of its way (1; see `rise_time`); 0 when it does not."""
-    share = _step(result, signal, start, stop, initial, target).share
+    share = _step_response(result, signal, start, stop, initial, target).fraction
     return {"value": max(float(share.max()) - 1, 0.0) if share.size else math.nan}
 
 
@@ -195,7 +195,7 @@ def settling_time(
 
     NaN when the last row is outside, or when a row is not a number.
     """
-    time, share = _step(result, signal, start, stop, initial, target)
+    time, share = _step_response(result, signal, start, stop, initial, target)
     away = np.abs(share - 1)
     outside = np.flatnonzero(~(away <= band))
     if not share.size or np.isnan(away).any() or away[-1] > band:
@@ -203,42 +203,46 @@ def settling_time(
     if not outside.size:
         return {"value": 0.0}
     last = outside[-1]
-    return {"value": first_time(time[last:], -away[last:], -band) - float(time[0])}
+    return {"value": first_crossing_time(time[last:], -away[last:], -band) - float(time[0])}
 
 
-class _Step(NamedTuple):
+class _StepResponse(NamedTuple):
     """A response as the share of its way from initial value (0) to target (1)."""
 
     time: np.ndarray
-    share: np.ndarray
+    fraction: np.ndarray
 
 
-def _step(result: Result, signal: str, start: float, stop: float, initial: float | None, target: float | None) -> _Step:
+def _step_response(
+    result: Result, signal: str, start: float, stop: float, initial: float | None, target: float | None
+) -> _StepResponse:
     """Without any rows when there are none or no way to go."""
-    rows = _rows(result, start, stop)
+    rows = _row_slice(result, start, stop)
     time, values = result.time[rows], result[signal][rows].astype(np.float64)
     if not values.size:
-        return _Step(time, values)
+        return _StepResponse(time, values)
     begin = float(values[0]) if initial is None else initial
     end = float(values[-1]) if target is None else target
-    return _Step(time, (values - begin) / (end - begin)) if end != begin else _Step(time[:0], values[:0])
+    return _StepResponse(time, (values - begin) / (end - begin)) if end != begin else _StepResponse(time[:0], values[:0])
 
 
-def _rows(result: Result, start: float, stop: float) -> slice:
+def _row_slice(result: Result, start: float, stop: float) -> slice:
     return slice(int(np.searchsorted(result.time, start, "left")), int(np.searchsorted(result.time, stop, "right")))
 
 
-def _error(result: Result, signal: str, target: Signal | float, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
-    rows = _rows(result, start, stop)
+def _control_error(
+    result: Result, signal: str, target: Signal | float, start: float, stop: float
+) -> tuple[np.ndarray, np.ndarray]:
+    rows = _row_slice(result, start, stop)
     wanted = result[target] if isinstance(target, str) else target
     return result.time[rows], (result[signal].astype(np.float64) - wanted)[rows]
 
 
-def _integral(time: np.ndarray, values: np.ndarray) -> float:
+def _integrate(time: np.ndarray, values: np.ndarray) -> float:
     return float(np.trapezoid(values, time)) if time.size else math.nan
 
 
-def _mean(time: np.ndarray, values: np.ndarray) -> float:
+def _time_average(time: np.ndarray, values: np.ndarray) -> float:
     if not time.size:
         return math.nan
-    return _integral(time, values) / float(time[-1] - time[0]) if time[-1] > time[0] else float(values.mean())
+    return _integrate(time, values) / float(time[-1] - time[0]) if time[-1] > time[0] else float(values.mean())

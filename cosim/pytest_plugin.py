@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 
-from .studies.regression import EXPECTATIONS, Regression, holds
+from .studies.regression import EXPECTATION_KEYS, Regression, has_keys
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """pytest's hook: asked for each file."""
-    if file_path.suffix == ".json" and _may_be_scenario(file_path) and holds(file_path, ("components",), EXPECTATIONS):
+    if file_path.suffix == ".json" and _may_be_scenario(file_path) and has_keys(file_path, ("components",), EXPECTATION_KEYS):
         return ScenarioFile.from_parent(parent, path=file_path)
     return None
 
@@ -33,20 +33,20 @@ def _may_be_scenario(file: Path) -> bool:
 class ScenarioFile(pytest.File):
     """A scenario's file: one test."""
 
-    def collect(self) -> Iterator[Scenario]:
-        yield Scenario.from_parent(self, name=self.path.stem)
+    def collect(self) -> Iterator[ScenarioItem]:
+        yield ScenarioItem.from_parent(self, name=self.path.stem)
 
 
-class Scenario(pytest.Item):
+class ScenarioItem(pytest.Item):
     """A scenario, held against its checks and its reference."""
 
     def runtest(self) -> None:
-        outcome = Regression(self.path, self._directory, update=False).outcome()
+        outcome = Regression(self.path, self._output_directory, update=False).run()
         if outcome.code:
-            raise Unmet("\n".join([outcome.summary, *outcome.details]))
+            raise ScenarioFailed("\n".join([outcome.summary, *outcome.details]))
 
     @property
-    def _directory(self) -> Path:
+    def _output_directory(self) -> Path:
         """Of its own for each scenario: those of several folders may have the same name, and run at the same time."""
         root = self.config.rootpath
         inside = self.path.relative_to(root if self.path.is_relative_to(root) else self.path.anchor)
@@ -54,11 +54,13 @@ class Scenario(pytest.Item):
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *more: Any, **options: Any) -> Any:
         """What the scenario did not meet, without a traceback."""
-        return str(excinfo.value) if isinstance(excinfo.value, Unmet) else super().repr_failure(excinfo, *more, **options)
+        return (
+            str(excinfo.value) if isinstance(excinfo.value, ScenarioFailed) else super().repr_failure(excinfo, *more, **options)
+        )
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
         return self.path, None, self.name
 
 
-class Unmet(Exception):
+class ScenarioFailed(Exception):
     """A scenario did not do what it was expected to do."""

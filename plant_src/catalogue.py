@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .vehicles.ar_drone import geometry as ar_drone
 from .vehicles.ar_drone.parameters import AIRFRAME as AR_DRONE
-from .vehicles.common.interface import AFLOAT_STATES
+from .vehicles.common.interface import VESSEL_STATES
 from .vehicles.crazyflie import geometry as crazyflie
 from .vehicles.crazyflie.parameters import AIRFRAME as CRAZYFLIE
 from .vehicles.model import Boxes, Model
@@ -22,8 +22,8 @@ from .vehicles.survey_hexacopter.parameters import AIRFRAME as SURVEY_HEXACOPTER
 
 def _multirotor(airframe: Airframe, boxes: Boxes) -> Model:
     variables, states = multirotor_interface.variables(airframe), multirotor_interface.states(airframe)
-    constants = multirotor_interface.constants(airframe)
-    return Model(airframe.name, variables, states, airframe.body(boxes), constants=constants, airframe=airframe, boxes=boxes)
+    constants = multirotor_interface.constant_count(airframe)
+    return Model(airframe.name, variables, states, airframe.body(boxes), constant_count=constants, airframe=airframe, boxes=boxes)
 
 
 _STRIDER = Model("strider", strider_interface.VARIABLES, strider_interface.STATES, strider.BODY, is_vessel=True, motion="planar")
@@ -38,24 +38,24 @@ MODELS = {
         Model(
             "strider_6dof",
             strider_6dof_interface.VARIABLES,
-            AFLOAT_STATES,
+            VESSEL_STATES,
             strider_6dof.BODY,
             is_vessel=True,
             vehicle="strider",
-            constants=strider_6dof_interface.CONSTANTS,
+            constant_count=strider_6dof_interface.CONSTANT_COUNT,
         ),
         Model(
             "otter",
             otter_interface.VARIABLES,
-            (*AFLOAT_STATES, *otter_interface.SHAFTS),
+            (*VESSEL_STATES, *otter_interface.PROPELLER_STATES),
             otter.BODY,
             is_vessel=True,
-            constants=otter_interface.CONSTANTS,
+            constant_count=otter_interface.CONSTANT_COUNT,
         ),
     )
 }
 
 #: vehicle -> motion -> its model; the first motion is the usual one
-VEHICLES: dict[str, dict[str, Model]] = {}
+VEHICLE_MODELS: dict[str, dict[str, Model]] = {}
 for _model in MODELS.values():
-    VEHICLES.setdefault(_model.vehicle or _model.name, {})[_model.motion] = _model
+    VEHICLE_MODELS.setdefault(_model.vehicle or _model.name, {})[_model.motion] = _model

@@ -11,7 +11,7 @@ import numpy as np
 from cosim.results import Result
 
 
-def axes(result: Result, vehicle: str) -> np.ndarray:
+def rotation_matrix(result: Result, vehicle: str) -> np.ndarray:
     """The forward, left and up axis of a vehicle in the world's axes, as columns: Rz(yaw) Ry(pitch) Rx(roll); (rows, 3, 3)."""
     roll, pitch, yaw = (result[f"{vehicle}.attitude.{angle}"] for angle in ("roll", "pitch", "yaw"))
     (cr, sr), (cp, sp), (cy, sy) = ((np.cos(angle), np.sin(angle)) for angle in (roll, pitch, yaw))
@@ -23,33 +23,33 @@ def axes(result: Result, vehicle: str) -> np.ndarray:
     return np.moveaxis(np.array(matrix, dtype=np.float64), 2, 0)
 
 
-def place(result: Result, vehicle: str, deck: str) -> np.ndarray:
+def relative_position(result: Result, vehicle: str, deck: str) -> np.ndarray:
     """The vehicle's centre of mass from the deck centre, in the deck's axes (m)."""
-    return _in_deck(result, deck, _offset(result, vehicle, deck))
+    return _to_deck_axes(result, deck, _world_offset(result, vehicle, deck))
 
 
-def velocity(result: Result, vehicle: str, deck: str) -> np.ndarray:
+def relative_velocity(result: Result, vehicle: str, deck: str) -> np.ndarray:
     """Velocity of the vehicle relative to the point of the deck where it is, in the deck's axes (m/s)."""
     vessel = deck.removesuffix(".deck")
     rates_body = np.stack([result[f"{vessel}.rates.{axis}"] for axis in "pqr"], axis=1)
-    rates = np.einsum("nij,nj->ni", axes(result, vessel), rates_body)
-    point = _vectors(result, f"{deck}.velocity") + np.cross(rates, _offset(result, vehicle, deck))
-    return _in_deck(result, deck, _vectors(result, f"{vehicle}.velocity") - point)
+    rates = np.einsum("nij,nj->ni", rotation_matrix(result, vessel), rates_body)
+    point = _vector_signal(result, f"{deck}.velocity") + np.cross(rates, _world_offset(result, vehicle, deck))
+    return _to_deck_axes(result, deck, _vector_signal(result, f"{vehicle}.velocity") - point)
 
 
-def tilt(result: Result, vehicle: str, deck: str) -> np.ndarray:
+def relative_tilt(result: Result, vehicle: str, deck: str) -> np.ndarray:
     """Angle between the up axes of vehicle and deck (rad), shape (rows,)."""
-    up, normal = (axes(result, name)[:, :, 2] for name in (vehicle, deck.removesuffix(".deck")))
+    up, normal = (rotation_matrix(result, name)[:, :, 2] for name in (vehicle, deck.removesuffix(".deck")))
     return np.arctan2(np.linalg.norm(np.cross(up, normal), axis=1), np.sum(up * normal, axis=1))
 
 
-def _in_deck(result: Result, deck: str, vectors: np.ndarray) -> np.ndarray:
-    return np.einsum("nji,nj->ni", axes(result, deck.removesuffix(".deck")), vectors)
+def _to_deck_axes(result: Result, deck: str, vectors: np.ndarray) -> np.ndarray:
+    return np.einsum("nji,nj->ni", rotation_matrix(result, deck.removesuffix(".deck")), vectors)
 
 
-def _offset(result: Result, vehicle: str, deck: str) -> np.ndarray:
-    return _vectors(result, f"{vehicle}.position") - _vectors(result, f"{deck}.position")
+def _world_offset(result: Result, vehicle: str, deck: str) -> np.ndarray:
+    return _vector_signal(result, f"{vehicle}.position") - _vector_signal(result, f"{deck}.position")
 
 
-def _vectors(result: Result, name: str) -> np.ndarray:
+def _vector_signal(result: Result, name: str) -> np.ndarray:
     return np.stack([result[f"{name}.{axis}"] for axis in "xyz"], axis=1)

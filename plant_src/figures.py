@@ -21,13 +21,25 @@ from cosim.results.kpi import Prefix, Signal
 
 from .kpis import horizontal_distance, touchdown_row, waypoints
 
-FLYING, SAILING, REFERENCE, TOUCHDOWN = "#0072B2", "#D55E00", "#444444", "#111111"
-TINTS = ("#F4F4F4", "#FFF8E1", "#EAF2FA", "#EDF6E8", "#FDEFE7", "#F2EDF8")
-STAR: Mapping[str, Any] = {"color": TOUCHDOWN, "linestyle": "", "marker": "*", "markersize": 9, "markeredgecolor": "white"}
-LEGEND: Mapping[str, Any] = {"ncols": 4, "columnspacing": 0.7, "handlelength": 1.4, "handletextpad": 0.4, "borderaxespad": 0.2}
-AFTER_TOUCHDOWN = 4.0  # s shown of the time after it
-SMALLEST_ERROR = 1e-3  # m; the axis is logarithmic
-COLUMN = 3.5  # in, width of a column in a two-column paper
+MULTIROTOR_COLOUR, VESSEL_COLOUR, REFERENCE_COLOUR, TOUCHDOWN_COLOUR = "#0072B2", "#D55E00", "#444444", "#111111"
+PHASE_COLOURS = ("#F4F4F4", "#FFF8E1", "#EAF2FA", "#EDF6E8", "#FDEFE7", "#F2EDF8")
+TOUCHDOWN_MARKER: Mapping[str, Any] = {
+    "color": TOUCHDOWN_COLOUR,
+    "linestyle": "",
+    "marker": "*",
+    "markersize": 9,
+    "markeredgecolor": "white",
+}
+LEGEND_STYLE: Mapping[str, Any] = {
+    "ncols": 4,
+    "columnspacing": 0.7,
+    "handlelength": 1.4,
+    "handletextpad": 0.4,
+    "borderaxespad": 0.2,
+}
+TIME_AFTER_TOUCHDOWN = 4.0  # s shown of the time after it
+MIN_PLOTTED_ERROR = 1e-3  # m; the axis is logarithmic
+COLUMN_WIDTH = 3.5  # in, width of a column in a two-column paper
 
 
 def paths(
@@ -49,12 +61,12 @@ def paths(
     for name, platform in (platforms or {}).items():
         _draw_platform(axes, name, platform)
     _draw_waypoints(axes, x, y, radius)
-    _draw_path(axes, result, deck.removesuffix(".deck"), color=SAILING, label="vessel")
-    _draw_path(axes, result, vehicle, color=FLYING, label="quadcopter", linestyle=(0, (1.2, 1.0)))
+    _draw_path(axes, result, deck.removesuffix(".deck"), color=VESSEL_COLOUR, label="vessel")
+    _draw_path(axes, result, vehicle, color=MULTIROTOR_COLOUR, label="quadcopter", linestyle=(0, (1.2, 1.0)))
     row = touchdown_row(result, vehicle)
     if row is not None:
-        axes.plot(*(result[f"{vehicle}.position.{axis}"][row] for axis in "xy"), **STAR, label="touchdown", zorder=6)
-    figure.legend(loc="upper center", **LEGEND)
+        axes.plot(*(result[f"{vehicle}.position.{axis}"][row] for axis in "xy"), **TOUCHDOWN_MARKER, label="touchdown", zorder=6)
+    figure.legend(loc="upper center", **LEGEND_STYLE)
     _fit_height(figure, axes)
     return figure
 
@@ -63,7 +75,7 @@ def _draw_platform(axes: Axes, name: str, platform: Mapping[str, Sequence[float]
     (width, height), (x, y) = platform["size"][:2], platform["position"][:2]
     corner = (x - width / 2, y - height / 2)
     axes.add_patch(Rectangle(corner, width, height, facecolor="#F0EAE0", edgecolor="#C8B89A", linewidth=0.6, zorder=1))
-    _write(axes, name, corner, offset=(3, 3), color="#8A7650")
+    _annotate(axes, name, corner, offset=(3, 3), color="#8A7650")
 
 
 def _draw_waypoints(axes: Axes, x: Sequence[float], y: Sequence[float], radius: float) -> None:
@@ -71,7 +83,7 @@ def _draw_waypoints(axes: Axes, x: Sequence[float], y: Sequence[float], radius: 
         axes.plot(x, y, "+", color="#555555", markersize=5, label="waypoints", zorder=2)
     for number, (east, north) in enumerate(zip(x, y, strict=True), start=1):
         axes.add_patch(Circle((east, north), radius, fill=False, color="#888888", linestyle="--", linewidth=0.7, zorder=2))
-        _write(axes, str(number), (east + 0.7 * radius, north + 0.7 * radius), offset=(1, 1), color="#333333")
+        _annotate(axes, str(number), (east + 0.7 * radius, north + 0.7 * radius), offset=(1, 1), color="#333333")
 
 
 def _draw_path(axes: Axes, result: Result, vehicle: str, **line: Any) -> None:
@@ -85,11 +97,11 @@ def _fit_height(figure: Figure, axes: Axes) -> None:
     left, right, below, above, most = 0.45, 0.08, 0.4, 0.27, 6.0  # in
     axes.margins(0.05)
     (x_first, x_last), (y_first, y_last) = axes.get_xlim(), axes.get_ylim()
-    width = COLUMN - left - right
+    width = COLUMN_WIDTH - left - right
     height = min(most, max(1.0, width * (y_last - y_first) / (x_last - x_first)))
     total = below + height + above
-    figure.set_size_inches(COLUMN, total)
-    axes.set_position((left / COLUMN, below / total, width / COLUMN, height / total))
+    figure.set_size_inches(COLUMN_WIDTH, total)
+    axes.set_position((left / COLUMN_WIDTH, below / total, width / COLUMN_WIDTH, height / total))
 
 
 def landing(
@@ -110,9 +122,9 @@ def landing(
     """
     row = touchdown_row(result, vehicle)
     if stop is None:
-        stop = result.time[-1] if row is None else min(result.time[-1], result.time[row] + AFTER_TOUCHDOWN)
+        stop = result.time[-1] if row is None else min(result.time[-1], result.time[row] + TIME_AFTER_TOUCHDOWN)
     shown = slice(*np.searchsorted(result.time, (start, stop + 1e-9)))
-    figure = Figure(figsize=(COLUMN, 3.4))
+    figure = Figure(figsize=(COLUMN_WIDTH, 3.4))
     figure.subplots_adjust(left=0.185, right=0.965, bottom=0.11, top=0.88, hspace=0.1)
     above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
     for name, line in _altitudes(vehicle, deck, altitude_reference):
@@ -126,24 +138,24 @@ def landing(
         _mark_touchdown(figure, result.time[row], result[f"{vehicle}.position.z"][row])
     lowest, highest = above.get_ylim()
     above.set_ylim(lowest, highest + 0.12 * (highest - lowest))  # room for the legend
-    above.legend(loc="upper right", **LEGEND)
+    above.legend(loc="upper right", **LEGEND_STYLE)
     figure.align_ylabels()
     return figure
 
 
 def _altitudes(vehicle: str, deck: str, reference: str | None) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    yield f"{deck}.position.z", {"color": SAILING, "label": "deck"}
-    yield f"{vehicle}.position.z", {"color": FLYING, "label": "quadcopter"}
+    yield f"{deck}.position.z", {"color": VESSEL_COLOUR, "label": "deck"}
+    yield f"{vehicle}.position.z", {"color": MULTIROTOR_COLOUR, "label": "quadcopter"}
     if reference is not None:
-        yield reference, {"color": REFERENCE, "label": "reference", "linestyle": "--", "linewidth": 0.9}
+        yield reference, {"color": REFERENCE_COLOUR, "label": "reference", "linestyle": "--", "linewidth": 0.9}
 
 
 def _draw_error(axes: Axes, time: np.ndarray, error: np.ndarray, limit: float | None) -> None:
-    axes.plot(time, np.maximum(error, SMALLEST_ERROR), color=FLYING)
+    axes.plot(time, np.maximum(error, MIN_PLOTTED_ERROR), color=MULTIROTOR_COLOUR)
     axes.set(yscale="log", ylabel="horizontal\nerror / m")
     axes.yaxis.set_major_formatter("{x:g}")
     if limit is not None:
-        axes.axhline(limit, color=REFERENCE, linestyle="--", linewidth=0.9, label=f"limit {limit:g} m")
+        axes.axhline(limit, color=REFERENCE_COLOUR, linestyle="--", linewidth=0.9, label=f"limit {limit:g} m")
         axes.legend(loc="upper right")
 
 
@@ -153,15 +165,15 @@ def _shade_phases(figure: Figure, time: np.ndarray, mode: np.ndarray, phases: Se
     for first, last in pairwise(changes):
         value = int(mode[first])
         for axes in figure.axes:
-            axes.axvspan(time[first], time[last], color=TINTS[value % len(TINTS)], linewidth=0, zorder=0)
+            axes.axvspan(time[first], time[last], color=PHASE_COLOURS[value % len(PHASE_COLOURS)], linewidth=0, zorder=0)
         name = phases[value - 1] if 0 < value <= len(phases) else str(value)
-        _name_span(figure.axes[0], time[first], time[last], name)
+        _label_span(figure.axes[0], time[first], time[last], name)
 
 
-def _name_span(axes: Axes, first: float, last: float, name: str) -> None:
+def _label_span(axes: Axes, first: float, last: float, name: str) -> None:
     """Write `name` above a span of time: upright where it would not fit, not at all where not even that would."""
     left, right = axes.get_xlim()
-    room = (last - first) / (right - left) * 0.78 * COLUMN * 72  # pt
+    room = (last - first) / (right - left) * 0.78 * COLUMN_WIDTH * 72  # pt
     if room < 6:
         return
     text = axes.text((first + last) / 2, 1.02, name, transform=axes.get_xaxis_transform(), fontsize=6.5, color="#444444")
@@ -170,8 +182,8 @@ def _name_span(axes: Axes, first: float, last: float, name: str) -> None:
 
 def _mark_touchdown(figure: Figure, time: float, altitude: float) -> None:
     for axes, top in zip(figure.axes, (0.88, 1.0), strict=True):
-        axes.axvline(time, ymax=top, color=TOUCHDOWN, linewidth=0.8, linestyle=":")
-    figure.axes[0].plot(time, altitude, **STAR, label="touchdown", zorder=5)
+        axes.axvline(time, ymax=top, color=TOUCHDOWN_COLOUR, linewidth=0.8, linestyle=":")
+    figure.axes[0].plot(time, altitude, **TOUCHDOWN_MARKER, label="touchdown", zorder=5)
 
 
 def tracking_error(
@@ -189,7 +201,7 @@ def tracking_error(
     Numbered lines mark the turns of the target's vessel: when it comes within `radius` (m) of its waypoints `x`, `y` (m, world).
     `limit` (m) marks a distance.
     """
-    figure = Figure(figsize=(COLUMN, 2.2), layout="constrained")
+    figure = Figure(figsize=(COLUMN_WIDTH, 2.2), layout="constrained")
     axes = figure.add_subplot()
     shown = slice(int(np.searchsorted(result.time, start)), None)
     _draw_error(axes, result.time[shown], horizontal_distance(result, vehicle, target)[shown], limit)
@@ -205,13 +217,13 @@ def _mark_turns(axes: Axes, reached: Mapping[str, Any], count: int) -> None:
     for number in range(1, count):
         time = reached[f"time[{number}]"]
         if first <= time <= last:
-            axes.axvline(time, color=SAILING, linewidth=0.8, linestyle=":", zorder=1)
+            axes.axvline(time, color=VESSEL_COLOUR, linewidth=0.8, linestyle=":", zorder=1)
             axes.text(
-                time, 1.02, f"turn {number}", transform=axes.get_xaxis_transform(), ha="center", fontsize=6.5, color=SAILING
+                time, 1.02, f"turn {number}", transform=axes.get_xaxis_transform(), ha="center", fontsize=6.5, color=VESSEL_COLOUR
             )
 
 
-def _write(axes: Axes, text: str, place: tuple[float, float], offset: tuple[float, float], color: str) -> Text:
+def _annotate(axes: Axes, text: str, place: tuple[float, float], offset: tuple[float, float], color: str) -> Text:
     """A small text beside a place (m), `offset` in pt, readable on top of lines."""
     halo = withStroke(linewidth=2, foreground="white")
     return axes.annotate(

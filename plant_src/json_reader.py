@@ -9,84 +9,84 @@ from typing import Any
 
 from cosim.core.errors import Problem, did_you_mean
 
-Keys = tuple[str, ...]
+JsonPath = tuple[str, ...]
 Numbers = tuple[float, ...]
 
 
-class Reader:
+class JsonReader:
     """Reads values and collects `problems`; their subject is the path of the setting in a component."""
 
     def __init__(self) -> None:
         self.problems: list[Problem] = []
 
-    def complain(self, path: Keys, text: str) -> None:
+    def add_problem(self, path: JsonPath, text: str) -> None:
         self.problems.append(Problem(text, ".".join(path), ("arguments", *path)))
 
-    def named(self, value: Any, path: Keys) -> Mapping[str, Any]:
+    def read_named_objects(self, value: Any, path: JsonPath) -> Mapping[str, Any]:
         """An object whose keys name things that variables are named after."""
         for name in (found := self.mapping(value, path)):
             if not re.fullmatch(r"[A-Za-z_]\w*", name):
-                self.complain((*path, name), f'found the name "{name}", expected letters, digits and underscores')
+                self.add_problem((*path, name), f'found the name "{name}", expected letters, digits and underscores')
         return found
 
-    def keys(self, value: Any, path: Keys, required: Sequence[str], optional: Sequence[str]) -> Mapping[str, Any]:
+    def read_object(self, value: Any, path: JsonPath, required: Sequence[str], optional: Sequence[str]) -> Mapping[str, Any]:
         """An object with these keys and no others."""
         found = self.mapping(value, path)
         for key in found:
             if key not in (*required, *optional):
-                self.complain((*path, key), f'unknown key "{key}"{did_you_mean(key, (*required, *optional))}')
+                self.add_problem((*path, key), f'unknown key "{key}"{did_you_mean(key, (*required, *optional))}')
         if isinstance(value, Mapping):
             for key in required:
                 if key not in found:
-                    self.complain(path, f'"{key}" is missing')
+                    self.add_problem(path, f'"{key}" is missing')
         return found
 
-    def mapping(self, value: Any, path: Keys) -> Mapping[str, Any]:
+    def mapping(self, value: Any, path: JsonPath) -> Mapping[str, Any]:
         if isinstance(value, Mapping):
             return value
-        self.complain(path, f"found {value!r}, expected an object {{...}}")
+        self.add_problem(path, f"found {value!r}, expected an object {{...}}")
         return {}
 
-    def vector(self, value: Any, path: Keys, axes: Sequence[str]) -> Numbers:
+    def vector(self, value: Any, path: JsonPath, axes: Sequence[str]) -> Numbers:
         if not isinstance(value, list | tuple) or len(value) != len(axes):
-            self.complain(path, f"found {value!r}, expected a list of {len(axes)} numbers [{', '.join(axes)}]")
+            self.add_problem(path, f"found {value!r}, expected a list of {len(axes)} numbers [{', '.join(axes)}]")
             return (1.0,) * len(axes)
         return tuple(self.number(number, path) for number in value)
 
-    def number(self, value: Any, path: Keys, low: float = -math.inf, high: float = math.inf) -> float:
+    def number(self, value: Any, path: JsonPath, low: float = -math.inf, high: float = math.inf) -> float:
         """A finite number from `low` to `high`."""
         if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
-            self.complain(path, f"found {value!r}, expected a finite number")
+            self.add_problem(path, f"found {value!r}, expected a finite number")
         elif not low <= value <= high:
-            self.complain(path, f"found {value!r}, expected {_range(low, high)}")
+            self.add_problem(path, f"found {value!r}, expected {_range_text(low, high)}")
         else:
             return float(value)
         return min(max(1.0, low), high)
 
-    def positive(self, value: Any, path: Keys) -> float:
+    def positive(self, value: Any, path: JsonPath) -> float:
         number = self.number(value, path)
         if number <= 0:
-            self.complain(path, f"found {value!r}, expected a number greater than 0")
+            self.add_problem(path, f"found {value!r}, expected a number greater than 0")
         return number if number > 0 else 1.0
 
-    def integer(self, value: Any, path: Keys, low: int, high: int | None = None) -> int:
+    def integer(self, value: Any, path: JsonPath, low: int, high: int | None = None) -> int:
         """An integer from `low` to `high`."""
         if isinstance(value, int) and not isinstance(value, bool) and value >= low and (high is None or value <= high):
             return value
         expected = f"of at least {low}" if high is None else f"from {low} to {high}"
-        self.complain(path, f"found {value!r}, expected an integer {expected}")
+        self.add_problem(path, f"found {value!r}, expected an integer {expected}")
         return low
 
-    def choice(self, value: Any, path: Keys, valid: Sequence[str]) -> str:
+    def choice(self, value: Any, path: JsonPath, valid: Sequence[str]) -> str:
         """One of these words."""
         if isinstance(value, str) and value in valid:
             return value
         hint = did_you_mean(value, valid) if isinstance(value, str) else f", expected one of: {', '.join(valid)}"
-        self.complain(path, f"found {value!r}{hint}")
+        self.add_problem(path, f"found {value!r}{hint}")
         return valid[0]
 
 
-def _range(low: float, high: float) -> str:
+def _range_text(low: float, high: float) -> str:
     if high == math.inf:
         return f"at least {low:g}"
     return f"at most {high:g}" if low == -math.inf else f"a number from {low:g} to {high:g}"

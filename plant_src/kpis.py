@@ -19,7 +19,7 @@ from cosim.results.kpi import Prefix, Signal, better, units
 from . import deck_frame
 
 #: A vehicle without any contact for this long (s) flies; a start some millimetres above its support or a bounce does not.
-FLIGHT_TIME = 0.1
+MIN_FLIGHT_TIME = 0.1
 
 
 @better(
@@ -49,7 +49,7 @@ def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, Number]:
     contact = result[f"{vehicle}.contact.vessel"].astype(bool)
     row = touchdown_row(result, vehicle)
     if row is None:
-        return _not_landed()
+        return _values_without_landing()
     distance = horizontal_distance(result, vehicle, deck)
     u, v, w = (result[f"{vehicle}.velocity.{axis}"] - result[f"{deck}.velocity.{axis}"] for axis in "xyz")
     landed = bool(contact[-1])
@@ -65,7 +65,7 @@ def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, Number]:
     }
 
 
-def _not_landed() -> dict[str, Number]:
+def _values_without_landing() -> dict[str, Number]:
     unknown = ("time", "lateral_error", "touchdown_speed", "tangential_speed", "slide")
     return {**dict.fromkeys(unknown, math.nan), "bounces": 0, "landed_at_end": False, "final_lateral_error": math.nan}
 
@@ -74,7 +74,7 @@ def touchdown_row(result: Result, vehicle: str) -> int | None:
     """Row of the first contact of `vehicle` with a vessel after it flew (see FLIGHT_TIME), None when there is none."""
     time, touching = result.time, result[f"{vehicle}.contact.touching"].astype(bool)
     last_contact = np.maximum.accumulate(np.where(touching, time, time[:1]))
-    has_flown = np.logical_or.accumulate(time - last_contact >= FLIGHT_TIME - 1e-9)
+    has_flown = np.logical_or.accumulate(time - last_contact >= MIN_FLIGHT_TIME - 1e-9)
     rows = np.flatnonzero(has_flown & result[f"{vehicle}.contact.vessel"].astype(bool))
     return int(rows[0]) if rows.size else None
 
@@ -87,7 +87,7 @@ def horizontal_distance(result: Result, first: str, second: str) -> np.ndarray:
 
 def _slide(result: Result, vehicle: str, deck: str, row: int) -> float:
     """Largest distance from the place of row `row` in the plane of the deck, over rows in contact."""
-    place = deck_frame.place(result, vehicle, deck)[row:, :2]
+    place = deck_frame.relative_position(result, vehicle, deck)[row:, :2]
     contact = result[f"{vehicle}.contact.vessel"].astype(bool)[row:]
     return float(np.linalg.norm(place - place[0], axis=1)[contact].max())
 
@@ -132,8 +132,8 @@ def touchdown(result: Result, vehicle: Prefix, deck: Prefix, mass: float) -> dic
     if row is None:
         return dict.fromkeys(touchdown.units, math.nan)  # type: ignore[attr-defined]
     vessel = deck.removesuffix(".deck")
-    forward, left, _ = deck_frame.place(result, vehicle, deck)[row].tolist()
-    u, v, w = deck_frame.velocity(result, vehicle, deck)[row - 1].tolist()
+    forward, left, _ = deck_frame.relative_position(result, vehicle, deck)[row].tolist()
+    u, v, w = deck_frame.relative_velocity(result, vehicle, deck)[row - 1].tolist()
     height = result[f"{deck}.position.z"]
     return {
         "forward_error": forward,
@@ -142,7 +142,7 @@ def touchdown(result: Result, vehicle: Prefix, deck: Prefix, mass: float) -> dic
         "normal_speed": -w,
         "tangential_speed": math.hypot(u, v),
         "kinetic_energy": mass / 2 * (u**2 + v**2 + w**2),
-        "tilt": float(deck_frame.tilt(result, vehicle, deck)[row]),
+        "tilt": float(deck_frame.relative_tilt(result, vehicle, deck)[row]),
         "deck_roll": float(result[f"{vessel}.attitude.roll"][row]),
         "deck_pitch": float(result[f"{vessel}.attitude.pitch"][row]),
         "deck_heave": float((height[row] - height).mean()),

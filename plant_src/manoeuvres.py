@@ -20,7 +20,7 @@ import numpy as np
 from cosim.core.errors import InputError
 from cosim.results import Result
 from cosim.results.checks import Number
-from cosim.results.kpi import Prefix, better, first_time, units
+from cosim.results.kpi import Prefix, better, first_crossing_time, units
 
 DEGREE = math.pi / 180
 
@@ -35,22 +35,22 @@ class Track:
     #: s, of the result
     time: np.ndarray
     #: m, ahead + i * left, from the place of the order along the original course
-    place: np.ndarray
+    position: np.ndarray
     #: rad from the original course, counter-clockwise, beyond a full turn too
-    turned: np.ndarray
+    heading_change: np.ndarray
     #: m, along the track
-    travelled: np.ndarray
+    distance: np.ndarray
 
-    def at(self, values: np.ndarray, time: float) -> complex:
+    def interpolate(self, values: np.ndarray, time: float) -> complex:
         return complex(np.interp(time, self.time, values)) if math.isfinite(time) else complex(math.nan, math.nan)
 
-    def time_of_turn(self, angle: float) -> float:
+    def time_of_heading_change(self, angle: float) -> float:
         """When the heading is first off the original course by `angle` (rad), to whichever side it turns."""
-        return first_time(self.time, self.side(angle) * self.turned, angle)
+        return first_crossing_time(self.time, self.turn_direction(angle) * self.heading_change, angle)
 
-    def side(self, angle: float) -> int:
+    def turn_direction(self, angle: float) -> int:
         """1 when the heading is off by `angle` (rad) to the left first, -1 to the right."""
-        beyond = self.turned[np.abs(self.turned) >= angle]
+        beyond = self.heading_change[np.abs(self.heading_change) >= angle]
         return -1 if beyond.size and beyond[0] < 0 else 1
 
 
@@ -65,7 +65,7 @@ def track(result: Result, vehicle: str, start: float, midships: Point = CENTRE_O
     if start > time[-1]:
         return Track(*(np.full(1, math.nan, dtype) for dtype in (float, complex, float, float)))
     later = time > start
-    place = result[f"{vehicle}.position.x"] + 1j * result[f"{vehicle}.position.y"] + _offset(result, vehicle, midships)
+    place = result[f"{vehicle}.position.x"] + 1j * result[f"{vehicle}.position.y"] + _point_offset(result, vehicle, midships)
     place, heading = (
         np.concatenate([[np.interp(start, time, values)], values[later]])
         for values in (place, np.unwrap(result[f"{vehicle}.attitude.yaw"]))
@@ -75,7 +75,7 @@ def track(result: Result, vehicle: str, start: float, midships: Point = CENTRE_O
     return Track(np.concatenate([[start], time[later]]), ahead_and_left, heading - heading[0], travelled)
 
 
-def _offset(result: Result, vehicle: str, point: Point) -> np.ndarray:
+def _point_offset(result: Result, vehicle: str, point: Point) -> np.ndarray:
     """Where a point of the vehicle (body frame) is from its centre of mass, x + i * y in the world."""
     if not any(point):
         return np.zeros(len(result.time), complex)
@@ -114,10 +114,10 @@ def turning_circle(
     speed_loss                  1    share of the speed at the order that is lost by then
     """
     own = track(result, vehicle, start, midships)
-    quarter, half = own.time_of_turn(math.pi / 2), own.time_of_turn(math.pi)
-    advance, transfer = own.at(own.place, quarter).real, own.at(own.place, quarter).imag
-    tactical = own.at(own.place, half).imag
-    period, way = _last_turn(own)
+    quarter, half = own.time_of_heading_change(math.pi / 2), own.time_of_heading_change(math.pi)
+    advance, transfer = own.interpolate(own.position, quarter).real, own.interpolate(own.position, quarter).imag
+    tactical = own.interpolate(own.position, half).imag
+    period, way = _last_full_turn(own)
     speed = way / period
     return {
         "advance": advance,
@@ -130,20 +130,20 @@ def turning_circle(
         "time_to_180": half - start,
         "period": period,
         "steady_speed": speed,
-        "speed_loss": 1 - speed / _speed(result, vehicle, start),
+        "speed_loss": 1 - speed / _speed_over_ground(result, vehicle, start),
     }
 
 
-def _last_turn(own: Track) -> tuple[float, float]:
+def _last_full_turn(own: Track) -> tuple[float, float]:
     """Time (s) and length of track (m) of the last full turn, NaN when there is none."""
-    turned = own.turned * math.copysign(1, own.turned[-1])
+    turned = own.heading_change * math.copysign(1, own.heading_change[-1])
     if not turned[-1] >= 2 * math.pi:
         return math.nan, math.nan
-    begin = first_time(own.time, turned, turned[-1] - 2 * math.pi)
-    return float(own.time[-1]) - begin, float(own.travelled[-1]) - own.at(own.travelled, begin).real
+    begin = first_crossing_time(own.time, turned, turned[-1] - 2 * math.pi)
+    return float(own.time[-1]) - begin, float(own.distance[-1]) - own.interpolate(own.distance, begin).real
 
 
-def _speed(result: Result, vehicle: str, time: float) -> float:
+def _speed_over_ground(result: Result, vehicle: str, time: float) -> float:
     """Speed over ground (m/s)."""
     u, v = (np.interp(time, result.time, result[f"{vehicle}.velocity.{axis}"]) for axis in "xy")
     return math.hypot(u, v)
@@ -168,7 +168,7 @@ def zigzag(result: Result, vehicle: Prefix, start: float, angle: float = 10 * DE
         **{f"overshoot[{i}]": excess for i, excess in enumerate(excesses[:overshoots], 1)},
         **{f"execute[{i}]": time for i, time in enumerate(executes[:overshoots], 1)},
         "initial_turning_time": executes[0],
-        "reach": _back_on_course(own, times[0]) - start,
+        "reach": _time_back_on_course(own, times[0]) - start,
         "period": executes[2] - executes[0],
     }
 
@@ -179,12 +179,12 @@ def _reversals(own: Track, angle: float, count: int) -> tuple[list[float], list[
     The excess is NaN where the heading had not begun to come back by the end.
     """
     times, excesses, rows = [], [], slice(0, None)
-    side = own.side(angle)
+    side = own.turn_direction(angle)
     for _ in range(count):
-        when = first_time(own.time[rows], side * own.turned[rows], angle)
+        when = first_crossing_time(own.time[rows], side * own.heading_change[rows], angle)
         rows = slice(int(np.searchsorted(own.time, when)), None)
-        back = first_time(own.time[rows], -side * own.turned[rows], angle)
-        swing = side * own.turned[rows][own.time[rows] <= (back if math.isfinite(back) else math.inf)]
+        back = first_crossing_time(own.time[rows], -side * own.heading_change[rows], angle)
+        swing = side * own.heading_change[rows][own.time[rows] <= (back if math.isfinite(back) else math.inf)]
         turned_back = swing.size > 0 and swing[-1] < swing.max()
         times.append(when)
         excesses.append(float(swing.max()) - angle if turned_back else math.nan)
@@ -192,12 +192,12 @@ def _reversals(own: Track, angle: float, count: int) -> tuple[list[float], list[
     return times, excesses
 
 
-def _back_on_course(own: Track, reversal: float) -> float:
+def _time_back_on_course(own: Track, reversal: float) -> float:
     rows = own.time > reversal
     if not rows.any():
         return math.nan
-    side = math.copysign(1, own.turned[rows][0])
-    return first_time(own.time[rows], -side * own.turned[rows], 0.0)
+    side = math.copysign(1, own.heading_change[rows][0])
+    return first_crossing_time(own.time[rows], -side * own.heading_change[rows], 0.0)
 
 
 @better(distance="lower", distance_lengths="lower", time="lower")
@@ -212,8 +212,8 @@ def initial_turning(
     time              s  from the order until then
     """
     own = track(result, vehicle, start, midships)
-    when = own.time_of_turn(angle)
-    distance = own.at(own.travelled, when).real
+    when = own.time_of_heading_change(angle)
+    distance = own.interpolate(own.distance, when).real
     return {"distance": distance, "distance_lengths": distance / length, "time": when - start}
 
 
@@ -235,8 +235,8 @@ def stopping(
     """
     own = track(result, vehicle, start, midships)
     forward = np.interp(own.time, result.time, result[f"{vehicle}.velocity_body.u"])
-    when = first_time(own.time, -forward, -speed)
-    place, reach = own.at(own.place, when), own.at(own.travelled, when).real
+    when = first_crossing_time(own.time, -forward, -speed)
+    place, reach = own.interpolate(own.position, when), own.interpolate(own.distance, when).real
     return {
         "track_reach": reach,
         "track_reach_lengths": reach / length,

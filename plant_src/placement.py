@@ -10,7 +10,7 @@ from .vehicles.model import Model
 
 
 @dataclass(frozen=True)
-class Spawn:
+class VehiclePlacement:
     """A vehicle to place: `parameters` holds the values of its model's parameters, in order; `body` is its body in Bullet."""
 
     name: str

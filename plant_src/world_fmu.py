@@ -19,12 +19,12 @@ from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
 from cosim.core.component import Ports, Variable
 
-from .world import State, World
+from .world import World, WorldState
 
-ARGUMENTS = "world_fmu.json"
+ARGUMENTS_FILE = "world_fmu.json"
 
 
-class Quantity(Real):
+class RealWithUnit(Real):
     """A Real variable with a unit."""
 
     def __init__(self, name: str, unit: str, **attributes: Any):
@@ -38,11 +38,11 @@ class Quantity(Real):
         return element
 
 
-class Saved:
+class SavedState:
     """A state of the world with the bound values; Bullet forgets it together with this object."""
 
     def __init__(self, world: World, ports: list[np.ndarray]):
-        self.state: State = world.get_state()
+        self.state: WorldState = world.get_state()
         self.values = [array.copy() for array in ports]
         weakref.finalize(self, world.free_state, self.state)
 
@@ -56,7 +56,7 @@ class WorldFmu(Fmi2Slave):
         super().__init__(**arguments)
         # every instance has resources of its own; the module may have been loaded from some that are gone by now
         folder = Path(self.resources or Path(__file__).parent)
-        self._world = World(self.instance_name, **json.loads((folder / ARGUMENTS).read_text()))
+        self._world = World(self.instance_name, **json.loads((folder / ARGUMENTS_FILE).read_text()))
         weakref.finalize(self, self._world.free)
         inputs, outputs = (self._ports(causality) for causality in ("input", "output"))
         for variable in inputs.variables:
@@ -73,29 +73,29 @@ class WorldFmu(Fmi2Slave):
         variables = [variable for variable in self._world.variables if variable.causality == causality]
         counts: dict[np.dtype[Any], int] = {}
         for variable in variables:
-            counts[variable.dtype] = counts.get(variable.dtype, 0) + len(variable.slots)
+            counts[variable.dtype] = counts.get(variable.dtype, 0) + len(variable.scalar_names)
         return Ports(variables, {dtype: np.zeros(count, dtype) for dtype, count in counts.items()})
 
     @staticmethod
     def _view(ports: Ports, variable: Variable) -> np.ndarray:
         """The part of the ports where a variable lies."""
         before = ports.variables[: ports.variables.index(variable)]
-        first = sum(len(other.slots) for other in before if other.dtype == variable.dtype)
-        return ports.arrays[variable.dtype][first : first + len(variable.slots)]
+        first = sum(len(other.scalar_names) for other in before if other.dtype == variable.dtype)
+        return ports.arrays[variable.dtype][first : first + len(variable.scalar_names)]
 
     def _register(self, variable: Variable, values: np.ndarray) -> None:
         data: Any = values.data
-        for index, slot in enumerate(variable.slots):
+        for index, slot in enumerate(variable.scalar_names):
             attributes: dict[str, Any] = {
                 "causality": Fmi2Causality[variable.causality],
                 "description": variable.description,
-                "getter": _getter(data, index),
-                "setter": _setter(data, index),
+                "getter": _create_getter(data, index),
+                "setter": _create_setter(data, index),
             }
             if variable.type == "Boolean":
                 made = Boolean(slot, variability=Fmi2Variability.discrete, **attributes)
             else:
-                made = Quantity(slot, variable.unit.name if variable.unit else "", **attributes)
+                made = RealWithUnit(slot, variable.unit.name if variable.unit else "", **attributes)
             self.register_variable(made, nested=False)
 
     def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
@@ -116,7 +116,7 @@ class WorldFmu(Fmi2Slave):
         return True
 
     def _get_fmu_state(self) -> Any:
-        return Saved(self._world, self._arrays)
+        return SavedState(self._world, self._arrays)
 
     def _set_fmu_state(self, state: Any) -> None:
         self._world.set_state(state.state)
@@ -124,11 +124,11 @@ class WorldFmu(Fmi2Slave):
             array[:] = values
 
 
-def _getter(data: Any, index: int) -> Callable[[], Any]:
+def _create_getter(data: Any, index: int) -> Callable[[], Any]:
     return lambda: data[index]
 
 
-def _setter(data: Any, index: int) -> Callable[[Any], None]:
+def _create_setter(data: Any, index: int) -> Callable[[Any], None]:
     def set_value(value: Any) -> None:
         data[index] = value
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 from foreign import probe, probes
-from validation import Measured, Writer
+from validation import MeasurementCheck, ValidationReport
 
 from cosim.engine import EXECUTORS
-from cosim.engine import available as native_available
+from cosim.engine import native_available as native_available
 
 __all__ = ["executor", "probe", "probes"]
 
@@ -19,7 +19,7 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     target = config.getoption("--validation")
     if target and not hasattr(config, "workerinput"):
-        config.pluginmanager.register(Writer(Path(target)))
+        config.pluginmanager.register(ValidationReport(Path(target)))
 
 
 def pytest_collection_modifyitems(config, items):
@@ -30,7 +30,7 @@ def pytest_collection_modifyitems(config, items):
 @pytest.fixture
 def measured(request):
     """States a quantity of the plant beside its reference (tests/support/validation.py)."""
-    return Measured(request.node)
+    return MeasurementCheck(request.node)
 
 
 @pytest.fixture(params=sorted(EXECUTORS))

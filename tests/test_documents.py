@@ -54,7 +54,7 @@ def schema(example):
     from cosim.studies import schema as sweeps
 
     if "factors" in example or "minimize" in example:
-        return sweeps.json_schema(sweeps.SweepSpec if "factors" in example else sweeps.TuneSpec)
+        return sweeps.study_json_schema(sweeps.SweepSpec if "factors" in example else sweeps.TuneSpec)
     return json_schema(nested="ports" in example)
 
 

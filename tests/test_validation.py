@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from validation import DOCUMENT, TESTS, Measured, Statement, Writer, document, statement
+from validation import DOCUMENT, TESTS, MeasurementCheck, Statement, ValidationReport, render_document, statement
 
 FILE = "plant_src/sensors/test_air_and_field.py"
 
@@ -78,9 +78,9 @@ def records() -> list[tuple[str, dict[str, object]]]:
 
 
 @pytest.fixture
-def stating(records: list[tuple[str, dict[str, object]]]) -> Measured:
+def stating(records: list[tuple[str, dict[str, object]]]) -> MeasurementCheck:
     """The fixture `measured` of a test that is made up."""
-    return Measured(SimpleNamespace(path=TESTS / FILE, originalname="test_it", user_properties=records))
+    return MeasurementCheck(SimpleNamespace(path=TESTS / FILE, originalname="test_it", user_properties=records))
 
 
 @pytest.mark.parametrize(
@@ -93,26 +93,26 @@ def stating(records: list[tuple[str, dict[str, object]]]) -> Measured:
         (float("nan"), 1.0, {"within": 1e9}),
     ],
 )
-def test_what_does_not_agree_fails(stating: Measured, found: object, expected: object, limit: dict[str, float]) -> None:
+def test_what_does_not_agree_fails(stating: MeasurementCheck, found: object, expected: object, limit: dict[str, float]) -> None:
     with pytest.raises(AssertionError, match="Otter: speed"):
         stating("Otter", "speed", found, expected, "m/s", "theory", **limit)
 
 
-def test_a_model_without_a_section_is_refused(stating: Measured) -> None:
+def test_a_model_without_a_section_is_refused(stating: MeasurementCheck) -> None:
     with pytest.raises(AssertionError, match="Ottter is none of"):
         stating("Ottter", "speed", 1.0, 1.0, "m/s", "theory")
 
 
-def test_of_several_values_the_worst_is_listed(stating: Measured, records: list[tuple[str, dict[str, object]]]) -> None:
+def test_of_several_values_the_worst_is_listed(stating: MeasurementCheck, records: list[tuple[str, dict[str, object]]]) -> None:
     for found in (1.001, [1.0, 0.996], 1.002):
         for case in ("10 s", "2 s"):
             stating("Otter", "speed", found, 1.0, "m/s", "theory", within=0.01, case=case)
-    rows = list(listed(document([record for _, record in records])))
+    rows = list(listed(render_document([record for _, record in records])))
     assert [row[1:] for row in rows] == [("2 s", [1.0, 0.996, 0.004]), ("10 s", [1.0, 0.996, 0.004])]
 
 
 @pytest.mark.parametrize("exitstatus", [0, 1])
 def test_the_page_is_left_alone_when_tests_fail(tmp_path: Path, exitstatus: int) -> None:
     (page := tmp_path / "page.md").write_text("before")
-    Writer(page).pytest_sessionfinish(exitstatus)
+    ValidationReport(page).pytest_sessionfinish(exitstatus)
     assert (page.read_text() == "before") == bool(exitstatus)

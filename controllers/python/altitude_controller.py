@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from .fleet import GRAVITY, ROTOR_SPEED_MAX
+from .fleet import GRAVITY, MAX_ROTOR_SPEED
 from .fleet.pid import Pid
-from .fleet.sampled import Sampled
+from .fleet.sampled import SampledController
 
 
-class AltitudeController(Sampled):
+class AltitudeController(SampledController):
     """PID from altitude error (m) to throttle (%); its integral starts at the throttle that carries the weight.
 
     Gains of the published simulator, the same in controllers/modelica/AltitudeController.mo.
@@ -29,13 +29,13 @@ class AltitudeController(Sampled):
         self.parameter("mass", 0.441, "kg", "Of the quadcopter, as the controller believes it")
         self.parameter("thrust_coefficient", 9.148e-6, "N.s2/rad2", "Thrust of a rotor over its squared speed")
         self.calculated_parameter(
-            "hover_throttle", self._hover, "%", "Throttle that carries the weight: the integral starts there"
+            "hover_throttle", self._hover_throttle, "%", "Throttle that carries the weight: the integral starts there"
         )
         self.input("vehicle.position.z", 0.0, "m", "Up")
         self.input("altitude_reference", 0.0, "m", "Of the centre of mass")
         self.input("reset", False, description="Holds the loop in its start state: hover throttle")
         self.output("throttle", 0.0, "%")
-        self.climb = self.block("climb", Pid())
+        self.climb = self.add_block("climb", Pid())
 
     def tick(self, time: float) -> None:
         self.throttle = self.climb(
@@ -46,8 +46,8 @@ class AltitudeController(Sampled):
             D=self.altitude_D,
             N=self.altitude_N,
             limits=(self.throttle_min, self.throttle_max),
-            start=self._hover(),
+            start=self._hover_throttle(),
         )
 
-    def _hover(self) -> float:
-        return 100 / ROTOR_SPEED_MAX * math.sqrt(self.mass * GRAVITY / (4 * self.thrust_coefficient))
+    def _hover_throttle(self) -> float:
+        return 100 / MAX_ROTOR_SPEED * math.sqrt(self.mass * GRAVITY / (4 * self.thrust_coefficient))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from .fleet import DEGREES, wrap_angle
+from .fleet import DEGREES_PER_RADIAN, wrap_angle
 from .fleet.pid import Pid
-from .fleet.sampled import Sampled
+from .fleet.sampled import SampledController
 
 
-class AttitudeController(Sampled):
+class AttitudeController(SampledController):
     """PIDs from angle errors in degrees (commands and measurements in rad) to throttle differences in %.
 
     Gains of the published simulator, the same in controllers/modelica/AttitudeController.mo.
@@ -30,7 +30,7 @@ class AttitudeController(Sampled):
         self.output("roll_difference", 0.0, "%", "Positive: raises the left side")
         self.output("pitch_difference", 0.0, "%", "Positive: lowers the nose")
         self.output("yaw_difference", 0.0, "%", "Positive: turns counter-clockwise")
-        self.roll, self.pitch, self.yaw = (self.block(axis, Pid()) for axis in ("roll", "pitch", "yaw"))
+        self.roll, self.pitch, self.yaw = (self.add_block(axis, Pid()) for axis in ("roll", "pitch", "yaw"))
 
     def _declare_parameters(self) -> None:
         self.parameter("roll_P", 0.3217, "%/deg")
@@ -49,9 +49,9 @@ class AttitudeController(Sampled):
 
     def tick(self, time: float) -> None:
         attitude, tilt, yaw = self.vehicle.attitude, (-self.tilt_limit, self.tilt_limit), (-self.yaw_limit, self.yaw_limit)
-        self.roll_difference = self._loop("roll", DEGREES * (self.roll_command - attitude.roll), self.tilt_N, tilt)
-        self.pitch_difference = self._loop("pitch", DEGREES * (self.pitch_command - attitude.pitch), self.tilt_N, tilt)
-        self.yaw_difference = self._loop("yaw", DEGREES * wrap_angle(self.yaw_command - attitude.yaw), self.yaw_N, yaw)
+        self.roll_difference = self._loop("roll", DEGREES_PER_RADIAN * (self.roll_command - attitude.roll), self.tilt_N, tilt)
+        self.pitch_difference = self._loop("pitch", DEGREES_PER_RADIAN * (self.pitch_command - attitude.pitch), self.tilt_N, tilt)
+        self.yaw_difference = self._loop("yaw", DEGREES_PER_RADIAN * wrap_angle(self.yaw_command - attitude.yaw), self.yaw_N, yaw)
 
     def _loop(self, axis: str, error: float, N: float, limits: tuple[float, float]) -> float:
         gains = {gain: getattr(self, f"{axis}_{gain}") for gain in "PID"}

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from .fleet import GRAVITY, ROTOR_SPEED_MAX, limit
+from .fleet import GRAVITY, MAX_ROTOR_SPEED, limit
 from .fleet.butterworth import Butterworth
 from .fleet.pid import Pid
-from .fleet.sampled import Sampled
+from .fleet.sampled import SampledController
 
 
-class InverseKinematics(Sampled):
+class InverseKinematics(SampledController):
     """Inverse kinematics of the thrust vector, equations 14 to 20 of the paper, in the world frame (east, north, up).
 
     The vertical force is that of an altitude PID behind a low-pass, as in the published simulator; both start at hover.
@@ -34,7 +34,7 @@ class InverseKinematics(Sampled):
         self.output("pitch_command", 0.0, "rad", "Positive: nose down, accelerates forward")
         self.output("throttle", 0.0, "%")
         self.output("thrust", 0.0, "N", "Wanted, of all rotors together")
-        self.climb, self.low_pass = self.block("climb", Pid()), self.block("low_pass", Butterworth())
+        self.climb, self.low_pass = self.add_block("climb", Pid()), self.add_block("low_pass", Butterworth())
 
     def _declare_parameters(self) -> None:
         self.parameter("altitude_P", 10.0, "N/m", "Vertical force per altitude error")
@@ -54,7 +54,7 @@ class InverseKinematics(Sampled):
         force_z = self._vertical_force()
         self.thrust = math.sqrt(force_x * force_x + force_y * force_y + force_z * force_z)
         self._tilt(force_x / self.thrust, force_y / self.thrust, force_z / self.thrust)
-        self.throttle = 100 / ROTOR_SPEED_MAX * math.sqrt(self.thrust / (4 * self.thrust_coefficient))
+        self.throttle = 100 / MAX_ROTOR_SPEED * math.sqrt(self.thrust / (4 * self.thrust_coefficient))
 
     def _vertical_force(self) -> float:
         weight = self.mass * GRAVITY

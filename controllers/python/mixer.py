@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from .fleet import ROTOR_SPEED_MAX, limit
-from .fleet.sampled import Sampled
+from .fleet import MAX_ROTOR_SPEED, limit
+from .fleet.sampled import SampledController
 
 
-class Mixer(Sampled):
+class Mixer(SampledController):
     """Rotors 1 front, 2 left, 3 rear, 4 right; front and rear turn the body counter-clockwise by reaction."""
 
     description = "Throttle and its differences to the rotor speeds of a '+' frame"
@@ -25,4 +25,4 @@ class Mixer(Sampled):
     def tick(self, time: float) -> None:
         throttle, roll, pitch, yaw = self.throttle, self.roll_difference, self.pitch_difference, self.yaw_difference
         rotors = (throttle - pitch + yaw, throttle + roll - yaw, throttle + pitch + yaw, throttle - roll - yaw)
-        self.rotor_speed[:] = [self.motor_share * ROTOR_SPEED_MAX / 100 * limit(rotor, 0, 100) for rotor in rotors]
+        self.rotor_speed[:] = [self.motor_share * MAX_ROTOR_SPEED / 100 * limit(rotor, 0, 100) for rotor in rotors]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from .fleet import DEGREES
+from .fleet import DEGREES_PER_RADIAN
 from .fleet.pid import Pid
-from .fleet.sampled import Sampled
+from .fleet.sampled import SampledController
 
 
-class PositionController(Sampled):
+class PositionController(SampledController):
     """Position PIDs give velocity commands, velocity PIDs give tilt commands (degrees inside, rad outside).
 
     World-frame errors are turned into the heading frame (forward, left). Gains of the published simulator, the same in
@@ -37,7 +37,7 @@ class PositionController(Sampled):
         self.output("roll_command", 0.0, "rad", "Positive: left side up, accelerates to the right")
         self.output("pitch_command", 0.0, "rad", "Positive: nose down, accelerates forward")
         for loop in ("position_forward", "position_left", "velocity_forward", "velocity_left"):
-            self.block(loop, Pid())
+            self.add_block(loop, Pid())
 
     def tick(self, time: float) -> None:
         c, s = math.cos(self.vehicle.attitude.yaw), math.sin(self.vehicle.attitude.yaw)
@@ -46,8 +46,8 @@ class PositionController(Sampled):
         feed, velocity = self.velocity_reference, self.vehicle.velocity
         forward = self._speed("forward", c * x + s * y, c * feed.x + s * feed.y)
         left = self._speed("left", c * y - s * x, c * feed.y - s * feed.x)
-        self.pitch_command = self._tilt("forward", forward - (c * velocity.x + s * velocity.y)) / DEGREES
-        self.roll_command = -self._tilt("left", left - (c * velocity.y - s * velocity.x)) / DEGREES
+        self.pitch_command = self._tilt("forward", forward - (c * velocity.x + s * velocity.y)) / DEGREES_PER_RADIAN
+        self.roll_command = -self._tilt("left", left - (c * velocity.y - s * velocity.x)) / DEGREES_PER_RADIAN
 
     def _speed(self, axis: str, error: float, feed_forward: float) -> float:
         pid, limits = getattr(self, f"position_{axis}"), (-self.speed_limit, self.speed_limit)

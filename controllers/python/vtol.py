@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from .fleet import SAMPLE_PERIOD, FlightMode, length, limit
-from .fleet.sampled import Sampled
+from .fleet import SAMPLE_PERIOD, FlightMode, horizontal_norm, limit
+from .fleet.sampled import SampledController
 
 
-class Vtol(Sampled):
+class Vtol(SampledController):
     """A machine of six flight modes; table of modes in controllers/modelica/README.md, the same machine in Vtol.mo there."""
 
     description = "Path command of the quadcopter: take-off, pursuit of a vessel and landing on its deck"
@@ -71,23 +71,23 @@ class Vtol(Sampled):
         self.output("aborts", 0, description="Aborted descents")
 
     def exit_initialization_mode(self) -> None:
-        self.horizontal_error = self._distance()
+        self.horizontal_error = self._horizontal_distance()
 
     def tick(self, time: float) -> None:
-        self.horizontal_error = self._distance()
+        self.horizontal_error = self._horizontal_distance()
         if self.mode == FlightMode.IDLE:
-            self._remember_home()
-        self._measure_times()
+            self._store_home_pose()
+        self._update_timers()
         self.mode = int(self._next_mode(time))
-        self._drive_motors()
+        self._update_motor_share()
         self._set_horizontal_references()
         self._set_altitude_reference()
 
-    def _distance(self) -> float:
+    def _horizontal_distance(self) -> float:
         target, vehicle = self.target.position, self.vehicle.position
-        return length(target.x - vehicle.x, target.y - vehicle.y)
+        return horizontal_norm(target.x - vehicle.x, target.y - vehicle.y)
 
-    def _remember_home(self) -> None:
+    def _store_home_pose(self) -> None:
         position = self.vehicle.position
         self.home_x, self.home_y, self.home_z = position.x, position.y, position.z
         self.home_yaw = self.vehicle.attitude.yaw
@@ -99,12 +99,12 @@ class Vtol(Sampled):
         return self.target.position.z + self.resting_height
 
     @property
-    def _centred(self) -> bool:
+    def _is_centred(self) -> bool:
         return self.horizontal_error <= self.landing_error
 
-    def _measure_times(self) -> None:
+    def _update_timers(self) -> None:
         level = abs(self.vehicle.position.z - self._landed_altitude - self.approach_height) <= self.approach_band
-        holding = self._centred and level and self.mode == FlightMode.APPROACH
+        holding = self._is_centred and level and self.mode == FlightMode.APPROACH
         self.steady = self.steady + SAMPLE_PERIOD if holding else 0.0
         self.touching = self.touching + SAMPLE_PERIOD if self.vehicle.contact.vessel else 0.0
 
@@ -125,10 +125,10 @@ class Vtol(Sampled):
     def _after_approach(self) -> FlightMode:
         if not self.landing_enabled:
             return FlightMode.FOLLOW
-        return FlightMode.DESCEND if _reached(self.steady, self.hold_time) else FlightMode.APPROACH
+        return FlightMode.DESCEND if _has_elapsed(self.steady, self.hold_time) else FlightMode.APPROACH
 
     def _after_descent(self) -> FlightMode:
-        if _reached(self.touching, self.contact_time):
+        if _has_elapsed(self.touching, self.contact_time):
             return FlightMode.LANDED
         if not self.landing_enabled:
             return FlightMode.FOLLOW
@@ -139,7 +139,7 @@ class Vtol(Sampled):
 
     # -- what the controllers get ----------------------------------------------------------------------------------------------
 
-    def _drive_motors(self) -> None:
+    def _update_motor_share(self) -> None:
         direction = -1 if self.mode in (FlightMode.IDLE, FlightMode.LANDED) else 1
         self.motor_share = limit(self.motor_share + direction * SAMPLE_PERIOD / self.ramp_time, 0.0, 1.0)
         self.motors_on, self.reset = self.motor_share > 0, self.motor_share < 1
@@ -175,9 +175,9 @@ class Vtol(Sampled):
     def _altitude_rate(self) -> float:
         if self.mode != FlightMode.DESCEND:
             return self.climb_rate
-        return self.descent_rate if self._centred else 0.0
+        return self.descent_rate if self._is_centred else 0.0
 
 
-def _reached(elapsed: float, duration: float) -> bool:
+def _has_elapsed(elapsed: float, duration: float) -> bool:
     """Half a period lets sums of periods meet a duration in spite of rounding."""
     return elapsed >= duration - SAMPLE_PERIOD / 2

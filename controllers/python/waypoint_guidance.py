@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from .fleet.waypoint_guidance import Guidance
+from .fleet.waypoint_guidance import WaypointGuidanceBase
 
 
-class WaypointGuidance(Guidance):
+class WaypointGuidance(WaypointGuidanceBase):
     """Path command of the vessel: heading and speed reference from its position and a list of waypoints."""
 
     description = "Line of sight to the active waypoint, which a circle of acceptance switches on"
@@ -17,4 +17,4 @@ class WaypointGuidance(Guidance):
         self.output("speed_reference", 0.0, "m/s", "Forward")
 
     def tick(self, time: float) -> None:
-        self.speed_reference = self.guide()
+        self.speed_reference = self.update_guidance()

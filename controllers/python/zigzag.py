@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from .fleet.sampled import Sampled
+from .fleet.sampled import SampledController
 
 
-class Zigzag(Sampled):
+class Zigzag(SampledController):
     """Straight ahead until `start_time`, then turns to starboard; whenever the heading is `angle` off the original course on the
     side to which the vessel turns, it is ordered to turn to the other side (IMO resolution MSC.137(76), 5.2.3).
     """

@@ -12,7 +12,7 @@ import click
 
 from ..core.errors import CosimError
 from ..core.version import __version__
-from ..process.standard_streams import outlasting
+from ..process.standard_streams import ignoring_broken_pipe
 
 #: command -> (module in this package, what it does)
 COMMANDS = {
@@ -37,7 +37,7 @@ COMMANDS = {
 }
 
 
-class _Commands(click.Group):
+class _LazyGroup(click.Group):
     """Knows its commands by name and imports them when they are used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -54,7 +54,7 @@ class _Commands(click.Group):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
 
-@click.command(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.command(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--debug", is_flag=True, help="Show tracebacks.")
 @click.version_option(__version__, package_name="cosim", message="cosim %(version)s")
 def cli(debug: bool) -> None:
@@ -63,23 +63,23 @@ def cli(debug: bool) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of the command `cosim`; ends the process with the exit code of the outcome."""
-    sys.stdout, sys.stderr = outlasting(sys.stdout), outlasting(sys.stderr)
-    sys.exit(_code(sys.argv[1:] if arguments is None else arguments))
+    sys.stdout, sys.stderr = ignoring_broken_pipe(sys.stdout), ignoring_broken_pipe(sys.stderr)
+    sys.exit(_run_command_line(sys.argv[1:] if arguments is None else arguments))
 
 
-def _code(arguments: list[str]) -> int:
-    return guarded(lambda: _outcome(cli.main(arguments, prog_name="cosim", standalone_mode=False, obj=tuple(arguments))))
+def _run_command_line(arguments: list[str]) -> int:
+    return run_guarded(lambda: _exit_code(cli.main(arguments, prog_name="cosim", standalone_mode=False, obj=tuple(arguments))))
 
 
-def guarded(command: Callable[[], int]) -> int:
+def run_guarded(command: Callable[[], int]) -> int:
     """The exit code of a command; what it raises is reported to the user."""
     try:
         return command()
     except (Exception, KeyboardInterrupt) as error:
-        return report(error)
+        return report_error(error)
 
 
-def report(error: BaseException) -> int:
+def report_error(error: BaseException) -> int:
     """Tell the user about an error; returns the exit code that belongs to it. With --debug the traceback is shown."""
     if isinstance(error, KeyboardInterrupt | click.exceptions.Abort):
         click.echo("interrupted", err=True)
@@ -99,5 +99,5 @@ def report(error: BaseException) -> int:
     return 70
 
 
-def _outcome(value: Any) -> int:
+def _exit_code(value: Any) -> int:
     return value if isinstance(value, int) else 0

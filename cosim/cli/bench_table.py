@@ -6,16 +6,16 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ..report.tables import LONGEST_LINE, number_text
+from ..report.tables import MAX_LINE_WIDTH, format_number
 
 if TYPE_CHECKING:
     from ..results.checks import Number
-    from ..studies.controller_bench.score import Row
+    from ..studies.controller_bench.score import KpiComparison
 
 _COLOURS = {"better": "[green]better[/]", "worse": "[red]worse[/]", "": ""}
 
 
-def print_comparison(rows: Sequence[Row], candidate: str) -> None:
+def print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:
     """One line for each KPI: numbers of the candidate, the shipped controller and the last run, which are better, and checks.
 
     Prints nothing when there are no KPIs; colours as `cosim.report.tables.print_kpis`.
@@ -42,19 +42,19 @@ def print_comparison(rows: Sequence[Row], candidate: str) -> None:
             escape(header), justify="right" if header in (candidate, "shipped", "last run") else "left", no_wrap=True
         )
     for row in rows:
-        cells = [row.name, row.unit, _text(row.candidate), _text(row.shipped)]
-        last = [_text(row.last), _COLOURS[row.against_last]] if with_last else []
-        table.add_row(*map(escape, cells), _COLOURS[row.against_shipped], *last, *([_checks(row)] if with_checks else []))
+        cells = [row.name, row.unit, _format_value(row.candidate), _format_value(row.shipped)]
+        last = [_format_value(row.last), _COLOURS[row.against_last]] if with_last else []
+        table.add_row(*map(escape, cells), _COLOURS[row.against_shipped], *last, *([_format_checks(row)] if with_checks else []))
     console = Console(file=sys.stdout, highlight=False)
     if not console.is_terminal:
-        console.width = LONGEST_LINE
+        console.width = MAX_LINE_WIDTH
     console.print(table)
 
 
-def _text(value: Number | None) -> str:
-    return "" if value is None else number_text(value)
+def _format_value(value: Number | None) -> str:
+    return "" if value is None else format_number(value)
 
 
-def _checks(row: Row) -> str:
+def _format_checks(row: KpiComparison) -> str:
     words = ("[green]{} met[/]" if outcome.passed else "[bold red]{} not met[/]" for outcome in row.checks)
     return ", ".join(word.format(outcome.limits) for word, outcome in zip(words, row.checks, strict=True))

@@ -14,12 +14,12 @@ from . import supervision
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-    from ..process.supervisor import Outcome
-    from ..report.live.control import Control
-    from ..scenario import Assembly
+    from ..process.supervisor import SupervisedOutcome
+    from ..report.live.control import LiveControl
+    from ..scenario import PreparedRun
 
 #: simulated seconds per second, unless `--real-time` says otherwise: what runs as fast as it can is over before it is seen
-_SPEED = 1.0
+_DEFAULT_SPEED = 1.0
 
 _view = click.option(
     "--view",
@@ -30,16 +30,16 @@ _view = click.option(
 _port = click.option("--view-port", type=click.IntRange(0, 65535), default=0, help="Port of that page; default: any free one.")
 
 
-def option(command: Callable[..., Any]) -> Callable[..., Any]:
+def view_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Whether and where the run is shown: `view` and `view_port`."""
     return _view(_port(command))
 
 
-def require(isolation: str, sandbox: str | None, late: str) -> None:
+def check_view_options(isolation: str, sandbox: str | None, late: str) -> None:
     """Raises UsageError when a run under these conditions cannot be shown."""
-    from ..process.supervisor import possible
+    from ..process.supervisor import can_supervise
 
-    if isolation == "none" or not possible():
+    if isolation == "none" or not can_supervise():
         raise click.UsageError("--view shows a supervised run: it does not go with --isolation none, nor where there is none")
     if sandbox == "strict":
         raise click.UsageError("--view needs the network of this machine, which --sandbox strict takes away")
@@ -47,40 +47,42 @@ def require(isolation: str, sandbox: str | None, late: str) -> None:
         raise click.UsageError("--late fail does not go with --view: whoever looks may stop the clock")
 
 
-def viewed(run: Callable[[Connection], int], isolation: str, salvage: Callable[[Outcome], None], port: int) -> int:
+def run_with_view(
+    run: Callable[[Connection], int], isolation: str, salvage: Callable[[SupervisedOutcome], None], port: int
+) -> int:
     """Do as `supervision.protected` while the page is served; `run` gets the pipe that commands come through."""
-    from ..process.temporary_folders import run_folder
-    from ..report.live.viewing import Viewing, has_display, open_browser
+    from ..process.temporary_folders import temporary_run_folder
+    from ..report.live.viewing import LiveView, has_display, open_browser
 
-    viewing = Viewing(port)
+    viewing = LiveView(port)
     click.echo(f"live view: {viewing.url}")
-    with run_folder() as folder:
+    with temporary_run_folder() as folder:
         if has_display():
             open_browser(viewing.url, Path(folder))
-        return supervision.protected(lambda: run(viewing.link()), isolation, salvage, viewing.serving)
+        return supervision.run_supervised_command(lambda: run(viewing.open_in_child()), isolation, salvage, viewing.serve)
 
 
-def control(assembly: Assembly, link: Connection) -> Control:
+def create_control(assembly: PreparedRun, link: Connection) -> LiveControl:
     """What steers a run from the other end of `link`."""
-    from ..core.time_grid import Grid
-    from ..report.live.control import Control
-    from ..report.scene import scene_of
+    from ..core.time_grid import TimeGrid
+    from ..report.live.control import LiveControl
+    from ..report.scene import build_scene
 
     settings, value = assembly.settings, assembly.document.value
-    grid = Grid.of(settings.start_time, settings.stop_time, settings.step_size)
+    grid = TimeGrid.from_times(settings.start_time, settings.stop_time, settings.step_size)
     every = int((settings.record_interval or grid.step) / grid.step)
     about = {
         "name": assembly.spec.name,
         "description": assembly.spec.description,
-        "scene": scene_of({"scenario": value, "scenario_file": str(assembly.document.file.resolve())}),
+        "scene": build_scene({"scenario": value, "scenario_file": str(assembly.document.file.resolve())}),
         "rows": grid.count // every + 1,
         "stop_time": float(settings.stop_time),
     }
-    return Control(link, assembly.system, grid, settings.real_time or _SPEED, about)
+    return LiveControl(link, assembly.system, grid, settings.real_time or _DEFAULT_SPEED, about)
 
 
-def controlled(assembly: Assembly, control: Control | None) -> Assembly:
+def with_control(assembly: PreparedRun, control: LiveControl | None) -> PreparedRun:
     """The same to run with a control, which keeps pace itself."""
     if control is None:
         return assembly
-    return replace(assembly, settings=replace(assembly.settings, real_time=None, control=control))
+    return replace(assembly, settings=replace(assembly.settings, real_time=None, step_hook=control))

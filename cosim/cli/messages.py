@@ -9,10 +9,10 @@ from collections.abc import Iterable
 from ..core.errors import Problem
 
 #: warnings that are kept for the report
-MOST_KEPT = 200
+MAX_WARNINGS = 200
 
 
-class _Keeper(logging.Handler):
+class _WarningCollector(logging.Handler):
     """Keeps the texts of warnings and errors."""
 
     def __init__(self) -> None:
@@ -20,13 +20,13 @@ class _Keeper(logging.Handler):
         self.texts: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        if len(self.texts) < MOST_KEPT:
+        if len(self.texts) < MAX_WARNINGS:
             self.texts.append(f"{record.levelname} {record.getMessage()}")
 
 
-def show(level: int = logging.INFO) -> list[str]:
+def print_log(level: int = logging.INFO) -> list[str]:
     """Print messages of components from now on; the list returned grows by the text of each warning and error among them."""
-    handler, keeper = logging.StreamHandler(sys.stderr), _Keeper()
+    handler, keeper = logging.StreamHandler(sys.stderr), _WarningCollector()
     handler.setFormatter(logging.Formatter("%(levelname)s %(message)s"))
     logger = logging.getLogger("cosim")
     logger.handlers[:] = [handler, keeper]
@@ -34,7 +34,7 @@ def show(level: int = logging.INFO) -> list[str]:
     return keeper.texts
 
 
-def warn(problems: Iterable[Problem]) -> None:
+def log_problems(problems: Iterable[Problem]) -> None:
     """Print problems that do not keep anything from running, as `show` prints the warnings of components."""
     for problem in problems:
         logging.getLogger("cosim").warning("%s", problem)

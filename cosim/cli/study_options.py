@@ -14,11 +14,11 @@ import click
 
 if TYPE_CHECKING:
     from ..studies.execution.job import Record
-    from ..studies.execution.run_store import Ledger
-    from ..studies.study import Laboratory, Study
+    from ..studies.execution.run_store import RunStore
+    from ..studies.study import CheckingRunner, Study
 
 #: without a terminal a line of progress is printed so often (s)
-_LINE = 30.0
+_LINE_INTERVAL = 30.0
 
 _workers = click.option(
     "--workers", type=click.IntRange(min=1), help="Runs at a time on this machine; default: one per processor."
@@ -29,66 +29,66 @@ _scheduler = click.option(
 _retry = click.option("--retry-failed", is_flag=True, help="Run again what failed in an earlier call.")
 
 
-def options(command: Callable[..., int]) -> Callable[..., int]:
+def study_options(command: Callable[..., int]) -> Callable[..., int]:
     """Where runs are made."""
     return _workers(_scheduler(_retry(command)))
 
 
-def ledger(folder: Path, retry: bool) -> Ledger:
+def open_run_store(folder: Path, retry: bool) -> RunStore:
     """The finished runs of a folder; says how many of them cannot be read."""
-    from ..results.files import prepare
-    from ..studies.execution.run_store import Ledger
+    from ..results.files import check_writable
+    from ..studies.execution.run_store import RunStore
 
-    prepare(folder)
-    found = Ledger(folder, retry)
-    if found.unreadable:
-        click.echo(f"unreadable lines in {found.path}, whose runs are made again: {found.unreadable}", err=True)
+    check_writable(folder)
+    found = RunStore(folder, retry)
+    if found.unreadable_lines:
+        click.echo(f"unreadable lines in {found.path}, whose runs are made again: {found.unreadable_lines}", err=True)
     return found
 
 
-def engine(study: Study, workers: int | None, scheduler: str | None) -> Laboratory:
+def create_runner(study: Study, workers: int | None, scheduler: str | None) -> CheckingRunner:
     """The engine that the options ask for."""
     if scheduler is None:
-        from ..studies.execution.local import LocalEngine
+        from ..studies.execution.local import LocalRunner
 
-        return LocalEngine(study.order, workers or processors())
+        return LocalRunner(study.context, workers or available_processors())
     if workers is not None:
         raise click.UsageError("--workers counts processes of this machine, a --scheduler has its own")
-    from ..studies.cluster import ClusterEngine
+    from ..studies.cluster import ClusterRunner
 
-    return ClusterEngine(study, scheduler)
+    return ClusterRunner(study, scheduler)
 
 
-def processors() -> int:
+def available_processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-class Progress:
+class StudyProgress:
     """Counts runs, and says now and then how many there are, how many a second, and how long the rest takes."""
 
     def __init__(self, total: int, show: Callable[[str, int], None]):
         self._total, self._show, self._began = total, show, time.monotonic()
-        self.made = self.failed = self._before = 0
+        self.finished = self.failed = self._before = 0
 
-    def begin(self, done: int) -> None:
+    def start(self, done: int) -> None:
         """So many were there already."""
         self._before = done
 
     def __call__(self, record: Record) -> None:
-        self.made += 1
+        self.finished += 1
         self.failed += bool(record.failure)
-        self._show(self.text(time.monotonic() - self._began), self._before + self.made)
+        self._show(self.text(time.monotonic() - self._began), self._before + self.finished)
 
     def text(self, seconds: float) -> str:
         """ "120 of 1000 runs, 3 failed, 7.5 per second, 2 min left"."""
-        done = self._before + self.made
-        rate = self.made / max(seconds, 1e-9)
-        left = duration((self._total - done) / rate) if rate else "?"
+        done = self._before + self.finished
+        rate = self.finished / max(seconds, 1e-9)
+        left = format_duration((self._total - done) / rate) if rate else "?"
         failed = f", {self.failed} failed" if self.failed else ""
         return f"{done} of {self._total} runs{failed}, {rate:.3g} per second, {left} left"
 
 
-def duration(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """ "45 s", "12 min" or "3.5 h"."""
     if seconds < 100:
         return f"{seconds:.0f} s"
@@ -96,10 +96,10 @@ def duration(seconds: float) -> str:
 
 
 @contextmanager
-def progress(total: int) -> Iterator[Progress]:
+def show_progress(total: int) -> Iterator[StudyProgress]:
     """A bar on a terminal, lines elsewhere."""
     if not sys.stderr.isatty():
-        yield Progress(total, _Lines())
+        yield StudyProgress(total, _ProgressLines())
         return
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn
@@ -107,15 +107,15 @@ def progress(total: int) -> Iterator[Progress]:
 
     with Bar(BarColumn(), TextColumn("{task.description}"), console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=total)
-        yield Progress(total, lambda text, done: bar.update(task, completed=done, description=text))
+        yield StudyProgress(total, lambda text, done: bar.update(task, completed=done, description=text))
 
 
-class _Lines:
+class _ProgressLines:
     def __init__(self) -> None:
         self._last = time.monotonic()
 
     def __call__(self, text: str, done: int) -> None:
-        if time.monotonic() - self._last > _LINE:
+        if time.monotonic() - self._last > _LINE_INTERVAL:
             self._last = time.monotonic()
             click.echo(text, err=True)
 

@@ -13,39 +13,39 @@ from ..core.errors import did_you_mean
 from ..core.units import Unit
 
 _METHODS = {name: method for name, method in vars(Component).items() if inspect.isfunction(method) and not name.startswith("_")}
-_CHOICES = {"causality": get_args(Causality), "variability": get_args(Variability)}
+_VALID_FIELD_VALUES = {"causality": get_args(Causality), "variability": get_args(Variability)}
 
 
-def violations(made: Any) -> Iterator[str]:
+def find_violations(candidate: Any) -> Iterator[str]:
     """Everything that keeps an object from being a component."""
     expected = (name for name in {**Component.__annotations__, **vars(Component)} if not name.startswith("_"))
-    if missing := [name for name in expected if not hasattr(made, name)]:
+    if missing := [name for name in expected if not hasattr(candidate, name)]:
         yield f"it has no {', '.join(missing)}; expected a component or an Fmi2Slave class"
         return
-    variables = made.variables if isinstance(made.variables, Sequence) else [made.variables]
-    yield from _wrong_variables(variables)
+    variables = candidate.variables if isinstance(candidate.variables, Sequence) else [candidate.variables]
+    yield from _check_variables(variables)
     known = [variable for variable in variables if isinstance(variable, Variable)]
-    for name in _needed({variable.causality for variable in known}, made.has_state):
-        if getattr(getattr(made, name), "__func__", None) is _METHODS[name]:
-            yield f'it does not define "{name}"{_instead(made, name)}'
+    for name in _required_methods({variable.causality for variable in known}, candidate.has_state):
+        if getattr(getattr(candidate, name), "__func__", None) is _METHODS[name]:
+            yield f'it does not define "{name}"{_misnamed_method_hint(candidate, name)}'
     for name, method in _METHODS.items():
         arguments = list(inspect.signature(method).parameters)[1:]
-        if not _takes(getattr(made, name), arguments):
+        if not _accepts_arguments(getattr(candidate, name), arguments):
             yield f'"{name}" does not take the arguments ({", ".join(arguments)})'
 
 
-def _wrong_variables(variables: Sequence[Any]) -> Iterator[str]:
+def _check_variables(variables: Sequence[Any]) -> Iterator[str]:
     for variable in variables:
         if isinstance(variable, Variable):
-            yield from (f'variable "{variable.name}": {text}' for text in _wrong_fields(variable))
+            yield from (f'variable "{variable.name}": {text}' for text in _check_variable_fields(variable))
         else:
             yield f'"variables" holds {variable!r}, expected a cosim.core.component.Variable'
     names = Counter(str(variable.name) for variable in variables if isinstance(variable, Variable))
     yield from (f'variable "{name}" stands there {count} times' for name, count in names.items() if count > 1)
 
 
-def _wrong_fields(variable: Variable) -> Iterator[str]:
-    for field, valid in _CHOICES.items():
+def _check_variable_fields(variable: Variable) -> Iterator[str]:
+    for field, valid in _VALID_FIELD_VALUES.items():
         if (found := getattr(variable, field)) not in valid:
             yield f'{field} is "{found}"{did_you_mean(str(found), valid)}'
     if not isinstance(variable.unit, Unit | None):
@@ -54,7 +54,7 @@ def _wrong_fields(variable: Variable) -> Iterator[str]:
         yield f"shape is {variable.shape!r}, expected a tuple of sizes"
 
 
-def _needed(causalities: set[Causality], has_state: bool) -> Iterator[str]:
+def _required_methods(causalities: set[Causality], has_state: bool) -> Iterator[str]:
     """The methods that a component with such variables cannot leave to the empty ones of `Component`."""
     yield "do_step"
     if causalities & {"input", "output"}:
@@ -69,14 +69,14 @@ def _needed(causalities: set[Causality], has_state: bool) -> Iterator[str]:
         yield from ("get_state", "set_state")
 
 
-def _instead(made: Any, name: str) -> str:
+def _misnamed_method_hint(made: Any, name: str) -> str:
     """What may be the method under a wrong name, as the end of a message."""
     own = [other for other in dir(type(made)) if not hasattr(Component, other)]
     near = get_close_matches(name, own, n=1)
     return f', but "{near[0]}"' if near else ""
 
 
-def _takes(method: Any, arguments: list[str]) -> bool:
+def _accepts_arguments(method: Any, arguments: list[str]) -> bool:
     try:
         inspect.signature(method).bind(*arguments)
     except TypeError:

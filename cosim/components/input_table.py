@@ -20,10 +20,10 @@ from ..core.paths import open_text
 Interpolation = Literal["linear", "hold"]
 
 #: units in the last place by which a time and a sum of two others may differ
-_ROUNDING = 4
+_MAX_ULPS = 4
 
 
-class Table(Component):
+class InputTable(Component):
     """Columns over time (s); before the first and after the last row the nearest row holds.
 
     "linear" interpolates between rows; "hold" keeps each row's value until the next row's time, which already has the new one.
@@ -34,23 +34,23 @@ class Table(Component):
 
     def __init__(self, time: np.ndarray, columns: Mapping[str, np.ndarray], interpolation: Interpolation = "linear"):
         self._time, self._columns, self._interpolation = time, columns, interpolation
-        self._now = float(time[0])
-        self._rows: Sequence[np.ndarray] = ()
+        self._current_time = float(time[0])
+        self._output_columns: Sequence[np.ndarray] = ()
         self.variables = [Variable(name, causality="output") for name in columns]
 
     def set(self, name: str, value: Any) -> None:
         raise AttributeError(f"a profile has nothing to set, found {name}")
 
     def get(self, name: str) -> float:
-        return self._at(self._now, self._columns[name])
+        return self._value_at(self._current_time, self._columns[name])
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
-        self._now = start_time
+        self._current_time = start_time
 
     def exit_initialization_mode(self) -> None: ...
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
-        self._rows = [self._columns[variable.name] for variable in outputs.variables]
+        self._output_columns = [self._columns[variable.name] for variable in outputs.variables]
         self._values = outputs.arrays.get(np.dtype(np.float64), np.empty(0))
 
     def set_inputs(self) -> None: ...
@@ -58,23 +58,23 @@ class Table(Component):
     def do_step(self, time: float, step_size: float) -> None:
         """To the end of the step; if only rounding keeps that from being a row's time, it is the row's."""
         now = time + step_size
-        row = int(np.searchsorted(self._time, now + _ROUNDING * np.spacing(max(abs(time), abs(now))), side="right")) - 1
-        self._now = max(now, float(self._time[row])) if row >= 0 else now
+        row = int(np.searchsorted(self._time, now + _MAX_ULPS * np.spacing(max(abs(time), abs(now))), side="right")) - 1
+        self._current_time = max(now, float(self._time[row])) if row >= 0 else now
 
     def get_outputs(self) -> None:
-        for i, column in enumerate(self._rows):
-            self._values[i] = self._at(self._now, column)
+        for i, column in enumerate(self._output_columns):
+            self._values[i] = self._value_at(self._current_time, column)
 
-    def _at(self, now: float, column: np.ndarray) -> float:
+    def _value_at(self, now: float, column: np.ndarray) -> float:
         if self._interpolation == "linear":
             return float(np.interp(now, self._time, column))
         return float(column[max(0, int(np.searchsorted(self._time, now, side="right")) - 1)])
 
     def get_state(self) -> float:
-        return self._now
+        return self._current_time
 
     def set_state(self, state: float) -> None:
-        self._now = state
+        self._current_time = state
 
     def free_state(self, state: float) -> None: ...
 
@@ -83,7 +83,7 @@ class Table(Component):
     def free(self) -> None: ...
 
 
-def read_table(path: Path, columns: Sequence[str], interpolation: Interpolation, where: str = "") -> Table:
+def read_input_table(path: Path, columns: Sequence[str], interpolation: Interpolation, where: str = "") -> InputTable:
     """A CSV file with a header and a first column `time`; only the named columns are kept.
 
     Raises InputError for a missing file or column, for cells that are no finite numbers and for time that does not increase.
@@ -111,4 +111,4 @@ def read_table(path: Path, columns: Sequence[str], interpolation: Interpolation,
         problems.append(Problem(f'profile "{path}" needs rows of finite numbers with increasing time', where))
     if problems:
         raise InputError(problems)
-    return Table(values[:, 0], {name: values[:, header.index(name)] for name in columns}, interpolation)
+    return InputTable(values[:, 0], {name: values[:, header.index(name)] for name in columns}, interpolation)

@@ -13,17 +13,17 @@ import numpy as np
 Restore = Callable[[], object]
 
 #: what does not change, or is nobody's own
-_CLOSED = (type, str, bytes, int, float, complex, FunctionType, BuiltinFunctionType, MethodType, ModuleType)
+_OPAQUE_TYPES = (type, str, bytes, int, float, complex, FunctionType, BuiltinFunctionType, MethodType, ModuleType)
 
 
-def remember(thing: object, besides: Collection[str] = ()) -> Restore:
+def snapshot(thing: object, exclude: Collection[str] = ()) -> Restore:
     """Everything that can be reached through attributes (`besides` some), lists, dicts, sets, arrays and random generators.
 
     What is returned brings it back, as often as it is called. Files, iterators and whatever else does not show what it holds stay
     as they are.
     """
     restores: list[Restore] = []
-    _visit(thing, restores, set(), besides)
+    _snapshot_object(thing, restores, set(), exclude)
 
     def restore_all() -> None:
         for restore in restores:
@@ -32,8 +32,8 @@ def remember(thing: object, besides: Collection[str] = ()) -> Restore:
     return restore_all
 
 
-def _visit(thing: Any, restores: list[Restore], seen: set[int], besides: Collection[str] = ()) -> None:
-    if id(thing) in seen or isinstance(thing, _CLOSED):
+def _snapshot_object(thing: Any, restores: list[Restore], seen: set[int], exclude: Collection[str] = ()) -> None:
+    if id(thing) in seen or isinstance(thing, _OPAQUE_TYPES):
         return
     seen.add(id(thing))
     parts: list[Any] = []
@@ -51,13 +51,13 @@ def _visit(thing: Any, restores: list[Restore], seen: set[int], besides: Collect
     elif isinstance(thing, tuple):
         parts = list(thing)
     elif hasattr(thing, "clear") and isinstance(thing, Collection):
-        parts = _remember_members(thing, restores)
-    parts += _remember_attributes(thing, restores, besides)
+        parts = _snapshot_members(thing, restores)
+    parts += _snapshot_attributes(thing, restores, exclude)
     for part in parts:
-        _visit(part, restores, seen)
+        _snapshot_object(part, restores, seen)
 
 
-def _remember_members(thing: Any, restores: list[Restore]) -> list[Any]:
+def _snapshot_members(thing: Any, restores: list[Restore]) -> list[Any]:
     """Of a dict, list, deque or set."""
     refill = next((getattr(thing, name) for name in ("update", "extend") if hasattr(thing, name)), None)
     if refill is None:
@@ -72,14 +72,14 @@ def _remember_members(thing: Any, restores: list[Restore]) -> list[Any]:
     return [*members.values()] if isinstance(members, dict) else members
 
 
-def _remember_attributes(thing: Any, restores: list[Restore], besides: Collection[str]) -> list[Any]:
+def _snapshot_attributes(thing: Any, restores: list[Restore], exclude: Collection[str]) -> list[Any]:
     if not hasattr(thing, "__dict__"):
         return []
     own = vars(thing)
-    held = {name: value for name, value in own.items() if name not in besides}
+    held = {name: value for name, value in own.items() if name not in exclude}
 
     def restore() -> None:
-        for name in own.keys() - held.keys() - set(besides):
+        for name in own.keys() - held.keys() - set(exclude):
             del own[name]
         own.update(held)
 

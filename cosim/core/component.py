@@ -68,7 +68,7 @@ class Variable:
     minimum: float | None = None
     maximum: float | None = None
     items: tuple[tuple[str, int], ...] = ()
-    relative: bool = False
+    relative_quantity: bool = False
     dtype: np.dtype[Any] = field(default=None)  # type: ignore[arg-type]
 
     def __post_init__(self) -> None:
@@ -80,7 +80,7 @@ class Variable:
             object.__setattr__(self, "dtype", DTYPES[self.type])
 
     @property
-    def slots(self) -> tuple[str, ...]:
+    def scalar_names(self) -> tuple[str, ...]:
         """Names of the scalars this variable consists of: itself, or "name[1]", "name[2]" or "name[1,2]" for arrays."""
         if not self.shape:
             return (self.name,)
@@ -96,19 +96,19 @@ class StepResult(NamedTuple):
     terminate_requested: bool = False
 
 
-class Access(NamedTuple):
+class NativeGetSet(NamedTuple):
     """A get or set of FMI in C: addresses of function, instance, value references and values, and how many there are."""
 
     version: int
     function: int
     instance: int
-    references: int
-    reference_count: int
+    value_references: int
+    value_reference_count: int
     values: int
     value_count: int
 
 
-class DoStep(NamedTuple):
+class NativeDoStep(NamedTuple):
     """A doStep of FMI in C; `flags` is where FMI 3.0 says event needed, terminate and early return, `reached` where how far."""
 
     version: int
@@ -116,20 +116,20 @@ class DoStep(NamedTuple):
     instance: int
     step_size: float
     flags: int = 0
-    reached: int = 0
+    last_successful_time: int = 0
 
 
-class Flags(NamedTuple):
+class NativeFlagCheck(NamedTuple):
     """A look at the flags of a doStep: discard (2) when one of them is set."""
 
     flags: int
 
 
 #: the FMI statuses OK and warning; whatever else an FMU returns is bad, numbers that are no status among them
-GOOD = (0, 1)
+SUCCESS_STATUSES = (0, 1)
 
 
-class Call(NamedTuple):
+class PreparedCall(NamedTuple):
     """A call made ready beforehand: a function that returns an FMI status (0 OK, 1 warning), and its arguments.
 
     `native` is the same call for an executor in C, `kept` what has to live as long as the call.
@@ -138,8 +138,8 @@ class Call(NamedTuple):
     function: Callable[..., int]
     arguments: tuple[Any, ...]
     name: str
-    native: Access | DoStep | Flags | None = None
-    kept: tuple[Any, ...] = ()
+    native: NativeGetSet | NativeDoStep | NativeFlagCheck | None = None
+    keep_alive: tuple[Any, ...] = ()
 
 
 class Ports(NamedTuple):
@@ -159,7 +159,7 @@ class Component(Protocol):
     #: bound with all inputs and outputs, not only with those that are connected or recorded
     binds_everything: bool
     #: what components have in common that may not step at the same time: the same code, which may have state of its own
-    code: object = None
+    shared_code: object = None
     #: get_state and set_state work (FMI: canGetAndSetFMUState)
     has_state: bool
 
@@ -185,16 +185,16 @@ class Component(Protocol):
     def get_outputs(self) -> None:
         """Write the present values into the bound output arrays."""
 
-    def turn(self, clock: ctypes.c_double, step_size: float) -> Sequence[Call] | None:
+    def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall] | None:
         """set_inputs, do_step and get_outputs as calls that need nothing but to be made, for a step from the time in `clock`.
 
         None: the component offers no such calls. Asked for once, in step mode.
         """
         return None
 
-    def failed(self, name: str, status: int) -> StepResult:
+    def interpret_status(self, function: str, status: int) -> StepResult:
         """What a call of `turn` means that returned a status worse than a warning. Raises ComponentError for a failure."""
-        raise ComponentError(type(self).__name__, name, f"status {status}")
+        raise ComponentError(type(self).__name__, function, f"status {status}")
 
     def get_state(self) -> Any:
         """A snapshot that only this component can read."""

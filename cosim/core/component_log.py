@@ -8,38 +8,38 @@ import time
 INFO, WARNING, ERROR = logging.INFO, logging.WARNING, logging.ERROR
 
 #: messages per second that are passed on, and characters of one
-PER_SECOND, LONGEST = 1000, 4000
+MAX_MESSAGES_PER_SECOND, MAX_MESSAGE_LENGTH = 1000, 4000
 
-_second, _passed, _cut = 0, 0, 0
+_current_second, _passed_count, _dropped_count = 0, 0, 0
 
 
-def message(component: str, level: int, text: str) -> None:
+def log_message(component: str, level: int, text: str) -> None:
     """Pass on what a component said; control characters are made harmless."""
-    if not _has_room():
+    if not _is_within_rate_limit():
         return
-    if len(text) > LONGEST:
-        text = f"{text[:LONGEST]} ... and {len(text) - LONGEST} characters more"
+    if len(text) > MAX_MESSAGE_LENGTH:
+        text = f"{text[:MAX_MESSAGE_LENGTH]} ... and {len(text) - MAX_MESSAGE_LENGTH} characters more"
     printable = "".join(c if c.isprintable() or c in "\n\t" else "\N{REPLACEMENT CHARACTER}" for c in text).rstrip()
     logging.getLogger("cosim.component").log(level, "%s: %s", component, printable)
 
 
-def _has_room() -> bool:
+def _is_within_rate_limit() -> bool:
     """Whether one more message may pass in this second; tells how many were cut when the next second begins."""
-    global _second, _passed, _cut
+    global _current_second, _passed_count, _dropped_count
     now = int(time.monotonic())
-    if now != _second:
-        _second, _passed = now, 0
-        tell_what_was_cut()
-    if _passed >= PER_SECOND:
-        _cut += 1
+    if now != _current_second:
+        _current_second, _passed_count = now, 0
+        report_dropped_messages()
+    if _passed_count >= MAX_MESSAGES_PER_SECOND:
+        _dropped_count += 1
         return False
-    _passed += 1
+    _passed_count += 1
     return True
 
 
-def tell_what_was_cut() -> None:
+def report_dropped_messages() -> None:
     """Say how many messages were not passed on since it was said last."""
-    global _cut
-    if _cut:
-        logging.getLogger("cosim.component").warning("%d messages of components were not shown", _cut)
-        _cut = 0
+    global _dropped_count
+    if _dropped_count:
+        logging.getLogger("cosim.component").warning("%d messages of components were not shown", _dropped_count)
+        _dropped_count = 0

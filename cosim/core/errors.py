@@ -18,9 +18,9 @@ from functools import lru_cache
 from pathlib import Path
 
 #: what passes through other people's code without being its failure; all else is, also what is no Exception (a library's panic)
-PASSING = (KeyboardInterrupt, GeneratorExit)
+PASS_THROUGH_EXCEPTIONS = (KeyboardInterrupt, GeneratorExit)
 #: characters of an exception's text that are shown
-_LONGEST_TEXT = 2000
+_MAX_TEXT_LENGTH = 2000
 
 
 class CosimError(Exception):
@@ -43,10 +43,10 @@ class Problem:
 
     def __str__(self) -> str:
         text = f"{self.where}: {self.message}" if self.where else self.message
-        return _printable(text)
+        return _escape_unprintable(text)
 
 
-def _printable(text: str) -> str:
+def _escape_unprintable(text: str) -> str:
     """One line; what cannot be printed, as what would control a terminal, is escaped."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
 
@@ -74,7 +74,7 @@ class ComponentError(CosimError):
 
     def __str__(self) -> str:
         when = "" if self.time is None else f" at t = {self.time:.12g} s"
-        return _printable(f"{self.component}: {self.function} failed{when}: {self.reason}")
+        return _escape_unprintable(f"{self.component}: {self.function} failed{when}: {self.reason}")
 
 
 class LateError(CosimError):
@@ -95,19 +95,23 @@ class CheckError(CosimError):
     exit_code = 3
 
 
-def told(error: BaseException) -> str:
+def describe_exception(error: BaseException) -> str:
     """An exception of other people's code in one line: its kind, its text, and where it was raised."""
     try:
         text = str(error)
     except Exception:
         text = "(its text cannot be made)"
-    text = text if len(text) <= _LONGEST_TEXT else f"{text[:_LONGEST_TEXT]} ... and {len(text) - _LONGEST_TEXT} characters more"
+    text = (
+        text
+        if len(text) <= _MAX_TEXT_LENGTH
+        else f"{text[:_MAX_TEXT_LENGTH]} ... and {len(text) - _MAX_TEXT_LENGTH} characters more"
+    )
     places = traceback.extract_tb(error.__traceback__)
     where = f" ({Path(places[-1].filename).name}:{places[-1].lineno})" if places else ""
     return f"{type(error).__name__}: {text}{where}"
 
 
-def one_of(names: Iterable[str]) -> str:
+def join_alternatives(names: Iterable[str]) -> str:
     """Who a failure may be of, when it cannot be known: the name, or "one of a, b", of many not all.
 
     >>> one_of(["uav"]), one_of(["uav", "usv"])

@@ -14,7 +14,7 @@ def is_file(path: Path) -> bool:
     return os.path.isfile(path)  # noqa: PTH113
 
 
-def real(path: Path) -> Path:
+def resolve_path(path: Path) -> Path:
     """Where a path leads, links followed; where they lead in a circle, as far as that goes."""
     return Path(os.path.realpath(path))
 

@@ -16,18 +16,18 @@ import numpy as np
 from .component import Component, Variable
 from .errors import Problem, did_you_mean
 
-INTEGERS = frozenset({"Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64"})
-FLOATS = frozenset({"Float64", "Float32"})
+INTEGER_TYPES = frozenset({"Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64"})
+FLOAT_TYPES = frozenset({"Float64", "Float32"})
 
 
 class Endpoint(NamedTuple):
     """One scalar variable (or array element) of one component."""
 
     component: str
-    slot: str
+    scalar: str
 
     def __str__(self) -> str:
-        return f"{self.component}.{self.slot}"
+        return f"{self.component}.{self.scalar}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Iteration:
     """
 
     tolerance: float
-    limit: int
+    max_rounds: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,25 +69,25 @@ class Group:
 Stage = tuple["str | Group", ...]
 
 
-def members(stages: Iterable[Stage]) -> Iterator[str]:
+def component_names(stages: Iterable[Stage]) -> Iterator[str]:
     """Names of all components in the stages, groups opened."""
     for stage in stages:
         for member in stage:
             if isinstance(member, Group):
-                yield from members(member.stages)
+                yield from component_names(member.stages)
             else:
                 yield member
 
 
-def groups(stages: Iterable[Stage]) -> Iterator[Group]:
+def iterate_groups(stages: Iterable[Stage]) -> Iterator[Group]:
     """All groups in the stages, also those inside groups."""
     for member in (member for stage in stages for member in stage):
         if isinstance(member, Group):
             yield member
-            yield from groups(member.stages)
+            yield from iterate_groups(member.stages)
 
 
-class Place(NamedTuple):
+class VariableElement(NamedTuple):
     """The variable a slot belongs to, and the element's index in it (row-major)."""
 
     variable: Variable
@@ -112,50 +112,54 @@ class System:
     parallel: Parallel = "auto"
 
     @cached_property
-    def slots(self) -> Mapping[str, Mapping[str, Place]]:
+    def slots(self) -> Mapping[str, Mapping[str, VariableElement]]:
         """Every slot of every component, by component and slot name."""
         return {
-            name: {slot: Place(variable, i) for variable in component.variables for i, slot in enumerate(variable.slots)}
+            name: {
+                slot: VariableElement(variable, i)
+                for variable in component.variables
+                for i, slot in enumerate(variable.scalar_names)
+            }
             for name, component in self.components.items()
         }
 
-    def place(self, endpoint: Endpoint) -> Place:
-        return self.slots[endpoint.component][endpoint.slot]
+    def find_element(self, endpoint: Endpoint) -> VariableElement:
+        return self.slots[endpoint.component][endpoint.scalar]
 
     def problems(self) -> list[Problem]:
         """Everything that is wrong with connections and stages; empty when the system can run."""
-        return [*self._stage_problems(), *self._connection_problems()]
+        return [*self._find_stage_problems(), *self._find_connection_problems()]
 
-    def _stage_problems(self) -> Iterator[Problem]:
+    def _find_stage_problems(self) -> Iterator[Problem]:
         seen: set[str] = set()
         subject = ("algorithm", "stages")
-        for name in members(self.stages):
+        for name in component_names(self.stages):
             if name not in self.components:
                 yield Problem(f'unknown component "{name}"{did_you_mean(name, self.components)}', subject=subject)
             elif name in seen:
                 yield Problem(f'component "{name}" stands in the stages twice', subject=subject)
             seen.add(name)
-        for group in groups(self.stages):
+        for group in iterate_groups(self.stages):
             if group.iteration:
-                yield from self._iteration_problems(group)
+                yield from self._find_iteration_problems(group)
         for name in self.components:
             if name not in seen:
                 yield Problem(f'component "{name}" is in no stage, so it would never step', subject=subject)
 
-    def _iteration_problems(self, group: Group) -> Iterator[Problem]:
+    def _find_iteration_problems(self, group: Group) -> Iterator[Problem]:
         repeated = f"the stages of {group.name} are iterated"
-        for name in members(group.stages):
+        for name in component_names(group.stages):
             if name in self.components and not self.components[name].has_state:
                 text = f'{repeated}, but "{name}" cannot return to a state (FMI: canGetAndSetFMUState)'
                 yield Problem(text, subject=("components", name))
             if name in self.periods:
                 yield Problem(f'{repeated}, so "{name}" cannot have a period of its own', subject=("components", name, "period"))
 
-    def _connection_problems(self) -> Iterator[Problem]:
+    def _find_connection_problems(self) -> Iterator[Problem]:
         fed: dict[Endpoint, Connection] = {}
         for connection in self.connections:
-            source = self._end_problem(connection.source, "output")
-            target = self._end_problem(connection.target, "input")
+            source = self._find_endpoint_problem(connection.source, "output")
+            target = self._find_endpoint_problem(connection.target, "input")
             if source or target:
                 yield from (Problem(text, connection.where) for text in (source, target) if text)
                 continue
@@ -163,38 +167,40 @@ class System:
                 first = fed[connection.target].source
                 yield Problem(f"input {connection.target} is connected twice: it is already fed by {first}", connection.where)
             fed.setdefault(connection.target, connection)
-            if text := incompatibility(self.place(connection.source).variable, self.place(connection.target).variable):
+            if text := incompatibility(
+                self.find_element(connection.source).variable, self.find_element(connection.target).variable
+            ):
                 yield Problem(f"{connection.source} cannot feed {connection.target}: {text}", connection.where)
 
-    def _end_problem(self, end: Endpoint, causality: str) -> str:
+    def _find_endpoint_problem(self, end: Endpoint, causality: str) -> str:
         if end.component not in self.components:
             return f'unknown component "{end.component}"{did_you_mean(end.component, self.components)}'
         slots = self.slots[end.component]
-        if end.slot not in slots:
+        if end.scalar not in slots:
             valid = (name for name, place in slots.items() if place.variable.causality == causality)
-            return f'component "{end.component}" has no variable "{end.slot}"{did_you_mean(end.slot, valid)}'
-        if (found := slots[end.slot].variable.causality) != causality:
+            return f'component "{end.component}" has no variable "{end.scalar}"{did_you_mean(end.scalar, valid)}'
+        if (found := slots[end.scalar].variable.causality) != causality:
             return f"{end} is of causality {found}, expected an {causality}"
         return ""
 
 
 def incompatibility(source: Variable, target: Variable) -> str:
     """Why a value of `source` cannot become one of `target`; "" when it can, if necessary with conversion."""
-    if not _converts(source, target):
+    if not _is_convertible(source, target):
         return f"type {source.type} does not become {target.type}"
     if source.unit and target.unit and not source.unit.converts_to(target.unit):
         return f'units "{source.unit.name}" and "{target.unit.name}" measure different quantities'
     return ""
 
 
-def _converts(source: Variable, target: Variable) -> bool:
+def _is_convertible(source: Variable, target: Variable) -> bool:
     if source.type == target.type:
         return source.type != "Clock"
-    if target.type in FLOATS:
-        exact = source.type in INTEGERS and source.dtype.itemsize < target.dtype.itemsize
-        return source.type in FLOATS or source.type == "Enumeration" or exact
+    if target.type in FLOAT_TYPES:
+        exact = source.type in INTEGER_TYPES and source.dtype.itemsize < target.dtype.itemsize
+        return source.type in FLOAT_TYPES or source.type == "Enumeration" or exact
     if source.type == "Enumeration":  # its values are small, whatever their type
         return target.type in ("Int32", "Int64")
     if target.type == "Enumeration":
-        return source.type in INTEGERS - {"UInt64"}
-    return {source.type, target.type} <= INTEGERS and bool(np.can_cast(source.dtype, target.dtype, "safe"))
+        return source.type in INTEGER_TYPES - {"UInt64"}
+    return {source.type, target.type} <= INTEGER_TYPES and bool(np.can_cast(source.dtype, target.dtype, "safe"))

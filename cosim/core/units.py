@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class Unit:
     """A named unit; two units can be converted if and only if their exponents are equal."""
 
     name: str
-    exponents: tuple[int, ...] = (0,) * len(BASE)
+    exponents: tuple[int, ...] = (0,) * len(BASE_UNITS)
     factor: float = 1.0
     offset: float = 0.0
 
@@ -32,59 +32,59 @@ class Unit:
         return self.factor / other.factor, (self.offset - other.offset) / other.factor
 
 
-def _unit(name: str, factor: float = 1.0, offset: float = 0.0, **exponents: int) -> Unit:
-    return Unit(name, tuple(exponents.get(base, 0) for base in BASE), factor, offset)
+def _define_unit(name: str, factor: float = 1.0, offset: float = 0.0, **exponents: int) -> Unit:
+    return Unit(name, tuple(exponents.get(base, 0) for base in BASE_UNITS), factor, offset)
 
 
-KNOWN = {
+KNOWN_UNITS = {
     unit.name: unit
     for unit in (
-        _unit("1"),
-        _unit("%", 0.01),
-        *(_unit(base, **{base: 1}) for base in BASE),
-        _unit("g", 1e-3, kg=1),
-        _unit("mm", 1e-3, m=1),
-        _unit("cm", 1e-2, m=1),
-        _unit("km", 1e3, m=1),
-        _unit("ms", 1e-3, s=1),
-        _unit("min", 60.0, s=1),
-        _unit("h", 3600.0, s=1),
-        _unit("deg", math.pi / 180, rad=1),
-        _unit("rev", 2 * math.pi, rad=1),
-        _unit("rpm", 2 * math.pi / 60, rad=1, s=-1),
-        _unit("kn", 1852 / 3600, m=1, s=-1),
-        _unit("degC", 1.0, 273.15, K=1),
-        _unit("Hz", s=-1),
-        _unit("N", kg=1, m=1, s=-2),
-        _unit("kN", 1e3, kg=1, m=1, s=-2),
-        _unit("Pa", kg=1, m=-1, s=-2),
-        _unit("J", kg=1, m=2, s=-2),
-        _unit("W", kg=1, m=2, s=-3),
-        _unit("C", s=1, A=1),
-        _unit("V", kg=1, m=2, s=-3, A=-1),
-        _unit("Ohm", kg=1, m=2, s=-3, A=-2),
-        _unit("F", kg=-1, m=-2, s=4, A=2),
-        _unit("T", kg=1, s=-2, A=-1),
+        _define_unit("1"),
+        _define_unit("%", 0.01),
+        *(_define_unit(base, **{base: 1}) for base in BASE_UNITS),
+        _define_unit("g", 1e-3, kg=1),
+        _define_unit("mm", 1e-3, m=1),
+        _define_unit("cm", 1e-2, m=1),
+        _define_unit("km", 1e3, m=1),
+        _define_unit("ms", 1e-3, s=1),
+        _define_unit("min", 60.0, s=1),
+        _define_unit("h", 3600.0, s=1),
+        _define_unit("deg", math.pi / 180, rad=1),
+        _define_unit("rev", 2 * math.pi, rad=1),
+        _define_unit("rpm", 2 * math.pi / 60, rad=1, s=-1),
+        _define_unit("kn", 1852 / 3600, m=1, s=-1),
+        _define_unit("degC", 1.0, 273.15, K=1),
+        _define_unit("Hz", s=-1),
+        _define_unit("N", kg=1, m=1, s=-2),
+        _define_unit("kN", 1e3, kg=1, m=1, s=-2),
+        _define_unit("Pa", kg=1, m=-1, s=-2),
+        _define_unit("J", kg=1, m=2, s=-2),
+        _define_unit("W", kg=1, m=2, s=-3),
+        _define_unit("C", s=1, A=1),
+        _define_unit("V", kg=1, m=2, s=-3, A=-1),
+        _define_unit("Ohm", kg=1, m=2, s=-3, A=-2),
+        _define_unit("F", kg=-1, m=-2, s=4, A=2),
+        _define_unit("T", kg=1, s=-2, A=-1),
     )
 }
-_FACTOR = re.compile(r"(1|[A-Za-z%]+)([+-]?\d+)?")
+_FACTOR_PATTERN = re.compile(r"(1|[A-Za-z%]+)([+-]?\d+)?")
 
 
-def parse(text: str) -> Unit:
+def parse_unit(text: str) -> Unit:
     """The unit written in `text` in Modelica syntax: "kg.m/s2", "m.s-1", "W/(m2.K)".
 
     Raises ValueError when the text cannot be read or holds an unknown unit.
     """
-    if text in KNOWN:
-        return KNOWN[text]
-    exponents, scale = [0] * len(BASE), 1.0
-    for (unit, power), sign in ((_factor(part, text), sign) for part, sign in _factors(text)):
+    if text in KNOWN_UNITS:
+        return KNOWN_UNITS[text]
+    exponents, scale = [0] * len(BASE_UNITS), 1.0
+    for (unit, power), sign in ((_parse_factor(part, text), sign) for part, sign in _split_factors(text)):
         scale *= unit.factor ** (sign * power)
         exponents = [e + sign * power * k for e, k in zip(exponents, unit.exponents, strict=True)]
     return Unit(text, tuple(exponents), scale)
 
 
-def _factors(text: str) -> list[tuple[str, int]]:
+def _split_factors(text: str) -> list[tuple[str, int]]:
     """The factors of a unit as they are written, and whether each stands above (1) or below the line (-1)."""
     above, slash, below = text.partition("/")
     if slash and below.startswith("(") and below.endswith(")"):
@@ -92,15 +92,15 @@ def _factors(text: str) -> list[tuple[str, int]]:
     return [(part, 1) for part in above.split(".")] + [(part, -1) for part in below.split(".") if slash]
 
 
-def product(units: Iterable[tuple[str, int]]) -> str:
+def multiply_units(units: Iterable[tuple[str, int]]) -> str:
     """The product of units and their powers, in Modelica syntax: [("m/s", 2), ("s", 1)] is "m2/s", what cancels out "1".
 
     Raises ValueError for a unit whose syntax cannot be read.
     """
     powers: dict[str, int] = {}
     for text, power in units:
-        for part, sign in _factors(text):
-            match = _FACTOR.fullmatch(part)
+        for part, sign in _split_factors(text):
+            match = _FACTOR_PATTERN.fullmatch(part)
             if match is None:
                 raise ValueError(f'cannot read the unit "{text}" at "{part}"')
             powers[match.group(1)] = powers.get(match.group(1), 0) + sign * power * int(match.group(2) or 1)
@@ -110,12 +110,12 @@ def product(units: Iterable[tuple[str, int]]) -> str:
     return (".".join(above) or "1") + (f"/{divisor}" if below else "")
 
 
-def _factor(text: str, whole: str) -> tuple[Unit, int]:
+def _parse_factor(text: str, whole: str) -> tuple[Unit, int]:
     """One factor of a unit, "m2", as known unit and power."""
-    match = _FACTOR.fullmatch(text)
+    match = _FACTOR_PATTERN.fullmatch(text)
     if match is None:
         raise ValueError(f'cannot read the unit "{whole}" at "{text}"')
-    unit = KNOWN.get(match.group(1))
+    unit = KNOWN_UNITS.get(match.group(1))
     if unit is None or unit.offset:
         raise ValueError(f'unknown unit "{match.group(1)}" in "{whole}"')
     return unit, int(match.group(2) or 1)

@@ -5,50 +5,52 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from ..core.component import GOOD, Call
+from ..core.component import SUCCESS_STATUSES, PreparedCall
 from ..process import float_mode
 from .plan import Step
 
 #: components or outputs shown in messages about several
-SHOWN = 8
+MAX_NAMES_SHOWN = 8
 
 
-def shown(names: Iterable[str]) -> str:
+def abbreviate_names(names: Iterable[str]) -> str:
     """The names, each once; of many the first ones and how many there are."""
     different = list(dict.fromkeys(names))
-    return ", ".join(different[:SHOWN]) + (f", ... ({len(different)} in all)" if len(different) > SHOWN else "")
+    return ", ".join(different[:MAX_NAMES_SHOWN]) + (
+        f", ... ({len(different)} in all)" if len(different) > MAX_NAMES_SHOWN else ""
+    )
 
 
-class Turn(NamedTuple):
+class ScheduledStep(NamedTuple):
     """One component's turn as calls that return an FMI status; `first` is the number of the first call."""
 
     step: Step
-    calls: Sequence[Call]
-    first: int
+    calls: Sequence[PreparedCall]
+    first_call: int
 
 
-class Ending(NamedTuple):
+class StepFailure(NamedTuple):
     """A turn that stopped: after which of its calls, and its status; None: the floating-point mode was changed."""
 
-    turn: Turn
-    place: int
+    step: ScheduledStep
+    call_index: int
     status: int | None
 
     @property
-    def call(self) -> Call:
-        return self.turn.calls[self.place]
+    def call(self) -> PreparedCall:
+        return self.step.calls[self.call_index]
 
 
-def take(turns: Sequence[Turn], n: int) -> list[Ending]:
+def run_due(turns: Sequence[ScheduledStep], n: int) -> list[StepFailure]:
     """Take the turns that are due in macro step n, one after the other; those that stopped are returned."""
-    return [ending for turn in turns if n % turn.step.divisor == 0 for ending in _take(turn)]
+    return [ending for turn in turns if n % turn.step.divisor == 0 for ending in _run_calls(turn)]
 
 
-def _take(turn: Turn) -> Iterator[Ending]:
+def _run_calls(turn: ScheduledStep) -> Iterator[StepFailure]:
     for place, call in enumerate(turn.calls):
         status = call.function(*call.arguments)
-        if status not in GOOD:
-            yield Ending(turn, place, status)
+        if status not in SUCCESS_STATUSES:
+            yield StepFailure(turn, place, status)
             break
-    if float_mode.changed():
-        yield Ending(turn, -1, None)
+    if float_mode.is_changed():
+        yield StepFailure(turn, -1, None)

@@ -11,10 +11,10 @@ import numpy as np
 
 from ..core import component_log
 from ..core.errors import LateError
-from ..core.time_grid import Grid
+from ..core.time_grid import TimeGrid
 
 #: what happens when a step is ready more than one step too late
-Late = Literal["warn", "fail"]
+LatePolicy = Literal["warn", "fail"]
 
 
 class Pacer:
@@ -25,7 +25,7 @@ class Pacer:
     its deadline a step was ready, 0 when it was in time.
     """
 
-    def __init__(self, grid: Grid, factor: float, late: Late):
+    def __init__(self, grid: TimeGrid, factor: float, late: LatePolicy):
         self._grid, self._factor, self._late = grid, factor, late
         interval = grid.step * 10**9 / Fraction(factor)
         self._numerator, self._denominator = interval.numerator, interval.denominator
@@ -44,16 +44,16 @@ class Pacer:
         if ahead > 0:
             time.sleep(ahead * 1e-9)
         elif -ahead * self._denominator > self._numerator:
-            self._complain(n, -ahead * 1e-9)
+            self._report_lateness(n, -ahead * 1e-9)
 
-    def _complain(self, n: int, late: float) -> None:
+    def _report_lateness(self, n: int, late: float) -> None:
         step = float(self._grid.step) / self._factor
-        text = f"t = {self._grid.seconds(n):.12g} s was reached {late:.3g} s late, more than one step ({step:.3g} s)"
+        text = f"t = {self._grid.time_at(n):.12g} s was reached {late:.3g} s late, more than one step ({step:.3g} s)"
         if self._late == "fail":
             raise LateError(f"too slow for {self._factor:g} times real time: {text}")
         if not self._warned:
             self._warned = True
-            component_log.message(
+            component_log.log_message(
                 "real time", component_log.WARNING, f"{text}; said once, the number of late steps stands at the end"
             )
 

@@ -14,103 +14,105 @@ from queue import SimpleQueue
 from threading import Event, Thread
 from typing import Generic, TypeVar
 
-from ..core.component import DoStep
+from ..core.component import NativeDoStep
 from ..core.system import Parallel
-from .component_step import Turn
+from .component_step import ScheduledStep
 
 #: macro steps in which the steps of components are measured before anything runs on threads
-TRIALS = 3
+MEASURED_STEPS = 3
 #: a component whose step takes as long as this (s) is worth a thread: handing over takes some 50 us
-LONG = 100e-6
+MIN_PARALLEL_DURATION = 100e-6
 
-Work = TypeVar("Work")
-Outcome = TypeVar("Outcome")
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 
 @dataclass(eq=False)
-class SideBySide:
+class ParallelGroup:
     """The turns of one stage that may be taken at the same time, and the lanes in which they are once that was decided."""
 
-    turns: Sequence[Turn]
+    steps: Sequence[ScheduledStep]
     parallel: Parallel
-    lanes: Sequence[Sequence[Turn]] = ()
+    partitions: Sequence[Sequence[ScheduledStep]] = ()
 
-    def groups(self) -> Mapping[object, list[Turn]]:
+    def exclusive_groups(self) -> Mapping[object, list[ScheduledStep]]:
         """Turns that may not be taken at the same time, together."""
-        groups: dict[object, list[Turn]] = defaultdict(list)
-        for turn in self.turns:
-            groups[turn.first if self.parallel is True else turn.step.component.code].append(turn)
+        groups: dict[object, list[ScheduledStep]] = defaultdict(list)
+        for turn in self.steps:
+            groups[turn.first_call if self.parallel is True else turn.step.component.shared_code].append(turn)
         return groups
 
-    def decide(self, seconds: Mapping[int, float], processors: int) -> None:
+    def partition(self, seconds: Mapping[int, float], processors: int) -> None:
         """Choose the lanes from the measured step of each turn, by the turn's first number.
 
         "auto" asks for two lanes of long steps at least, and puts instances of one FMU file into one lane, for their code may
         have state in common; True takes every component as independent and worth a thread.
         """
-        groups = self.groups()
-        costs = {key: sum(seconds[turn.first] for turn in group) for key, group in groups.items()}
-        worthy = [key for key, cost in costs.items() if self.parallel is True or cost >= LONG]
+        groups = self.exclusive_groups()
+        costs = {key: sum(seconds[turn.first_call] for turn in group) for key, group in groups.items()}
+        worthy = [key for key, cost in costs.items() if self.parallel is True or cost >= MIN_PARALLEL_DURATION]
         count = min(max(2, processors) if self.parallel is True else processors, len(worthy))
-        self.lanes = _spread(groups, costs, count) if count > 1 else ()
+        self.partitions = _balance_load(groups, costs, count) if count > 1 else ()
 
 
-def _spread(groups: Mapping[object, Sequence[Turn]], costs: Mapping[object, float], count: int) -> list[list[Turn]]:
+def _balance_load(
+    groups: Mapping[object, Sequence[ScheduledStep]], costs: Mapping[object, float], count: int
+) -> list[list[ScheduledStep]]:
     """The groups in `count` lanes of about equal cost: the longest first, each to the lane that has least to do."""
-    lanes: list[list[Turn]] = [[] for _ in range(count)]
+    lanes: list[list[ScheduledStep]] = [[] for _ in range(count)]
     loads = [0.0] * count
     for key in sorted(groups, key=lambda key: -costs[key]):
         least = loads.index(min(loads))
         lanes[least] += groups[key]
         loads[least] += costs[key]
-    return [sorted(lane, key=lambda turn: turn.first) for lane in lanes if lane]
+    return [sorted(lane, key=lambda turn: turn.first_call) for lane in lanes if lane]
 
 
-def may_overlap(turn: Turn) -> bool:
+def releases_gil(turn: ScheduledStep) -> bool:
     """Whether the turn steps in C, without the interpreter."""
-    return any(isinstance(call.native, DoStep) for call in turn.calls)
+    return any(isinstance(call.native, NativeDoStep) for call in turn.calls)
 
 
-def processors() -> int:
+def available_processors() -> int:
     """Processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @dataclass(eq=False)
-class _Task(Generic[Work, Outcome]):
-    work: Work
-    outcome: Outcome | None = None
+class _Task(Generic[Item, Result]):
+    work: Item
+    result: Result | None = None
     error: BaseException | None = None
     done: Event = field(default_factory=Event)
 
-    def perform(self, function: Callable[[Work], Outcome]) -> None:
+    def run(self, function: Callable[[Item], Result]) -> None:
         try:
-            self.outcome = function(self.work)
+            self.result = function(self.work)
         except BaseException as error:
             self.error = error
         self.done.set()
 
 
-class Crew(Generic[Work, Outcome]):
+class ThreadPool(Generic[Item, Result]):
     """Threads that do pieces of work at the same time as the calling thread."""
 
-    def __init__(self, size: int, function: Callable[[Work], Outcome]):
+    def __init__(self, size: int, function: Callable[[Item], Result]):
         self._function = function
-        self._tasks: SimpleQueue[_Task[Work, Outcome] | None] = SimpleQueue()
-        self._threads = [Thread(target=self._serve, name=f"cosim-{i}", daemon=True) for i in range(size)]
+        self._tasks: SimpleQueue[_Task[Item, Result] | None] = SimpleQueue()
+        self._threads = [Thread(target=self._run_tasks, name=f"cosim-{i}", daemon=True) for i in range(size)]
         for thread in self._threads:
             thread.start()
 
-    def _serve(self) -> None:
+    def _run_tasks(self) -> None:
         while task := self._tasks.get():
-            task.perform(self._function)
+            task.run(self._function)
 
-    def run(self, works: Sequence[Work]) -> list[Outcome]:
+    def map(self, items: Sequence[Item]) -> list[Result]:
         """The outcomes, in order; raises the first error. Returns, and is interrupted, only when nobody works any more."""
-        tasks: list[_Task[Work, Outcome]] = [_Task(work) for work in works]
+        tasks: list[_Task[Item, Result]] = [_Task(work) for work in items]
         for task in tasks[1:]:
             self._tasks.put(task)
-        tasks[0].perform(self._function)
+        tasks[0].run(self._function)
         interrupt = None
         for task in tasks:
             while not task.done.is_set():
@@ -120,7 +122,7 @@ class Crew(Generic[Work, Outcome]):
                     interrupt = error
         if failure := interrupt or next((task.error for task in tasks if task.error), None):
             raise failure
-        return [task.outcome for task in tasks]  # type: ignore[misc]
+        return [task.result for task in tasks]  # type: ignore[misc]
 
     def close(self) -> None:
         """Let the threads end."""

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..core.component import Causality, Component, Variable
-from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System, members
-from ..core.time_grid import Grid
-from .layout import Layout, lay_out
-from .transfer_plan import Gather, Gathering
+from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System, component_names
+from ..core.time_grid import TimeGrid
+from .layout import Layout, build_layout
+from .transfer_plan import Transfer, TransferPlanner
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Step:
 class Phase:
     """Gathers, then steps, then a loop."""
 
-    gathers: tuple[Gather, ...]
+    transfers: tuple[Transfer, ...]
     steps: tuple[Step, ...]
     parallel: Parallel = "auto"
     loop: Loop | None = None
@@ -51,7 +51,7 @@ class Loop:
     @property
     def components(self) -> dict[str, Component]:
         """The components that step in it, by name."""
-        return {step.name: step.component for phase in _opened(self.phases) for step in phase.steps}
+        return {step.name: step.component for phase in _flatten_phases(self.phases) for step in phase.steps}
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,82 +59,82 @@ class Plan:
     """Everything an executor needs."""
 
     system: System
-    grid: Grid
+    grid: TimeGrid
     inputs: Layout
-    signals: Layout
+    outputs: Layout
     phases: Sequence[Phase]
 
     @property
     def all_phases(self) -> Iterator[Phase]:
         """The phases, each followed by those of its loop."""
-        return _opened(self.phases)
+        return _flatten_phases(self.phases)
 
 
-def compile_plan(system: System, grid: Grid, recorded: Iterable[Endpoint] = ()) -> Plan:
+def compile_plan(system: System, grid: TimeGrid, recorded_outputs: Iterable[Endpoint] = ()) -> Plan:
     """Lay out the arrays and order the work. The system must have no problems, its periods must fit the grid."""
-    phases = list(_phases(system))
-    connections = [connection for phase in phases for connection in _read(phase)]
-    inputs, signals = _inputs(system, connections), _signals(system, connections, recorded)
-    gathering = Gathering(system, inputs, signals)
+    phases = list(_split_into_phases(system))
+    connections = [connection for phase in phases for connection in _connections_of(phase)]
+    inputs, signals = _input_layout(system, connections), _output_layout(system, connections, recorded_outputs)
+    gathering = TransferPlanner(system, inputs, signals)
 
-    def phase_of(raw: _RawPhase) -> Phase:
-        steps = tuple(_step(system, grid, name) for name in raw.names)
-        return Phase(tuple(gathering.gathers(raw.connections)), steps, raw.parallel, loop_of(raw.group, raw.inner))
+    def phase_of(raw: _PhaseDraft) -> Phase:
+        steps = tuple(_make_step(system, grid, name) for name in raw.names)
+        return Phase(tuple(gathering.plan_transfers(raw.connections)), steps, raw.parallel, loop_of(raw.group, raw.inner))
 
-    def loop_of(group: Group | None, inner: Sequence[_RawPhase]) -> Loop | None:
+    def loop_of(group: Group | None, inner: Sequence[_PhaseDraft]) -> Loop | None:
         if not group or not group.iteration:
             return None
-        connections = [connection for phase in inner for connection in _read(phase)]
+        connections = [connection for phase in inner for connection in _connections_of(phase)]
         return Loop(group.name, group.iteration, tuple(map(phase_of, inner)), connections)
 
     return Plan(system, grid, inputs, signals, list(map(phase_of, phases)))
 
 
-def _opened(phases: Iterable[Phase]) -> Iterator[Phase]:
+def _flatten_phases(phases: Iterable[Phase]) -> Iterator[Phase]:
     for phase in phases:
         yield phase
         if phase.loop:
-            yield from _opened(phase.loop.phases)
+            yield from _flatten_phases(phase.loop.phases)
 
 
-def _step(system: System, grid: Grid, name: str) -> Step:
+def _make_step(system: System, grid: TimeGrid, name: str) -> Step:
     divisor = int(system.periods.get(name, grid.step) / grid.step)
     return Step(name, system.components[name], divisor, float(grid.step * divisor))
 
 
-class _RawPhase(NamedTuple):
+class _PhaseDraft(NamedTuple):
     """Connections to read, components to step and whether at the same time; then the inner phases of an iterated group."""
 
     connections: list[Connection]
     names: list[str]
     parallel: Parallel = "auto"
     group: Group | None = None
-    inner: Sequence[_RawPhase] = ()
+    inner: Sequence[_PhaseDraft] = ()
 
 
-def _read(phase: _RawPhase) -> Iterator[Connection]:
+def _connections_of(phase: _PhaseDraft) -> Iterator[Connection]:
     yield from phase.connections
     for inner in phase.inner:
-        yield from _read(inner)
+        yield from _connections_of(inner)
 
 
-def _phases(system: System) -> Iterator[_RawPhase]:
+def _split_into_phases(system: System) -> Iterator[_PhaseDraft]:
     """Every phase, in order."""
     incoming: dict[str, list[Connection]] = defaultdict(list)
     for connection in system.connections:
         incoming[connection.target.component].append(connection)
-    yield from _run(system.stages, system.parallel, frozenset(system.components), incoming)
+    yield from _phases_of_stages(system.stages, system.parallel, frozenset(system.components), incoming)
 
 
-def _run(
+def _phases_of_stages(
     stages: Sequence[Stage], parallel: Parallel, inside: frozenset[str], incoming: Mapping[str, Sequence[Connection]]
-) -> Iterator[_RawPhase]:
+) -> Iterator[_PhaseDraft]:
     """Phases of stages whose members read from `inside` now; everything else was read before."""
     for stage in stages:
         groups = [member for member in stage if isinstance(member, Group)]
-        own_group = {name: frozenset(members(group.stages)) for group in groups for name in members(group.stages)}
-        readers = [connection for name in members([stage]) for connection in incoming.get(name, ())]
-        yield _RawPhase(
+        own_group = {name: frozenset(component_names(group.stages)) for group in groups for name in component_names(group.stages)}
+        readers = [connection for name in component_names([stage]) for connection in incoming.get(name, ())]
+        yield _PhaseDraft(
             [
                 c
                 for c in readers
@@ -144,38 +144,38 @@ def _run(
             parallel,
         )
         for group in groups:
-            inner = _run(group.stages, group.parallel, frozenset(members(group.stages)), incoming)
+            inner = _phases_of_stages(group.stages, group.parallel, frozenset(component_names(group.stages)), incoming)
             if group.iteration:
-                yield _RawPhase([], [], group=group, inner=list(inner))
+                yield _PhaseDraft([], [], group=group, inner=list(inner))
             else:
                 yield from inner
 
 
-def _inputs(system: System, connections: Iterable[Connection]) -> Layout:
+def _input_layout(system: System, connections: Iterable[Connection]) -> Layout:
     """Inputs in the order in which they are gathered, so that what is gathered together lies together."""
-    return _lay_out(system, (connection.target for connection in connections), "input")
+    return _layout_of_endpoints(system, (connection.target for connection in connections), "input")
 
 
-def _signals(system: System, connections: Iterable[Connection], recorded: Iterable[Endpoint]) -> Layout:
+def _output_layout(system: System, connections: Iterable[Connection], recorded: Iterable[Endpoint]) -> Layout:
     """Every output that something reads, in the order in which they are read first."""
-    return _lay_out(system, (*(connection.source for connection in connections), *recorded), "output")
+    return _layout_of_endpoints(system, (*(connection.source for connection in connections), *recorded), "output")
 
 
-def _lay_out(system: System, endpoints: Iterable[Endpoint], causality: Causality) -> Layout:
-    wanted: dict[str, dict[str, Variable]] = {name: {} for name in members(system.stages)}
+def _layout_of_endpoints(system: System, endpoints: Iterable[Endpoint], causality: Causality) -> Layout:
+    wanted: dict[str, dict[str, Variable]] = {name: {} for name in component_names(system.stages)}
     for endpoint in endpoints:
-        variable = system.place(endpoint).variable
+        variable = system.find_element(endpoint).variable
         wanted[endpoint.component][variable.name] = variable
-    return lay_out({name: _chosen(system.components[name], found, causality) for name, found in wanted.items()})
+    return build_layout({name: _variables_to_bind(system.components[name], found, causality) for name, found in wanted.items()})
 
 
-def _chosen(component: Component, wanted: Mapping[str, Variable], causality: Causality) -> Sequence[Variable]:
+def _variables_to_bind(component: Component, wanted: Mapping[str, Variable], causality: Causality) -> Sequence[Variable]:
     if not component.binds_everything:
-        return _by_type(list(wanted.values()))
+        return _group_by_type(list(wanted.values()))
     return [variable for variable in component.variables if variable.causality == causality or variable.name in wanted]
 
 
-def _by_type(variables: Sequence[Variable]) -> list[Variable]:
+def _group_by_type(variables: Sequence[Variable]) -> list[Variable]:
     """Those of one type next to each other, so that one call sets or gets them all; enumerations go with integers."""
     types = [f"Int{8 * v.dtype.itemsize}" if v.type == "Enumeration" else v.type for v in variables]
     return [variable for kind in dict.fromkeys(types) for variable, type_ in zip(variables, types, strict=True) if type_ == kind]

@@ -17,26 +17,26 @@ import numpy as np
 
 from ..core import component_log
 from ..core.component import Component, Variable
-from ..core.errors import ComponentError, InputError, Problem, one_of
+from ..core.errors import ComponentError, InputError, Problem, join_alternatives
 from ..core.recording import Recording
 from ..core.stopwatch import Stopwatch
 from ..core.system import Endpoint, System
-from ..core.time_grid import Grid
-from ..process.containment import contained
-from ..process.float_mode import usual
-from ..process.journal import Phase, calling, current, waiting
-from . import MARKER_SIZE, Executor, Kind, Recorder, Termination, compile_plan, executor_kind
-from .pacer import Late, Pacer
+from ..core.time_grid import TimeGrid
+from ..process.containment import restoring_process_state
+from ..process.float_mode import default_float_mode
+from ..process.journal import Phase, calling_component, current_journal, suspending_deadline
+from . import MARKER_SIZE, Executor, ExecutorKind, Recorder, Termination, compile_plan, executor_class
+from .pacer import LatePolicy, Pacer
 from .saving_recorder import SavingRecorder, write_header
 
 #: bytes that a recorded number takes in rows and in CSV, about; what takes less than so many is not looked at
-_VALUE_SIZE, _LARGE = 8 + 20, 1_000_000_000
+_BYTES_PER_VALUE, _SIZE_CHECK_THRESHOLD = 8 + 20, 1_000_000_000
 
 #: called with (finished macro steps, all macro steps); observers only look
 Observer = Callable[[int, int], None]
 
 #: called with n before the step that starts at communication point n; it may take its time, and set variables as events do
-Control = Callable[[int], None]
+StepHook = Callable[[int], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,16 +67,16 @@ class Settings:
     columns: Mapping[str, Endpoint] = field(default_factory=dict)
     record_interval: Fraction | None = None
     events: Sequence[Event] = ()
-    executor: Kind = "auto"
-    finite: bool = True
+    executor: ExecutorKind = "auto"
+    require_finite: bool = True
     real_time: float | None = None
-    late: Late = "warn"
-    control: Control | None = None
+    late: LatePolicy = "warn"
+    step_hook: StepHook | None = None
     rows_file: Path | None = None
 
 
 @dataclass(frozen=True)
-class Run:
+class SimulationOutcome:
     """What came of it. `failure` is the error that ended the run early; the rows until then are in the recording.
 
     `timing`: wall time (s) of checking the system and laying out the plan ("wiring_seconds"), extracting and instantiating
@@ -97,7 +97,7 @@ class Run:
         return self.timing.get("loop_seconds", 0.0)
 
 
-def simulate(system: System, settings: Settings, observers: Sequence[Observer] = ()) -> Run:
+def simulate(system: System, settings: Settings, observers: Sequence[Observer] = ()) -> SimulationOutcome:
     """Simulate a system whose components have just been made; they are freed in every case.
 
     Raises InputError when the system or the settings cannot be simulated. Failures while running are kept in the returned
@@ -105,7 +105,7 @@ def simulate(system: System, settings: Settings, observers: Sequence[Observer] =
     """
     run = None
     try:
-        with simulation(system, settings, observers) as run:
+        with simulating(system, settings, observers) as run:
             pass
     except ComponentError as error:  # while terminating
         if run is None:
@@ -115,47 +115,47 @@ def simulate(system: System, settings: Settings, observers: Sequence[Observer] =
 
 
 @contextmanager
-def simulation(system: System, settings: Settings, observers: Sequence[Observer] = ()) -> Iterator[Run]:
+def simulating(system: System, settings: Settings, observers: Sequence[Observer] = ()) -> Iterator[SimulationOutcome]:
     """As `simulate`, but the components are terminated and freed when the block is left: whatever they do then, the run is safe.
 
     Raises ComponentError at the end when a component fails to terminate.
     """
-    with usual(), ExitStack() as stack:
+    with default_float_mode(), ExitStack() as stack:
         for name, component in system.components.items():
-            stack.callback(_free, name, component)
+            stack.callback(_free_component, name, component)
         watch = Stopwatch()
         with watch.measure("wiring_seconds"):
-            if found := problems(system, settings):
+            if found := find_problems(system, settings):
                 raise InputError(found)
-            executor = _executor(system, settings)
-        run = _run(executor, settings, observers, watch)
+            executor = _create_executor(system, settings)
+        run = _run_executor(executor, settings, observers, watch)
         yield run
         if run.failure is None:
             for name, component in system.components.items():
-                with calling(name, "terminate", "end"):
+                with calling_component(name, "terminate", "end"):
                     component.terminate()
 
 
-def _free(name: str, component: Component) -> None:
-    with calling(name, "free", "end"):
+def _free_component(name: str, component: Component) -> None:
+    with calling_component(name, "free", "end"):
         component.free()
 
 
-def _executor(system: System, settings: Settings) -> Executor:
-    grid = Grid.of(settings.start_time, settings.stop_time, settings.step_size)
+def _create_executor(system: System, settings: Settings) -> Executor:
+    grid = TimeGrid.from_times(settings.start_time, settings.stop_time, settings.step_size)
     plan = compile_plan(system, grid, settings.columns.values())
-    journal = current()
+    journal = current_journal()
     every = int((settings.record_interval or grid.step) / grid.step)
     if journal and journal.folder and not settings.rows_file:
         recorder: Recorder = SavingRecorder(plan, settings.columns, every, journal.folder)
     else:
         recorder = Recorder(plan, settings.columns, every, settings.rows_file)
     marker = None if journal is None else np.frombuffer(journal.memory, np.int64, MARKER_SIZE)
-    return executor_kind(settings.executor)(plan, recorder, marker, settings.finite)
+    return executor_class(settings.executor)(plan, recorder, marker, settings.require_finite)
 
 
-def _run(executor: Executor, settings: Settings, observers: Sequence[Observer], watch: Stopwatch) -> Run:
-    journal, grid, recorder = current(), executor.plan.grid, executor.recorder
+def _run_executor(executor: Executor, settings: Settings, observers: Sequence[Observer], watch: Stopwatch) -> SimulationOutcome:
+    journal, grid, recorder = current_journal(), executor.plan.grid, executor.recorder
     events: dict[int, list[Event]] = defaultdict(list)
     for event in settings.events:
         events[grid.index(event.time)].append(event)
@@ -169,26 +169,28 @@ def _run(executor: Executor, settings: Settings, observers: Sequence[Observer], 
         if journal and journal.folder:
             write_header(journal.folder, executor)
         if journal:
-            journal.enter(Phase.STEPPING, journal.deadlines.step)
-        with contained(one_of(executor.plan.system.components)), watch.measure("loop_seconds"):
-            _loop(executor, events, observers, pacer, settings.control)
+            journal.enter_phase(Phase.STEPPING, journal.deadlines.step)
+        with restoring_process_state(join_alternatives(executor.plan.system.components)), watch.measure("loop_seconds"):
+            _step_to_end(executor, events, observers, pacer, settings.step_hook)
     except (Exception, KeyboardInterrupt) as error:
         failure = error
     finally:
         executor.close()
     if journal:
-        journal.enter(Phase.QUIET)
-    component_log.tell_what_was_cut()
+        journal.enter_phase(Phase.IDLE)
+    component_log.report_dropped_messages()
     kept_up = pacer.statistics() if pacer else None
-    return Run(recorder.recording(), watch.seconds, executor.finished, executor.termination, failure, kept_up)
+    return SimulationOutcome(
+        recorder.recording(), watch.seconds, executor.completed_steps, executor.termination, failure, kept_up
+    )
 
 
-def _loop(
+def _step_to_end(
     executor: Executor,
     events: Mapping[int, Sequence[Event]],
     observers: Sequence[Observer],
     pacer: Pacer | None,
-    control: Control | None,
+    control: StepHook | None,
 ) -> None:
     """From event to event and from look to look of the observers."""
     if pacer:
@@ -196,55 +198,55 @@ def _loop(
     components, count = executor.plan.system.components, executor.plan.grid.count
     looks = set(range(0, count, max(1, count // 100))) if observers else set()
     for stop in sorted({*(n for n in events if n < count), *looks, count}):
-        _advance(executor, stop, pacer, control)
+        _advance_to(executor, stop, pacer, control)
         for observe in observers:
-            observe(executor.finished, count)
+            observe(executor.completed_steps, count)
         if executor.termination:
             return
         for event in events.get(stop, ()):
-            _act(event, components)
+            _apply_event(event, components)
 
 
-def _advance(executor: Executor, stop: int, pacer: Pacer | None, control: Control | None) -> None:
+def _advance_to(executor: Executor, stop: int, pacer: Pacer | None, control: StepHook | None) -> None:
     """To communication point `stop`, or until a component asks to terminate."""
     if pacer is None and control is None:
         executor.run(stop)
         return
-    for n in range(executor.finished + 1, stop + 1):
+    for n in range(executor.completed_steps + 1, stop + 1):
         if control:
             control(n - 1)
         executor.run(n)
         if executor.termination:
             return
         if pacer:
-            with waiting():
+            with suspending_deadline():
                 pacer.wait(n)
 
 
-def _act(event: Event, components: Mapping[str, Component]) -> None:
+def _apply_event(event: Event, components: Mapping[str, Component]) -> None:
     for name, values in event.values.items():
         for variable, value in values.items():
             components[name].set(variable, value)
 
 
-def problems(system: System, settings: Settings) -> list[Problem]:
+def find_problems(system: System, settings: Settings) -> list[Problem]:
     """Everything that keeps a system from being simulated with these settings; empty when it can run."""
-    found = [*system.problems(), *_event_problems(system, settings.events)]
+    found = [*system.problems(), *_find_event_problems(system, settings.events)]
     if settings.real_time is not None and not 0 < settings.real_time < inf:
         found.append(Problem(f"expected a positive factor for real time, found {settings.real_time!r}"))
     try:
-        grid = Grid.of(settings.start_time, settings.stop_time, settings.step_size)
+        grid = TimeGrid.from_times(settings.start_time, settings.stop_time, settings.step_size)
     except ValueError as error:
         found.append(Problem(str(error), subject=("stop_time",)))
         if settings.step_size <= 0:
             return found
-        grid = Grid.of(settings.start_time, settings.start_time, settings.step_size)
-    found += _period_problems(system, grid)
+        grid = TimeGrid.from_times(settings.start_time, settings.start_time, settings.step_size)
+    found += _find_period_problems(system, grid)
     interval = settings.record_interval or grid.step
     if interval < grid.step or (interval / grid.step).denominator != 1:
         text = f"recording interval {float(interval)!r} s is no multiple of the step size {float(grid.step)!r} s"
         found.append(Problem(text, subject=("record", "interval")))
-    elif text := _too_large(settings, grid, int(interval / grid.step)):
+    elif text := _find_disk_space_problem(settings, grid, int(interval / grid.step)):
         found.append(Problem(text, subject=("step_size",)))
     for event in settings.events:
         try:
@@ -254,13 +256,13 @@ def problems(system: System, settings: Settings) -> list[Problem]:
     return found
 
 
-def _too_large(settings: Settings, grid: Grid, every: int) -> str:
+def _find_disk_space_problem(settings: Settings, grid: TimeGrid, every: int) -> str:
     """Why there is no room for what is to be recorded; "" when there is."""
     rows = grid.count // every + 1
-    size = rows * (len(settings.columns) + 1) * _VALUE_SIZE
-    if size < _LARGE:
+    size = rows * (len(settings.columns) + 1) * _BYTES_PER_VALUE
+    if size < _SIZE_CHECK_THRESHOLD:
         return ""
-    journal = current()
+    journal = current_journal()
     folder = (journal and journal.folder) or Path(tempfile.gettempdir())
     free = shutil.disk_usage(folder).free
     table = f"{rows} rows of {len(settings.columns)} signals take about {size / 1e9:.3g} GB"
@@ -268,7 +270,7 @@ def _too_large(settings: Settings, grid: Grid, every: int) -> str:
     return f'{text}; make the step longer, or set "record": {{"interval": ...}}' if size > free else ""
 
 
-def _period_problems(system: System, grid: Grid) -> Iterator[Problem]:
+def _find_period_problems(system: System, grid: TimeGrid) -> Iterator[Problem]:
     step, duration = float(grid.step), float(grid.step * grid.count)
     for name, period in system.periods.items():
         subject = ("components", name, "period")
@@ -279,30 +281,30 @@ def _period_problems(system: System, grid: Grid) -> Iterator[Problem]:
             yield Problem(f"the duration {duration!r} s is no multiple of the period {float(period)!r} s", subject=subject)
 
 
-def adjustable(system: System) -> Iterator[tuple[str, Variable]]:
+def settable_variables(system: System) -> Iterator[tuple[str, Variable]]:
     """Components and their variables that can be set while a run goes on."""
     fed = {connection.target for connection in system.connections}
     for name, component in system.components.items():
         for variable in component.variables:
-            if not _obstacle(name, variable, fed):
+            if not _not_settable_reason(name, variable, fed):
                 yield name, variable
 
 
-def _obstacle(name: str, variable: Variable, fed: Set[Endpoint]) -> str:
+def _not_settable_reason(name: str, variable: Variable, fed: Set[Endpoint]) -> str:
     """Why an event cannot set a variable; it can set tunable parameters and inputs that nothing feeds."""
-    if variable.causality == "input" and any(Endpoint(name, slot) in fed for slot in variable.slots):
+    if variable.causality == "input" and any(Endpoint(name, slot) in fed for slot in variable.scalar_names):
         return f"{name}.{variable.name} is fed by a connection, an event cannot set it"
     if variable.causality != "input" and (variable.causality, variable.variability) != ("parameter", "tunable"):
         return f"{name}.{variable.name} is neither a tunable parameter nor an input, an event cannot set it"
     return ""
 
 
-def _event_problems(system: System, events: Iterable[Event]) -> list[Problem]:
+def _find_event_problems(system: System, events: Iterable[Event]) -> list[Problem]:
     fed = {connection.target for connection in system.connections}
     found = []
     for event in events:
         for name, values in event.values.items():
             variables = {variable.name: variable for variable in system.components[name].variables}
-            texts = (_obstacle(name, variables[variable_name], fed) for variable_name in values)
+            texts = (_not_settable_reason(name, variables[variable_name], fed) for variable_name in values)
             found += [Problem(text, event.where) for text in texts if text]
     return found

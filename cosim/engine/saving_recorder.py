@@ -23,29 +23,29 @@ class SavingRecorder(Recorder):
 
     def __init__(self, plan: Plan, columns: Mapping[str, Endpoint], every: int, folder: Path):
         super().__init__(plan, columns, every, folder / ROWS_FILE)
-        slots = {name: plan.signals.places[endpoint] for name, endpoint in columns.items()}
-        self._cells = [(name, plan.signals.arrays[s.dtype], s.offset) for name, s in slots.items() if s.dtype.hasobject]
-        self._saved: dict[str, Any] = dict.fromkeys((name for name, _, _ in self._cells), "")
+        slots = {name: plan.outputs.positions[endpoint] for name, endpoint in columns.items()}
+        self._text_signals = [(name, plan.outputs.arrays[s.dtype], s.offset) for name, s in slots.items() if s.dtype.hasobject]
+        self._saved_texts: dict[str, Any] = dict.fromkeys((name for name, _, _ in self._text_signals), "")
         self._file = (folder / TEXTS_FILE).open("wb", buffering=0)
-        if self._cells:
-            self._text_keepers.append(self._save)
+        if self._text_signals:
+            self._string_writers.append(self._save_changed_texts)
 
-    def _save(self, row: int) -> None:
+    def _save_changed_texts(self, row: int) -> None:
         """In one write without a buffer, which nothing that kills this process can take back."""
-        texts = {name: array[place] for name, array, place in self._cells}
-        if changed := {name: text for name, text in texts.items() if text != self._saved[name]}:
-            self._saved |= changed
-            os.write(self._file.fileno(), json.dumps([row, changed], default=_hex).encode() + b"\n")
+        texts = {name: array[place] for name, array, place in self._text_signals}
+        if changed := {name: text for name, text in texts.items() if text != self._saved_texts[name]}:
+            self._saved_texts |= changed
+            os.write(self._file.fileno(), json.dumps([row, changed], default=_encode_bytes).encode() + b"\n")
 
 
-def _hex(value: bytes) -> dict[str, str]:
+def _encode_bytes(value: bytes) -> dict[str, str]:
     return {"bytes": value.hex()}
 
 
 def write_header(folder: Path, executor: Executor) -> None:
     """Describe the run that is about to step."""
     recorder, grid = executor.recorder, executor.plan.grid
-    dtype = recorder.store.dtype
+    dtype = recorder.row_store.dtype
     columns = [
         {
             "name": name,
@@ -57,11 +57,11 @@ def write_header(folder: Path, executor: Executor) -> None:
         for name in dtype.names or ()
     ]
     header = {
-        **grid.integers,
+        **grid.integer_coefficients,
         "every": recorder.every,
         "row_size": dtype.itemsize,
         "columns": columns,
-        "calls": executor.calls,
+        "calls": executor.call_names,
         "texts": [(i, name) for i, name in enumerate(recorder.variables) if name not in (dtype.names or ())],
     }
     (folder / HEADER_FILE).write_text(json.dumps(header), encoding="utf-8")

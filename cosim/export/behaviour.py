@@ -18,9 +18,9 @@ import numpy as np
 from ..core.component import Component, Ports, Variable
 from ..core.errors import ComponentError
 
-STEPS, STEP_SIZE, STEPS_PER_INPUT = 300, 0.01, 15
+STEP_COUNT, STEP_SIZE, STEPS_PER_INPUT = 300, 0.01, 15
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-9, 1e-12
-_NUMBERS = ("Float64", "Int32", "Boolean", "Enumeration")
+_NUMERIC_TYPES = ("Float64", "Int32", "Boolean", "Enumeration")
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Trace:
     failure: str = ""
 
 
-def compare(first: Sequence[Path], second: Sequence[Path], seed: int = 1) -> dict[Path, str]:
+def compare_fmus(first: Sequence[Path], second: Sequence[Path], seed: int = 1) -> dict[Path, str]:
     """How FMUs of `second` differ from their counterparts in `first`; those that behave alike are left out.
 
     Each side runs in one process of its own, so that an FMU that crashes is named instead of taking this process along.
@@ -42,28 +42,28 @@ def compare(first: Sequence[Path], second: Sequence[Path], seed: int = 1) -> dic
         return {}
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(1, context) as one, ProcessPoolExecutor(1, context) as other:
-        left = [one.submit(traces, path, seed) for path in first]
-        right = [other.submit(traces, path, seed) for path in second]
-        outcomes = {path: _difference(a, b) for path, a, b in zip(second, left, right, strict=True)}
+        left = [one.submit(record_traces, path, seed) for path in first]
+        right = [other.submit(record_traces, path, seed) for path in second]
+        outcomes = {path: _difference_of_results(a, b) for path, a, b in zip(second, left, right, strict=True)}
     return {path: difference for path, difference in outcomes.items() if difference}
 
 
-def _difference(first: Future[list[Trace]], second: Future[list[Trace]]) -> str:
+def _difference_of_results(first: Future[list[Trace]], second: Future[list[Trace]]) -> str:
     try:
         pairs = zip(first.result(), second.result(), strict=True)
     except BrokenProcessPool:
         return "the process that ran it, or one before it, died"
     except Exception as error:
         return f"cannot be run: {error}"
-    return next((text for a, b in pairs if (text := difference(a, b))), "")
+    return next((text for a, b in pairs if (text := first_difference(a, b))), "")
 
 
-def difference(first: Trace, second: Trace) -> str:
+def first_difference(first: Trace, second: Trace) -> str:
     """The first thing in which two traces differ; empty when they agree within the tolerances."""
     ours, theirs = ({variable.name: variable for variable in trace.variables} for trace in (first, second))
     for name in sorted(ours.keys() | theirs.keys()):
         if ours.get(name) != theirs.get(name):
-            return f'variable "{name}" {_declarations(ours.get(name), theirs.get(name))}'
+            return f'variable "{name}" {_declaration_difference(ours.get(name), theirs.get(name))}'
     if first.failure != second.failure:
         return f'outcome differs: "{first.failure or "no failure"}" and "{second.failure or "no failure"}"'
     for name, a, b in zip(first.outputs, first.values.T, second.values.T, strict=True):
@@ -75,91 +75,91 @@ def difference(first: Trace, second: Trace) -> str:
     return ""
 
 
-def _declarations(ours: Variable | None, theirs: Variable | None) -> str:
+def _declaration_difference(ours: Variable | None, theirs: Variable | None) -> str:
     if ours is None or theirs is None:
         return f"exists only in the {'rebuilt' if ours is None else 'present'} FMU"
     changed = [key for key in Variable.__slots__ if getattr(ours, key) != getattr(theirs, key)]
     return "; ".join(f"has {key} {getattr(ours, key)!r} and {getattr(theirs, key)!r}" for key in changed)
 
 
-def traces(path: Path, seed: int) -> list[Trace]:
+def record_traces(path: Path, seed: int) -> list[Trace]:
     """Two runs of an FMU: with its own parameters, and with random ones. The name of the file goes into the seed."""
-    return [_trace(path, np.random.default_rng([seed, crc32(path.name.encode())]), vary) for vary in (False, True)]
+    return [_record_trace(path, np.random.default_rng([seed, crc32(path.name.encode())]), vary) for vary in (False, True)]
 
 
-def _trace(path: Path, random: np.random.Generator, vary_parameters: bool) -> Trace:
-    from ..components.fmi import FmuFile, instantiate
+def _record_trace(path: Path, random: np.random.Generator, vary_parameters: bool) -> Trace:
+    from ..components.fmi import FmuFile, create_component
 
-    component = instantiate(FmuFile(path), path.stem)
-    variables = [variable for variable in component.variables if variable.type in _NUMBERS]
-    inputs = _ports([variable for variable in variables if variable.causality == "input"])
-    outputs = _ports([variable for variable in variables if variable.causality == "output"])
+    component = create_component(FmuFile(path), path.stem)
+    variables = [variable for variable in component.variables if variable.type in _NUMERIC_TYPES]
+    inputs = _allocate_ports([variable for variable in variables if variable.causality == "input"])
+    outputs = _allocate_ports([variable for variable in variables if variable.causality == "output"])
     rows: list[np.ndarray] = []
     failure = ""
     try:
         component.bind(inputs, outputs)
         if vary_parameters:
-            _set_parameters(component, random, ("fixed", "tunable"))
-        for _ in _run(component, inputs, random):
+            _set_random_parameters(component, random, ("fixed", "tunable"))
+        for _ in _simulate(component, inputs, random):
             component.get_outputs()
-            rows.append(_flat(outputs))
-            if vary_parameters and len(rows) == STEPS // 2:
-                _set_parameters(component, random, ("tunable",))
+            rows.append(_concatenate(outputs))
+            if vary_parameters and len(rows) == STEP_COUNT // 2:
+                _set_random_parameters(component, random, ("tunable",))
     except ComponentError as error:
         failure = str(error)
     finally:
         component.free()
-    names = [slot for variable in _ordered(outputs) for slot in variable.slots]
+    names = [slot for variable in _variables_in_memory_order(outputs) for slot in variable.scalar_names]
     return Trace(component.variables, names, np.array(rows).reshape(len(rows), len(names)), failure)
 
 
-def _run(component: Component, inputs: Ports, random: np.random.Generator) -> Iterator[None]:
+def _simulate(component: Component, inputs: Ports, random: np.random.Generator) -> Iterator[None]:
     """Walk through the life cycle; yields wherever outputs can be read."""
-    component.enter_initialization_mode(0.0, STEPS * STEP_SIZE)
-    _draw_inputs(inputs, random)
+    component.enter_initialization_mode(0.0, STEP_COUNT * STEP_SIZE)
+    _set_random_inputs(inputs, random)
     component.set_inputs()
     component.exit_initialization_mode()
     yield
-    for step in range(STEPS):
+    for step in range(STEP_COUNT):
         if step % STEPS_PER_INPUT == 0:
-            _draw_inputs(inputs, random)
+            _set_random_inputs(inputs, random)
         component.set_inputs()
         component.do_step(step * STEP_SIZE, STEP_SIZE)
         yield
     component.terminate()
 
 
-def _ports(variables: Sequence[Variable]) -> Ports:
+def _allocate_ports(variables: Sequence[Variable]) -> Ports:
     sizes: dict[np.dtype, int] = {}
     for variable in variables:
-        sizes[variable.dtype] = sizes.get(variable.dtype, 0) + len(variable.slots)
+        sizes[variable.dtype] = sizes.get(variable.dtype, 0) + len(variable.scalar_names)
     return Ports(variables, {dtype: np.zeros(size, dtype) for dtype, size in sizes.items()})
 
 
-def _ordered(ports: Ports) -> list[Variable]:
+def _variables_in_memory_order(ports: Ports) -> list[Variable]:
     """The variables in the order in which their values lie in the arrays, one array after the other."""
     return [variable for dtype in ports.arrays for variable in ports.variables if variable.dtype == dtype]
 
 
-def _flat(ports: Ports) -> np.ndarray:
+def _concatenate(ports: Ports) -> np.ndarray:
     return np.concatenate([np.empty(0), *(array.astype(float) for array in ports.arrays.values())])
 
 
-def _draw_inputs(inputs: Ports, random: np.random.Generator) -> None:
+def _set_random_inputs(inputs: Ports, random: np.random.Generator) -> None:
     for dtype, array in inputs.arrays.items():
-        array[:] = np.concatenate([_draw(variable, random) for variable in inputs.variables if variable.dtype == dtype])
+        array[:] = np.concatenate([_random_values(variable, random) for variable in inputs.variables if variable.dtype == dtype])
 
 
-def _set_parameters(component: Component, random: np.random.Generator, variabilities: Sequence[str]) -> None:
+def _set_random_parameters(component: Component, random: np.random.Generator, variabilities: Sequence[str]) -> None:
     for variable in component.variables:
-        if variable.causality == "parameter" and variable.variability in variabilities and variable.type in _NUMBERS:
-            values = _draw(variable, random).tolist()
+        if variable.causality == "parameter" and variable.variability in variabilities and variable.type in _NUMERIC_TYPES:
+            values = _random_values(variable, random).tolist()
             component.set(variable.name, values if variable.shape else values[0])
 
 
-def _draw(variable: Variable, random: np.random.Generator) -> np.ndarray:
+def _random_values(variable: Variable, random: np.random.Generator) -> np.ndarray:
     """Random values: inputs all over their declared limits, else, like parameters, about the start value."""
-    size = len(variable.slots)
+    size = len(variable.scalar_names)
     start = np.resize(np.array(variable.start if variable.start is not None else 0, float), size)
     low, high = (np.nan if limit is None else limit for limit in (variable.minimum, variable.maximum))
     bounded = np.isfinite(high - low)

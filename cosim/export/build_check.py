@@ -8,18 +8,18 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..core.errors import CosimError, Problem
-from .behaviour import compare
+from .behaviour import compare_fmus
 from .build import file_hash, fmu_files, read_manifest
-from .sources import Source, export, find_sources
+from .sources import Source, export_source, find_sources
 
 
-def check(root: Path) -> list[Problem]:
+def check_fmus(root: Path) -> list[Problem]:
     """Whether `fmus/` is what its sources say: hashes agree with the manifest, and rebuilt FMUs behave as the present ones."""
     manifest, sources = read_manifest(root), find_sources(root)
     problems = _orphans(root, manifest, sources)
     sound = []
     for source in sources:
-        found = _stale(root, manifest, source)
+        found = _manifest_mismatches(root, manifest, source)
         problems += found
         if not found:
             sound.append(source)
@@ -33,15 +33,15 @@ def _orphans(root: Path, manifest: Mapping[str, Any], sources: Sequence[Source])
     return [Problem("belongs to no source", path.relative_to(root).as_posix()) for path in sorted((present | listed) - expected)]
 
 
-def _stale(root: Path, manifest: Mapping[str, Any], source: Source) -> list[Problem]:
+def _manifest_mismatches(root: Path, manifest: Mapping[str, Any], source: Source) -> list[Problem]:
     """What the manifest says about a source and is no longer true."""
-    entry = manifest.get(source.key)
+    entry = manifest.get(source.manifest_key)
     if entry is None:
         return [Problem("has no FMU; run `cosim build`", source.path.relative_to(root).as_posix())]
     problems = []
     for name, recorded in entry["sources"].items():
         if not (root / name).is_file() or file_hash(root / name) != recorded:
-            problems.append(Problem(f'changed since "{source.key}" was built; run `cosim build`', name))
+            problems.append(Problem(f'changed since "{source.manifest_key}" was built; run `cosim build`', name))
     for path in fmu_files(source, root).values():
         name = path.relative_to(root).as_posix()
         if not path.is_file():
@@ -59,12 +59,12 @@ def _changed_behaviour(root: Path, sources: Sequence[Source]) -> list[Problem]:
         for source in sources:
             again = fmu_files(source, Path(temporary))
             try:
-                export(source, again)
+                export_source(source, again)
             except CosimError as error:
                 problems.append(Problem(f"cannot be built any more: {error}", source.path.relative_to(root).as_posix()))
                 continue
             present += fmu_files(source, root).values()
             rebuilt += again.values()
-        for path, difference in compare(present, rebuilt).items():
+        for path, difference in compare_fmus(present, rebuilt).items():
             problems.append(Problem(f"differs from a rebuild: {difference}", path.relative_to(temporary).as_posix()))
     return problems

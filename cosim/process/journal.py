@@ -16,19 +16,26 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..core.errors import PASSING, ComponentError, CosimError, told
+from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, describe_exception
 
 #: bytes of a journal; its fields: int64 until 64, the time as double, then two texts
-SIZE = 5 * 4096
-CALL, STEPS, ROWS, PHASE, CHANGES, DEADLINE, CODE, SHOWING = range(8)
-_TIME, _COMPONENT, _FUNCTION, _FOLDER, _LIVE, _TEXT = 64, 4096, 8192, 12288, 16384, 4092
+JOURNAL_SIZE = 5 * 4096
+CALL_NUMBER, STEP_COUNT, ROW_COUNT, PHASE, CHANGE_COUNT, DEADLINE, EXIT_CODE, CSV_UPDATE = range(8)
+_TIME_OFFSET, _COMPONENT_OFFSET, _FUNCTION_OFFSET, _FOLDER_OFFSET, _CSV_PATH_OFFSET, _MAX_TEXT_SIZE = (
+    64,
+    4096,
+    8192,
+    12288,
+    16384,
+    4092,
+)
 
 
 class Phase(IntEnum):
     """What kind of thing is going on: nothing foreign, a call, the stepping loop, a call with all results written, the end,
     or that a call or the stepping loop waits for something that is no component."""
 
-    QUIET, CALLING, STEPPING, LEAVING, DONE, WAITING = range(6)
+    IDLE, CALLING, STEPPING, RESULTS_WRITTEN, DONE, WAITING = range(6)
 
     @property
     def in_loop(self) -> bool:
@@ -38,7 +45,7 @@ class Phase(IntEnum):
 
 _PHASES = frozenset(Phase)
 #: no deadline is longer (ms)
-_LONGEST = 10**15
+_MAX_DEADLINE = 10**15
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +76,9 @@ class Journal:
 
     def __init__(self, memory: Any):
         self.memory = memory
-        self._integers = memoryview(memory)[:_TIME].cast("q")
+        self._integers = memoryview(memory)[:_TIME_OFFSET].cast("q")
         self.deadlines = Deadlines()
-        self.enter(Phase.QUIET)
+        self.enter_phase(Phase.IDLE)
 
     def __getitem__(self, field: int) -> int:
         return self._integers[field]
@@ -80,12 +87,12 @@ class Journal:
         self._integers[field] = value
 
     @property
-    def sound(self) -> bool:
+    def is_valid(self) -> bool:
         """Whether this can be what cosim wrote: foreign code in the process can write anywhere."""
-        deadline, counts = self[DEADLINE], (self[STEPS], self[ROWS], self[CHANGES])
-        return self[PHASE] in _PHASES and self[SHOWING] in (0, 1) and -1 <= deadline <= _LONGEST and min(counts) >= 0
+        deadline, counts = self[DEADLINE], (self[STEP_COUNT], self[ROW_COUNT], self[CHANGE_COUNT])
+        return self[PHASE] in _PHASES and self[CSV_UPDATE] in (0, 1) and -1 <= deadline <= _MAX_DEADLINE and min(counts) >= 0
 
-    def contents(self) -> bytes:
+    def to_bytes(self) -> bytes:
         """All that stands here."""
         return bytes(self.memory[:])
 
@@ -97,33 +104,33 @@ class Journal:
     def phase(self) -> Phase:
         return Phase(self[PHASE])
 
-    def enter(self, phase: Phase, deadline: float = math.inf) -> None:
+    def enter_phase(self, phase: Phase, deadline: float = math.inf) -> None:
         """From now on this is going on, for at most `deadline` s at a time."""
-        self[CHANGES] += 1  # first: whoever sees the new deadline sees that something has changed
-        self[DEADLINE] = -1 if math.isinf(deadline) else int(min(deadline * 1000, _LONGEST))
+        self[CHANGE_COUNT] += 1  # first: whoever sees the new deadline sees that something has changed
+        self[DEADLINE] = -1 if math.isinf(deadline) else int(min(deadline * 1000, _MAX_DEADLINE))
         self[PHASE] = phase
-        while self[SHOWING]:
+        while self[CSV_UPDATE]:
             clock.sleep(1e-4)
 
     @contextmanager
-    def showing(self) -> Iterator[bool]:
+    def updating_csv(self) -> Iterator[bool]:
         """Within this block the supervisor may change the result file, if True comes of it: the run does not touch it yet."""
-        self[SHOWING] = 1
+        self[CSV_UPDATE] = 1
         try:
             yield self.phase.in_loop
         finally:
-            self[SHOWING] = 0
+            self[CSV_UPDATE] = 0
 
-    def note(self, component: str, function: str, time: float = math.nan) -> None:
+    def record_call(self, component: str, function: str, time: float = math.nan) -> None:
         """Which call is being made."""
-        struct.pack_into("d", self.memory, _TIME, time)
-        self._write(_COMPONENT, component)
-        self._write(_FUNCTION, function)
+        struct.pack_into("d", self.memory, _TIME_OFFSET, time)
+        self._write_text(_COMPONENT_OFFSET, component)
+        self._write_text(_FUNCTION_OFFSET, function)
 
     def activity(self) -> Activity:
         """What was noted last."""
-        (time,) = struct.unpack_from("d", self.memory, _TIME)
-        return Activity(self._text(_COMPONENT), self._text(_FUNCTION), time, self.deadline)
+        (time,) = struct.unpack_from("d", self.memory, _TIME_OFFSET)
+        return Activity(self._read_text(_COMPONENT_OFFSET), self._read_text(_FUNCTION_OFFSET), time, self.deadline)
 
     @property
     def deadline(self) -> float:
@@ -131,87 +138,89 @@ class Journal:
         milliseconds = self[DEADLINE]
         return math.inf if milliseconds < 0 else milliseconds / 1000
 
-    def put_files(self, folder: Path, csv: Path | None) -> None:
+    def set_run_files(self, folder: Path, csv: Path | None) -> None:
         """The run's files lie in `folder`; the user waits for its rows in `csv`."""
-        self._write(_FOLDER, str(folder.resolve()))
-        self._write(_LIVE, str(csv.resolve()) if csv else "")
+        self._write_text(_FOLDER_OFFSET, str(folder.resolve()))
+        self._write_text(_CSV_PATH_OFFSET, str(csv.resolve()) if csv else "")
 
     @property
     def folder(self) -> Path | None:
         """Where the files of the run lie (see `unfinished`), once that is known."""
-        return Path(text) if (text := self._text(_FOLDER)) else None
+        return Path(text) if (text := self._read_text(_FOLDER_OFFSET)) else None
 
     @property
-    def csv(self) -> Path | None:
+    def csv_path(self) -> Path | None:
         """Where the user wants the rows."""
-        return Path(text) if (text := self._text(_LIVE)) else None
+        return Path(text) if (text := self._read_text(_CSV_PATH_OFFSET)) else None
 
-    def _write(self, place: int, text: str) -> None:
-        data = text.encode("utf-8", "replace")[:_TEXT]
+    def _write_text(self, place: int, text: str) -> None:
+        data = text.encode("utf-8", "replace")[:_MAX_TEXT_SIZE]
         struct.pack_into(f"I{len(data)}s", self.memory, place, len(data), data)
 
-    def _text(self, place: int) -> str:
-        size, data = struct.unpack_from(f"I{_TEXT}s", self.memory, place)
+    def _read_text(self, place: int) -> str:
+        size, data = struct.unpack_from(f"I{_MAX_TEXT_SIZE}s", self.memory, place)
         return str(data[:size].decode("utf-8", "replace"))
 
 
 _current: Journal | None = None
 
 
-def keep(journal: Journal | None) -> None:
+def set_current_journal(journal: Journal | None) -> None:
     """This process notes what it does in `journal` from now on."""
     global _current
     _current = journal
 
 
-def current() -> Journal | None:
+def current_journal() -> Journal | None:
     """The journal of this process, if it has a supervisor."""
     return _current
 
 
 @contextmanager
-def calling(component: str, function: str, kind: str, time: float = math.nan) -> Iterator[None]:
+def calling_component(component: str, function: str, deadline_name: str, time: float = math.nan) -> Iterator[None]:
     """Within this block a function of a component is called, outside the stepping loop; `kind` names its deadline.
 
     Raises ComponentError for whatever is raised there.
     """
     journal = _current
     if journal is None:
-        with blamed(component, function, time):
+        with as_component_error(component, function, time):
             yield
         return
     phase, deadline, before = journal.phase, journal.deadline, journal.activity()
-    journal.note(component, function, time)
-    journal.enter(Phase.LEAVING if phase == Phase.LEAVING else Phase.CALLING, getattr(journal.deadlines, kind))
+    journal.record_call(component, function, time)
+    journal.enter_phase(
+        Phase.RESULTS_WRITTEN if phase == Phase.RESULTS_WRITTEN else Phase.CALLING, getattr(journal.deadlines, deadline_name)
+    )
     try:
-        with blamed(component, function, time):
+        with as_component_error(component, function, time):
             yield
     finally:
-        journal.note(before.component, before.function, before.time)
-        journal.enter(phase, deadline)
+        journal.record_call(before.component, before.function, before.time)
+        journal.enter_phase(phase, deadline)
 
 
 @contextmanager
-def blamed(component: str, function: str, time: float = math.nan) -> Iterator[None]:
+def as_component_error(component: str, function: str, time: float = math.nan) -> Iterator[None]:
     """What is raised in this block is a failure of the component: a ComponentError, unless it is an error of cosim already."""
     try:
         yield
-    except (CosimError, *PASSING):
+    except (CosimError, *PASS_THROUGH_EXCEPTIONS):
         raise
     except BaseException as error:
-        raise ComponentError(component, function, told(error), None if math.isnan(time) else time) from error
+        raise ComponentError(component, function, describe_exception(error), None if math.isnan(time) else time) from error
 
 
 @contextmanager
-def waiting() -> Iterator[None]:
+def suspending_deadline() -> Iterator[None]:
     """Within this block something is done or waited for that is no component, as long as it takes."""
     journal = _current
     if journal is None:
         yield
         return
     phase, deadline = journal.phase, journal.deadline
-    journal.enter(Phase.WAITING)
+    journal.enter_phase(Phase.WAITING)
     try:
         yield
     finally:
-        journal.enter(phase, deadline)
+        journal.enter_phase(phase, deadline)

@@ -7,7 +7,7 @@ import os
 from typing import Any, TextIO
 
 
-class _Unheard(io.FileIO):
+class _BrokenPipeIgnoringFile(io.FileIO):
     """A file whose reader may go away, as `head` does: what is written from then on is dropped."""
 
     def write(self, data: Any) -> int:
@@ -17,7 +17,7 @@ class _Unheard(io.FileIO):
             return memoryview(data).nbytes
 
 
-def outlasting(stream: TextIO, apart: bool = False) -> TextIO:
+def ignoring_broken_pipe(stream: TextIO, duplicate: bool = False) -> TextIO:
     """The stream, working on without a reader; `apart`: on a file descriptor of its own, which foreign code does not know.
 
     A stream that is no file, such as that of a notebook, stays as it is.
@@ -26,5 +26,5 @@ def outlasting(stream: TextIO, apart: bool = False) -> TextIO:
         descriptor = stream.fileno()
     except (OSError, AttributeError):
         return stream
-    raw = _Unheard(os.dup(descriptor) if apart else descriptor, "w", closefd=apart)
+    raw = _BrokenPipeIgnoringFile(os.dup(descriptor) if duplicate else descriptor, "w", closefd=duplicate)
     return io.TextIOWrapper(io.BufferedWriter(raw), encoding=stream.encoding, errors="replace", line_buffering=True)

@@ -13,7 +13,7 @@ from shutil import rmtree
 from weakref import finalize
 
 #: what a folder is for: a run, an extracted FMU, what an FMU in a process of its own writes
-RUN, FMU, WORKER = "cosim-run-", "cosim-fmu-", "cosim-worker-"
+RUN_PREFIX, FMU_PREFIX, WORKER_PREFIX = "cosim-run-", "cosim-fmu-", "cosim-worker-"
 
 
 class LockedFolder:
@@ -24,9 +24,9 @@ class LockedFolder:
     """
 
     def __init__(self, prefix: str):
-        _remove_abandoned_in(tempfile.gettempdir())
-        self.name, lock = _locked_folder(prefix)
-        self._finalizer = finalize(self, _remove, self.name, lock, os.getpid())
+        _remove_abandoned_folders(tempfile.gettempdir())
+        self.name, lock = _create_locked_folder(prefix)
+        self._finalizer = finalize(self, _remove_folder, self.name, lock, os.getpid())
 
     def cleanup(self) -> None:
         """Remove the folder; done at the end of the process at the latest."""
@@ -34,16 +34,16 @@ class LockedFolder:
 
 
 @contextmanager
-def run_folder() -> Iterator[str]:
+def temporary_run_folder() -> Iterator[str]:
     """A locked folder until the block ends."""
-    folder = LockedFolder(RUN)
+    folder = LockedFolder(RUN_PREFIX)
     try:
         yield folder.name
     finally:
         folder.cleanup()
 
 
-def _remove(folder: str, lock: int, owner: int) -> None:
+def _remove_folder(folder: str, lock: int, owner: int) -> None:
     """What cannot be removed stays, and the next process finds it. A child that was forked owns nothing."""
     if os.getpid() != owner:
         return
@@ -52,11 +52,11 @@ def _remove(folder: str, lock: int, owner: int) -> None:
         os.close(lock)
 
 
-def _locked_folder(prefix: str) -> tuple[str, int]:
+def _create_locked_folder(prefix: str) -> tuple[str, int]:
     """A new folder and the descriptor that holds its lock; another process may have removed it before it was locked."""
     while True:
         folder = tempfile.mkdtemp(prefix=prefix)
-        lock = _lock(folder, wait=True)
+        lock = _lock_folder(folder, wait=True)
         if lock is None:
             return folder, -1  # no locks here: such folders are never taken for abandoned ones
         if Path(folder).is_dir():
@@ -65,17 +65,17 @@ def _locked_folder(prefix: str) -> tuple[str, int]:
 
 
 @cache
-def _remove_abandoned_in(directory: str) -> None:
+def _remove_abandoned_folders(directory: str) -> None:
     """Once in a process: 1000 runs need not look 1000 times."""
-    for prefix in (RUN, FMU, WORKER):
+    for prefix in (RUN_PREFIX, FMU_PREFIX, WORKER_PREFIX):
         for folder in Path(directory).glob(f"{prefix}*"):
-            lock = _lock(folder, wait=False)
+            lock = _lock_folder(folder, wait=False)
             if lock is not None:
                 rmtree(folder, ignore_errors=True)
                 os.close(lock)
 
 
-def _lock(folder: str | Path, wait: bool) -> int | None:
+def _lock_folder(folder: str | Path, wait: bool) -> int | None:
     """A descriptor that holds the lock of a folder of this user; None when it cannot be had."""
     if sys.platform == "win32":
         return None

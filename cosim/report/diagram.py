@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN, LANE = 152.0, 52.0, 70.0, 34.0, 44.0, 14.0  # px
 FRAME_GAP = 12.0  # px between a frame and what it holds
-FRAME = 0.2  # rows above and below a nested system, for its frame
-LONGEST_TITLE, LONGEST_ORIGIN = 20, 25  # characters
-LONGEST_LIST = 40  # lines of a tool tip
+FRAME_ROWS = 0.2  # rows above and below a nested system, for its frame
+MAX_TITLE_LENGTH, MAX_ORIGIN_LENGTH = 20, 25  # characters
+MAX_TOOLTIP_LINES = 40  # lines of a tool tip
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Box:
     y: float
     title: str
     origin: str
-    about: str
+    tooltip: str
 
 
 class Frame(NamedTuple):
@@ -43,7 +43,7 @@ class Wire(NamedTuple):
     x: float
     y: float
     connections: int
-    about: str
+    tooltip: str
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,12 @@ class Diagram:
     wires: Sequence[Wire]
 
 
-def diagram(system: Mapping[str, Any]) -> Diagram:
+def build_diagram(system: Mapping[str, Any]) -> Diagram:
     """The diagram of a system as `cosim.scenario.overview` describes it."""
     known = {component["name"]: component for component in system["components"]}
-    block = _sequence(system["stages"])
-    boxes = {name: _box(known[name], *place) for name, place in block.places.items()}
-    flows = _flows(system["connections"], boxes)
+    block = _place_side_by_side(system["stages"])
+    boxes = {name: _build_box(known[name], *place) for name, place in block.places.items()}
+    flows = _connections_by_pair(system["connections"], boxes)
     lanes = sum(boxes[target].x <= boxes[source].x for source, target in flows)
     bottom = MARGIN + block.rows * (HEIGHT + GAP_Y)
     width = 2 * MARGIN + block.columns * (WIDTH + GAP_X) - GAP_X
@@ -70,7 +70,7 @@ def diagram(system: Mapping[str, Any]) -> Diagram:
     return Diagram(width, bottom + LANE * lanes + MARGIN / 2, list(boxes.values()), list(_frames(boxes.values())), wires)
 
 
-class _Block(NamedTuple):
+class _GridLayout(NamedTuple):
     """Components by name at (column, row), and how many columns and rows they take."""
 
     places: dict[str, tuple[float, float]]
@@ -78,64 +78,64 @@ class _Block(NamedTuple):
     rows: float
 
 
-def _sequence(stages: Sequence[Sequence[Any]]) -> _Block:
+def _place_side_by_side(stages: Sequence[Sequence[Any]]) -> _GridLayout:
     """Stages one beside the other, each centred."""
-    blocks = [_stack([_member(member) for member in stage]) for stage in stages]
+    blocks = [_place_below_each_other([_layout_member(member) for member in stage]) for stage in stages]
     rows = max((block.rows for block in blocks), default=0)
     places: dict[str, tuple[float, float]] = {}
     columns = 0
     for block in blocks:
-        places |= _moved(block, columns, (rows - block.rows) / 2)
+        places |= _shifted(block, columns, (rows - block.rows) / 2)
         columns += block.columns
-    return _Block(places, columns, rows)
+    return _GridLayout(places, columns, rows)
 
 
-def _stack(blocks: Sequence[_Block]) -> _Block:
+def _place_below_each_other(blocks: Sequence[_GridLayout]) -> _GridLayout:
     """What steps side by side, one below the other."""
     places: dict[str, tuple[float, float]] = {}
     rows = 0.0
     for block in blocks:
-        places |= _moved(block, 0, rows)
+        places |= _shifted(block, 0, rows)
         rows += block.rows
-    return _Block(places, max((block.columns for block in blocks), default=0), rows)
+    return _GridLayout(places, max((block.columns for block in blocks), default=0), rows)
 
 
-def _member(member: Any) -> _Block:
+def _layout_member(member: Any) -> _GridLayout:
     """A component, or a nested system with room for its frame."""
     if isinstance(member, str):
-        return _Block({member: (0, 0)}, 1, 1)
-    block = _sequence(member["stages"])
-    return _Block(_moved(block, 0, FRAME), block.columns, block.rows + 2 * FRAME)
+        return _GridLayout({member: (0, 0)}, 1, 1)
+    block = _place_side_by_side(member["stages"])
+    return _GridLayout(_shifted(block, 0, FRAME_ROWS), block.columns, block.rows + 2 * FRAME_ROWS)
 
 
-def _moved(block: _Block, columns: float, rows: float) -> dict[str, tuple[float, float]]:
+def _shifted(block: _GridLayout, columns: float, rows: float) -> dict[str, tuple[float, float]]:
     return {name: (x + columns, y + rows) for name, (x, y) in block.places.items()}
 
 
-def _box(component: Mapping[str, Any], column: float, row: float) -> Box:
+def _build_box(component: Mapping[str, Any], column: float, row: float) -> Box:
     place = (MARGIN + column * (WIDTH + GAP_X), MARGIN + row * (HEIGHT + GAP_Y))
     name, origin = component["name"], component["origin"]
     every = f", every {component['period']:g} s" if component["period"] else ""
     about = f"{name}\n{origin}\n{component['inputs']} inputs, {component['outputs']} outputs{every}"
-    return Box(name, *place, _cut(name, LONGEST_TITLE), _cut(origin.rpartition("/")[2], LONGEST_ORIGIN), about)
+    return Box(name, *place, _truncate(name, MAX_TITLE_LENGTH), _truncate(origin.rpartition("/")[2], MAX_ORIGIN_LENGTH), about)
 
 
-def _cut(text: str, length: int) -> str:
+def _truncate(text: str, length: int) -> str:
     return text if len(text) <= length else f"{text[: length - 1]}…"
 
 
-def _flows(connections: Sequence[Sequence[str]], boxes: Mapping[str, Box]) -> dict[tuple[str, str], list[str]]:
+def _connections_by_pair(connections: Sequence[Sequence[str]], boxes: Mapping[str, Box]) -> dict[tuple[str, str], list[str]]:
     """(from component, to component) -> a line for each connection."""
     flows: dict[tuple[str, str], list[str]] = {}
     for source, target, unit, note in connections:
-        ends = _component(source, boxes), _component(target, boxes)
+        ends = _component_of(source, boxes), _component_of(target, boxes)
         text = f"{source} → {target}" + (f"  [{unit}]" if unit else "") + (f"  ({note})" if note else "")
         if ends[0] and ends[1]:
             flows.setdefault(ends, []).append(text)
     return flows
 
 
-def _component(name: str, boxes: Mapping[str, Box]) -> str:
+def _component_of(name: str, boxes: Mapping[str, Box]) -> str:
     """The component that a variable belongs to."""
     return max((box for box in boxes if name.startswith(f"{box}.")), key=len, default="")
 
@@ -144,17 +144,17 @@ def _wires(flows: Mapping[tuple[str, str], list[str]], boxes: Mapping[str, Box],
     lanes = 0
     for (source, target), lines in flows.items():
         start, end = boxes[source], boxes[target]
-        more = [f"and {len(lines) - LONGEST_LIST} more"] if len(lines) > LONGEST_LIST else []
-        about = "\n".join([*lines[:LONGEST_LIST], *more])
+        more = [f"and {len(lines) - MAX_TOOLTIP_LINES} more"] if len(lines) > MAX_TOOLTIP_LINES else []
+        about = "\n".join([*lines[:MAX_TOOLTIP_LINES], *more])
         if end.x > start.x:
-            path, x, y = _forward(start, end)
+            path, x, y = _forward_path(start, end)
         else:
-            path, x, y = _back(start, end, lanes, bottom)
+            path, x, y = _feedback_path(start, end, lanes, bottom)
             lanes += 1
         yield Wire(path, x, y, len(lines), about)
 
 
-def _forward(start: Box, end: Box) -> tuple[str, float, float]:
+def _forward_path(start: Box, end: Box) -> tuple[str, float, float]:
     """A curve from the right side of a box to the left side of one further right; it bows around what lies between."""
     x1, y1, x2, y2 = start.x + WIDTH, start.y + HEIGHT / 2, end.x, end.y + HEIGHT / 2
     bend = (x2 - x1) / 2
@@ -164,24 +164,24 @@ def _forward(start: Box, end: Box) -> tuple[str, float, float]:
     return path, (x1 + x2) / 2, (y1 + y2) / 2 + 0.75 * lift
 
 
-def _back(start: Box, end: Box, number: int, bottom: float) -> tuple[str, float, float]:
+def _feedback_path(start: Box, end: Box, number: int, bottom: float) -> tuple[str, float, float]:
     """From the right side of a box, along a lane of its own below everything, to the left side of a box further left."""
     aside, lane = 12 + 4 * (number % 6), bottom - GAP_Y / 2 + LANE * (number + 1)
     x1, y1, x2, y2 = start.x + WIDTH, start.y + 0.75 * HEIGHT, end.x, end.y + 0.75 * HEIGHT
     right, left = x1 + aside, x2 - aside
-    return _rounded([(x1, y1), (right, y1), (right, lane), (left, lane), (left, y2), (x2, y2)]), (left + right) / 2, lane
+    return _rounded_path([(x1, y1), (right, y1), (right, lane), (left, lane), (left, y2), (x2, y2)]), (left + right) / 2, lane
 
 
-def _rounded(points: Sequence[tuple[float, float]], radius: float = 6.0) -> str:
+def _rounded_path(points: Sequence[tuple[float, float]], radius: float = 6.0) -> str:
     """A path along horizontal and vertical lines through `points`, with round corners."""
     path = "M{:g} {:g}".format(*points[0])
     for before, corner, after in zip(points, points[1:], points[2:], strict=False):
-        (x1, y1), (x2, y2) = (_towards(corner, other, radius) for other in (before, after))
+        (x1, y1), (x2, y2) = (_point_towards(corner, other, radius) for other in (before, after))
         path += f"L{x1:g} {y1:g}Q{corner[0]:g} {corner[1]:g} {x2:g} {y2:g}"
     return path + "L{:g} {:g}".format(*points[-1])
 
 
-def _towards(corner: tuple[float, float], other: tuple[float, float], distance: float) -> tuple[float, float]:
+def _point_towards(corner: tuple[float, float], other: tuple[float, float], distance: float) -> tuple[float, float]:
     share = min(0.5, distance / max(math.dist(corner, other), 1e-9))
     return corner[0] + share * (other[0] - corner[0]), corner[1] + share * (other[1] - corner[1])
 

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..results import Result
-from ..results.files import replacing
-from ..results.kpi import Evaluation
-from .numbers import write_numbers
+from ..results.files import writing_atomically
+from ..results.kpi import ResultFunction
+from .numbers import write_figure_data
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,7 +49,7 @@ STYLE: Mapping[Any, Any] = {
 
 
 @contextmanager
-def style() -> Iterator[None]:
+def figure_style() -> Iterator[None]:
     """Within the block STYLE holds, whatever the user's own matplotlib settings are."""
     from matplotlib import rc_context, rcdefaults, rcParams
 
@@ -59,36 +59,36 @@ def style() -> Iterator[None]:
         yield
 
 
-def draw(result: Result, name: str, function: Callable[..., Figure], arguments: Mapping[str, Any]) -> Figure:
+def draw_figure(result: Result, name: str, function: Callable[..., Figure], arguments: Mapping[str, Any]) -> Figure:
     """The figure `name` in the common style. Raises InputError or ComponentError that name the figure."""
     from matplotlib.figure import Figure
 
-    evaluation = Evaluation(name, function, arguments)
-    with style():
+    evaluation = ResultFunction(name, function, arguments)
+    with figure_style():
         figure = evaluation.evaluate("figure", result)
     if not isinstance(figure, Figure):
         raise evaluation.failure("figure", f"returned {type(figure).__name__}, expected a matplotlib.figure.Figure")
     return figure
 
 
-def save(figure: Figure, path: Path) -> None:
+def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure as PNG or SVG, whichever the suffix of `path` says: atomically, without dates and versions."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
-    with style(), replacing(path) as temporary:
+    with figure_style(), writing_atomically(path) as temporary:
         if path.suffix == ".png":
             FigureCanvasAgg(figure).print_png(temporary, metadata={"Software": None})
         else:
             FigureCanvasSVG(figure).print_svg(temporary, metadata={"Date": None, "Creator": None})
 
 
-def svg(figure: Figure) -> str:
+def figure_to_svg(figure: Figure) -> str:
     """A figure as the text of an SVG file, without dates and versions."""
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     text = StringIO()
-    with style():
+    with figure_style():
         FigureCanvasSVG(figure).print_svg(text, metadata={"Date": None, "Creator": None})
     return text.getvalue()
 
@@ -98,7 +98,7 @@ def draw_figures(
     figures: Iterable[tuple[str, Callable[..., Figure], Mapping[str, Any]]],
     directory: str | Path,
     suffixes: Sequence[str] = (".png",),
-    numbers: bool = False,
+    write_data: bool = False,
 ) -> list[Path]:
     """Draw all figures, given as (name, function, arguments), into `directory`/NAME.png (or .svg); returns the files.
 
@@ -106,12 +106,12 @@ def draw_figures(
     """
     files = []
     for name, function, arguments in figures:
-        figure = draw(result, name, function, arguments)
+        figure = draw_figure(result, name, function, arguments)
         for suffix in suffixes:
             path = Path(directory) / f"{name}{suffix}"
-            save(figure, path)
+            save_figure(figure, path)
             files.append(path)
         path = Path(directory) / f"{name}.csv"
-        if numbers and write_numbers(figure, path):
+        if write_data and write_figure_data(figure, path):
             files.append(path)
     return files

@@ -25,41 +25,41 @@ if TYPE_CHECKING:
     import numpy as np
 
 #: frames that are worth the start of a process
-FEWEST = 25
-LARGEST_COUNT = 8
+MIN_FRAMES_PER_PROCESS = 25
+MAX_PROCESSES = 8
 
 
 @dataclass(frozen=True)
-class Job:
+class RenderJob:
     """What to render: `source` names a function(result, camera, moments, size) that yields a frame for each moment (s)."""
 
     source: str
     result: Result
     camera: str
-    moments: np.ndarray
+    times: np.ndarray
     size: tuple[int, int]
 
     def frames(self) -> Iterator[np.ndarray]:
         """The frames, uint8 (height, width, 3), rendered here."""
         function: Callable[..., Iterator[Any]] = load_object(self.source, root())
-        return function(self.result, self.camera, self.moments, self.size)
+        return function(self.result, self.camera, self.times, self.size)
 
 
-def rendered(job: Job, processes: int | None = None) -> Generator[np.ndarray, None, None]:
+def render_frames(job: RenderJob, processes: int | None = None) -> Generator[np.ndarray, None, None]:
     """The frames of a job, by as many processes (None: as there are processors, and as are worth it)."""
     if processes is None:
-        processes = min(os.cpu_count() or 1, LARGEST_COUNT, len(job.moments) // FEWEST)
+        processes = min(os.cpu_count() or 1, MAX_PROCESSES, len(job.times) // MIN_FRAMES_PER_PROCESS)
     if processes < 2:
         yield from job.frames()
         return
     with ExitStack() as stack:
-        workers = [stack.enter_context(_worker(replace(job, moments=job.moments[k::processes]))) for k in range(processes)]
-        for i in range(len(job.moments)):
-            yield _received(workers[i % processes])
+        workers = [stack.enter_context(_render_process(replace(job, times=job.times[k::processes]))) for k in range(processes)]
+        for i in range(len(job.times)):
+            yield _receive_frame(workers[i % processes])
 
 
 @contextmanager
-def _worker(job: Job) -> Iterator[subprocess.Popen[bytes]]:
+def _render_process(job: RenderJob) -> Iterator[subprocess.Popen[bytes]]:
     """A process at work, ended with the block."""
     command = [sys.executable, "-P", "-m", __name__]
     worker = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)  # noqa: S603
@@ -73,7 +73,7 @@ def _worker(job: Job) -> Iterator[subprocess.Popen[bytes]]:
             worker.kill()
 
 
-def _received(worker: subprocess.Popen[bytes]) -> np.ndarray:
+def _receive_frame(worker: subprocess.Popen[bytes]) -> np.ndarray:
     """The next frame of a process; what it raised is raised here."""
     assert worker.stdout is not None
     try:
@@ -90,7 +90,7 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted as well, and ends this process
     with os.fdopen(os.dup(1), "wb") as channel:
         os.dup2(2, 1)
-        job: Job = pickle.load(sys.stdin.buffer)  # noqa: S301
+        job: RenderJob = pickle.load(sys.stdin.buffer)  # noqa: S301
         try:
             for frame in job.frames():
                 pickle.dump(frame, channel)

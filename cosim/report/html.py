@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 
 from ..results import Result
 from ..results.checks import CheckOutcome, Number
-from ..results.files import plain, replacing
-from .diagram import diagram
-from .pages import embedded, markup, render
+from ..results.files import to_json_types, writing_atomically
+from .diagram import build_diagram
+from .pages import embed_json, render_page, safe_markup
 from .replay import replay_data
-from .tables import number_text
+from .tables import format_number
 
 #: what timings measure, in the order in which things happen
-TIMINGS = {
+TIMING_LABELS = {
     "load_seconds": "load",
     "initialize_seconds": "initialise",
     "loop_seconds": "stepping loop",
@@ -25,10 +25,10 @@ TIMINGS = {
 }
 
 #: files whose hashes are shown
-MOST_HASHES = 300
+MAX_HASHES = 300
 
 
-class Row(NamedTuple):
+class KpiRow(NamedTuple):
     """A KPI as it is shown; with `limits` where it has a check."""
 
     name: str
@@ -38,34 +38,34 @@ class Row(NamedTuple):
     passed: bool = True
 
 
-def write_report(result: Result, outcomes: Sequence[CheckOutcome], pictures: Mapping[str, str], path: Path) -> None:
+def write_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Mapping[str, str], path: Path) -> None:
     """Write the page about `result` to `path`: KPIs with their checks, the figures (`pictures`: name -> SVG), the system with
     its connections and units, scenario, versions, timings and warnings, and the replay.
 
     Raises InputError for a result without rows, and when the file cannot be written.
     """
-    about, units = _about(result), result.metadata.get("kpi_units", {})
-    text = render(
+    about, units = _metadata_with_defaults(result), result.metadata.get("kpi_units", {})
+    text = render_page(
         "report.html",
         about=about,
         checks=len(outcomes),
         failed=sum(not outcome.passed for outcome in outcomes),
         facts=list(_facts(result)),
-        cards=[_card(outcome, units) for outcome in outcomes],
-        kpis=_grouped(result.kpis, units),
+        cards=[_check_row(outcome, units) for outcome in outcomes],
+        kpis=_group_kpis(result.kpis, units),
         warnings=result.metadata.get("warnings", []),
-        figures=[_figure(name, svg) for name, svg in pictures.items()],
-        d=diagram(about["system"]) if about["system"] else None,
+        figures=[_figure_element(name, svg) for name, svg in figures.items()],
+        d=build_diagram(about["system"]) if about["system"] else None,
         scenario=json.dumps(about["scenario"], indent=1, ensure_ascii=False),
         timings=list(_timings(result)),
         versions=[*about["versions"].items(), *about["machine"].items()],
-        data=embedded(replay_data([result])),
+        data=embed_json(replay_data([result])),
     )
-    with replacing(path) as temporary:
+    with writing_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def _about(result: Result) -> dict[str, Any]:
+def _metadata_with_defaults(result: Result) -> dict[str, Any]:
     """What run.json says, with everything that the template names."""
     missing: dict[str, Any] = {
         "name": "run",
@@ -77,8 +77,8 @@ def _about(result: Result) -> dict[str, Any]:
         "machine": {},
         "sha256": {},
     }
-    about = plain({**missing, **result.metadata})
-    return {**about, "sha256": dict(islice(about["sha256"].items(), MOST_HASHES))}
+    about = to_json_types({**missing, **result.metadata})
+    return {**about, "sha256": dict(islice(about["sha256"].items(), MAX_HASHES))}
 
 
 def _facts(result: Result) -> Iterator[tuple[str, str]]:
@@ -94,32 +94,32 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
         yield "ended by", f"{by['component']} at {by['time']:g} s"
 
 
-def _row(name: str, value: Number, units: Mapping[str, str]) -> Row:
-    return Row(name, number_text(value), units.get(name, ""))
+def _kpi_row(name: str, value: Number, units: Mapping[str, str]) -> KpiRow:
+    return KpiRow(name, format_number(value), units.get(name, ""))
 
 
-def _card(outcome: CheckOutcome, units: Mapping[str, str]) -> Row:
-    row = _row(outcome.check["kpi"], outcome.value, units)
+def _check_row(outcome: CheckOutcome, units: Mapping[str, str]) -> KpiRow:
+    row = _kpi_row(outcome.check["kpi"], outcome.value, units)
     return row._replace(limits=outcome.limits, passed=outcome.passed)
 
 
-def _grouped(kpis: Mapping[str, Number], units: Mapping[str, str]) -> dict[str, list[Row]]:
+def _group_kpis(kpis: Mapping[str, Number], units: Mapping[str, str]) -> dict[str, list[KpiRow]]:
     """The numbers of each KPI function, without its name before theirs."""
-    groups: dict[str, list[Row]] = {}
+    groups: dict[str, list[KpiRow]] = {}
     for name, value in kpis.items():
         group, _, own = name.partition(".")
-        groups.setdefault(group, []).append(_row(name, value, units)._replace(name=own))
+        groups.setdefault(group, []).append(_kpi_row(name, value, units)._replace(name=own))
     return groups
 
 
 def _timings(result: Result) -> Iterator[tuple[str, str]]:
-    for key, label in TIMINGS.items():
+    for key, label in TIMING_LABELS.items():
         if key in result.timing:
             yield label, f"{1e3 * result.timing[key]:.0f} ms"
     if pace := result.metadata.get("real_time"):
         yield "real time", f"{pace['late_steps']} of {pace['steps']} steps late"
 
 
-def _figure(name: str, svg: str) -> dict[str, Any]:
+def _figure_element(name: str, svg: str) -> dict[str, Any]:
     """An SVG file as an element of a page, without the declarations before it; `drawn`: there is no photograph in it."""
-    return {"name": name, "svg": markup(svg[svg.index("<svg") :]), "drawn": "<image" not in svg}
+    return {"name": name, "svg": safe_markup(svg[svg.index("<svg") :]), "drawn": "<image" not in svg}

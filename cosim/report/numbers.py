@@ -7,30 +7,30 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..results.files import replacing
+from ..results.files import writing_atomically
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Row = tuple[str, str, str | float, float]
+DataPoint = tuple[str, str, str | float, float]
 
 
-def write_numbers(figure: Figure, path: Path) -> bool:
+def write_figure_data(figure: Figure, path: Path) -> bool:
     """Write every curve and bar of `figure` to `path`, one point a row; False (and no file) when it has none.
 
     Columns: label of the panel's y axis, name of the curve, place on the x axis (its header is that axis's label), value.
     """
-    rows = [row for axes in figure.axes for row in _rows(axes)]
+    rows = [row for axes in figure.axes for row in _curve_points(axes)]
     if not rows:
         return False
     header = ("panel", "curve", figure.axes[-1].get_xlabel() or "x", "value")
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+    with writing_atomically(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows([header, *rows])
     return True
 
 
-def _rows(axes: Axes) -> Iterator[Row]:
+def _curve_points(axes: Axes) -> Iterator[DataPoint]:
     panel = axes.get_ylabel().replace("\n", " ")
     for line in axes.lines:
         name, in_data_units = str(line.get_label()), line.get_transform() == axes.transData
@@ -39,10 +39,10 @@ def _rows(axes: Axes) -> Iterator[Row]:
             curve = "" if name.startswith("_") else name
             points = zip(line.get_xdata().tolist(), line.get_ydata().tolist(), strict=True)  # type: ignore[union-attr]
             yield from ((panel, curve, x, y) for x, y in points)
-    yield from _bars(axes, panel)
+    yield from _bar_points(axes, panel)
 
 
-def _bars(axes: Axes, panel: str) -> Iterator[Row]:
+def _bar_points(axes: Axes, panel: str) -> Iterator[DataPoint]:
     from matplotlib.container import BarContainer
 
     for container in axes.containers:

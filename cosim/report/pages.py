@@ -7,45 +7,51 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..results.files import plain
+from ..results.files import to_json_types
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-FOLDER = Path(__file__).with_name("page")
+TEMPLATE_FOLDER = Path(__file__).with_name("page")
 
 #: a page runs its own script, has its own style and pictures, and asks nobody for anything
-POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; form-action 'none'"
+CONTENT_SECURITY_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; form-action 'none'"
+)
 
 
 @cache
-def _environment() -> Environment:
+def _jinja_environment() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     return Environment(
-        loader=FileSystemLoader(FOLDER), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(TEMPLATE_FOLDER), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
 
 
 @cache
-def _bundle() -> dict[str, Any]:
-    script, style = ((FOLDER / "bundle" / f"replay.{kind}").read_text(encoding="utf-8") for kind in ("js", "css"))
-    return {"script": markup(script.replace("</script", "<\\/script")), "style": markup(style), "policy": POLICY}
+def _page_assets() -> dict[str, Any]:
+    script, style = ((TEMPLATE_FOLDER / "bundle" / f"replay.{kind}").read_text(encoding="utf-8") for kind in ("js", "css"))
+    return {
+        "script": safe_markup(script.replace("</script", "<\\/script")),
+        "style": safe_markup(style),
+        "policy": CONTENT_SECURITY_POLICY,
+    }
 
 
-def markup(text: str) -> str:
+def safe_markup(text: str) -> str:
     """Text that stands in a page as it is; only for what this package has made."""
     from markupsafe import Markup
 
     return Markup(text)  # noqa: S704
 
 
-def render(template: str, **values: Any) -> str:
+def render_page(template: str, **values: Any) -> str:
     """A page as text; all `values` are escaped but those that are marked as safe."""
-    return _environment().get_template(template).render(**{**_bundle(), **values})
+    return _jinja_environment().get_template(template).render(**{**_page_assets(), **values})
 
 
-def embedded(data: Any) -> str:
+def embed_json(data: Any) -> str:
     """Data as JSON that can stand in a script element, whatever texts it contains."""
-    text = json.dumps(plain(data), ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-    return markup(text.replace("<", "\\u003c"))
+    text = json.dumps(to_json_types(data), ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return safe_markup(text.replace("<", "\\u003c"))

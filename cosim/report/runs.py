@@ -13,7 +13,7 @@ from ..core.errors import InputError
 from ..results import Kpis, Result
 from ..scenario.functions import load_function
 
-Function = tuple[str, Callable[..., Any], Mapping[str, Any]]
+NamedCall = tuple[str, Callable[..., Any], Mapping[str, Any]]
 
 
 def read_run(directory: str | Path) -> Result:
@@ -42,7 +42,7 @@ def _read_json(path: Path) -> dict[str, Any]:
     return value
 
 
-def figures_of(result: Result) -> list[Function]:
+def load_figures(result: Result) -> list[NamedCall]:
     """(name, function, arguments) of every figure that the result's scenario asks for."""
     specs = result.metadata.get("scenario", {}).get("figures", [])
     if not specs:

@@ -24,48 +24,50 @@ from pathlib import Path
 from typing import Any
 
 from ..components.python_class import load_object
-from ..core.errors import PASSING, ComponentError, InputError, did_you_mean
-from ..results.files import plain
+from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, did_you_mean
+from ..results.files import to_json_types
 from ..scenario.functions import load_function
 from ..scenario.json_document import read_document
 
-LISTS = ("bodies", "fixed", "markers", "views", "spans", "plots")
+LIST_KEYS = ("bodies", "fixed", "markers", "views", "spans", "plots")
 
 #: shape -> how many numbers its size has
-SIZES: Mapping[str, int] = {"box": 3, "cylinder": 2, "cone": 3, "sphere": 1, "ring": 2}
+SHAPE_SIZES: Mapping[str, int] = {"box": 3, "cylinder": 2, "cone": 3, "sphere": 1, "ring": 2}
 
-_BODY: Mapping[str, Any] = {"colour": "#0072b2", "parts": ()}
-_PART: Mapping[str, Any] = {"position": (0, 0, 0), "orientation": (0, 0, 0, 1), "colour": (0.6, 0.6, 0.6), "opacity": 1}
+_BODY_DEFAULTS: Mapping[str, Any] = {"colour": "#0072b2", "parts": ()}
+_PART_DEFAULTS: Mapping[str, Any] = {"position": (0, 0, 0), "orientation": (0, 0, 0, 1), "colour": (0.6, 0.6, 0.6), "opacity": 1}
 
 
-def scene_of(metadata: Mapping[str, Any]) -> dict[str, Any]:
+def build_scene(metadata: Mapping[str, Any]) -> dict[str, Any]:
     """The scene of a run, given what its run.json says; nothing to draw when no component says what it looks like.
 
     Raises InputError when something that the scenario names is not there, ComponentError when asking fails.
     """
-    scene: dict[str, Any] = {**{key: [] for key in LISTS}, "water": None}
+    scene: dict[str, Any] = {**{key: [] for key in LIST_KEYS}, "water": None}
     if "scenario_file" not in metadata:
         return scene
-    for part in _parts(metadata["scenario"], Path(metadata["scenario_file"]).parent):
-        for key in LISTS:
+    for part in _scene_parts(metadata["scenario"], Path(metadata["scenario_file"]).parent):
+        for key in LIST_KEYS:
             scene[key] += part.get(key, [])
         scene["water"] = scene["water"] or part.get("water")
     return scene
 
 
-def _parts(scenario: Mapping[str, Any], folder: Path) -> Iterator[dict[str, Any]]:
-    leaves = list(_leaves(scenario, folder))
+def _scene_parts(scenario: Mapping[str, Any], folder: Path) -> Iterator[dict[str, Any]]:
+    leaves = list(_flatten_components(scenario, folder))
     flat = {**scenario, "components": {name: component for name, component, _ in leaves}}
     for name, component, own_folder in leaves:
         if isinstance(reference := component.get("python"), str):
             ask = getattr_static(load_object(reference, own_folder), "scene", None)
             if isinstance(ask, staticmethod):
-                yield _answer(f'component "{name}"', ask, name, flat)
+                yield _call_scene_function(f'component "{name}"', ask, name, flat)
     if spec := scenario.get("scene"):
-        yield _answer("the scenario's scene", load_function(spec["python"], folder), flat, **spec.get("arguments", {}))
+        yield _call_scene_function(
+            "the scenario's scene", load_function(spec["python"], folder), flat, **spec.get("arguments", {})
+        )
 
 
-def _leaves(system: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, dict[str, Any], Path]]:
+def _flatten_components(system: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, dict[str, Any], Path]]:
     """(full name, component, where its paths start) of all components, those of nested systems instead of these.
 
     Parameters that are set from outside ("usv.waypoint_x") reach the components inside.
@@ -75,43 +77,43 @@ def _leaves(system: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, dict
             yield name, component, folder
             continue
         file = folder / component["system"]
-        for inner, leaf, own_folder in _leaves(read_document(file).value, file.parent):
+        for inner, leaf, own_folder in _flatten_components(read_document(file).value, file.parent):
             outside = component.get("parameters", {}).items()
             given = {key.removeprefix(f"{inner}."): value for key, value in outside if key.startswith(f"{inner}.")}
             yield f"{name}.{inner}", {**leaf, "parameters": {**leaf.get("parameters", {}), **given}}, own_folder
 
 
-def _answer(who: str, ask: Callable[..., Any], *values: Any, **named: Any) -> dict[str, Any]:
+def _call_scene_function(who: str, ask: Callable[..., Any], *values: Any, **named: Any) -> dict[str, Any]:
     try:
         answer = ask(*values, **named)
         if not isinstance(answer, dict):
             raise TypeError(f"returned {type(answer).__name__}, expected a dict")
-        json.dumps(plain(answer))
-        return _completed(answer)
-    except (InputError, *PASSING):
+        json.dumps(to_json_types(answer))
+        return _with_defaults(answer)
+    except (InputError, *PASS_THROUGH_EXCEPTIONS):
         raise
     except BaseException as error:
         raise ComponentError(who, "scene", f"{type(error).__name__}: {error}") from error
 
 
-def _completed(scene: Mapping[str, Any]) -> dict[str, Any]:
+def _with_defaults(scene: Mapping[str, Any]) -> dict[str, Any]:
     """The scene with everything that may be left out. Raises TypeError or ValueError for what cannot be drawn."""
-    if unknown := [key for key in scene if key not in (*LISTS, "water")]:
-        raise ValueError(f'unknown key "{unknown[0]}"{did_you_mean(unknown[0], (*LISTS, "water"))}')
-    bodies = [{**_BODY, "title": body.get("name"), **body} for body in scene.get("bodies", [])]
+    if unknown := [key for key in scene if key not in (*LIST_KEYS, "water")]:
+        raise ValueError(f'unknown key "{unknown[0]}"{did_you_mean(unknown[0], (*LIST_KEYS, "water"))}')
+    bodies = [{**_BODY_DEFAULTS, "title": body.get("name"), **body} for body in scene.get("bodies", [])]
     for body in bodies:
-        body["parts"] = [_part(part) for part in body["parts"]]
+        body["parts"] = [_part_with_defaults(part) for part in body["parts"]]
         if lacking := [key for key in ("name", "position") if key not in body]:
             raise ValueError(f'a body has no "{lacking[0]}"')
         if ("orientation" in body) == ("attitude" in body):
             raise ValueError(f'body "{body["name"]}" needs either "orientation" or "attitude"')
-    return {**scene, "bodies": bodies, "fixed": [_part(part) for part in scene.get("fixed", [])]}
+    return {**scene, "bodies": bodies, "fixed": [_part_with_defaults(part) for part in scene.get("fixed", [])]}
 
 
-def _part(part: Mapping[str, Any]) -> dict[str, Any]:
+def _part_with_defaults(part: Mapping[str, Any]) -> dict[str, Any]:
     shape, size = str(part.get("shape")), part.get("size", ())
-    if shape not in SIZES:
-        raise ValueError(f'unknown shape "{shape}"{did_you_mean(shape, SIZES)}')
-    if len(size) != SIZES[shape]:
-        raise ValueError(f"a {shape} has {SIZES[shape]} numbers as its size, found {list(size)}")
-    return {**_PART, **part}
+    if shape not in SHAPE_SIZES:
+        raise ValueError(f'unknown shape "{shape}"{did_you_mean(shape, SHAPE_SIZES)}')
+    if len(size) != SHAPE_SIZES[shape]:
+        raise ValueError(f"a {shape} has {SHAPE_SIZES[shape]} numbers as its size, found {list(size)}")
+    return {**_PART_DEFAULTS, **part}

@@ -12,7 +12,7 @@ from ..results.checks import CheckOutcome, Number
 if TYPE_CHECKING:
     from rich.table import Table
 
-LONGEST_LINE = 1000  # characters, where nothing but the reader's patience limits it
+MAX_LINE_WIDTH = 1000  # characters, where nothing but the reader's patience limits it
 
 
 def print_kpis(
@@ -31,13 +31,13 @@ def print_kpis(
     if not kpis:
         return
     console = Console(file=file or sys.stdout, highlight=False)
-    table = _table(kpis, outcomes, units or {}, plain=console.options.ascii_only)
+    table = _kpi_table(kpis, outcomes, units or {}, plain=console.options.ascii_only)
     if not console.is_terminal:
-        console.width = LONGEST_LINE
+        console.width = MAX_LINE_WIDTH
     console.print(table)
 
 
-def _table(kpis: Mapping[str, Number], outcomes: Sequence[CheckOutcome], units: Mapping[str, str], plain: bool) -> Table:
+def _kpi_table(kpis: Mapping[str, Number], outcomes: Sequence[CheckOutcome], units: Mapping[str, str], plain: bool) -> Table:
     from rich import box
     from rich.markup import escape
     from rich.table import Table
@@ -51,18 +51,21 @@ def _table(kpis: Mapping[str, Number], outcomes: Sequence[CheckOutcome], units: 
         table.add_column("", no_wrap=True)
     for name, value in kpis.items():
         own = [outcome for outcome in outcomes if outcome.check["kpi"] == name]
-        limits, marks = "\n".join(outcome.limits for outcome in own), "\n".join(_mark(outcome.passed, plain) for outcome in own)
-        table.add_row(escape(name), number_text(value), escape(units.get(name, "")), *([limits, marks] if outcomes else []))
+        limits, marks = (
+            "\n".join(outcome.limits for outcome in own),
+            "\n".join(_check_mark(outcome.passed, plain) for outcome in own),
+        )
+        table.add_row(escape(name), format_number(value), escape(units.get(name, "")), *([limits, marks] if outcomes else []))
     return table
 
 
-def _mark(passed: bool, plain: bool) -> str:
+def _check_mark(passed: bool, plain: bool) -> str:
     if passed:
         return f"[green]{'ok' if plain else '✓'}[/]"
     return f"[bold red]{'failed' if plain else '✗ failed'}[/]"
 
 
-def number_text(value: Number) -> str:
+def format_number(value: Number) -> str:
     """A number as people read it: four significant digits, "yes" and "no", "-" for NaN."""
     if isinstance(value, bool):
         return "yes" if value else "no"

@@ -11,12 +11,12 @@ from ..results import Result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-COLUMN, PAGE, BAR = 3.5, 7.16, 0.8  # in
+COLUMN_WIDTH, PAGE_WIDTH, BAR_WIDTH = 3.5, 7.16, 0.8  # in
 #: real-time factors of the published simulator (Simulink and V-REP over TCP): figure 18 and section 6.3 of the paper
-PUBLISHED = (0.5, 0.7)
+PUBLISHED_FACTORS = (0.5, 0.7)
 
 
-def timings(result: Result, others: Sequence[Result] = ()) -> Figure:
+def draw_timings(result: Result, others: Sequence[Result] = ()) -> Figure:
     """Bars of simulated over elapsed time (of the stepping loop) of `result` and `others`, above the band of the paper.
 
     The axis is logarithmic; the width grows with the runs, from a column to a page. Raises InputError for a result that holds
@@ -25,10 +25,10 @@ def timings(result: Result, others: Sequence[Result] = ()) -> Figure:
     from matplotlib.figure import Figure
 
     runs = [result, *others]
-    names, factors = [_name(run) for run in runs], [real_time_factor(run) for run in runs]
-    figure = Figure(figsize=(min(PAGE, max(COLUMN, BAR * len(runs))), 2.6), layout="constrained")
+    names, factors = [_tick_label(run) for run in runs], [real_time_factor(run) for run in runs]
+    figure = Figure(figsize=(min(PAGE_WIDTH, max(COLUMN_WIDTH, BAR_WIDTH * len(runs))), 2.6), layout="constrained")
     axes = figure.add_subplot(yscale="log", ylabel="simulated time / elapsed time")
-    axes.axhspan(*PUBLISHED, color="#D55E00", alpha=0.35, linewidth=0, label="published simulator")
+    axes.axhspan(*PUBLISHED_FACTORS, color="#D55E00", alpha=0.35, linewidth=0, label="published simulator")
     bars = axes.bar(range(len(runs)), factors, width=0.6, color="#0072B2", label="cosim")
     axes.bar_label(bars, [f"{factor:.3g}" for factor in factors], padding=1, fontsize=7)
     axes.axhline(1.0, color="#444444", linestyle="--", linewidth=0.9, label="real time")
@@ -45,10 +45,10 @@ def real_time_factor(result: Result) -> float:
     """Simulated time over the wall time of the stepping loop."""
     loop = result.timing.get("loop_seconds", 0.0)
     if not loop or len(result.time) < 2:
-        raise InputError(f"{_name(result)}: no wall time of the stepping loop is known (timing.loop_seconds in run.json)")
+        raise InputError(f"{_tick_label(result)}: no wall time of the stepping loop is known (timing.loop_seconds in run.json)")
     return float(result.time[-1] - result.time[0]) / loop
 
 
-def _name(result: Result) -> str:
+def _tick_label(result: Result) -> str:
     """The scenario's name, broken where it may be."""
     return str(result.metadata.get("name", "run")).replace("_", "\n")

@@ -9,40 +9,42 @@ from matplotlib.figure import Figure
 
 from ..results import Result
 from ..results.comparison import Comparison, Tolerance, Verdict
-from ..results.comparison.comparison import Comparer, matched
+from ..results.comparison.comparison import Comparer, match_tolerances
 
 WIDTH, HEIGHT = 7.16, 1.7  # in: a page, each signal
-OUTSIDE = "#D55E00"
+OUTSIDE_COLOUR = "#D55E00"
 
 
-def tubes(
-    result: Result, reference: Result, tolerances: Mapping[str, Tolerance], comparison: Comparison, most: int = 4
+def draw_tubes(
+    result: Result, reference: Result, tolerances: Mapping[str, Tolerance], comparison: Comparison, max_signals: int = 4
 ) -> Figure:
     """The `most` signals of `comparison` that are farthest out of their tubes, or nearest to leaving them, over time (s)."""
-    worst = [verdict for verdict in comparison.worst if reference[verdict.signal].dtype != object][:most]
+    worst = [verdict for verdict in comparison.worst if reference[verdict.signal].dtype != object][:max_signals]
     figure = Figure(figsize=(WIDTH, HEIGHT * max(len(worst), 1)), layout="constrained")
     if not worst:
         figure.text(0.5, 0.5, "nothing can be compared", ha="center")
         return figure
-    chosen, comparer = matched(tolerances, list(reference)), Comparer(result, reference)
+    chosen, comparer = match_tolerances(tolerances, list(reference)), Comparer(result, reference)
     panels = figure.subplots(len(worst), sharex=True, squeeze=False)[:, 0]
     for axes, verdict in zip(panels, worst, strict=True):
-        _panel(axes, comparer, verdict, chosen[verdict.signal], result, reference)
+        _draw_panel(axes, comparer, verdict, chosen[verdict.signal], result, reference)
     panels[0].legend(loc="best", ncols=4)
     panels[-1].set_xlabel("time (s)")
     return figure
 
 
-def _panel(axes: Axes, comparer: Comparer, verdict: Verdict, tolerance: Tolerance, result: Result, reference: Result) -> None:
+def _draw_panel(
+    axes: Axes, comparer: Comparer, verdict: Verdict, tolerance: Tolerance, result: Result, reference: Result
+) -> None:
     name = verdict.signal
     tube = comparer.tube(name, tolerance)
     axes.fill_between(tube.time, tube.lower, tube.upper, color="#0072B2", alpha=0.2, linewidth=0, label="tube")
     axes.plot(reference.time, reference[name], "--", color="#0072B2", label="reference", linewidth=0.9)
     axes.plot(result.time, result[name], color="black", label="result", linewidth=0.9)
     if not verdict.passed:
-        axes.axvline(verdict.time, color=OUTSIDE, linewidth=0.8)
-        values, outside = comparer.points.values(result[name]), comparer.outside(name, tolerance)
-        axes.plot(tube.time[outside], values[outside], ".", color=OUTSIDE, markersize=2, label="outside")
+        axes.axvline(verdict.time, color=OUTSIDE_COLOUR, linewidth=0.8)
+        values, outside = comparer.points.interpolate_result(result[name]), comparer.is_outside(name, tolerance)
+        axes.plot(tube.time[outside], values[outside], ".", color=OUTSIDE_COLOUR, markersize=2, label="outside")
     axes.set_xlim(reference.time[0], reference.time[-1])
     axes.set_title(name, loc="left")
     axes.set_ylabel(reference.units.get(name) or result.units.get(name) or "")

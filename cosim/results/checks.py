@@ -11,7 +11,7 @@ from ..core.errors import InputError, Problem, did_you_mean
 
 Number = float | int | bool
 
-LIMITS: Mapping[str, Callable[[Any, Any], bool]] = {"min": operator.ge, "max": operator.le, "equals": operator.eq}
+LIMIT_OPERATORS: Mapping[str, Callable[[Any, Any], bool]] = {"min": operator.ge, "max": operator.le, "equals": operator.eq}
 
 
 class CheckOutcome(NamedTuple):
@@ -37,28 +37,32 @@ def evaluate_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, An
     NaN keeps no limit. Raises InputError for KPIs that were not evaluated and limits that do not exist.
     """
     checks = list(checks)
-    if problems := [problem for check in checks for problem in _check_problems(kpis, check)]:
+    if problems := [problem for check in checks for problem in _find_check_problems(kpis, check)]:
         raise InputError(problems)
-    return [_outcome(check, kpis[check["kpi"]]) for check in checks]
+    return [_evaluate_check(check, kpis[check["kpi"]]) for check in checks]
 
 
-def held_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, Any]]) -> list[CheckOutcome]:
+def evaluate_all_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, Any]]) -> list[CheckOutcome]:
     """As `evaluate_checks`, but a check of a KPI that was not evaluated is one that is not met: its value is NaN."""
     checks = list(checks)
     return evaluate_checks({**{check["kpi"]: math.nan for check in checks}, **kpis}, checks)
 
 
-def _check_problems(kpis: Mapping[str, Number], check: Mapping[str, Any]) -> list[Problem]:
+def _find_check_problems(kpis: Mapping[str, Number], check: Mapping[str, Any]) -> list[Problem]:
     name, limits = check["kpi"], [key for key in check if key != "kpi"]
     where = f'check of "{name}"'
-    problems = [Problem(f'unknown limit "{key}"{did_you_mean(key, LIMITS)}', where) for key in limits if key not in LIMITS]
+    problems = [
+        Problem(f'unknown limit "{key}"{did_you_mean(key, LIMIT_OPERATORS)}', where)
+        for key in limits
+        if key not in LIMIT_OPERATORS
+    ]
     if name not in kpis:
         problems.append(Problem(f"no such KPI{did_you_mean(name, kpis)}", where))
     if not limits:
-        problems.append(Problem(f"no limit given, expected one of {', '.join(LIMITS)}", where))
+        problems.append(Problem(f"no limit given, expected one of {', '.join(LIMIT_OPERATORS)}", where))
     return problems
 
 
-def _outcome(check: Mapping[str, Any], value: Number) -> CheckOutcome:
-    passed = all(LIMITS[key](value, limit) for key, limit in check.items() if key != "kpi")
+def _evaluate_check(check: Mapping[str, Any], value: Number) -> CheckOutcome:
+    passed = all(LIMIT_OPERATORS[key](value, limit) for key, limit in check.items() if key != "kpi")
     return CheckOutcome(check, value, passed)

@@ -14,29 +14,29 @@ import pydantic_core
 from ..core.errors import InputError, Problem
 from ..core.paths import open_text
 from ..core.recording import Recording
-from .files import pieces, replacing
+from .files import iterate_chunks, writing_atomically
 
-ROWS_AT_A_TIME = 2000
+ROWS_PER_CHUNK = 2000
 
 
 def write_csv(recording: Recording, path: str | Path) -> None:
     """Write `recording` to `path`, which is replaced only when the file is complete."""
     columns = [recording.time, *recording.columns.values()]
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(",".join(map(_quoted, ("time", *recording.columns))) + "\n")
-        for piece in pieces(columns, ROWS_AT_A_TIME):
-            cells = [_cells(column[piece]) for column in columns]
+    with writing_atomically(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(",".join(map(_quote_csv, ("time", *recording.columns))) + "\n")
+        for piece in iterate_chunks(columns, ROWS_PER_CHUNK):
+            cells = [_format_column(column[piece]) for column in columns]
             file.writelines(",".join(row) + "\n" for row in zip(*cells, strict=True))
 
 
-def _quoted(text: str) -> str:
+def _quote_csv(text: str) -> str:
     return '"' + str(text).replace('"', '""') + '"'
 
 
-def _cells(column: np.ndarray) -> list[str]:
+def _format_column(column: np.ndarray) -> list[str]:
     """The texts of one column. pydantic's writer finds the shortest digits that round-trip three times faster than `repr`."""
     if column.dtype == object:
-        return list(map(_quoted, column))
+        return list(map(_quote_csv, column))
     numbers = column.astype(np.uint8) if column.dtype == bool else column
     return pydantic_core.to_json(numbers.tolist(), inf_nan_mode="constants")[1:-1].decode().split(",")
 
@@ -57,9 +57,9 @@ def read_csv(path: str | Path) -> Recording:
         raise InputError(Problem("the file is empty, expected a header", str(path))) from None
     _check_table(path, header, rows)
     rows = [row for row in rows if row]
-    time, *columns = map(_parsed, zip(*rows, strict=True)) if rows else [np.empty(0)] * len(header)
+    time, *columns = map(_parse_column, zip(*rows, strict=True)) if rows else [np.empty(0)] * len(header)
     recording = Recording(time, dict(zip(header[1:], columns, strict=True)), dict.fromkeys(header[1:], ""))
-    return _checked_time(path, recording)
+    return _convert_time(path, recording)
 
 
 def _check_table(path: Path, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -75,7 +75,7 @@ def _check_table(path: Path, header: Sequence[str], rows: Sequence[Sequence[str]
         raise InputError(problems)
 
 
-def _parsed(cells: Sequence[str]) -> np.ndarray:
+def _parse_column(cells: Sequence[str]) -> np.ndarray:
     for kind in (np.int64, np.uint64, np.float64):
         try:
             return np.array(cells, dtype=kind)
@@ -84,7 +84,7 @@ def _parsed(cells: Sequence[str]) -> np.ndarray:
     return np.array(cells, dtype=object)
 
 
-def _checked_time(path: Path, recording: Recording) -> Recording:
+def _convert_time(path: Path, recording: Recording) -> Recording:
     try:
         time = recording.time.astype(np.float64)
     except ValueError as error:

@@ -20,8 +20,8 @@ from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..core.errors import PASSING, ComponentError, InputError, Problem, did_you_mean, told
-from ..core.units import product
+from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, Problem, describe_exception, did_you_mean
+from ..core.units import multiply_units
 from .checks import Number
 from .result import Result
 
@@ -29,14 +29,14 @@ from .result import Result
 Signal = str
 #: what names of recorded signals begin with, up to a dot or bracket: "plant.uav"
 Prefix = str
-Function = TypeVar("Function", bound=Callable[..., Any])
+KpiFunction = TypeVar("KpiFunction", bound=Callable[..., Any])
 
 
 #: a factor of a declared unit: a unit, or the argument whose signal has it, and a power
-_FACTOR = re.compile(r"(\{(\w+)\}|[A-Za-z%]+)(-?\d*)")
+_UNIT_FACTOR = re.compile(r"(\{(\w+)\}|[A-Za-z%]+)(-?\d*)")
 
 
-class Evaluation(NamedTuple):
+class ResultFunction(NamedTuple):
     """A function of a result under the name that a scenario gives it, with its keyword arguments: a KPI or a figure."""
 
     name: str
@@ -62,33 +62,33 @@ class Evaluation(NamedTuple):
             return self.function(result, **self.arguments)
         except InputError as error:
             raise InputError([Problem(str(problem), f'{kind} "{self.name}"') for problem in error.problems]) from error
-        except PASSING:
+        except PASS_THROUGH_EXCEPTIONS:
             raise
         except BaseException as error:
-            raise self.failure(kind, told(error)) from error
+            raise self.failure(kind, describe_exception(error)) from error
 
     def failure(self, kind: str, reason: str) -> ComponentError:
         """The error that says this function is at fault."""
         return ComponentError(f'{kind} "{self.name}"', self.function.__name__, reason)
 
 
-def units(**unit_of: str) -> Callable[[Function], Function]:
+def units(**unit_of: str) -> Callable[[KpiFunction], KpiFunction]:
     """Decorator: the units of a KPI's numbers in Modelica syntax; what is not named is a count or a Boolean.
 
     "{signal}" stands for the unit of the signal that the argument `signal` names: an integral of its square has "{signal}2.s".
     """
 
-    def declare(function: Function) -> Function:
+    def declare(function: KpiFunction) -> KpiFunction:
         function.units = unit_of  # type: ignore[attr-defined]
         return function
 
     return declare
 
 
-def better(**sense: Literal["lower", "higher"]) -> Callable[[Function], Function]:
+def better(**sense: Literal["lower", "higher"]) -> Callable[[KpiFunction], KpiFunction]:
     """Decorator: which of a KPI's numbers are better the lower or the higher they are; what is not named is neither."""
 
-    def declare(function: Function) -> Function:
+    def declare(function: KpiFunction) -> KpiFunction:
         function.better = sense  # type: ignore[attr-defined]
         return function
 
@@ -101,15 +101,15 @@ def evaluate_kpis(result: Result, kpis: Iterable[tuple[str, Callable[..., Any], 
     Values may be NaN (not applicable to this run). Raises InputError or ComponentError that name the KPI.
     """
     values: dict[str, Number] = {}
-    for evaluation in map(Evaluation._make, kpis):
+    for evaluation in map(ResultFunction._make, kpis):
         numbers = evaluation.evaluate("KPI", result)
         if not isinstance(numbers, Mapping):
             raise evaluation.failure("KPI", f"returned {type(numbers).__name__}, expected a mapping from names to numbers")
-        values |= {f"{evaluation.name}.{key}": _number(evaluation, key, value) for key, value in numbers.items()}
+        values |= {f"{evaluation.name}.{key}": _checked_number(evaluation, key, value) for key, value in numbers.items()}
     return values
 
 
-def _number(evaluation: Evaluation, key: str, value: Any) -> Number:
+def _checked_number(evaluation: ResultFunction, key: str, value: Any) -> Number:
     number = value.item() if isinstance(value, np.generic) else value
     if isinstance(number, int) and abs(number) > sys.float_info.max:
         raise evaluation.failure("KPI", f'"{key}" is larger than any double')
@@ -118,7 +118,7 @@ def _number(evaluation: Evaluation, key: str, value: Any) -> Number:
     return number
 
 
-def first_time(time: np.ndarray, values: np.ndarray, level: float) -> float:
+def first_crossing_time(time: np.ndarray, values: np.ndarray, level: float) -> float:
     """When a line through the rows (`time`, `values`), shape (rows,), first is at `level` or above; NaN when it never is."""
     above = np.flatnonzero(values >= level)
     if not above.size:
@@ -140,20 +140,20 @@ def kpi_units(
     `signal_units` are those of the result; a unit that depends on a signal's is "" where that is unknown.
     """
     declared = {
-        f"{name}.{key}": _unit(unit, arguments, signal_units)
+        f"{name}.{key}": _resolve_unit(unit, arguments, signal_units)
         for name, function, arguments in kpis
         for key, unit in getattr(function, "units", {}).items()
     }
     return {name: declared.get(name.partition("[")[0], "") for name in names}
 
 
-def _unit(declared: str, arguments: Mapping[str, Any], signal_units: Mapping[str, str]) -> str:
+def _resolve_unit(declared: str, arguments: Mapping[str, Any], signal_units: Mapping[str, str]) -> str:
     """A declared unit with the units of signals in their places."""
     if "{" not in declared:
         return declared
-    factors = [(part, signal, int(power or 1)) for part, signal, power in _FACTOR.findall(declared)]
+    factors = [(part, signal, int(power or 1)) for part, signal, power in _UNIT_FACTOR.findall(declared)]
     known = [(signal_units.get(str(arguments.get(signal)), "") if signal else part, power) for part, signal, power in factors]
-    return product(known) if all(unit for unit, _ in known) else ""
+    return multiply_units(known) if all(unit for unit, _ in known) else ""
 
 
 def kpi_senses(kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]], names: Iterable[str]) -> dict[str, str]:

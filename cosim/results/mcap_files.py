@@ -22,13 +22,13 @@ import pydantic_core
 
 from ..core.errors import InputError
 from ..core.recording import Recording
-from .files import pieces, plain, replacing
+from .files import iterate_chunks, to_json_types, writing_atomically
 
-ROWS_AT_A_TIME = 2000
-_POSE = [*(f"position.{axis}" for axis in "xyz"), *(f"orientation.{axis}" for axis in "wxyz")]
-_ELEMENT = re.compile(r"(.*)\[[\d,]+\]")
+ROWS_PER_CHUNK = 2000
+_POSE_SIGNALS = [*(f"position.{axis}" for axis in "xyz"), *(f"orientation.{axis}" for axis in "wxyz")]
+_ELEMENT_PATTERN = re.compile(r"(.*)\[[\d,]+\]")
 #: names -> column, columns of an array, or names further down
-Tree = dict[str, "int | list[int] | Tree"]
+SignalTree = dict[str, "int | list[int] | SignalTree"]
 
 
 def require_mcap() -> None:
@@ -40,7 +40,7 @@ def require_mcap() -> None:
 
 
 def write_mcap(
-    recording: Recording, path: str | Path, scene: Mapping[str, Any] | None = None, about: Mapping[str, Any] | None = None
+    recording: Recording, path: str | Path, scene: Mapping[str, Any] | None = None, metadata: Mapping[str, Any] | None = None
 ) -> None:
     """Write `recording` to `path`, which is replaced only when the file is complete.
 
@@ -54,12 +54,12 @@ def write_mcap(
     context = foxglove.Context()
     options = MCAPWriteOptions(compression_threads=0)
     with (
-        replacing(path) as temporary,
+        writing_atomically(path) as temporary,
         foxglove.open_mcap(temporary, context=context, writer_options=options) as writer,
     ):
-        if about:
-            writer.write_metadata("run", {key: json.dumps(plain(value)) for key, value in about.items()})
-        times = _nanoseconds(recording.time)
+        if metadata:
+            writer.write_metadata("run", {key: json.dumps(to_json_types(value)) for key, value in metadata.items()})
+        times = _to_nanoseconds(recording.time)
         if scene and len(times):
             from .mcap_scene import log_scene
 
@@ -68,7 +68,7 @@ def write_mcap(
         _log_signals(recording, times, context)
 
 
-def _nanoseconds(time: np.ndarray) -> list[int]:
+def _to_nanoseconds(time: np.ndarray) -> list[int]:
     shifted = time - min(float(time[0]), 0.0) if len(time) else time
     return [round(1e9 * second) for second in shifted.tolist()]
 
@@ -77,14 +77,14 @@ def _log_poses(recording: Recording, times: list[int], context: Any) -> None:
     from foxglove.channels import FrameTransformsChannel
     from foxglove.messages import FrameTransform, FrameTransforms, Quaternion, Timestamp, Vector3
 
-    names = poses(recording)
+    names = find_poses(recording)
     if not names:
         return
     channel = FrameTransformsChannel("/tf", context=context)
-    columns = [recording.columns[f"{name}.{rest}"] for name in names for rest in _POSE]
-    for now, row in zip(times, _rows(columns), strict=True):
+    columns = [recording.columns[f"{name}.{rest}"] for name in names for rest in _POSE_SIGNALS]
+    for now, row in zip(times, _iterate_rows(columns), strict=True):
         stamp = Timestamp(*divmod(now, 10**9))
-        numbers = (row[first : first + len(_POSE)] for first in range(0, len(row), len(_POSE)))
+        numbers = (row[first : first + len(_POSE_SIGNALS)] for first in range(0, len(row), len(_POSE_SIGNALS)))
         transforms = [
             FrameTransform(
                 timestamp=stamp,
@@ -98,58 +98,58 @@ def _log_poses(recording: Recording, times: list[int], context: Any) -> None:
         channel.log(FrameTransforms(transforms=transforms), log_time=now)
 
 
-def poses(recording: Recording) -> list[str]:
+def find_poses(recording: Recording) -> list[str]:
     """Names of everything that was recorded with position and orientation."""
     heads = (name.removesuffix(".position.x") for name in recording.columns if name.endswith(".position.x"))
-    return [head for head in heads if all(f"{head}.{rest}" in recording.columns for rest in _POSE)]
+    return [head for head in heads if all(f"{head}.{rest}" in recording.columns for rest in _POSE_SIGNALS)]
 
 
 def _log_signals(recording: Recording, times: list[int], context: Any) -> None:
     from foxglove import Channel, Schema
 
-    columns, tree = list(recording.columns.values()), _tree(list(recording.columns))
+    columns, tree = list(recording.columns.values()), _build_tree(list(recording.columns))
     channels = {}
     for component, node in tree.items():
-        data = json.dumps(_schema(node, columns, list(recording.units.values()))).encode()
+        data = json.dumps(_json_schema(node, columns, list(recording.units.values()))).encode()
         schema = Schema(name=f"cosim.{component}", encoding="jsonschema", data=data)
         channels[component] = Channel(f"/signals/{component}", schema=schema, message_encoding="json", context=context)
-    for now, row in zip(times, _rows(columns), strict=True):
+    for now, row in zip(times, _iterate_rows(columns), strict=True):
         for component, channel in channels.items():
-            channel.log(pydantic_core.to_json(_values(tree[component], row), inf_nan_mode="null"), log_time=now)
+            channel.log(pydantic_core.to_json(_nest_values(tree[component], row), inf_nan_mode="null"), log_time=now)
 
 
-def _rows(columns: list[np.ndarray]) -> Iterator[tuple[Any, ...]]:
-    for piece in pieces(columns, ROWS_AT_A_TIME) if columns else ():
+def _iterate_rows(columns: list[np.ndarray]) -> Iterator[tuple[Any, ...]]:
+    for piece in iterate_chunks(columns, ROWS_PER_CHUNK) if columns else ():
         yield from zip(*(column[piece].tolist() for column in columns), strict=True)
 
 
-def _tree(names: list[str]) -> Tree:
+def _build_tree(names: list[str]) -> SignalTree:
     """Columns by component and the parts of their names. A name with others below it becomes their neighbour `value`."""
     inner = {name[:place] for name in names for place, letter in enumerate(name) if letter == "."}
-    tree: Tree = {}
+    tree: SignalTree = {}
     for column, name in enumerate(names):
         *path, leaf = [*name.split("."), *(["value"] if name in inner or "." not in name else [])]
         node: Any = tree
         for part in path:
             node = node.setdefault(part, {})
-        if element := _ELEMENT.fullmatch(leaf):
+        if element := _ELEMENT_PATTERN.fullmatch(leaf):
             node.setdefault(element[1], []).append(column)
         else:
             node[leaf] = column
     return tree
 
 
-def _values(node: Any, row: tuple[Any, ...]) -> Any:
+def _nest_values(node: Any, row: tuple[Any, ...]) -> Any:
     if isinstance(node, dict):
-        return {name: _values(child, row) for name, child in node.items()}
+        return {name: _nest_values(child, row) for name, child in node.items()}
     return [row[column] for column in node] if isinstance(node, list) else row[node]
 
 
-def _schema(node: Any, columns: list[np.ndarray], units: list[str]) -> dict[str, Any]:
+def _json_schema(node: Any, columns: list[np.ndarray], units: list[str]) -> dict[str, Any]:
     """JSON Schema of what `_values` gives."""
     if isinstance(node, dict):
-        return {"type": "object", "properties": {name: _schema(child, columns, units) for name, child in node.items()}}
+        return {"type": "object", "properties": {name: _json_schema(child, columns, units) for name, child in node.items()}}
     if isinstance(node, list):
-        return {"type": "array", "items": _schema(node[0], columns, units)}
+        return {"type": "array", "items": _json_schema(node[0], columns, units)}
     kind = {"b": "boolean", "i": "integer", "u": "integer", "f": "number"}.get(columns[node].dtype.kind, "string")
     return {"type": kind, **({"description": units[node]} if units[node] else {})}

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 #: corners of a ring
-_CORNERS = 32
+_RING_CORNERS = 32
 
 
 def log_scene(scene: Mapping[str, Any], now: int, context: Any) -> None:
@@ -20,12 +20,12 @@ def log_scene(scene: Mapping[str, Any], now: int, context: Any) -> None:
         for marker in scene.get("markers", ())
     ]
     parts = {body["name"]: body["parts"] for body in scene.get("bodies", ())}
-    entities = [_entity(name, name, own, now) for name, own in parts.items()]
-    entities.append(_entity("fixed", "world", [*scene.get("fixed", ()), *markers], now))
+    entities = [_scene_entity(name, name, own, now) for name, own in parts.items()]
+    entities.append(_scene_entity("fixed", "world", [*scene.get("fixed", ()), *markers], now))
     SceneUpdateChannel("/scene", context=context).log(SceneUpdate(entities=entities), log_time=now)
 
 
-def _entity(name: str, frame: str, parts: Sequence[Mapping[str, Any]], now: int) -> Any:
+def _scene_entity(name: str, frame: str, parts: Sequence[Mapping[str, Any]], now: int) -> Any:
     from foxglove.messages import SceneEntity, Timestamp
 
     def primitives(*shapes: str) -> list[Any]:
@@ -43,20 +43,20 @@ def _entity(name: str, frame: str, parts: Sequence[Mapping[str, Any]], now: int)
     )
 
 
-def _box(part: Mapping[str, Any]) -> Any:
+def _cube_primitive(part: Mapping[str, Any]) -> Any:
     from foxglove.messages import CubePrimitive
 
     return CubePrimitive(pose=_pose(part), size=_size(*part["size"]), color=_colour(part))
 
 
-def _sphere(part: Mapping[str, Any]) -> Any:
+def _sphere_primitive(part: Mapping[str, Any]) -> Any:
     from foxglove.messages import SpherePrimitive
 
     diameter = 2 * part["size"][0]
     return SpherePrimitive(pose=_pose(part), size=_size(diameter, diameter, diameter), color=_colour(part))
 
 
-def _cylinder(part: Mapping[str, Any]) -> Any:
+def _cylinder_primitive(part: Mapping[str, Any]) -> Any:
     """A cylinder (radius, length) or a cone (lower and upper radius, length)."""
     from foxglove.messages import CylinderPrimitive
 
@@ -71,11 +71,11 @@ def _cylinder(part: Mapping[str, Any]) -> Any:
     )
 
 
-def _ring(part: Mapping[str, Any]) -> Any:
+def _line_primitive(part: Mapping[str, Any]) -> Any:
     from foxglove.messages import LinePrimitive, LinePrimitiveLineType, Point3
 
     radius, thickness = part["size"]
-    angles = (2 * math.pi * corner / _CORNERS for corner in range(_CORNERS))
+    angles = (2 * math.pi * corner / _RING_CORNERS for corner in range(_RING_CORNERS))
     return LinePrimitive(
         type=LinePrimitiveLineType.LineLoop,
         pose=_pose(part),
@@ -85,7 +85,13 @@ def _ring(part: Mapping[str, Any]) -> Any:
     )
 
 
-_PRIMITIVES = {"box": _box, "sphere": _sphere, "cylinder": _cylinder, "cone": _cylinder, "ring": _ring}
+_PRIMITIVES = {
+    "box": _cube_primitive,
+    "sphere": _sphere_primitive,
+    "cylinder": _cylinder_primitive,
+    "cone": _cylinder_primitive,
+    "ring": _line_primitive,
+}
 
 
 def _pose(part: Mapping[str, Any]) -> Any:

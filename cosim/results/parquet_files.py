@@ -9,9 +9,9 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.recording import Recording
-from .files import pieces, replacing
+from .files import iterate_chunks, writing_atomically
 
-ROWS_AT_A_TIME = 1 << 17
+ROWS_PER_GROUP = 1 << 17
 
 
 def require_parquet() -> None:
@@ -34,13 +34,15 @@ def write_parquet(recording: Recording, path: str | Path) -> None:
 
     columns = {"time": recording.time, **recording.columns}
     units = {"time": "s", **recording.units}
-    schema = pa.schema([pa.field(name, _type(pa, values), metadata={"unit": units[name]}) for name, values in columns.items()])
-    with replacing(path) as temporary, ParquetWriter(temporary, schema) as writer:
-        for piece in pieces(list(columns.values()), ROWS_AT_A_TIME):
+    schema = pa.schema(
+        [pa.field(name, _arrow_type(pa, values), metadata={"unit": units[name]}) for name, values in columns.items()]
+    )
+    with writing_atomically(path) as temporary, ParquetWriter(temporary, schema) as writer:
+        for piece in iterate_chunks(list(columns.values()), ROWS_PER_GROUP):
             values = (np.ascontiguousarray(column[piece]) for column in columns.values())
             arrays = [pa.array(part, field.type) for part, field in zip(values, schema, strict=True)]
             writer.write_batch(pa.record_batch(arrays, schema=schema))
 
 
-def _type(pa: Any, values: np.ndarray) -> Any:
+def _arrow_type(pa: Any, values: np.ndarray) -> Any:
     return pa.string() if values.dtype == object else pa.from_numpy_dtype(values.dtype)

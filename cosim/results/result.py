@@ -90,14 +90,14 @@ class Result:
         span = f", {self.time[0]:g} s to {self.time[-1]:g} s" if len(self.time) else ""
         failure, units = self.metadata.get("failure"), self.metadata.get("kpi_units", {})
         lines = [f"{self.metadata.get('name', 'Result')}: {rows}{span}", *([f"ended early: {failure}"] if failure else [])]
-        lines += self._verdict()
+        lines += self._summarize_checks()
         width = max(map(len, self.kpis), default=0)
         for name, value in self.kpis.items():
             text = str(value) if isinstance(value, bool) else f"{value:.6g}"
             lines.append(f"  {name:{width}}  {text} {units.get(name, '')}".rstrip())
         return "\n".join(lines)
 
-    def _verdict(self) -> list[str]:
+    def _summarize_checks(self) -> list[str]:
         if not self.checks:
             return []
         failed = [f"  {outcome}" for outcome in self.checks if not outcome.passed]

@@ -17,27 +17,27 @@ from ..core.errors import InputError, Problem
 from ..core.stopwatch import Stopwatch
 from ..core.system import System
 from ..engine.run_loop import Settings
-from ..process.float_mode import usual
-from ..process.journal import blamed
-from .assembler import Assembler
-from .component_factory import Workshop
+from ..process.float_mode import default_float_mode
+from ..process.journal import as_component_error
+from .assembler import SystemBuilder
+from .component_factory import ComponentFactory
 from .functions import load_function, signal_problems
 from .json_document import Document
-from .nested_systems import Node, Scenario, load
+from .nested_systems import Node, Scenario, load_scenario
 from .schema import FunctionSpec, ScenarioSpec
 
-Function = tuple[str, Callable[..., Any], Mapping[str, Any]]
+NamedCall = tuple[str, Callable[..., Any], Mapping[str, Any]]
 
 
 @dataclass(frozen=True, repr=False)
-class Assembly:
+class PreparedRun:
     """A scenario ready to run. Its components live until `simulate` or `free`."""
 
     root: Node
     spec: ScenarioSpec
     system: System
     settings: Settings
-    workshop: Workshop
+    component_factory: ComponentFactory
     #: wall time (s) of "load_seconds" (all), of it "parse_seconds", "instantiate_seconds" and "wiring_seconds"
     timing: Mapping[str, float]
 
@@ -56,19 +56,19 @@ class Assembly:
         """The scenario's checks as `cosim.results.kpi.evaluate_checks` takes them."""
         return [check.model_dump(exclude_none=True) for check in self.spec.checks]
 
-    def kpis(self) -> list[Function]:
+    def kpis(self) -> list[NamedCall]:
         """(name, function, arguments) of every KPI."""
-        return self._functions(self.spec.kpis)
+        return self._load_functions(self.spec.kpis)
 
-    def figures(self) -> list[Function]:
+    def figures(self) -> list[NamedCall]:
         """(name, function, arguments) of every figure."""
-        return self._functions(self.spec.figures)
+        return self._load_functions(self.spec.figures)
 
     def figure_problems(self) -> list[Problem]:
         """Why figures could not be drawn from what is recorded, which is no matter where none are drawn, as in sweeps."""
         return list(signal_problems(self.root, "figures", self.settings.columns))
 
-    def _functions(self, specs: Sequence[FunctionSpec]) -> list[Function]:
+    def _load_functions(self, specs: Sequence[FunctionSpec]) -> list[NamedCall]:
         return [(spec.name, load_function(spec.python, self.root.folder), spec.arguments) for spec in specs]
 
     def files(self) -> dict[str, Path]:
@@ -78,11 +78,11 @@ class Assembly:
         calls = (*self.spec.kpis, *self.spec.figures, *([self.spec.scene] if self.spec.scene else []))
         places = (spec.python.rpartition(":")[0] for spec in calls)
         functions = [self.root.folder / place for place in places if place.endswith(".py")]
-        python = [member for file in (*functions, *self.workshop.python) for member in package_files(file)]
-        files = {file.resolve() for file in (*own, *python, *self.workshop.fmus, *self.workshop.modelica)}
+        python = [member for file in (*functions, *self.component_factory.python_files) for member in package_files(file)]
+        files = {file.resolve() for file in (*own, *python, *self.component_factory.fmus, *self.component_factory.modelica_files)}
         return {Path(relpath(file, self.root.folder.resolve())).as_posix(): file for file in sorted(files)}
 
-    def origin(self, name: str) -> str:
+    def component_source(self, name: str) -> str:
         """Where a component comes from, in words."""
         for node, own in self.root.leaves():
             if node.full_name(own) == name:
@@ -91,18 +91,18 @@ class Assembly:
         return self.spec.inputs[int(name.rpartition(".")[2])].file
 
     def free(self) -> None:
-        _free(self.system.components)
+        _free_components(self.system.components)
 
 
-@usual()
-def assemble(
+@default_float_mode()
+def prepare(
     scenario: str | Path,
     settings: Mapping[str, Any] | None = None,
     *,
-    apart: bool = False,
+    isolate_fmus: bool = False,
     sandbox: bool = False,
-    prepared: Mapping[Path, FmuFile] = MappingProxyType({}),
-) -> Assembly:
+    loaded_fmus: Mapping[Path, FmuFile] = MappingProxyType({}),
+) -> PreparedRun:
     """Read, wire and check a scenario; `settings` are changes from outside (see `tree.load`).
 
     With `apart` every FMU runs in a process of its own; with `sandbox` also, and those that do are confined. `prepared` are
@@ -113,27 +113,27 @@ def assemble(
     watch = Stopwatch()
     with watch.measure("load_seconds"):
         with watch.measure("parse_seconds"):
-            loaded = load(scenario, settings)
-        return _assembled(loaded, Assembler(loaded, apart, sandbox, prepared), watch)
+            loaded = load_scenario(scenario, settings)
+        return _build_run(loaded, SystemBuilder(loaded, isolate_fmus, sandbox, loaded_fmus), watch)
 
 
-def _assembled(loaded: Scenario, assembler: Assembler, watch: Stopwatch) -> Assembly:
+def _build_run(loaded: Scenario, assembler: SystemBuilder, watch: Stopwatch) -> PreparedRun:
     try:
         with watch.measure("instantiate_seconds"):
             assembler.make_components()
         with watch.measure("wiring_seconds"):
-            assembler.wire()
+            assembler.build_system()
         if assembler.problems:
             raise InputError(dict.fromkeys(assembler.problems))
     except BaseException:
-        _free(assembler.components)
+        _free_components(assembler.components)
         raise
-    return Assembly(loaded.root, loaded.spec, assembler.system, assembler.settings, assembler.workshop, watch.seconds)
+    return PreparedRun(loaded.root, loaded.spec, assembler.system, assembler.settings, assembler.component_factory, watch.seconds)
 
 
-def _free(components: Mapping[str, Component]) -> None:
+def _free_components(components: Mapping[str, Component]) -> None:
     """Free all of them, even when one fails to be freed."""
     with ExitStack() as stack:
         for name, component in components.items():
-            stack.enter_context(blamed(name, "free"))
+            stack.enter_context(as_component_error(name, "free"))
             stack.callback(component.free)

@@ -20,14 +20,14 @@ from typing import Any
 from ..core.errors import InputError, Problem
 from ..core.paths import open_text
 
-Path_ = tuple["str | int", ...]
-_SPACE = re.compile(r"[ \t\r\n]*")
+JsonPath = tuple["str | int", ...]
+_WHITESPACE = re.compile(r"[ \t\r\n]*")
 _LITERAL = re.compile(r"-?Infinity|NaN|true|false|null|-?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][-+]?\d+)?")
 #: neither file names nor UTF-8 can hold these
-_UNUSABLE = re.compile("[\0\ud800-\udfff]")
+_FORBIDDEN_CHARACTERS = re.compile("[\0\ud800-\udfff]")
 #: characters
-_LONGEST_NUMBER = 1000
-_NAME = re.compile(r"[A-Za-z_]\w*")
+_MAX_NUMBER_LENGTH = 1000
+_IDENTIFIER = re.compile(r"[A-Za-z_]\w*")
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Document:
     file: Path
     text: str
     value: Any = None
-    offsets: dict[Path_, int] = field(default_factory=dict)
+    offsets: dict[JsonPath, int] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
 
     def where(self, path: Sequence[str | int]) -> str:
@@ -60,13 +60,13 @@ class Document:
 
 def json_path(path: Sequence[str | int]) -> str:
     """ "$.components.uav" or "$.stages[0]" for a sequence of keys and indices."""
-    return "$" + "".join(_step(key) for key in path)
+    return "$" + "".join(_format_key(key) for key in path)
 
 
-def _step(key: str | int) -> str:
+def _format_key(key: str | int) -> str:
     if isinstance(key, int):
         return f"[{key}]"
-    return f".{key}" if _NAME.fullmatch(key) else f"[{json.dumps(key)}]"
+    return f".{key}" if _IDENTIFIER.fullmatch(key) else f"[{json.dumps(key)}]"
 
 
 def read_document(file: Path) -> Document:
@@ -79,19 +79,19 @@ def read_document(file: Path) -> Document:
     except UnicodeDecodeError as error:
         raise InputError(f'"{file}" is not UTF-8 text: {error.reason} at byte {error.start}') from None
     document = Document(file, text)
-    reader = _Reader(document)
-    document.value, end = reader.value(_skip(text, 0), ())
-    if _skip(text, end) != len(text):
-        raise reader.error(_skip(text, end), "expected the end of the file")
+    reader = _JsonParser(document)
+    document.value, end = reader.value(_skip_whitespace(text, 0), ())
+    if _skip_whitespace(text, end) != len(text):
+        raise reader.error(_skip_whitespace(text, end), "expected the end of the file")
     return document
 
 
-def _skip(text: str, offset: int) -> int:
-    match = _SPACE.match(text, offset)
+def _skip_whitespace(text: str, offset: int) -> int:
+    match = _WHITESPACE.match(text, offset)
     return match.end() if match else offset
 
 
-class _Reader:
+class _JsonParser:
     """Recursive descent over JSON text; every method returns (value, offset behind it)."""
 
     def __init__(self, document: Document):
@@ -101,7 +101,7 @@ class _Reader:
         self.document.offsets.setdefault((), 0)
         return InputError(f"{self.document.position(offset)}: {message}")
 
-    def value(self, offset: int, path: Path_) -> tuple[Any, int]:
+    def value(self, offset: int, path: JsonPath) -> tuple[Any, int]:
         self.document.offsets[path] = offset
         if len(path) > 100:
             raise self.error(offset, "nested more than 100 levels deep")
@@ -114,9 +114,9 @@ class _Reader:
                 return self.string(offset)
         return self.literal(offset, path)
 
-    def object(self, offset: int, path: Path_) -> tuple[dict[str, Any], int]:
+    def object(self, offset: int, path: JsonPath) -> tuple[dict[str, Any], int]:
         result: dict[str, Any] = {}
-        offset = _skip(self.text, offset + 1)
+        offset = _skip_whitespace(self.text, offset + 1)
         while self.text[offset : offset + 1] != "}":
             if result:
                 offset = self.expect(offset, ",", "}")
@@ -124,52 +124,52 @@ class _Reader:
                 raise self.error(offset, 'expected a key in double quotes or "}"')
             begin = offset
             key, offset = self.string(offset)
-            offset = self.expect(_skip(self.text, offset), ":")
+            offset = self.expect(_skip_whitespace(self.text, offset), ":")
             value, offset = self.value(offset, (*path, key))
             if key in result:
                 self.document.offsets[(*path, key)] = begin
                 self.problem((*path, key), "duplicate key")
             self.document.offsets[(*path, key)] = begin
             result[key] = value
-            offset = _skip(self.text, offset)
+            offset = _skip_whitespace(self.text, offset)
         return result, offset + 1
 
-    def array(self, offset: int, path: Path_) -> tuple[list[Any], int]:
+    def array(self, offset: int, path: JsonPath) -> tuple[list[Any], int]:
         result: list[Any] = []
-        offset = _skip(self.text, offset + 1)
+        offset = _skip_whitespace(self.text, offset + 1)
         while self.text[offset : offset + 1] != "]":
             if result:
                 offset = self.expect(offset, ",", "]")
             value, offset = self.value(offset, (*path, len(result)))
             result.append(value)
-            offset = _skip(self.text, offset)
+            offset = _skip_whitespace(self.text, offset)
         return result, offset + 1
 
     def expect(self, offset: int, *symbols: str) -> int:
         if self.text[offset : offset + 1] != symbols[0]:
             raise self.error(offset, f"expected {' or '.join(map(repr, symbols))}")
-        return _skip(self.text, offset + 1)
+        return _skip_whitespace(self.text, offset + 1)
 
     def string(self, offset: int) -> tuple[str, int]:
         try:
             text, end = scanstring(self.text, offset + 1, True)
         except json.JSONDecodeError as error:
             raise self.error(error.pos, error.msg) from None
-        if found := _UNUSABLE.search(text):
+        if found := _FORBIDDEN_CHARACTERS.search(text):
             message = f"the character U+{ord(found.group()):04X} is not allowed"
             self.document.problems.append(Problem(message, self.document.position(offset)))
-        return _UNUSABLE.sub("\N{REPLACEMENT CHARACTER}", text), end
+        return _FORBIDDEN_CHARACTERS.sub("\N{REPLACEMENT CHARACTER}", text), end
 
-    def literal(self, offset: int, path: Path_) -> tuple[Any, int]:
+    def literal(self, offset: int, path: JsonPath) -> tuple[Any, int]:
         match = _LITERAL.match(self.text, offset)
         if match is None:
             raise self.error(offset, "expected a JSON value")
         word = match.group()
-        value = json.loads(word) if len(word) <= _LONGEST_NUMBER else math.inf
+        value = json.loads(word) if len(word) <= _MAX_NUMBER_LENGTH else math.inf
         if isinstance(value, float) and not math.isfinite(value):
             self.problem(path, f"{word:.40} is not allowed, expected a finite number")
             value = 0.0
         return value, match.end()
 
-    def problem(self, path: Path_, message: str) -> None:
+    def problem(self, path: JsonPath, message: str) -> None:
         self.document.problems.append(Problem(message, self.document.where(path)))

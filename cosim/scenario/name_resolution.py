@@ -19,7 +19,7 @@ _PORT = re.compile(r"[^.\[]*")
 _REALS = ("Float64", "Float32")
 
 
-class Unknown(Exception):
+class UnknownName(Exception):
     """A name refers to nothing; the text says why. Empty when the reason was reported elsewhere."""
 
 
@@ -30,34 +30,38 @@ class Target(NamedTuple):
     prefix: str
 
 
-def resolve(node: Node, text: str, ports: Sequence[str], hidden: bool = False) -> list[Target]:
+def resolve_name(node: Node, text: str, ports: Sequence[str], include_inner: bool = False) -> list[Target]:
     """What a name means in a system. Through a nested system it goes by its ports of the given kinds ("inputs", ...); with
     `hidden`, inner components are reached by their own names too.
 
     Raises Unknown.
     """
     component, _, rest = text.partition(".")
-    if component in node.broken or "components" in node.refused:
-        raise Unknown
+    if component in node.invalid_components or "components" in node.invalid_keys:
+        raise UnknownName
     if component not in node.spec.components:
-        raise Unknown(f'unknown component "{component}"{did_you_mean(component, node.spec.components)}')
+        raise UnknownName(f'unknown component "{component}"{did_you_mean(component, node.spec.components)}')
     child = node.children.get(component)
     if child is None:
         return [Target(node.full_name(component), rest)]
     if not rest:
-        raise Unknown(f'"{text}" names a nested system, expected one of its ports{did_you_mean("", _ports(child, ports))}')
+        raise UnknownName(
+            f'"{text}" names a nested system, expected one of its ports{did_you_mean("", _port_targets(child, ports))}'
+        )
     match = _PORT.match(rest)
     port = match.group() if match else ""
-    shown = _ports(child, ports)
+    shown = _port_targets(child, ports)
     if port in shown:
-        return [target for inner in shown[port] for target in resolve(child, inner + rest[len(port) :], ports, hidden)]
-    if hidden and port in {*child.spec.components, *child.broken}:
-        return resolve(child, rest, ports, hidden)
-    valid = [*shown, *(child.spec.components if hidden else ())]
-    raise Unknown(f'nested system "{component}" has no {ports[0].rstrip("s")} port "{port}"{did_you_mean(port, valid)}')
+        return [
+            target for inner in shown[port] for target in resolve_name(child, inner + rest[len(port) :], ports, include_inner)
+        ]
+    if include_inner and port in {*child.spec.components, *child.invalid_components}:
+        return resolve_name(child, rest, ports, include_inner)
+    valid = [*shown, *(child.spec.components if include_inner else ())]
+    raise UnknownName(f'nested system "{component}" has no {ports[0].rstrip("s")} port "{port}"{did_you_mean(port, valid)}')
 
 
-def _ports(node: Node, kinds: Sequence[str]) -> Mapping[str, Sequence[str]]:
+def _port_targets(node: Node, kinds: Sequence[str]) -> Mapping[str, Sequence[str]]:
     declared = getattr(node.spec, "ports", None)
     shown: dict[str, Sequence[str]] = {}
     for kind in kinds if declared else ():
@@ -66,13 +70,13 @@ def _ports(node: Node, kinds: Sequence[str]) -> Mapping[str, Sequence[str]]:
     return shown
 
 
-class Heads:
+class PrefixIndex:
     """Names by how they begin, found without a look at all of them."""
 
     def __init__(self, names: Iterable[str]):
         self._sorted = sorted(names)
 
-    def starting(self, head: str) -> Sequence[str]:
+    def with_prefix(self, head: str) -> Sequence[str]:
         """All names that start with `head`, sorted."""
         if not head:
             return self._sorted
@@ -80,24 +84,26 @@ class Heads:
         return self._sorted[first : bisect_left(self._sorted, head[:-1] + chr(ord(head[-1]) + 1), first)]
 
 
-class Slots:
+class SlotIndex:
     """The slots of one causality of a component, in order, found by prefix without a look at all of them."""
 
     def __init__(self, component: Component, causality: str):
-        slots = (slot for variable in component.variables if variable.causality == causality for slot in variable.slots)
-        self._places = {slot: place for place, slot in enumerate(slots)}
-        self._heads = Heads(self._places)
+        slots = (slot for variable in component.variables if variable.causality == causality for slot in variable.scalar_names)
+        self._positions = {slot: place for place, slot in enumerate(slots)}
+        self._names = PrefixIndex(self._positions)
 
-    def under(self, prefix: str) -> dict[str, str]:
+    def below(self, prefix: str) -> dict[str, str]:
         """Slots below a prefix, by the rest of their names: "" for the prefix itself, ".position.x" below it."""
         if not prefix:
-            return {f".{slot}": slot for slot in self._places}
-        found = [prefix] if prefix in self._places else []
-        found += [slot for separator in ".[" for slot in self._heads.starting(prefix + separator)]
-        return {slot[len(prefix) :]: slot for slot in sorted(found, key=self._places.__getitem__)}
+            return {f".{slot}": slot for slot in self._positions}
+        found = [prefix] if prefix in self._positions else []
+        found += [slot for separator in ".[" for slot in self._names.with_prefix(prefix + separator)]
+        return {slot[len(prefix) :]: slot for slot in sorted(found, key=self._positions.__getitem__)}
 
 
-def assign(name: str, variables: Mapping[str, Variable], text: str, value: Any, whole: bool = False) -> dict[str, Any]:
+def check_assignment(
+    name: str, variables: Mapping[str, Variable], text: str, value: Any, all_elements: bool = False
+) -> dict[str, Any]:
     """Values by variable name for `text` = value; a list sets an array, or the scalars text[1], text[2], ...
 
     `variables` are those of the component `name`, by their names. A list may be shorter than an array, whose other elements keep
@@ -107,7 +113,7 @@ def assign(name: str, variables: Mapping[str, Variable], text: str, value: Any, 
     """
     value = value.tolist() if hasattr(value, "tolist") else value
     if text in variables:
-        return {text: _checked(variables[text], value, whole)}
+        return {text: _check_value(variables[text], value, all_elements)}
     if f"{text}[1]" in variables:
         if not isinstance(value, list) or not value:
             raise ValueError(f'"{text}" is a list of values, found {json.dumps(value)}')
@@ -115,12 +121,12 @@ def assign(name: str, variables: Mapping[str, Variable], text: str, value: Any, 
         if names[-1] not in variables:
             size = sum(other.startswith(f"{text}[") for other in variables)
             raise ValueError(f'"{text}" takes at most {size} values, found {len(value)}')
-        return {each: _checked(variables[each], element) for each, element in zip(names, value, strict=True)}
+        return {each: _check_value(variables[each], element) for each, element in zip(names, value, strict=True)}
     settable = [v.name for v in variables.values() if v.causality in ("parameter", "input")]
-    raise Unknown(f'component "{name}" has no variable "{text}"{did_you_mean(text, settable)}')
+    raise UnknownName(f'component "{name}" has no variable "{text}"{did_you_mean(text, settable)}')
 
 
-def _checked(variable: Variable, value: Any, whole: bool = False) -> Any:
+def _check_value(variable: Variable, value: Any, all_elements: bool = False) -> Any:
     if variable.causality not in ("parameter", "structuralParameter", "input") and variable.start is None:
         raise ValueError(f'"{variable.name}" is of causality {variable.causality} and cannot be set')
     if variable.causality == "structuralParameter" and value != variable.start:
@@ -128,17 +134,17 @@ def _checked(variable: Variable, value: Any, whole: bool = False) -> Any:
             f'"{variable.name}" is a structural parameter: it stays {json.dumps(variable.start)}, found {json.dumps(value)}'
         )
     if not variable.shape:
-        return _scalar(variable, value)
-    size = len(variable.slots)
+        return _scalar_value(variable, value)
+    size = len(variable.scalar_names)
     if not isinstance(value, list):
         raise ValueError(f'"{variable.name}" is an array of {size} values, expected a list, found {json.dumps(value)}')
-    if len(value) > size or (whole and len(value) < size):
-        raise ValueError(f'"{variable.name}" takes {"" if whole else "at most "}{size} values, found {len(value)}')
+    if len(value) > size or (all_elements and len(value) < size):
+        raise ValueError(f'"{variable.name}" takes {"" if all_elements else "at most "}{size} values, found {len(value)}')
     start = variable.start if isinstance(variable.start, tuple) else (variable.start or 0,) * size
-    return [*(_scalar(variable, element) for element in value), *start[len(value) :]]
+    return [*(_scalar_value(variable, element) for element in value), *start[len(value) :]]
 
 
-def _item(variable: Variable, value: Any) -> Any:
+def _enumeration_value(variable: Variable, value: Any) -> Any:
     """The value of an enumeration's item, which may be given by name."""
     items = dict(variable.items)
     if value in items:
@@ -150,11 +156,11 @@ def _item(variable: Variable, value: Any) -> Any:
     raise ValueError(f'"{variable.name}" is one of {valid}, found {json.dumps(value)}{hint}')
 
 
-def _scalar(variable: Variable, value: Any) -> Any:
+def _scalar_value(variable: Variable, value: Any) -> Any:
     """The value as the variable's type. Raises ValueError when it is not of that type or out of range."""
     if variable.items:
-        return _item(variable, value)
-    if not _accepts(variable.type, value):
+        return _enumeration_value(variable, value)
+    if not _type_accepts(variable.type, value):
         raise ValueError(f'"{variable.name}" is of type {variable.type}, found {json.dumps(value)}')
     low, high = _limits(variable)
     if (low is not None and value < low) or (high is not None and value > high):
@@ -177,7 +183,7 @@ def _limits(variable: Variable) -> tuple[float | None, float | None]:
     return least if low is None else max(low, least), largest if high is None else min(high, largest)
 
 
-def _accepts(kind: str, value: Any) -> bool:
+def _type_accepts(kind: str, value: Any) -> bool:
     if kind == "Boolean" or isinstance(value, bool):
         return kind == "Boolean" and isinstance(value, bool)
     if kind in ("String", "Binary"):

@@ -13,8 +13,8 @@ from ..components.python_class import package_files
 from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean
 from .json_document import Document, read_document
-from .schema import CallSpec, NestedSpec, ScenarioSpec, SystemSpec, kept
-from .validation import validate
+from .schema import CallSpec, NestedSpec, ScenarioSpec, SystemSpec, accepted
+from .validation import validate_document
 
 
 @dataclass
@@ -28,9 +28,9 @@ class Node:
     spec: SystemSpec
     prefix: str = ""
     children: dict[str, Node] = field(default_factory=dict)
-    broken: set[str] = field(default_factory=set)
+    invalid_components: set[str] = field(default_factory=set)
     #: keys of the file that were refused or are missing: nothing that follows from them is said
-    refused: set[str] = field(default_factory=set)
+    invalid_keys: set[str] = field(default_factory=set)
 
     @property
     def folder(self) -> Path:
@@ -54,7 +54,7 @@ class Node:
         for name, component in self.spec.components.items():
             if name in self.children:
                 yield from self.children[name].leaves()
-            elif name not in self.broken and component.system is None:
+            elif name not in self.invalid_components and component.system is None:
                 yield self, name
 
 
@@ -74,8 +74,8 @@ class Scenario:
     def files(self) -> list[Path]:
         """All files that are named, there or not: nested systems, sources with their packages, profiles, KPIs and figures."""
         files = [node.document.file for node in self.root.walk()]
-        files += [self.root.folder / spec.file for _, spec in kept(self.spec.inputs)]
-        functions: list[CallSpec] = [spec for _, spec in (*kept(self.spec.kpis), *kept(self.spec.figures))]
+        files += [self.root.folder / spec.file for _, spec in accepted(self.spec.inputs)]
+        functions: list[CallSpec] = [spec for _, spec in (*accepted(self.spec.kpis), *accepted(self.spec.figures))]
         functions += [self.spec.scene] if self.spec.scene else []
         python = [self.root.folder / spec.python.rpartition(":")[0] for spec in functions if ".py:" in spec.python]
         for node, name in self.root.leaves():
@@ -87,7 +87,7 @@ class Scenario:
         return [*files, *(member for file in python for member in package_files(file))]
 
 
-def find(scenario: str | Path) -> Path:
+def find_scenario(scenario: str | Path) -> Path:
     """A path as it is, or the file of a shipped scenario given by its name."""
     path = Path(scenario)
     shipped = resources.root() / "scenarios"
@@ -99,13 +99,13 @@ def find(scenario: str | Path) -> Path:
     return shipped / f"{scenario}.json"
 
 
-def load(scenario: str | Path, settings: Mapping[str, Any] | None = None) -> Scenario:
+def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = None) -> Scenario:
     """Read a scenario and its nested systems.
 
     `settings` are changes from outside: names that start with "/" are JSON pointers into the scenario file, "stop_time" and
     "step_size" its times, all others variables. Raises InputError when there is no file, or no JSON in it.
     """
-    document = read_document(find(scenario))
+    document = read_document(find_scenario(scenario))
     problems: list[Problem] = []
     variables: dict[str, Any] = {}
     for name, value in (settings or {}).items():
@@ -113,19 +113,19 @@ def load(scenario: str | Path, settings: Mapping[str, Any] | None = None) -> Sce
             problems += _set_pointer(document, name, value)
         else:
             variables[name] = value
-    spec, found, refused = validate(document, ScenarioSpec)
-    root = Node(document, spec, refused=refused)
+    spec, found, refused = validate_document(document, ScenarioSpec)
+    root = Node(document, spec, invalid_keys=refused)
     problems += found + _load_children(root, (document.file.resolve(),))
     return Scenario(root, problems, variables)
 
 
 def _load_children(node: Node, ancestors: tuple[Path, ...]) -> list[Problem]:
     problems: list[Problem] = []
-    if not node.spec.components and "components" not in node.refused:
+    if not node.spec.components and "components" not in node.invalid_keys:
         problems.append(Problem("expected at least one component, found none", node.where("components")))
-        node.refused.add("components")
+        node.invalid_keys.add("components")
     raw = node.document.value.get("components") if isinstance(node.document.value, dict) else None
-    node.broken |= set(raw if isinstance(raw, dict) else {}) - set(node.spec.components)
+    node.invalid_components |= set(raw if isinstance(raw, dict) else {}) - set(node.spec.components)
     for name, component in node.spec.components.items():
         if component.system is None:
             continue
@@ -135,11 +135,11 @@ def _load_children(node: Node, ancestors: tuple[Path, ...]) -> list[Problem]:
                 raise InputError(f'the nested system "{component.system}" contains itself')
             document = read_document(file)
         except InputError as error:
-            node.broken.add(name)
+            node.invalid_components.add(name)
             problems += [Problem(p.message, p.where or node.where("components", name, "system")) for p in error.problems]
             continue
-        spec, found, refused = validate(document, NestedSpec)
-        node.children[name] = Node(document, spec, node.full_name(name), refused=refused)
+        spec, found, refused = validate_document(document, NestedSpec)
+        node.children[name] = Node(document, spec, node.full_name(name), invalid_keys=refused)
         problems += found + _load_children(node.children[name], (*ancestors, file.resolve()))
     return problems
 
@@ -158,7 +158,7 @@ def _set_pointer(document: Document, pointer: str, value: Any) -> list[Problem]:
     keys = pointer_keys(pointer)
     target, where = document.value, f'setting "{pointer}"'
     for depth, key in enumerate(keys[:-1]):
-        target = _child(target, key)
+        target = _json_child(target, key)
         if target is None:
             return [Problem(f'the scenario has no "/{"/".join(keys[: depth + 1])}"', where)]
     if isinstance(target, dict):
@@ -170,7 +170,7 @@ def _set_pointer(document: Document, pointer: str, value: Any) -> list[Problem]:
     return []
 
 
-def _child(value: Any, key: str) -> Any:
+def _json_child(value: Any, key: str) -> Any:
     if isinstance(value, dict):
         return value.get(key)
     if isinstance(value, list) and key.isdigit() and int(key) < len(value):

@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..core.system import Connection, Group, Stage, System
-from ..engine.transfer_plan import conversion
-from .assembly import Assembly
+from ..engine.transfer_plan import unit_conversion
+from .assembly import PreparedRun
 
 
-def overview(assembly: Assembly) -> dict[str, Any]:
+def describe_system(assembly: PreparedRun) -> dict[str, Any]:
     """Components, stages (a nested system in them: {"name", "stages"}) and connections of a scenario that is ready to run.
 
     Of a component: its name, where it comes from, how many scalar inputs and outputs it has, and its period in s (None: every
@@ -18,38 +18,38 @@ def overview(assembly: Assembly) -> dict[str, Any]:
     """
     system = assembly.system
     return {
-        "components": [_component(assembly, name) for name in system.components],
-        "stages": _stages(system.stages),
-        "connections": [_connection(system, connection) for connection in system.connections],
+        "components": [_describe_component(assembly, name) for name in system.components],
+        "stages": _describe_stages(system.stages),
+        "connections": [_describe_connection(system, connection) for connection in system.connections],
     }
 
 
-def _component(assembly: Assembly, name: str) -> dict[str, Any]:
+def _describe_component(assembly: PreparedRun, name: str) -> dict[str, Any]:
     variables = assembly.system.components[name].variables
-    inputs, outputs = (sum(len(v.slots) for v in variables if v.causality == kind) for kind in ("input", "output"))
+    inputs, outputs = (sum(len(v.scalar_names) for v in variables if v.causality == kind) for kind in ("input", "output"))
     period = assembly.system.periods.get(name)
     return {
         "name": name,
-        "origin": assembly.origin(name),
+        "origin": assembly.component_source(name),
         "inputs": inputs,
         "outputs": outputs,
         "period": None if period is None else float(period),
     }
 
 
-def _stages(stages: Iterable[Stage]) -> list[list[Any]]:
-    return [[_member(member) for member in stage] for stage in stages]
+def _describe_stages(stages: Iterable[Stage]) -> list[list[Any]]:
+    return [[_describe_member(member) for member in stage] for stage in stages]
 
 
-def _member(member: str | Group) -> Any:
-    return {"name": member.name, "stages": _stages(member.stages)} if isinstance(member, Group) else member
+def _describe_member(member: str | Group) -> Any:
+    return {"name": member.name, "stages": _describe_stages(member.stages)} if isinstance(member, Group) else member
 
 
-def _connection(system: System, connection: Connection) -> list[str]:
-    source, target = system.place(connection.source).variable, system.place(connection.target).variable
+def _describe_connection(system: System, connection: Connection) -> list[str]:
+    source, target = system.find_element(connection.source).variable, system.find_element(connection.target).variable
     unit = source.unit.name if source.unit else ""
     notes = [f"delay {connection.delay}"] if connection.delay else []
-    if source.unit and target.unit and conversion(source, target) != (1.0, 0.0):
+    if source.unit and target.unit and unit_conversion(source, target) != (1.0, 0.0):
         notes.append(f"{source.unit.name} to {target.unit.name}")
     if source.type != target.type:
         notes.append(f"{source.type} to {target.type}")

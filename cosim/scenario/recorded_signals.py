@@ -8,53 +8,55 @@ from collections.abc import Iterable, Mapping, Sequence
 from ..core.component import Component
 from ..core.errors import Problem, did_you_mean
 from ..core.system import Endpoint
-from .name_resolution import Heads
+from .name_resolution import PrefixIndex
 
 
-class Selection:
+class SignalSelector:
     """Chooses signals by patterns in which "*" matches anything, dots too.
 
     Patterns choose outputs (also by the port names of nested systems, `aliases`); a pattern that matches no output may choose
     local variables and parameters. Patterns that may mean something of the `broken` components are no problem.
     """
 
-    def __init__(self, components: Mapping[str, Component], aliases: Mapping[str, Endpoint], broken: Sequence[str]):
-        self._outputs = {**_signals(components, ("output",)), **aliases}
-        self._others = _signals(components, ("local", "parameter", "calculatedParameter", "structuralParameter", "independent"))
-        self._output_heads, self._other_heads = Heads(self._outputs), Heads(self._others)
-        self._broken = broken
+    def __init__(self, components: Mapping[str, Component], aliases: Mapping[str, Endpoint], invalid: Sequence[str]):
+        self._outputs = {**_signal_endpoints(components, ("output",)), **aliases}
+        self._others = _signal_endpoints(
+            components, ("local", "parameter", "calculatedParameter", "structuralParameter", "independent")
+        )
+        self._output_index, self._other_index = PrefixIndex(self._outputs), PrefixIndex(self._others)
+        self._invalid = invalid
         self.problems: list[Problem] = []
 
-    def choose(self, patterns: Iterable[tuple[str, str]]) -> dict[str, Endpoint]:
+    def select(self, patterns: Iterable[tuple[str, str]]) -> dict[str, Endpoint]:
         """The signals that match (pattern, where it stands) pairs, in the order of components and variables."""
         chosen: set[str] = set()
         for pattern, where in patterns:
-            matches = _matching(pattern, self._output_heads) or _matching(pattern, self._other_heads)
-            if not matches and not self._may_be_broken(pattern):
+            matches = _matching_names(pattern, self._output_index) or _matching_names(pattern, self._other_index)
+            if not matches and not self._may_match_invalid(pattern):
                 self.problems.append(Problem(f'no output matches "{pattern}"{did_you_mean(pattern, self._outputs)}', where))
             chosen.update(matches)
         return {name: end for name, end in {**self._outputs, **self._others}.items() if name in chosen}
 
-    def _may_be_broken(self, pattern: str) -> bool:
+    def _may_match_invalid(self, pattern: str) -> bool:
         head = pattern.partition("*")[0]
-        return any(head.startswith(name) or name.startswith(head) for name in self._broken)
+        return any(head.startswith(name) or name.startswith(head) for name in self._invalid)
 
 
-def _signals(components: Mapping[str, Component], causalities: Sequence[str]) -> dict[str, Endpoint]:
+def _signal_endpoints(components: Mapping[str, Component], causalities: Sequence[str]) -> dict[str, Endpoint]:
     return {
         f"{name}.{slot}": Endpoint(name, slot)
         for name, component in components.items()
         for variable in component.variables
         if variable.causality in causalities
-        for slot in variable.slots
+        for slot in variable.scalar_names
     }
 
 
-def _matching(pattern: str, names: Heads) -> list[str]:
+def _matching_names(pattern: str, names: PrefixIndex) -> list[str]:
     if "*" not in pattern:
-        return [name for name in names.starting(pattern)[:1] if name == pattern]
+        return [name for name in names.with_prefix(pattern)[:1] if name == pattern]
     first, *middle, last = map(re.escape, pattern.split("*"))
     # each part where it stands first, for good: no pattern takes longer than its length times that of the name
     parts = "".join(f"(?>.*?{part})" for part in middle if part)
     matches = re.compile(f"{first}{parts}.*{last}").fullmatch
-    return [name for name in names.starting(pattern.partition("*")[0]) if matches(name)]
+    return [name for name in names.with_prefix(pattern.partition("*")[0]) if matches(name)]

@@ -17,70 +17,72 @@ from pydantic import (
     model_validator,
 )
 
-from ..core.time_grid import exact
+from ..core.time_grid import exact_fraction
 
 S = TypeVar("S")
 SOURCES = ("fmu", "python", "modelica", "system")
 
 
-def _time(value: Any) -> Fraction:
+def _parse_time(value: Any) -> Fraction:
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError('expected seconds as a number or as a fraction in text such as "1/60"')
     try:
-        return exact(value)
+        return exact_fraction(value)
     except (ValueError, ZeroDivisionError):
         raise ValueError('expected seconds as a number or as a fraction in text such as "1/60"') from None
 
 
-def _positive(value: Fraction) -> Fraction:
+def _check_positive(value: Fraction) -> Fraction:
     if value <= 0:
         raise ValueError("expected a positive number of seconds")
     return value
 
 
-def _assignable(value: Any) -> Any:
+def _check_value(value: Any) -> Any:
     values = value if isinstance(value, list) else [value]
     if not values or not all(isinstance(v, bool | int | float | str) for v in values):
         raise ValueError("expected a number, true, false, a text, or a list of these")
     return value
 
 
-def _choice(value: Any) -> Any:
+def _check_auto_or_bool(value: Any) -> Any:
     if value != "auto" and not isinstance(value, bool):
         raise ValueError('expected "auto", true or false')
     return value
 
 
-def _names(value: Any) -> Any:
+def _as_list(value: Any) -> Any:
     return [value] if isinstance(value, str) else value
 
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 Seconds = Annotated[
     Fraction,
-    BeforeValidator(_time),
+    BeforeValidator(_parse_time),
     WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^\d+/\d+$"}]}),
 ]
-Period = Annotated[Seconds, AfterValidator(_positive)]
-_scalar = [{"type": kind} for kind in ("number", "boolean", "string")]
+Period = Annotated[Seconds, AfterValidator(_check_positive)]
+_SCALAR_SCHEMAS = [{"type": kind} for kind in ("number", "boolean", "string")]
 Value = Annotated[
     Any,
-    BeforeValidator(_assignable),
-    WithJsonSchema({"anyOf": [*_scalar, {"type": "array", "items": {"anyOf": _scalar}, "minItems": 1}]}),
+    BeforeValidator(_check_value),
+    WithJsonSchema({"anyOf": [*_SCALAR_SCHEMAS, {"type": "array", "items": {"anyOf": _SCALAR_SCHEMAS}, "minItems": 1}]}),
 ]
-Choice = Annotated[Literal["auto"] | bool, BeforeValidator(_choice), WithJsonSchema({"enum": ["auto", True, False]})]
-Names = Annotated[
+AutoOrBool = Annotated[
+    Literal["auto"] | bool, BeforeValidator(_check_auto_or_bool), WithJsonSchema({"enum": ["auto", True, False]})
+]
+NameList = Annotated[
     list[str],
-    BeforeValidator(_names),
+    BeforeValidator(_as_list),
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
 ]
 
 
-class Cut:
+class InvalidElement:
     """Stands for a list element that was refused, so that its neighbours keep their indices."""
 
 
-CUT: Any = Cut()
+INVALID: Any = InvalidElement()
 
 
 class Spec(BaseModel):
@@ -90,13 +92,13 @@ class Spec(BaseModel):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _pass_cut(cls, value: Any, handler: Any) -> Any:
-        return value if value is CUT else handler(value)
+    def _pass_invalid(cls, value: Any, handler: Any) -> Any:
+        return value if value is INVALID else handler(value)
 
 
-def kept(specs: Iterable[S]) -> Iterator[tuple[int, S]]:
+def accepted(specs: Iterable[S]) -> Iterator[tuple[int, S]]:
     """(index, spec) of those list elements that were not refused."""
-    return ((i, spec) for i, spec in enumerate(specs) if spec is not CUT)
+    return ((i, spec) for i, spec in enumerate(specs) if spec is not INVALID)
 
 
 class ComponentSpec(Spec):
@@ -143,7 +145,7 @@ class AlgorithmSpec(Spec):
 
     kind: Literal["staged"] = "staged"
     stages: list[list[Name]]
-    parallel: Choice = Field(
+    parallel: AutoOrBool = Field(
         "auto",
         description="whether the FMUs of a stage step at the same time, on threads, with the same result: where their measured "
         "steps are long enough (instances of one file never at once), always, or never",
@@ -171,7 +173,7 @@ class InputSpec(Spec):
     """A profile over time from a CSV file (first column "time"), each named column to one or more inputs."""
 
     file: str
-    to: dict[str, Names]
+    to: dict[str, NameList]
     interpolation: Literal["linear", "hold"] = "linear"
 
 
@@ -198,9 +200,9 @@ class CheckSpec(Spec):
 
     @model_validator(mode="after")
     def _bounded(self) -> CheckSpec:
-        if self is not CUT and None not in (self.min, self.max) and self.min > self.max:  # type: ignore[operator]
+        if self is not INVALID and None not in (self.min, self.max) and self.min > self.max:  # type: ignore[operator]
             raise ValueError('expected "min" to be at most "max"')
-        if self is not CUT and self.min is None and self.max is None and self.equals is None:
+        if self is not INVALID and self.min is None and self.max is None and self.equals is None:
             raise ValueError('expected at least one of "min", "max", "equals"')
         return self
 
@@ -223,9 +225,9 @@ class ReferenceSpec(Spec):
 class PortsSpec(Spec):
     """What a nested system shows to the outside: each port is one or more inner variables or prefixes."""
 
-    inputs: dict[Name, Names] = {}
+    inputs: dict[Name, NameList] = {}
     outputs: dict[Name, str] = {}
-    parameters: dict[Name, Names] = {}
+    parameters: dict[Name, NameList] = {}
 
 
 class DeadlinesSpec(Spec):

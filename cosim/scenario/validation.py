@@ -13,12 +13,12 @@ from pydantic import BaseModel, ValidationError
 
 from ..core.errors import Problem, did_you_mean
 from .json_document import Document
-from .schema import CUT, SystemSpec
+from .schema import INVALID, SystemSpec
 
 S = TypeVar("S", bound=SystemSpec)
 
 #: what stands in for missing or wrong keys of the root, so that the rest can be read
-_STAND_INS: dict[str, Any] = {"name": "unnamed", "stop_time": 1, "step_size": 1, "components": {}}
+_PLACEHOLDERS: dict[str, Any] = {"name": "unnamed", "stop_time": 1, "step_size": 1, "components": {}}
 
 
 class Validated(NamedTuple, Generic[S]):
@@ -26,16 +26,16 @@ class Validated(NamedTuple, Generic[S]):
 
     spec: S
     problems: list[Problem]
-    refused: set[str]
+    invalid_keys: set[str]
 
 
-def validate(document: Document, kind: type[S]) -> Validated[S]:
+def validate_document(document: Document, kind: type[S]) -> Validated[S]:
     """Read a document as a spec, whatever is wrong with it."""
     value = copy.deepcopy(document.value)
     problems = list(document.problems)
     refused: set[str] = set()
     if not isinstance(value, dict):
-        problems.append(Problem(f"expected an object, found {_shown(value)}", document.where(())))
+        problems.append(Problem(f"expected an object, found {_shorten_json(value)}", document.where(())))
         value = {}
     first = True
     while True:
@@ -43,32 +43,32 @@ def validate(document: Document, kind: type[S]) -> Validated[S]:
             return Validated(kind.model_validate(value), problems, refused)
         except ValidationError as error:
             if first:  # later ones are consequences of cutting
-                problems += refusals(kind, document, error)
+                problems += schema_problems(kind, document, error)
             for detail in error.errors(include_url=False):
-                path = _path(detail)
+                path = _error_path(detail)
                 refused |= {str(key) for key in path[:1] if len(path) == 1}
                 if detail["type"] == "extra_forbidden":
-                    _remove(value, path)
+                    _remove_key(value, path)
                 else:
-                    _cut(kind, value, path[:-1] if detail["type"] == "missing" and len(path) > 1 else path)
+                    _replace_invalid(kind, value, path[:-1] if detail["type"] == "missing" and len(path) > 1 else path)
             first = False
 
 
-def refusals(kind: type[BaseModel], document: Document, error: ValidationError) -> list[Problem]:
+def schema_problems(kind: type[BaseModel], document: Document, error: ValidationError) -> list[Problem]:
     """What a schema has found wrong in a document, each with its place there."""
-    details = [(_path(detail), detail) for detail in error.errors(include_url=False)]
-    return [Problem(_message(kind, path, detail), document.where(path)) for path, detail in details]
+    details = [(_error_path(detail), detail) for detail in error.errors(include_url=False)]
+    return [Problem(_error_message(kind, path, detail), document.where(path)) for path, detail in details]
 
 
-def _path(detail: Any) -> tuple[str | int, ...]:
+def _error_path(detail: Any) -> tuple[str | int, ...]:
     return tuple(key for key in detail["loc"] if key != "[key]")
 
 
-def _message(kind: type[BaseModel], path: Sequence[str | int], detail: Any) -> str:
-    found = _shown(detail["input"])
+def _error_message(kind: type[BaseModel], path: Sequence[str | int], detail: Any) -> str:
+    found = _shorten_json(detail["input"])
     match detail["type"]:
         case "extra_forbidden":
-            return f"unknown key{did_you_mean(str(path[-1]), _keys(kind, path[:-1]))}"
+            return f"unknown key{did_you_mean(str(path[-1]), _known_keys(kind, path[:-1]))}"
         case "missing":
             return f'the key "{path[-1]}" is missing'
         case "value_error":
@@ -78,65 +78,65 @@ def _message(kind: type[BaseModel], path: Sequence[str | int], detail: Any) -> s
     return f"{detail['msg'].replace('Input should be', 'expected')}; found {found}"
 
 
-def _shown(value: Any) -> str:
+def _shorten_json(value: Any) -> str:
     text = json.dumps(value, ensure_ascii=False, default=str)
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _remove(value: Any, path: Sequence[str | int]) -> None:
+def _remove_key(value: Any, path: Sequence[str | int]) -> None:
     """Remove a key that should not be there, unless what it was in has been removed already."""
     for key in path[:-1]:
-        if value is CUT or not (key in value if isinstance(value, dict) else key in range(len(value))):
+        if value is INVALID or not (key in value if isinstance(value, dict) else key in range(len(value))):
             return
         value = value[key]
     if isinstance(value, dict):
         value.pop(path[-1], None)
 
 
-def _cut(kind: Any, value: Any, path: Sequence[str | int]) -> None:
+def _replace_invalid(kind: Any, value: Any, path: Sequence[str | int]) -> None:
     """Remove the element at `path`; what must be there gets a stand-in."""
     root = value
     for key in path[:-1]:
-        if value is CUT or not (key in value if isinstance(value, dict) else key in range(len(value))):
+        if value is INVALID or not (key in value if isinstance(value, dict) else key in range(len(value))):
             return
-        value, kind = value[key], _inner(kind, key)
+        value, kind = value[key], _child_type(kind, key)
     last = path[-1]
-    if value is root and last in _STAND_INS:
-        value[last] = copy.deepcopy(_STAND_INS[str(last)])
+    if value is root and last in _PLACEHOLDERS:
+        value[last] = copy.deepcopy(_PLACEHOLDERS[str(last)])
     elif isinstance(value, dict):
         value.pop(last, None)
     elif isinstance(value, list) and last in range(len(value)):
-        if _model(_inner(kind, last)):
-            value[int(last)] = CUT
+        if _model_type(_child_type(kind, last)):
+            value[int(last)] = INVALID
         else:
             del value[int(last)]
 
 
-def _keys(kind: Any, path: Sequence[str | int]) -> list[str]:
+def _known_keys(kind: Any, path: Sequence[str | int]) -> list[str]:
     """The keys that the schema knows at a path."""
     for key in path:
-        kind = _inner(kind, key)
-    kind = _model(kind)
+        kind = _child_type(kind, key)
+    kind = _model_type(kind)
     return [field.alias or name for name, field in kind.model_fields.items()] if kind else []
 
 
-def _inner(kind: Any, key: str | int) -> Any:
-    if model := _model(kind):
+def _child_type(kind: Any, key: str | int) -> Any:
+    if model := _model_type(kind):
         return next((f.annotation for n, f in model.model_fields.items() if key in (n, f.alias)), None)
-    for option in _options(kind):
+    for option in _union_members(kind):
         if typing.get_origin(option) in (dict, list):
             return typing.get_args(option)[-1]
     return None
 
 
-def _model(kind: Any) -> type[BaseModel] | None:
-    return next((o for o in _options(kind) if isinstance(o, type) and issubclass(o, BaseModel)), None)
+def _model_type(kind: Any) -> type[BaseModel] | None:
+    return next((o for o in _union_members(kind) if isinstance(o, type) and issubclass(o, BaseModel)), None)
 
 
-def _options(kind: Any) -> list[Any]:
+def _union_members(kind: Any) -> list[Any]:
     """The members of a union, annotations removed."""
     if typing.get_origin(kind) is typing.Annotated:
-        return _options(typing.get_args(kind)[0])
+        return _union_members(typing.get_args(kind)[0])
     if typing.get_origin(kind) in (typing.Union, types.UnionType):
-        return [option for member in typing.get_args(kind) for option in _options(member)]
+        return [option for member in typing.get_args(kind) for option in _union_members(member)]
     return [kind]

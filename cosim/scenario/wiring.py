@@ -8,14 +8,14 @@ from typing import NamedTuple
 from ..core.component import Component
 from ..core.errors import Problem, did_you_mean
 from ..core.system import Connection, Endpoint
-from .name_resolution import Slots, Target, Unknown, resolve
+from .name_resolution import SlotIndex, Target, UnknownName, resolve_name
 from .nested_systems import Node
-from .schema import ConnectionSpec, kept
+from .schema import ConnectionSpec, accepted
 
 
 class _Candidate(NamedTuple):
     connection: Connection
-    single: bool
+    is_variable: bool
 
 
 class Wiring:
@@ -25,35 +25,35 @@ class Wiring:
     a problem unless something else sets it (`set_inputs`) or feeds it. A connection of single variables beats a prefix.
     """
 
-    def __init__(self, components: Mapping[str, Component], set_inputs: set[Endpoint]):
+    def __init__(self, components: Mapping[str, Component], inputs_with_values: set[Endpoint]):
         self._components = components
-        self._set_inputs = set_inputs
-        self._slots: dict[tuple[str, str], Slots] = {}
-        self._fed: dict[Endpoint, _Candidate] = {}
-        self._unfed: dict[Endpoint, Problem] = {}
+        self._inputs_with_values = inputs_with_values
+        self._slots: dict[tuple[str, str], SlotIndex] = {}
+        self._by_input: dict[Endpoint, _Candidate] = {}
+        self._unmatched_inputs: dict[Endpoint, Problem] = {}
         self.problems: list[Problem] = []
 
     def connect(self, node: Node) -> None:
         """Expand the connections of one system (not of those nested in it)."""
-        for i, spec in kept(node.spec.connections):
+        for i, spec in accepted(node.spec.connections):
             self._expand(node, i, spec)
 
-    def feed(self, node: Node, output: Endpoint, name: str, where: str) -> None:
+    def connect_output(self, node: Node, output: Endpoint, name: str, where: str) -> None:
         """Connect one output to the input(s) that a name means."""
         for target in self._resolve(node, name, "inputs", where):
             self._add(_Candidate(Connection(output, Endpoint(*target), 0, where), True))
 
     def connections(self) -> Iterator[Connection]:
         """All connections; inputs that stayed without an output are added to the problems."""
-        self.problems += [problem for end, problem in self._unfed.items() if end not in self._fed]
-        return (candidate.connection for candidate in self._fed.values())
+        self.problems += [problem for end, problem in self._unmatched_inputs.items() if end not in self._by_input]
+        return (candidate.connection for candidate in self._by_input.values())
 
     def _expand(self, node: Node, i: int, spec: ConnectionSpec) -> None:
         where_from, where_to = (node.where("connections", i, key) for key in ("from", "to"))
         sources = self._resolve(node, spec.source, "outputs", where_from)
         targets = self._resolve(node, spec.target, "inputs", where_to)
-        outputs = self._under(sources, "output", where_from)
-        inputs = self._under(targets, "input", where_to)
+        outputs = self._slots_of_targets(sources, "output", where_from)
+        inputs = self._slots_of_targets(targets, "input", where_to)
         for source, own_outputs in outputs:
             for target, own_inputs in inputs:
                 self._match(source, own_outputs, target, own_inputs, spec.delay, node.where("connections", i))
@@ -71,46 +71,46 @@ class Wiring:
             end = Endpoint(target.component, slot)
             if rest in outputs:
                 connection = Connection(Endpoint(source.component, outputs[rest]), end, delay, where)
-                self._add(_Candidate(connection, single=rest == ""))
-            elif end not in self._set_inputs:
+                self._add(_Candidate(connection, is_variable=rest == ""))
+            elif end not in self._inputs_with_values:
                 wanted = f"{source.component}.{source.prefix}{rest}".replace("..", ".")
                 hint = did_you_mean(wanted, (f"{source.component}.{name}" for name in outputs.values()))
-                self._unfed[end] = Problem(f"input {end} has no matching output {wanted}{hint}", where)
+                self._unmatched_inputs[end] = Problem(f"input {end} has no matching output {wanted}{hint}", where)
 
     def _add(self, new: _Candidate) -> None:
         end = new.connection.target
-        old = self._fed.get(end)
-        if old and old.single == new.single:
+        old = self._by_input.get(end)
+        if old and old.is_variable == new.is_variable:
             text = f"input {end} is connected twice: it is already fed by {old.connection.source}"
             self.problems.append(Problem(text, new.connection.where))
-        elif old is None or new.single:
-            self._fed[end] = new
+        elif old is None or new.is_variable:
+            self._by_input[end] = new
 
     def _resolve(self, node: Node, name: str, kind: str, where: str) -> list[Target]:
         try:
-            return [t for t in resolve(node, name, (kind,)) if t.component in self._components]
-        except Unknown as error:
+            return [t for t in resolve_name(node, name, (kind,)) if t.component in self._components]
+        except UnknownName as error:
             if str(error):
                 self.problems.append(Problem(str(error), where))
             return []
 
-    def _under(self, targets: Sequence[Target], causality: str, where: str) -> list[tuple[Target, dict[str, str]]]:
+    def _slots_of_targets(self, targets: Sequence[Target], causality: str, where: str) -> list[tuple[Target, dict[str, str]]]:
         """Slots of the wanted causality below each prefix; a problem if there are none at all."""
-        found = [(target, self._below(target, causality)) for target in targets]
+        found = [(target, self._slots_of_target(target, causality)) for target in targets]
         if targets and not any(slots for _, slots in found):
-            self.problems.append(Problem(self._nothing_under(targets[0], causality), where))
+            self.problems.append(Problem(self._no_slots_message(targets[0], causality), where))
         return [(target, slots) for target, slots in found if slots]
 
-    def _below(self, target: Target, causality: str) -> dict[str, str]:
+    def _slots_of_target(self, target: Target, causality: str) -> dict[str, str]:
         key = target.component, causality
         if key not in self._slots:
-            self._slots[key] = Slots(self._components[target.component], causality)
-        return self._slots[key].under(target.prefix)
+            self._slots[key] = SlotIndex(self._components[target.component], causality)
+        return self._slots[key].below(target.prefix)
 
-    def _nothing_under(self, target: Target, causality: str) -> str:
+    def _no_slots_message(self, target: Target, causality: str) -> str:
         component = self._components[target.component]
         for other in ("input", "output", "parameter"):
-            if other != causality and self._below(target, other):
+            if other != causality and self._slots_of_target(target, other):
                 return f"{target.component}.{target.prefix} is an {other}, expected an {causality}"
         valid = (v.name for v in component.variables if v.causality == causality)
         return f'component "{target.component}" has no {causality} "{target.prefix}"{did_you_mean(target.prefix, valid)}'

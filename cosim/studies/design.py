@@ -16,7 +16,7 @@ import numpy as np
 from .schema import DesignSpec, DistributionSpec, FactorSpec, RangeSpec, SweepSpec
 
 #: largest double below 1
-_BELOW_ONE = float(np.nextafter(1.0, 0.0))
+_LARGEST_BELOW_ONE = float(np.nextafter(1.0, 0.0))
 
 
 class Level(NamedTuple):
@@ -32,42 +32,42 @@ class Factor:
 
     name: str
     paths: Sequence[str] = ()
-    listed: Sequence[Level] = ()
+    listed_levels: Sequence[Level] = ()
     quantile: Callable[[float], Any] | None = None
     #: levels in a full factorial design
-    grid: Sequence[Level] = ()
+    grid_levels: Sequence[Level] = ()
 
-    def at(self, place: float) -> Level:
+    def level_at(self, place: float) -> Level:
         """The level at a place of [0, 1)."""
         if self.quantile is None:
-            return self.listed[int(place * len(self.listed))]
-        return level(self.paths, self.quantile(place))
+            return self.listed_levels[int(place * len(self.listed_levels))]
+        return level_of_value(self.paths, self.quantile(place))
 
 
-def level(paths: Sequence[str], value: Any) -> Level:
+def level_of_value(paths: Sequence[str], value: Any) -> Level:
     """All paths set to one value."""
     return Level(value, dict.fromkeys(paths, value))
 
 
-def factor(spec: FactorSpec) -> Factor:
+def build_factor(spec: FactorSpec) -> Factor:
     """A factor as its file describes it."""
     if spec.levels is not None:
-        return _listed(spec.name, [Level(label, settings) for label, settings in spec.levels.items()])
+        return _listed_factor(spec.name, [Level(label, settings) for label, settings in spec.levels.items()])
     paths = spec.set or []
     if spec.values is not None:
-        return _listed(spec.name, [level(paths, value) for value in spec.values])
+        return _listed_factor(spec.name, [level_of_value(paths, value) for value in spec.values])
     part = spec.range or spec.distribution
     assert part is not None
-    quantile = _rounded(_range(spec.range) if spec.range else _distribution(part), spec.integer)  # type: ignore[arg-type]
-    grid = [level(paths, quantile(place)) for place in _places(part)]
-    return Factor(spec.name, paths, quantile=quantile, grid=grid)
+    quantile = _rounded_quantile(_range_quantile(spec.range) if spec.range else _distribution_quantile(part), spec.integer)  # type: ignore[arg-type]
+    grid = [level_of_value(paths, quantile(place)) for place in _grid_positions(part)]
+    return Factor(spec.name, paths, quantile=quantile, grid_levels=grid)
 
 
-def _listed(name: str, levels: Sequence[Level]) -> Factor:
-    return Factor(name, listed=levels, grid=levels)
+def _listed_factor(name: str, levels: Sequence[Level]) -> Factor:
+    return Factor(name, listed_levels=levels, grid_levels=levels)
 
 
-def _places(part: RangeSpec | DistributionSpec) -> list[float]:
+def _grid_positions(part: RangeSpec | DistributionSpec) -> list[float]:
     """Where the levels of a full factorial design lie: a range's ends belong to it, a distribution's are improbable."""
     count = part.count or 0
     if isinstance(part, RangeSpec):
@@ -75,35 +75,35 @@ def _places(part: RangeSpec | DistributionSpec) -> list[float]:
     return [(i + 0.5) / count for i in range(count)]
 
 
-def _rounded(quantile: Callable[[float], float], integer: bool) -> Callable[[float], float]:
+def _rounded_quantile(quantile: Callable[[float], float], integer: bool) -> Callable[[float], float]:
     return (lambda place: round(quantile(place))) if integer else quantile
 
 
-def _range(spec: RangeSpec) -> Callable[[float], float]:
-    return lambda place: between(place, spec.min, spec.max, spec.scale == "log")
+def _range_quantile(spec: RangeSpec) -> Callable[[float], float]:
+    return lambda place: interpolate(place, spec.min, spec.max, spec.scale == "log")
 
 
-def between(place: float, low: float, high: float, logarithmic: bool) -> float:
+def interpolate(position: float, low: float, high: float, logarithmic: bool) -> float:
     """The number at a place of [0, 1] between two bounds, which are met exactly."""
-    found = low * math.exp(place * math.log(high / low)) if logarithmic else low + place * (high - low)
-    return low if place == 0 else high if place == 1 else min(max(found, low), high)
+    found = low * math.exp(position * math.log(high / low)) if logarithmic else low + position * (high - low)
+    return low if position == 0 else high if position == 1 else min(max(found, low), high)
 
 
-def _distribution(spec: DistributionSpec) -> Callable[[float], float]:
+def _distribution_quantile(spec: DistributionSpec) -> Callable[[float], float]:
     from scipy import stats
 
     distribution = _DISTRIBUTIONS[spec.kind](stats, **spec.arguments)
-    return lambda place: float(distribution.ppf(min(max(place, 1 - _BELOW_ONE), _BELOW_ONE)))
+    return lambda place: float(distribution.ppf(min(max(place, 1 - _LARGEST_BELOW_ONE), _LARGEST_BELOW_ONE)))
 
 
-def _truncated(stats: Any, mean: float, std: float, min: float = -math.inf, max: float = math.inf) -> Any:
+def _truncated_normal(stats: Any, mean: float, std: float, min: float = -math.inf, max: float = math.inf) -> Any:
     return stats.truncnorm((min - mean) / std, (max - mean) / std, mean, std)
 
 
 _DISTRIBUTIONS: Mapping[str, Callable[..., Any]] = {
     "uniform": lambda stats, min, max: stats.uniform(min, max - min),
     "normal": lambda stats, mean, std: stats.norm(mean, std),
-    "truncated_normal": _truncated,
+    "truncated_normal": _truncated_normal,
     "lognormal": lambda stats, median, sigma: stats.lognorm(sigma, scale=median),
     "triangular": lambda stats, min, mode, max: stats.triang((mode - min) / (max - min), min, max - min),
     "exponential": lambda stats, mean: stats.expon(scale=mean),
@@ -126,7 +126,7 @@ class Design:
     factors: Sequence[Factor]
     seeds: Sequence[Level] = ()
     #: places in the unit cube, shape (points, factors); None: all combinations
-    samples: np.ndarray | None = field(default=None, repr=False)
+    unit_samples: np.ndarray | None = field(default=None, repr=False)
 
     @property
     def columns(self) -> list[str]:
@@ -134,7 +134,9 @@ class Design:
         return [*(factor.name for factor in self.factors), *(["seed"] if self.seeds else [])]
 
     def __len__(self) -> int:
-        points = math.prod(len(factor.grid) for factor in self.factors) if self.samples is None else len(self.samples)
+        points = (
+            math.prod(len(factor.grid_levels) for factor in self.factors) if self.unit_samples is None else len(self.unit_samples)
+        )
         return points * max(1, len(self.seeds))
 
     def __iter__(self) -> Iterator[Point]:
@@ -149,37 +151,37 @@ class Design:
         return Point(labels, {path: value for level in levels for path, value in level.settings.items()})
 
     def _levels(self, index: int) -> list[Level]:
-        if self.samples is not None:
-            return [factor.at(place) for factor, place in zip(self.factors, self.samples[index].tolist(), strict=True)]
+        if self.unit_samples is not None:
+            return [factor.level_at(place) for factor, place in zip(self.factors, self.unit_samples[index].tolist(), strict=True)]
         found = []
         for factor in reversed(self.factors):
-            index, place = divmod(index, len(factor.grid))
-            found.append(factor.grid[place])
+            index, place = divmod(index, len(factor.grid_levels))
+            found.append(factor.grid_levels[place])
         return found[::-1]
 
     def labels(self, name: str) -> list[Any]:
         """Labels of all levels of a factor that has some, or of the seeds."""
-        levels = self.seeds if name == "seed" else next(factor.grid for factor in self.factors if factor.name == name)
+        levels = self.seeds if name == "seed" else next(factor.grid_levels for factor in self.factors if factor.name == name)
         return [level.label for level in levels]
 
-    def variants(self) -> Iterator[Mapping[str, Any]]:
+    def level_settings(self) -> Iterator[Mapping[str, Any]]:
         """Settings of every listed level alone: a text among them may name a file."""
-        return (level.settings for factor in self.factors for level in factor.listed)
+        return (level.settings for factor in self.factors for level in factor.listed_levels)
 
 
-def design(spec: SweepSpec) -> Design:
+def build_design(spec: SweepSpec) -> Design:
     """The points of a sweep; the same file gives the same points."""
-    factors = [factor(each) for each in spec.factors]
+    factors = [build_factor(each) for each in spec.factors]
     seeds = spec.seeds
-    replications = [level(seeds.set, seeds.first + i) for i in range(seeds.count)] if seeds else []
-    return Design(factors, replications, _samples(spec.design, len(factors)))
+    replications = [level_of_value(seeds.set, seeds.first + i) for i in range(seeds.count)] if seeds else []
+    return Design(factors, replications, _draw_samples(spec.design, len(factors)))
 
 
-def _samples(spec: DesignSpec, dimensions: int) -> np.ndarray | None:
+def _draw_samples(spec: DesignSpec, dimensions: int) -> np.ndarray | None:
     if spec.runs is None or dimensions == 0:
         return None
     from scipy.stats import qmc
 
     generator = np.random.default_rng(spec.seed)
     kind = {"latin_hypercube": qmc.LatinHypercube, "sobol": qmc.Sobol}[spec.kind]
-    return np.minimum(kind(dimensions, rng=generator).random(spec.runs), _BELOW_ONE)
+    return np.minimum(kind(dimensions, rng=generator).random(spec.runs), _LARGEST_BELOW_ONE)

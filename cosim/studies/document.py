@@ -12,17 +12,17 @@ from pydantic import ValidationError
 from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean
 from ..scenario.json_document import Document, json_path, read_document
-from ..scenario.nested_systems import find, pointer_keys
-from ..scenario.validation import refusals
+from ..scenario.nested_systems import find_scenario, pointer_keys
+from ..scenario.validation import schema_problems
 from .schema import StudySpec
 
 S = TypeVar("S", bound=StudySpec)
 
-_FOLDER = Path("scenarios") / "sweeps"
+_SHIPPED_FOLDER = Path("scenarios") / "sweeps"
 
 
 @dataclass(frozen=True)
-class Read(Generic[S]):
+class StudyFile(Generic[S]):
     """A sweep or tuning file and what it says."""
 
     spec: S
@@ -32,38 +32,42 @@ class Read(Generic[S]):
     def scenario(self) -> Path:
         """The scenario's file."""
         near = self.document.file.parent / self.spec.scenario
-        return near if paths.is_file(near) else find(self.spec.scenario)
+        return near if paths.is_file(near) else find_scenario(self.spec.scenario)
 
-    def located(self, problems: Iterable[Problem], settings: Mapping[str, Any]) -> list[Problem]:
+    def locate_problems(self, problems: Iterable[Problem], settings: Mapping[str, Any]) -> list[Problem]:
         """Problems of a run with these settings, at the places in this file that make them, as far as a setting does."""
-        return list(dict.fromkeys(replace(problem, where=self._place(problem.where, settings)) for problem in problems))
+        return list(dict.fromkeys(replace(problem, where=self._locate(problem.where, settings)) for problem in problems))
 
-    def _place(self, where: str, settings: Mapping[str, Any]) -> str:
+    def _locate(self, where: str, settings: Mapping[str, Any]) -> str:
         _, quote, name = where.partition('setting "')
         if quote:
-            return self._made(name.removesuffix('"'), settings) or where
+            return self._setting_location(name.removesuffix('"'), settings) or where
         position, _, path = where.partition(": $")
         if Path(position.rsplit(":", 2)[0]).name != self.scenario.name:
             return where
         pointers = {each: _json_path(each) for each in settings if each.startswith("/")}
-        above = [each for each, start in pointers.items() if _within(path, start)]
+        above = [each for each, start in pointers.items() if _is_within(path, start)]
         if above:
             nearest = max(above, key=lambda each: len(pointers[each]))
-            return self._made(nearest, settings, path.removeprefix(pointers[nearest])) or where
-        below = [place for each, start in pointers.items() if _within(start, path) and (place := self._made(each, settings))]
+            return self._setting_location(nearest, settings, path.removeprefix(pointers[nearest])) or where
+        below = [
+            place
+            for each, start in pointers.items()
+            if _is_within(start, path) and (place := self._setting_location(each, settings))
+        ]
         return f"{below[0]}, in {where}" if len(below) == 1 else where
 
-    def _made(self, name: str, settings: Mapping[str, Any], part: str = "") -> str:
+    def _setting_location(self, name: str, settings: Mapping[str, Any], part: str = "") -> str:
         """Where this file makes a setting, or a part of it; "" where it does not."""
-        found = [path for path in self._places() if self._makes(path, name, settings)]
+        found = [path for path in self._setting_paths() if self._is_setting(path, name, settings)]
         return self.document.where(found[-1]) + (part if found[-1][-1] == name else "") if found else ""
 
-    def _makes(self, path: tuple[str | int, ...], name: str, settings: Mapping[str, Any]) -> bool:
+    def _is_setting(self, path: tuple[str | int, ...], name: str, settings: Mapping[str, Any]) -> bool:
         """Whether a place in this file is where a setting is made: a key with its value, or a text of "set"."""
-        value = _at(self.document.value, path)
+        value = _value_at(self.document.value, path)
         return value == name or (path[-1] == name and value == settings.get(name))
 
-    def _places(self) -> Iterable[tuple[str | int, ...]]:
+    def _setting_paths(self) -> Iterable[tuple[str | int, ...]]:
         """Paths in the file that may name settings, in their order."""
         for path in sorted(self.document.offsets, key=lambda path: self.document.offsets[path]):
             if path and ("set" in path or "settings" in path or "levels" in path or "cases" in path):
@@ -75,26 +79,26 @@ def _json_path(pointer: str) -> str:
     return json_path([int(key) if key.isdigit() else key for key in pointer_keys(pointer)])[1:]
 
 
-def _within(path: str, start: str) -> bool:
+def _is_within(path: str, start: str) -> bool:
     return path == start or path.startswith((f"{start}.", f"{start}["))
 
 
-def _at(value: object, path: tuple[str | int, ...]) -> object:
+def _value_at(value: object, path: tuple[str | int, ...]) -> object:
     for key in path:
         value = value[key]  # type: ignore[index]
     return value
 
 
-def read(file: str | Path, kind: type[S]) -> Read[S]:
+def read_study(file: str | Path, kind: type[S]) -> StudyFile[S]:
     """A sweep or tuning from a file, or a shipped one by its name. Raises InputError with everything that is wrong."""
-    document = read_document(_find(file))
+    document = read_document(_find_study(file))
     try:
         spec = kind.model_validate(document.value)
     except ValidationError as error:
-        raise InputError([*document.problems, *refusals(kind, document, error)]) from None
+        raise InputError([*document.problems, *schema_problems(kind, document, error)]) from None
     if document.problems:
         raise InputError(document.problems)
-    found = Read(spec, document)
+    found = StudyFile(spec, document)
     try:
         found.scenario  # noqa: B018
     except InputError as error:
@@ -102,11 +106,11 @@ def read(file: str | Path, kind: type[S]) -> Read[S]:
     return found
 
 
-def _find(file: str | Path) -> Path:
+def _find_study(file: str | Path) -> Path:
     path = Path(file)
     if path.suffix == ".json" or paths.is_file(path):
         return path
-    names = sorted(each.stem for each in (resources.root() / _FOLDER).glob("*.json"))
+    names = sorted(each.stem for each in (resources.root() / _SHIPPED_FOLDER).glob("*.json"))
     if str(file) not in names:
         raise InputError(f'no file and no shipped sweep "{file}"{did_you_mean(str(file), names)}')
-    return resources.root() / _FOLDER / f"{file}.json"
+    return resources.root() / _SHIPPED_FOLDER / f"{file}.json"

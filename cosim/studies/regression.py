@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 
 #: what a scenario expects of its run
-EXPECTATIONS = ("checks", "reference")
+EXPECTATION_KEYS = ("checks", "reference")
 
 
-def holds(file: Path, *groups: Sequence[str]) -> bool:
+def has_keys(file: Path, *groups: Sequence[str]) -> bool:
     """Whether a JSON file has one key at least of each group; yes when it cannot be read: running it says why."""
     try:
         with open_text(file, encoding="utf-8") as stream:
@@ -36,7 +36,7 @@ def holds(file: Path, *groups: Sequence[str]) -> bool:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RegressionOutcome:
     """What became of one scenario: `code` as of `cosim run`, what was done, what is wrong, and `seconds` of wall time."""
 
     name: str
@@ -54,45 +54,53 @@ class Regression:
     directory: Path
     update: bool
 
-    def outcome(self) -> Outcome:
+    def run(self) -> RegressionOutcome:
         """Run the scenario in a process of its own, as anybody would, and look at what it wrote."""
         began = time.perf_counter()
-        return replace(self._outcome(), seconds=time.perf_counter() - began)
+        return replace(self._run(), seconds=time.perf_counter() - began)
 
-    def _outcome(self) -> Outcome:
+    def _run(self) -> RegressionOutcome:
         command = [sys.executable, "-m", "cosim", "run", str(self.file), "--no-report", "--output-dir", str(self.directory)]
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)  # noqa: S603
         if done.returncode < 0:
-            return Outcome(self.file.stem, 1, "did not run to its end", (f"cosim run: ended by signal {-done.returncode}",))
+            return RegressionOutcome(
+                self.file.stem, 1, "did not run to its end", (f"cosim run: ended by signal {-done.returncode}",)
+            )
         if done.returncode not in (0, 3):
-            return Outcome(self.file.stem, done.returncode, "did not run to its end", tuple(done.stderr.splitlines()))
+            return RegressionOutcome(self.file.stem, done.returncode, "did not run to its end", tuple(done.stderr.splitlines()))
         try:
-            run = _Run.read(self.file, self.directory)
-            return self._updated(run) if self.update else self._compared(run)
+            run = _FinishedRun.read(self.file, self.directory)
+            return self._update_reference(run) if self.update else self._compare(run)
         except CosimError as error:
-            return Outcome(self.file.stem, error.exit_code, "cannot be compared", tuple(str(error).splitlines()))
+            return RegressionOutcome(self.file.stem, error.exit_code, "cannot be compared", tuple(str(error).splitlines()))
 
-    def _compared(self, run: _Run) -> Outcome:
+    def _compare(self, run: _FinishedRun) -> RegressionOutcome:
         failed, summary = run.failed_checks(), f"{len(run.checks)} checks"
         if run.scenario.get("reference"):
-            comparison = run.compared()
+            comparison = run.compare()
             summary += f", {len(comparison.verdicts)} signals"
             if not comparison.passed:
-                failed += [*str(comparison).splitlines(), *run.changes(), f"see {run.draw(comparison, self.directory)}"]
-        return Outcome(self.file.stem, 3 if failed else 0, summary, tuple(failed))
+                failed += [
+                    *str(comparison).splitlines(),
+                    *run.reference_changes(),
+                    f"see {run.draw_tubes(comparison, self.directory)}",
+                ]
+        return RegressionOutcome(self.file.stem, 3 if failed else 0, summary, tuple(failed))
 
-    def _updated(self, run: _Run) -> Outcome:
+    def _update_reference(self, run: _FinishedRun) -> RegressionOutcome:
         from ..results.comparison.reference import write_reference
 
         if failed := run.failed_checks():
-            return Outcome(self.file.stem, 3, "a failed run becomes no reference", tuple(failed))
-        written = write_reference(run.result, run.path, run.tolerances)
-        size = run.path.stat().st_size / 1000
-        return Outcome(self.file.stem, 0, f"{len(written)} signals, {len(written.time)} rows, {size:.0f} kB in {run.path}")
+            return RegressionOutcome(self.file.stem, 3, "a failed run becomes no reference", tuple(failed))
+        written = write_reference(run.result, run.reference_path, run.tolerances)
+        size = run.reference_path.stat().st_size / 1000
+        return RegressionOutcome(
+            self.file.stem, 0, f"{len(written)} signals, {len(written.time)} rows, {size:.0f} kB in {run.reference_path}"
+        )
 
 
 @dataclass(frozen=True)
-class _Run:
+class _FinishedRun:
     """A result, the scenario that it came from (as it was run), and the folder of that scenario's file."""
 
     result: Result
@@ -100,7 +108,7 @@ class _Run:
     folder: Path
 
     @classmethod
-    def read(cls, file: Path, directory: Path) -> _Run:
+    def read(cls, file: Path, directory: Path) -> _FinishedRun:
         from ..report.runs import read_run
 
         result = read_run(directory)
@@ -117,7 +125,7 @@ class _Run:
         return [str(outcome) for outcome in evaluate_checks(kpis, self.checks) if not outcome.passed]
 
     @property
-    def path(self) -> Path:
+    def reference_path(self) -> Path:
         return self.folder / self.scenario["reference"]["file"]
 
     @cached_property
@@ -130,32 +138,32 @@ class _Run:
     def reference(self) -> Result:
         from ..results import Result
 
-        if not self.path.is_file():
-            raise InputError(f'the reference "{self.path}" does not exist: `cosim regress --update` writes it')
-        return Result.from_csv(self.path)
+        if not self.reference_path.is_file():
+            raise InputError(f'the reference "{self.reference_path}" does not exist: `cosim regress --update` writes it')
+        return Result.from_csv(self.reference_path)
 
-    def compared(self) -> Comparison:
+    def compare(self) -> Comparison:
         from ..results.comparison import compare
 
         return compare(self.result, self.reference, self.tolerances)
 
-    def changes(self) -> Iterator[str]:
+    def reference_changes(self) -> Iterator[str]:
         """What is no longer as it was when the reference was made."""
-        from ..results.comparison.reference import changes
+        from ..results.comparison.reference import describe_provenance_changes
 
         try:
-            made_by = json.loads(self.path.with_suffix(".json").read_text(encoding="utf-8"))
+            made_by = json.loads(self.reference_path.with_suffix(".json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return
-        if found := changes(made_by, self.result.metadata):
+        if found := describe_provenance_changes(made_by, self.result.metadata):
             yield f"changed since the reference was made: {', '.join(found)}"
 
-    def draw(self, comparison: Comparison, directory: Path) -> Path:
+    def draw_tubes(self, comparison: Comparison, directory: Path) -> Path:
         """The worst signals in their tubes, as a file in `directory`."""
-        from ..report.figures import draw, save
-        from ..report.tubes import tubes
+        from ..report.figures import draw_figure, save_figure
+        from ..report.tubes import draw_tubes
 
         arguments = {"reference": self.reference, "tolerances": self.tolerances, "comparison": comparison}
         path = directory / "tubes.png"
-        save(draw(self.result, "tubes", tubes, arguments), path)
+        save_figure(draw_figure(self.result, "tubes", draw_tubes, arguments), path)
         return path

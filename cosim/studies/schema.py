@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, Field, StringConstraints, model_validator
 
 from ..core.errors import did_you_mean
-from ..scenario.schema import CheckSpec, Names, Spec
-from .setting_conflicts import set_once
+from ..scenario.schema import CheckSpec, NameList, Spec
+from .setting_conflicts import check_conflicts
 
 #: distribution -> its arguments; `min` and `max` of truncated_normal may be left out
 DISTRIBUTIONS = {
@@ -22,20 +22,20 @@ DISTRIBUTIONS = {
     "exponential": ("mean",),
     "weibull": ("shape", "scale"),
 }
-_OPTIONAL = {"truncated_normal": {"min", "max"}}
-_POSITIVE = ("std", "sigma", "median", "shape", "scale")
+_OPTIONAL_ARGUMENTS = {"truncated_normal": {"min", "max"}}
+_POSITIVE_ARGUMENTS = ("std", "sigma", "median", "shape", "scale")
 #: what makes the levels of a factor
-_LEVELS = ("values", "range", "distribution", "levels")
+_LEVEL_SOURCES = ("values", "range", "distribution", "levels")
 #: quantiles in the aggregates
 QUANTILES = {"min": 0.0, "q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95, "max": 1.0}
 #: columns that stand beside factors, and beside the parameters of a tuning, in some file
-TABLE = ("run", "seed", "status", "passed", "failure", "output", "command")
-AGGREGATES = ("kpi", "count", "mean", "std", *QUANTILES)
-SUCCESS = ("runs", "distinct", "failed", "passed", "rate", "low", "high")
-TRIALS = ("value", "violation", "failure")
+TABLE_COLUMNS = ("run", "seed", "status", "passed", "failure", "output", "command")
+AGGREGATE_COLUMNS = ("kpi", "count", "mean", "std", *QUANTILES)
+SUCCESS_COLUMNS = ("runs", "distinct", "failed", "passed", "rate", "low", "high")
+TRIAL_COLUMNS = ("value", "violation", "failure")
 
 
-def _no_column(*names: str) -> AfterValidator:
+def _reject_column_names(*names: str) -> AfterValidator:
     def check(value: str) -> str:
         if value in names:
             raise ValueError(f"expected a name other than those of columns: {', '.join(dict.fromkeys(names))}")
@@ -44,17 +44,21 @@ def _no_column(*names: str) -> AfterValidator:
     return AfterValidator(check)
 
 
-Paths = Annotated[Names, Field(min_length=1)]
-Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_. ]*$"), _no_column(*TABLE, *AGGREGATES, *SUCCESS)]
+SettingPaths = Annotated[NameList, Field(min_length=1)]
+FactorName = Annotated[
+    str,
+    StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_. ]*$"),
+    _reject_column_names(*TABLE_COLUMNS, *AGGREGATE_COLUMNS, *SUCCESS_COLUMNS),
+]
 Scale = Literal["linear", "log"]
 
 
-def _ordered(low: float | None, high: float | None) -> None:
+def _check_order(low: float | None, high: float | None) -> None:
     if low is not None and high is not None and not low < high:
         raise ValueError('expected "min" to be less than "max"')
 
 
-def _logarithmic(scale: Scale, low: float) -> None:
+def _check_log_scale(scale: Scale, low: float) -> None:
     if scale == "log" and low <= 0:
         raise ValueError('a logarithmic scale needs a positive "min"')
 
@@ -69,8 +73,8 @@ class RangeSpec(Spec):
 
     @model_validator(mode="after")
     def _possible(self) -> RangeSpec:
-        _ordered(self.min, self.max)
-        _logarithmic(self.scale, self.min)
+        _check_order(self.min, self.max)
+        _check_log_scale(self.scale, self.min)
         return self
 
 
@@ -94,13 +98,13 @@ class DistributionSpec(Spec):
         known, given = DISTRIBUTIONS[self.kind], self.arguments
         if unknown := [name for name in given if name not in known]:
             raise ValueError(f'"{self.kind}" has no "{unknown[0]}"{did_you_mean(unknown[0], known)}')
-        if missing := [name for name in known if name not in given and name not in _OPTIONAL.get(self.kind, ())]:
+        if missing := [name for name in known if name not in given and name not in _OPTIONAL_ARGUMENTS.get(self.kind, ())]:
             raise ValueError(f'"{self.kind}" needs {", ".join(missing)}')
-        if small := [name for name in _POSITIVE if given.get(name, 1.0) <= 0]:
+        if small := [name for name in _POSITIVE_ARGUMENTS if given.get(name, 1.0) <= 0]:
             raise ValueError(f'expected a positive "{small[0]}"')
         if self.kind == "exponential" and given["mean"] <= 0:
             raise ValueError('expected a positive "mean"')
-        _ordered(self.min, self.max)
+        _check_order(self.min, self.max)
         if self.mode is not None and not given["min"] <= self.mode <= given["max"]:
             raise ValueError('expected "mode" between "min" and "max"')
         return self
@@ -114,8 +118,8 @@ class DistributionSpec(Spec):
 class FactorSpec(Spec):
     """What varies: paths as of `--set` and the values that they take, or named levels that set several things at once."""
 
-    name: Label
-    set: Paths | None = Field(None, description="variable or JSON pointer; of several, all get the same value")
+    name: FactorName
+    set: SettingPaths | None = Field(None, description="variable or JSON pointer; of several, all get the same value")
     values: list[Any] | None = Field(None, min_length=1)
     range: RangeSpec | None = None
     distribution: DistributionSpec | None = None
@@ -124,9 +128,9 @@ class FactorSpec(Spec):
 
     @model_validator(mode="after")
     def _one_source(self) -> FactorSpec:
-        given = [name for name in _LEVELS if getattr(self, name) is not None]
+        given = [name for name in _LEVEL_SOURCES if getattr(self, name) is not None]
         if len(given) != 1:
-            raise ValueError(f"expected exactly one of {', '.join(_LEVELS)}; found {' and '.join(given) or 'none'}")
+            raise ValueError(f"expected exactly one of {', '.join(_LEVEL_SOURCES)}; found {' and '.join(given) or 'none'}")
         if (self.levels is None) == (self.set is None):
             raise ValueError('expected "set" beside values, range or distribution, and not beside levels')
         return self
@@ -141,7 +145,7 @@ class FactorSpec(Spec):
 class SeedsSpec(Spec):
     """Replications: every point is run with each of `count` seeds, the same ones for all points."""
 
-    set: Paths
+    set: SettingPaths
     first: int = 1
     count: int = Field(ge=1)
 
@@ -162,7 +166,7 @@ class MapSpec(Spec):
 
     @model_validator(mode="after")
     def _different(self) -> MapSpec:
-        _unique("axes of a map", self.factors)
+        _check_unique("axes of a map", self.factors)
         return self
 
 
@@ -201,22 +205,22 @@ class SweepSpec(StudySpec):
     design: DesignSpec = DesignSpec(kind="full_factorial", runs=None, seed=1)
     seeds: SeedsSpec | None = None
     success: list[CheckSpec] | None = Field(None, description="limits on KPIs; default: the checks of the scenario")
-    by: list[Names] = Field([], description="factors, or lists of factors, whose levels are told apart in the aggregates")
+    by: list[NameList] = Field([], description="factors, or lists of factors, whose levels are told apart in the aggregates")
     maps: list[MapSpec] = Field([], description="maps of success, as figures and in sweep.html")
 
     @model_validator(mode="after")
     def _consistent(self) -> SweepSpec:
         names = [factor.name for factor in self.factors]
-        _unique("factors", names)
+        _check_unique("factors", names)
         seeds = [("seed", [(path, None) for path in self.seeds.set])] if self.seeds else []
-        set_once(self.settings, [*((factor.name, factor.settings()) for factor in self.factors), *seeds])
+        check_conflicts(self.settings, [*((factor.name, factor.settings()) for factor in self.factors), *seeds])
         if not names and self.seeds is None:
             raise ValueError('expected "factors", "seeds" or both')
         for name in (name for group in self.by for name in group):
             if name not in (*names, "seed"):
                 raise ValueError(f'"by" names no factor "{name}"{did_you_mean(name, [*names, "seed"])}')
         for each in self.maps:
-            _mapped(each, self)
+            _check_map(each, self)
         if self.design.kind == "full_factorial":
             for factor in self.factors:
                 part = factor.range or factor.distribution
@@ -228,8 +232,8 @@ class SweepSpec(StudySpec):
 class ParameterSpec(Spec):
     """What a tuning may change, and within which bounds."""
 
-    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$"), _no_column(*TRIALS)]
-    set: Paths
+    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$"), _reject_column_names(*TRIAL_COLUMNS)]
+    set: SettingPaths
     min: float
     max: float
     start: float | None = None
@@ -237,8 +241,8 @@ class ParameterSpec(Spec):
 
     @model_validator(mode="after")
     def _possible(self) -> ParameterSpec:
-        _ordered(self.min, self.max)
-        _logarithmic(self.scale, self.min)
+        _check_order(self.min, self.max)
+        _check_log_scale(self.scale, self.min)
         if self.start is not None and not self.min <= self.start <= self.max:
             raise ValueError('expected "start" between "min" and "max"')
         return self
@@ -266,20 +270,20 @@ class TuneSpec(StudySpec):
 
     @model_validator(mode="after")
     def _consistent(self) -> TuneSpec:
-        _unique("parameters", [parameter.name for parameter in self.parameters])
+        _check_unique("parameters", [parameter.name for parameter in self.parameters])
         cases = [setting for case in self.cases for setting in case.items()]
         parameters = [(each.name, [(path, None) for path in each.set]) for each in self.parameters]
-        set_once(self.settings, [("cases", cases), *parameters])
+        check_conflicts(self.settings, [("cases", cases), *parameters])
         return self
 
 
-def _unique(what: str, names: Iterable[str]) -> None:
+def _check_unique(what: str, names: Iterable[str]) -> None:
     names = list(names)
     if twice := [name for i, name in enumerate(names) if name in names[:i]]:
         raise ValueError(f'two {what} are called "{twice[0]}"')
 
 
-def _mapped(map_: MapSpec, sweep: SweepSpec) -> None:
+def _check_map(map_: MapSpec, sweep: SweepSpec) -> None:
     """Raises ValueError when a factor of a map does not exist or has no levels."""
     known = [each.name for each in sweep.factors if _has_labels(each, sweep.design.kind != "full_factorial")]
     known += ["seed"] if sweep.seeds else []
@@ -295,6 +299,6 @@ def _has_labels(factor: FactorSpec, sampled: bool) -> bool:
     return factor.levels is not None or not sampled
 
 
-def json_schema(kind: type[BaseModel]) -> dict[str, Any]:
+def study_json_schema(kind: type[BaseModel]) -> dict[str, Any]:
     """JSON Schema (2020-12) of a sweep or tuning file."""
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **kind.model_json_schema(by_alias=True)}

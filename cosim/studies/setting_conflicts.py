@@ -12,31 +12,35 @@ class _Setting(NamedTuple):
     """Whose setting it is, how it is written, and the keys that lead to its place in the scenario."""
 
     owner: str
-    text: str
-    place: tuple[str, ...]
+    name: str
+    path: tuple[str, ...]
 
     @property
-    def pointer(self) -> bool:
+    def is_pointer(self) -> bool:
         """Whether it changes the scenario's JSON; variables are set after all that."""
-        return self.text.startswith("/")
+        return self.name.startswith("/")
 
     @property
-    def part(self) -> bool:
+    def is_nested(self) -> bool:
         """Whether it is within an object that is set."""
-        return self.place != _place(self.text)
+        return self.path != _setting_path(self.name)
 
-    def conflict(self, other: _Setting) -> str:
-        if self.text == other.text:
-            return f'both {other.owner} and {self.owner} set "{self.text}"'
-        return f'both {other.owner} and {self.owner} set the same thing, as "{other.text}" and as "{self.text}"'
+    def conflict_message(self, other: _Setting) -> str:
+        if self.name == other.name:
+            return f'both {other.owner} and {self.owner} set "{self.name}"'
+        return f'both {other.owner} and {self.owner} set the same thing, as "{other.name}" and as "{self.name}"'
 
 
-def _settings(owner: str, pairs: Iterable[tuple[str, Any]]) -> list[_Setting]:
+def _expand_settings(owner: str, pairs: Iterable[tuple[str, Any]]) -> list[_Setting]:
     """What is set, also within objects."""
-    return list(dict.fromkeys(_Setting(owner, text, place) for text, value in pairs for place in _places(_place(text), value)))
+    return list(
+        dict.fromkeys(
+            _Setting(owner, text, place) for text, value in pairs for place in _nested_paths(_setting_path(text), value)
+        )
+    )
 
 
-def _place(text: str) -> tuple[str, ...]:
+def _setting_path(text: str) -> tuple[str, ...]:
     """A variable is a parameter of the component that its name begins with."""
     if text.startswith("/"):
         return (*pointer_keys(text),)
@@ -44,34 +48,34 @@ def _place(text: str) -> tuple[str, ...]:
     return ("components", component, "parameters", variable) if dot else (text,)
 
 
-def _places(place: tuple[str, ...], value: Any) -> Iterator[tuple[str, ...]]:
+def _nested_paths(place: tuple[str, ...], value: Any) -> Iterator[tuple[str, ...]]:
     yield place
     for key, inner in value.items() if isinstance(value, dict) else ():
-        yield from _places((*place, key), inner)
+        yield from _nested_paths((*place, key), inner)
 
 
-def set_once(common: Mapping[str, Any], setters: Iterable[tuple[str, Iterable[tuple[str, Any]]]]) -> None:
+def check_conflicts(common: Mapping[str, Any], setters: Iterable[tuple[str, Iterable[tuple[str, Any]]]]) -> None:
     """Raises ValueError where one of two settings would have no effect.
 
     `setters` are (name, settings) in the order in which they are applied. They may change what is `common` to all runs, and
     variables that are common to all runs may change parts of objects that they set.
     """
-    defaults = _settings("the settings", common.items())
-    known = {each.place: each for each in defaults if not each.pointer}
-    beneath = _beneath(defaults)
+    defaults = _expand_settings("the settings", common.items())
+    known = {each.path: each for each in defaults if not each.is_pointer}
+    beneath = _pointers_by_ancestor(defaults)
     for name, pairs in setters:
-        own = _settings(f'"{name}"', pairs)
+        own = _expand_settings(f'"{name}"', pairs)
         for each in own:
-            other = known.get(each.place)
-            if other and (other not in defaults or not (each.part or each.text == other.text)):
-                raise ValueError(each.conflict(other))
-            if each.pointer and (other := beneath.get(each.place)):
-                raise ValueError(f'"{each.text}" of {each.owner} replaces "{other.text}" of {other.owner}')
-        known |= {each.place: each for each in own}
-        beneath |= _beneath(own)
+            other = known.get(each.path)
+            if other and (other not in defaults or not (each.is_nested or each.name == other.name)):
+                raise ValueError(each.conflict_message(other))
+            if each.is_pointer and (other := beneath.get(each.path)):
+                raise ValueError(f'"{each.name}" of {each.owner} replaces "{other.name}" of {other.owner}')
+        known |= {each.path: each for each in own}
+        beneath |= _pointers_by_ancestor(own)
 
 
-def _beneath(settings: Iterable[_Setting]) -> dict[tuple[str, ...], _Setting]:
+def _pointers_by_ancestor(settings: Iterable[_Setting]) -> dict[tuple[str, ...], _Setting]:
     """For every place that something is set within: one such setting."""
-    pointers = [each for each in settings if each.pointer and not each.part]
-    return {each.place[:depth]: each for each in pointers for depth in range(1, len(each.place))}
+    pointers = [each for each in settings if each.is_pointer and not each.is_nested]
+    return {each.path[:depth]: each for each in pointers for depth in range(1, len(each.path))}

@@ -6,9 +6,9 @@ from typing import Any
 
 from cosim.core.errors import InputError
 
-from ..json_reader import Reader
+from ..json_reader import JsonReader
 from . import settings
-from .sea import CALM, Sea, realise
+from .sea import CALM, Sea, realise_sea
 
 
 def sea(environment: Any) -> Sea:
@@ -17,8 +17,8 @@ def sea(environment: Any) -> Sea:
     Their time counts from the start of the run, and the world's input `environment.wave_gain` multiplies all amplitudes.
     No waves: arrays of length 0. Raises InputError with all problems.
     """
-    reader = Reader()
-    read = settings.read(reader, environment)
+    reader = JsonReader()
+    read = settings.read_environment(reader, environment)
     if reader.problems:
         raise InputError(reader.problems)
-    return realise(read.waves, read.seed) if read.waves else CALM
+    return realise_sea(read.waves, read.seed) if read.waves else CALM

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .noise import Channel, Noise
+from .noise import Channel, ColouredNoise
 
 
 @dataclass(frozen=True)
@@ -15,7 +15,7 @@ class Ramp:
     start: float
     duration: float
 
-    def at(self, time: float) -> tuple[float, float]:
+    def change_at(self, time: float) -> tuple[float, float]:
         share = min(max((time - self.start) / self.duration, 0.0), 1.0)
         return share * self.change[0], share * self.change[1]
 
@@ -27,9 +27,9 @@ class Variation:
     standard_deviation: float
     time_constant: float
 
-    def noise(self, seed: int) -> Noise:
+    def create_noise(self, seed: int) -> ColouredNoise:
         """One current for all vessels."""
-        return Noise(seed, "current", [Channel(self.standard_deviation, self.time_constant)] * 2)
+        return ColouredNoise(seed, "current", [Channel(self.standard_deviation, self.time_constant)] * 2)
 
 
 @dataclass(frozen=True)

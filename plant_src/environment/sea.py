@@ -23,13 +23,13 @@ from .seeds import generator
 from .spectrum import GRAVITY, SPECTRA
 
 #: the part of a spectrum that becomes waves, in peak frequencies
-LOWEST, HIGHEST = 0.5, 4.0
+MIN_FREQUENCY_RATIO, MAX_FREQUENCY_RATIO = 0.5, 4.0
 
 #: a vessel's equations have room for so many
-MOST_COMPONENTS = 64
+MAX_COMPONENTS = 64
 
-_write_place = struct.Struct("3d").pack_into
-_FREQUENCIES, _DIRECTIONS = 20_001, 2_001  # places at which the energy below is tabulated
+_pack_vector = struct.Struct("3d").pack_into
+_FREQUENCY_COUNT, _DIRECTION_COUNT = 20_001, 2_001  # places at which the energy below is tabulated
 
 
 class Sea(NamedTuple):
@@ -46,16 +46,16 @@ class Sea(NamedTuple):
 
     def elevation(self, x: float, y: float, time: float) -> float:
         """Height of the water (m) at a place in the world (m) and a time (s)."""
-        return self.surface()(x, y, time)
+        return self.elevation_function()(x, y, time)
 
-    def table(self) -> np.ndarray:
+    def component_table(self) -> np.ndarray:
         """Amplitude, wave number along x and y, frequency and phase of the components, a row each, with zeros for the rest."""
         east, north = self.wave_number * np.cos(self.direction), self.wave_number * np.sin(self.direction)
-        rows = np.zeros((5, MOST_COMPONENTS))
+        rows = np.zeros((5, MAX_COMPONENTS))
         rows[:, : len(self.phase)] = self.amplitude, east, north, self.frequency, self.phase
         return rows
 
-    def surface(self) -> Callable[[float, float, float], float]:
+    def elevation_function(self) -> Callable[[float, float, float], float]:
         """`elevation` for frequent use: with memory of its own it takes half the time."""
         east, north = self.wave_number * np.cos(self.direction), self.wave_number * np.sin(self.direction)
         rates = np.array([east, north, -self.frequency, self.phase])
@@ -63,7 +63,7 @@ class Sea(NamedTuple):
         where = place.data
 
         def elevation(x: float, y: float, time: float) -> float:
-            _write_place(where, 0, x, y, time)
+            _pack_vector(where, 0, x, y, time)
             return float(self.amplitude.dot(np.cos(place.dot(rates, angles), angles)))
 
         return elevation
@@ -85,25 +85,27 @@ class Waves:
 CALM = Sea(*(np.zeros(0) for _ in Sea._fields))
 
 
-def realise(waves: Waves, seed: int) -> Sea:
+def realise_sea(waves: Waves, seed: int) -> Sea:
     """The sea of this seed: equal arguments give equal numbers."""
     if waves.significant_height == 0:
         return CALM
     random, count = generator(seed, "waves"), waves.components
     peak = 2 * math.pi / waves.peak_period
-    grid = np.linspace(LOWEST * peak, HIGHEST * peak, _FREQUENCIES)
+    grid = np.linspace(MIN_FREQUENCY_RATIO * peak, MAX_FREQUENCY_RATIO * peak, _FREQUENCY_COUNT)
     density = SPECTRA[waves.spectrum](grid, waves.significant_height, waves.peak_period, waves.gamma)
-    frequency, energy = _drawn(grid, density, random, count)
+    frequency, energy = _stratified_samples(grid, density, random, count)
     direction = np.full(count, waves.direction)
     if waves.spreading is not None:
-        angles = np.linspace(-math.pi / 2, math.pi / 2, _DIRECTIONS)
-        spread, _ = _drawn(angles, np.maximum(np.cos(angles), 0) ** waves.spreading, random, count)
+        angles = np.linspace(-math.pi / 2, math.pi / 2, _DIRECTION_COUNT)
+        spread, _ = _stratified_samples(angles, np.maximum(np.cos(angles), 0) ** waves.spreading, random, count)
         direction += random.permutation(spread)
     amplitude = np.full(count, math.sqrt(2 * energy / count))
     return Sea(amplitude, frequency, frequency**2 / GRAVITY, direction, random.uniform(0, 2 * math.pi, count))
 
 
-def _drawn(grid: np.ndarray, density: np.ndarray, random: np.random.Generator, count: int) -> tuple[np.ndarray, float]:
+def _stratified_samples(
+    grid: np.ndarray, density: np.ndarray, random: np.random.Generator, count: int
+) -> tuple[np.ndarray, float]:
     """One place from each of `count` bins of equal area under a density, in order; and the whole area."""
     below = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(grid))])
     shares = (np.arange(count) + random.uniform(size=count)) / count

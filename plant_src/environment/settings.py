@@ -18,11 +18,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..json_reader import Keys, Numbers, Reader
+from ..json_reader import JsonPath, JsonReader, Numbers
 from .current import Current, Ramp, Variation
-from .sea import MOST_COMPONENTS, Waves
-from .spectrum import GAMMA, LARGEST_GAMMA, SIGNIFICANT_HEIGHTS, SMALLEST_GAMMA, SPECTRA, fully_developed_period
-from .wind import HIGHEST, LOWEST, Height, Turbulence, Wind, deviations, logarithmic, power_law
+from .sea import MAX_COMPONENTS, Waves
+from .spectrum import GAMMA, MAX_GAMMA, MIN_GAMMA, SIGNIFICANT_HEIGHTS, SPECTRA, fully_developed_period
+from .wind import (
+    MAX_HEIGHT,
+    MIN_HEIGHT,
+    Turbulence,
+    Wind,
+    WindProfile,
+    logarithmic_profile,
+    power_law_profile,
+    turbulence_intensities,
+)
 
 #: height (m) at which the wind is measured for turbulence, 20 ft
 TURBULENCE_HEIGHT = 6.096
@@ -31,13 +40,13 @@ TURBULENCE_HEIGHT = 6.096
 REFERENCE_HEIGHT = 10.0
 
 #: greater powers of the spreading function are long crests; greater heights (m) are no seas
-LARGEST_SPREADING, LARGEST_HEIGHT = 1000.0, 30.0
+MAX_SPREADING, MAX_SIGNIFICANT_HEIGHT = 1000.0, 30.0
 
 _WAVE_KEYS = ("spectrum", "significant_height", "peak_period", "gamma", "direction", "spreading", "components")
 
 
 @dataclass(frozen=True)
-class Environment:
+class EnvironmentSettings:
     """What surrounds the vehicles; None: there is none of it, and its variables do not exist."""
 
     seed: int = 0
@@ -46,129 +55,129 @@ class Environment:
     current: Current | None = None
 
 
-def read(reader: Reader, spec: Any) -> Environment:
+def read_environment(reader: JsonReader, spec: Any) -> EnvironmentSettings:
     """Read the section; problems are left with the reader."""
     root = ("environment",)
-    spec = reader.keys(spec, root, (), ("seed", "sea_state", "waves", "wind", "current"))
-    return Environment(
+    spec = reader.read_object(spec, root, (), ("seed", "sea_state", "waves", "wind", "current"))
+    return EnvironmentSettings(
         reader.integer(spec.get("seed", 0), (*root, "seed"), 0),
-        _waves(reader, spec, root) if {"sea_state", "waves"} & set(spec) else None,
-        _wind(reader, spec["wind"], (*root, "wind")) if "wind" in spec else None,
-        _current(reader, spec["current"], (*root, "current")) if "current" in spec else None,
+        _read_waves(reader, spec, root) if {"sea_state", "waves"} & set(spec) else None,
+        _read_wind(reader, spec["wind"], (*root, "wind")) if "wind" in spec else None,
+        _read_current(reader, spec["current"], (*root, "current")) if "current" in spec else None,
     )
 
 
-def _waves(reader: Reader, spec: Mapping[str, Any], root: Keys) -> Waves:
+def _read_waves(reader: JsonReader, spec: Mapping[str, Any], root: JsonPath) -> Waves:
     path = (*root, "waves")
-    height = _significant_height(reader, spec, root)
-    waves = reader.keys(spec.get("waves", {}), path, (), _WAVE_KEYS)
+    height = _read_significant_height(reader, spec, root)
+    waves = reader.read_object(spec.get("waves", {}), path, (), _WAVE_KEYS)
     usual = fully_developed_period(height) if height else 1.0
     spectrum = reader.choice(waves.get("spectrum", "pierson_moskowitz"), (*path, "spectrum"), tuple(SPECTRA))
     if "gamma" in waves and spectrum != "jonswap":
-        reader.complain((*path, "gamma"), f'found a peak enhancement, which a "{spectrum}" spectrum does not have')
+        reader.add_problem((*path, "gamma"), f'found a peak enhancement, which a "{spectrum}" spectrum does not have')
     spreading = waves.get("spreading")
     return Waves(
         spectrum,
         height,
         reader.positive(waves.get("peak_period", usual), (*path, "peak_period")),
-        reader.number(waves.get("gamma", GAMMA), (*path, "gamma"), SMALLEST_GAMMA, LARGEST_GAMMA),
+        reader.number(waves.get("gamma", GAMMA), (*path, "gamma"), MIN_GAMMA, MAX_GAMMA),
         reader.number(waves.get("direction", 0.0), (*path, "direction")),
-        None if spreading is None else reader.number(spreading, (*path, "spreading"), 0.0, LARGEST_SPREADING),
-        reader.integer(waves.get("components", MOST_COMPONENTS), (*path, "components"), 1, MOST_COMPONENTS),
+        None if spreading is None else reader.number(spreading, (*path, "spreading"), 0.0, MAX_SPREADING),
+        reader.integer(waves.get("components", MAX_COMPONENTS), (*path, "components"), 1, MAX_COMPONENTS),
     )
 
 
-def _significant_height(reader: Reader, spec: Mapping[str, Any], root: Keys) -> float:
+def _read_significant_height(reader: JsonReader, spec: Mapping[str, Any], root: JsonPath) -> float:
     """Hs in m, from the sea state or the waves, whichever is given."""
     path, waves = (*root, "waves", "significant_height"), spec.get("waves", {})
     if not isinstance(waves, Mapping):
         return 0.0
     if "sea_state" not in spec:
         if "significant_height" not in waves:
-            reader.complain(path[:-1], '"significant_height" is missing; or say "sea_state" beside "waves"')
-        return reader.number(waves.get("significant_height", 0.0), path, 0.0, LARGEST_HEIGHT)
+            reader.add_problem(path[:-1], '"significant_height" is missing; or say "sea_state" beside "waves"')
+        return reader.number(waves.get("significant_height", 0.0), path, 0.0, MAX_SIGNIFICANT_HEIGHT)
     if "significant_height" in waves:
-        reader.complain(path, 'found beside "sea_state", which says it already; expected one of them')
+        reader.add_problem(path, 'found beside "sea_state", which says it already; expected one of them')
     state = reader.integer(spec["sea_state"], (*root, "sea_state"), 0, len(SIGNIFICANT_HEIGHTS) - 1)
     return SIGNIFICANT_HEIGHTS[state]
 
 
-def _velocity(reader: Reader, spec: Any, path: Keys, axes: str) -> Numbers:
+def _read_velocity(reader: JsonReader, spec: Any, path: JsonPath, axes: str) -> Numbers:
     """A vector "velocity", or "speed" and "direction" (rad, towards which, counter-clockwise from x)."""
     if not isinstance(spec, Mapping):
         return (0.0,) * len(axes)
     if "velocity" in spec:
         for key in {"speed", "direction"} & set(spec):
-            reader.complain((*path, key), 'found beside "velocity", which says it already; expected one of them')
+            reader.add_problem((*path, key), 'found beside "velocity", which says it already; expected one of them')
         return reader.vector(spec["velocity"], (*path, "velocity"), axes)
     if "speed" not in spec:
-        reader.complain(path, '"speed" is missing; or say "velocity"')
+        reader.add_problem(path, '"speed" is missing; or say "velocity"')
     speed = reader.number(spec.get("speed", 0.0), (*path, "speed"), 0.0)
     direction = reader.number(spec.get("direction", 0.0), (*path, "direction"))
     level = (speed * math.cos(direction), speed * math.sin(direction), 0.0)
     return level[: len(axes)]
 
 
-def _wind(reader: Reader, spec: Any, path: Keys) -> Wind:
-    x, y, z = _velocity(reader, spec, path, "xyz")
-    spec = reader.keys(spec, path, (), ("speed", "direction", "velocity", "turbulence", "profile"))
+def _read_wind(reader: JsonReader, spec: Any, path: JsonPath) -> Wind:
+    x, y, z = _read_velocity(reader, spec, path, "xyz")
+    spec = reader.read_object(spec, path, (), ("speed", "direction", "velocity", "turbulence", "profile"))
     turbulence, profile = (*path, "turbulence"), (*path, "profile")
     return Wind(
         (x, y, z),
-        _turbulence(reader, spec["turbulence"], turbulence, math.hypot(x, y)) if "turbulence" in spec else None,
-        _profile(reader, spec["profile"], profile) if "profile" in spec else None,
+        _read_turbulence(reader, spec["turbulence"], turbulence, math.hypot(x, y)) if "turbulence" in spec else None,
+        _read_profile(reader, spec["profile"], profile) if "profile" in spec else None,
     )
 
 
-def _turbulence(reader: Reader, spec: Any, path: Keys, speed: float) -> Turbulence:
-    spec = reader.keys(spec, path, (), ("speed_20ft", "intensity", "height", "airspeed"))
-    height = reader.number(spec.get("height", TURBULENCE_HEIGHT), (*path, "height"), LOWEST, HIGHEST)
+def _read_turbulence(reader: JsonReader, spec: Any, path: JsonPath, speed: float) -> Turbulence:
+    spec = reader.read_object(spec, path, (), ("speed_20ft", "intensity", "height", "airspeed"))
+    height = reader.number(spec.get("height", TURBULENCE_HEIGHT), (*path, "height"), MIN_HEIGHT, MAX_HEIGHT)
     if "airspeed" not in spec and speed == 0:
-        reader.complain(path, '"airspeed" is missing: without a mean wind nothing says how fast the gusts pass')
+        reader.add_problem(path, '"airspeed" is missing: without a mean wind nothing says how fast the gusts pass')
     airspeed = reader.positive(spec.get("airspeed", speed or 1.0), (*path, "airspeed"))
     if "intensity" not in spec:
         speed_20ft = reader.number(spec.get("speed_20ft", speed), (*path, "speed_20ft"), 0.0)
-        return Turbulence(deviations(speed_20ft, height), height, airspeed)
+        return Turbulence(turbulence_intensities(speed_20ft, height), height, airspeed)
     if "speed_20ft" in spec:
-        reader.complain((*path, "speed_20ft"), 'found beside "intensity", which says it already; expected one of them')
+        reader.add_problem((*path, "speed_20ft"), 'found beside "intensity", which says it already; expected one of them')
     u, v, w = reader.vector(spec["intensity"], (*path, "intensity"), "uvw")
     if min(u, v, w) < 0:
-        reader.complain((*path, "intensity"), f"found {[u, v, w]}, expected standard deviations of at least 0")
+        reader.add_problem((*path, "intensity"), f"found {[u, v, w]}, expected standard deviations of at least 0")
     return Turbulence((u, v, w), height, airspeed)
 
 
-def _profile(reader: Reader, spec: Any, path: Keys) -> Height:
-    spec = reader.keys(spec, path, (), ("exponent", "roughness", "reference_height"))
+def _read_profile(reader: JsonReader, spec: Any, path: JsonPath) -> WindProfile:
+    spec = reader.read_object(spec, path, (), ("exponent", "roughness", "reference_height"))
     height = reader.positive(spec.get("reference_height", REFERENCE_HEIGHT), (*path, "reference_height"))
     if ("exponent" in spec) == ("roughness" in spec):
-        reader.complain(path, 'expected either "exponent" or "roughness"')
+        reader.add_problem(path, 'expected either "exponent" or "roughness"')
     if "roughness" not in spec:
-        return power_law(reader.number(spec.get("exponent", 0.0), (*path, "exponent"), 0.0, 1.0), height)
+        return power_law_profile(reader.number(spec.get("exponent", 0.0), (*path, "exponent"), 0.0, 1.0), height)
     roughness = reader.positive(spec["roughness"], (*path, "roughness"))
     if roughness >= height:
-        reader.complain((*path, "roughness"), f"found {roughness:g}, expected less than the reference height of {height:g} m")
+        reader.add_problem((*path, "roughness"), f"found {roughness:g}, expected less than the reference height of {height:g} m")
         roughness = height / 2
-    return logarithmic(roughness, height)
+    return logarithmic_profile(roughness, height)
 
 
-def _current(reader: Reader, spec: Any, path: Keys) -> Current:
-    x, y = _velocity(reader, spec, path, "xy")
-    spec = reader.keys(spec, path, (), ("speed", "direction", "velocity", "ramp", "variation"))
+def _read_current(reader: JsonReader, spec: Any, path: JsonPath) -> Current:
+    x, y = _read_velocity(reader, spec, path, "xy")
+    spec = reader.read_object(spec, path, (), ("speed", "direction", "velocity", "ramp", "variation"))
     return Current(
         (x, y),
-        _ramp(reader, spec["ramp"], (*path, "ramp")) if "ramp" in spec else None,
-        _variation(reader, spec["variation"], (*path, "variation")) if "variation" in spec else None,
+        _read_ramp(reader, spec["ramp"], (*path, "ramp")) if "ramp" in spec else None,
+        _read_variation(reader, spec["variation"], (*path, "variation")) if "variation" in spec else None,
     )
 
 
-def _ramp(reader: Reader, spec: Any, path: Keys) -> Ramp:
-    spec = reader.keys(spec, path, ("change", "duration"), ("start",))
+def _read_ramp(reader: JsonReader, spec: Any, path: JsonPath) -> Ramp:
+    spec = reader.read_object(spec, path, ("change", "duration"), ("start",))
     x, y = reader.vector(spec.get("change", [0.0, 0.0]), (*path, "change"), "xy")
     start = reader.number(spec.get("start", 0.0), (*path, "start"), 0.0)
     return Ramp((x, y), start, reader.positive(spec.get("duration", 1.0), (*path, "duration")))
 
 
-def _variation(reader: Reader, spec: Any, path: Keys) -> Variation:
-    spec = reader.keys(spec, path, ("standard_deviation", "time_constant"), ())
+def _read_variation(reader: JsonReader, spec: Any, path: JsonPath) -> Variation:
+    spec = reader.read_object(spec, path, ("standard_deviation", "time_constant"), ())
     deviation = reader.number(spec.get("standard_deviation", 0.0), (*path, "standard_deviation"), 0.0)
     return Variation(deviation, reader.positive(spec.get("time_constant", 1.0), (*path, "time_constant")))

@@ -23,7 +23,7 @@ GRAVITY = 9.81
 SIGNIFICANT_HEIGHTS = (0.0, 0.05, 0.3, 0.875, 1.875, 3.25, 5.0, 7.5, 11.5, 14.0)
 
 #: peak enhancement of a mean JONSWAP sea, and what the normalising factor is good for
-GAMMA, SMALLEST_GAMMA, LARGEST_GAMMA = 3.3, 1.0, 7.0
+GAMMA, MIN_GAMMA, MAX_GAMMA = 3.3, 1.0, 7.0
 
 Spectrum = Callable[[np.ndarray, float, float, float], np.ndarray]
 

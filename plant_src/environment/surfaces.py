@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any
 from .sea import Sea
 
 if TYPE_CHECKING:
-    from ..physics.body import Shadow
+    from ..physics.body import ContactBody
     from ..placement import Platform
 
 #: so high above the still water (m) waves make no difference to a rotor any more
-HIGH = 5.0
+MAX_WAVE_EFFECT_HEIGHT = 5.0
 
 
-class Deck:
+class DeckSurface:
     """The top of a vessel's highest box, of which the published `deck.position` is the centre."""
 
-    def __init__(self, vessel: Shadow):
+    def __init__(self, vessel: ContactBody):
         half_x, half_y, _ = max(vessel.model.body.boxes, key=lambda box: box.position[2] + box.half_extents[2]).half_extents
-        self._half_x, self._half_y, self._reach = half_x, half_y, half_x + half_y
+        self._half_x, self._half_y, self._bounding_radius = half_x, half_y, half_x + half_y
         slots = vessel.model.slots("output")
         self._outputs: Any = vessel.outputs.data
         self._centre, self._orientation = slots.index("deck.position.x"), slots.index("orientation.w")
@@ -30,7 +30,7 @@ class Deck:
         """Height of the deck (m, world frame) at a place that it is below or above."""
         c, q, outputs = self._centre, self._orientation, self._outputs
         dx, dy = x - outputs[c], y - outputs[c + 1]
-        if abs(dx) > self._reach or abs(dy) > self._reach:
+        if abs(dx) > self._bounding_radius or abs(dy) > self._bounding_radius:
             return None
         qw, qx, qy, qz = outputs[q], outputs[q + 1], outputs[q + 2], outputs[q + 3]
         normal_x, normal_y, normal_z = 2 * (qx * qz + qw * qy), 2 * (qy * qz - qw * qx), 1 - 2 * (qx * qx + qy * qy)
@@ -43,23 +43,23 @@ class Deck:
         return outputs[c + 2] + dz if inside else None
 
 
-class Below:
+class GroundDistance:
     """Distances from the rotor planes of multirotors to the next surface straight below."""
 
-    def __init__(self, vessels: Sequence[Shadow], platforms: Sequence[Platform], sea: Sea):
-        self._decks = [Deck(vessel) for vessel in vessels]
+    def __init__(self, vessels: Sequence[ContactBody], platforms: Sequence[Platform], sea: Sea):
+        self._decks = [DeckSurface(vessel) for vessel in vessels]
         self._platforms = [(platform.position, platform.size) for platform in platforms]
-        self._elevation = sea.surface() if len(sea.amplitude) else None
+        self._elevation = sea.elevation_function() if len(sea.amplitude) else None
 
     def distance(self, x: float, y: float, z: float, time: float, wave_gain: float) -> float:
         """From a point in the world (m); zero below the water."""
-        solid = self._solid(x, y, z)
+        solid = self._solid_height(x, y, z)
         if solid > -math.inf:  # it keeps the water away
             return z - solid
-        surface = wave_gain * self._elevation(x, y, time) if z < HIGH and self._elevation else 0.0
+        surface = wave_gain * self._elevation(x, y, time) if z < MAX_WAVE_EFFECT_HEIGHT and self._elevation else 0.0
         return max(z - surface, 0.0)
 
-    def _solid(self, x: float, y: float, z: float) -> float:
+    def _solid_height(self, x: float, y: float, z: float) -> float:
         """Height (m) of the highest deck or platform at a place that is not above z."""
         highest = -math.inf
         for deck in self._decks:

@@ -21,29 +21,31 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .noise import Channel, Noise
+from .noise import Channel, ColouredNoise
 
 FOOT = 0.3048
 
 #: heights (m) for which the low-altitude model is made: 10 ft to 1000 ft
-LOWEST, HIGHEST = 10 * FOOT, 1000 * FOOT
+MIN_HEIGHT, MAX_HEIGHT = 10 * FOOT, 1000 * FOOT
 
-Height = Callable[[float], float]
+WindProfile = Callable[[float], float]
 
 
 @dataclass(frozen=True)
 class Turbulence:
     """Deviations (su, sv, sw) in m/s, height in m and speed of passage in m/s."""
 
-    deviations: tuple[float, float, float]
+    intensities: tuple[float, float, float]
     height: float
     airspeed: float
 
     def channels(self) -> list[Channel]:
         """The filters of u, v and w."""
-        along, upwards = scales(self.height)
+        along, upwards = turbulence_scale_lengths(self.height)
         lengths, leads = (along, along, upwards), (1.0, math.sqrt(3), math.sqrt(3))
-        return [Channel(s, length / self.airspeed, lead) for s, length, lead in zip(self.deviations, lengths, leads, strict=True)]
+        return [
+            Channel(s, length / self.airspeed, lead) for s, length, lead in zip(self.intensities, lengths, leads, strict=True)
+        ]
 
 
 @dataclass(frozen=True)
@@ -52,37 +54,37 @@ class Wind:
 
     velocity: tuple[float, float, float]
     turbulence: Turbulence | None = None
-    profile: Height | None = None
+    profile: WindProfile | None = None
 
 
-def _slope(height: float) -> float:
+def _height_factor(height: float) -> float:
     return 0.177 + 0.000823 * height / FOOT
 
 
-def scales(height: float) -> tuple[float, float]:
+def turbulence_scale_lengths(height: float) -> tuple[float, float]:
     """Lu = Lv and Lw in m at a height in m."""
-    return height / _slope(height) ** 1.2, height
+    return height / _height_factor(height) ** 1.2, height
 
 
-def deviations(speed_20ft: float, height: float) -> tuple[float, float, float]:
+def turbulence_intensities(speed_20ft: float, height: float) -> tuple[float, float, float]:
     """su, sv and sw in m/s at a height in m, from the wind speed in m/s at 20 ft."""
     upwards = 0.1 * speed_20ft
-    along = upwards / _slope(height) ** 0.4
+    along = upwards / _height_factor(height) ** 0.4
     return along, along, upwards
 
 
-def power_law(exponent: float, reference_height: float) -> Height:
+def power_law_profile(exponent: float, reference_height: float) -> WindProfile:
     """(z / zr)^exponent, zero below the water."""
     return lambda z: (max(z, 0.0) / reference_height) ** exponent
 
 
-def logarithmic(roughness: float, reference_height: float) -> Height:
+def logarithmic_profile(roughness: float, reference_height: float) -> WindProfile:
     """ln(z / z0) / ln(zr / z0), zero up to the roughness length z0 (m)."""
     whole = math.log(reference_height / roughness)
     return lambda z: math.log(max(z, roughness) / roughness) / whole
 
 
-class Gusts(Noise):
+class DrydenGusts(ColouredNoise):
     """The turbulence that one vehicle meets, in the world frame."""
 
     def __init__(self, wind: Wind, turbulence: Turbulence, seed: int, vehicle: str):
@@ -91,6 +93,6 @@ class Gusts(Noise):
         self._cos, self._sin = math.cos(direction), math.sin(direction)
         super().__init__(seed, f"wind/{vehicle}", turbulence.channels())
 
-    def _directed(self, values: np.ndarray) -> np.ndarray:
+    def _map_channels(self, values: np.ndarray) -> np.ndarray:
         u, v, w = values
         return np.array([self._cos * u - self._sin * v, self._sin * u + self._cos * v, w])

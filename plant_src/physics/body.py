@@ -21,39 +21,39 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from ..vehicles.common.alarms import LARGEST_STATE
+from ..vehicles.common.alarms import MAX_STATE_NORM
 from ..vehicles.common.shapes import Body, Box
-from .clearance import Enclosure
+from .clearance import BoundingBox
 from .client import pybullet
-from .compiled_equations import bound, load
+from .compiled_equations import bind_arrays, load_library
 
 if TYPE_CHECKING:
-    from ..placement import Spawn
+    from ..placement import VehiclePlacement
     from ..vehicles.model import Model
 
 #: friction of every surface; Bullet multiplies those of the two bodies in contact
 FRICTION = 1.0
 
 #: bodies that do not take part stand in a row from here on (m), where no vehicle can be
-PARKING, PARKING_SPACE, UPRIGHT = 2 * LARGEST_STATE, 100.0, (0.0, 0.0, 0.0, 1.0)
+INACTIVE_POSITION, INACTIVE_SPACING, IDENTITY_QUATERNION = 2 * MAX_STATE_NORM, 100.0, (0.0, 0.0, 0.0, 1.0)
 
 #: so fast a planar vessel may rise or sink in Bullet (m/s), and so far (m) before it is put back to its height
-SINKING, LARGEST_HEAVE = 1e-4, 1e-9
+MAX_SINK_RATE, MAX_HEAVE = 1e-4, 1e-9
 
 _MAX_VELOCITY = 1e6  # Bullet limits velocities silently, by default at 100 m/s and rad/s
-_LIFT = 2  # place of the vertical velocity in a motion
-_LEAST_SLOPE = 0.01  # of sinking over lift: M / (m + M) for a load of the mass m
-_write_vector = struct.Struct("3d").pack_into
+_VERTICAL_VELOCITY = 2  # place of the vertical velocity in a motion
+_MIN_SLOPE = 0.01  # of sinking over lift: M / (m + M) for a load of the mass m
+_pack_vector = struct.Struct("3d").pack_into
 
-Names = tuple[Sequence[str], Sequence[str]]  # of the arguments and of the results of a compiled function
-_BEFORE = ("state", "inputs", "surroundings", "constants", "step", "anchor", "leash")
+ArrayNames = tuple[Sequence[str], Sequence[str]]  # of the arguments and of the results of a compiled function
+_PREDICT_ARGUMENTS = ("state", "inputs", "surroundings", "constants", "step", "anchor", "leash")
 
 
-class UnsoundError(Exception):
+class InvalidStateError(Exception):
     """A vehicle cannot go on: an input or its motion is not finite; the text names the variable."""
 
 
-class Shadow:
+class ContactBody:
     """One vehicle: its body in Bullet and its compiled equations (`vehicles/shadow_maps.py`).
 
     `pieces` are its numbers by name, as many as `sizes` says, and "step" (s), which all vehicles share. `inputs` and `outputs`
@@ -62,106 +62,109 @@ class Shadow:
     `twist` and `torque`; Bullet's motion takes the place of the one foreseen.
     """
 
-    PIECES: ClassVar[Mapping[str, int]] = {"twist": 6, "motion": 6, "pose": 7}  # name -> size
-    SPAWN: ClassVar[Names] = (("parameters",), ("constants", "predicted", "twist", "motion", "pose"))
-    BEFORE: ClassVar[Names]
-    AFTER: ClassVar[Names] = (("start", "predicted", "twist", "motion", "constants", "step"), ("state", "impulse", "outputs"))
+    ARRAY_SIZES: ClassVar[Mapping[str, int]] = {"twist": 6, "motion": 6, "pose": 7}  # name -> size
+    INITIALIZE_ARRAYS: ClassVar[ArrayNames] = (("parameters",), ("constants", "predicted", "twist", "motion", "pose"))
+    PREDICT_ARRAYS: ClassVar[ArrayNames]
+    CORRECT_ARRAYS: ClassVar[ArrayNames] = (
+        ("start", "predicted", "twist", "motion", "constants", "step"),
+        ("state", "impulse", "outputs"),
+    )
     #: Bullet takes half as long, but its saved states lack the inertia of such a body in world axes
-    IN_MAXIMAL_COORDINATES = False
+    USE_MAXIMAL_COORDINATES = False
 
-    def __init__(self, client: int, spawn: Spawn, pieces: Mapping[str, np.ndarray]):
+    def __init__(self, client: int, spawn: VehiclePlacement, arrays: Mapping[str, np.ndarray]):
         self.name, self.model, self._client = spawn.name, spawn.model, client
-        constants = spawn.model.constants if spawn.model.constants is not None else len(spawn.parameters)
+        constants = spawn.model.constant_count if spawn.model.constant_count is not None else len(spawn.parameters)
         given = {"parameters": np.array(spawn.parameters), "axes": np.array(spawn.body.axes)}
-        self._pieces = pieces = {**pieces, **given, "constants": np.zeros(constants)}
-        pieces["surroundings"][:] = [variable.start for variable in spawn.model.surroundings]
-        self.inputs, self.outputs = pieces["inputs"], pieces["outputs"]
-        self.surroundings = pieces["surroundings"]
+        self._arrays = arrays = {**arrays, **given, "constants": np.zeros(constants)}
+        arrays["surroundings"][:] = [variable.start for variable in spawn.model.environment_inputs]
+        self.inputs, self.outputs = arrays["inputs"], arrays["outputs"]
+        self.environment_inputs = arrays["surroundings"]
         # memoryviews: numpy takes longer for so few numbers
-        self.motion: Any = pieces["motion"].data
-        self.twist: Any = pieces["twist"].data
-        self.torque: Any = pieces["torque"].data if "torque" in pieces else None
-        library = load(spawn.model.name)
+        self.bullet_twist: Any = arrays["motion"].data
+        self.twist: Any = arrays["twist"].data
+        self.torque: Any = arrays["torque"].data if "torque" in arrays else None
+        library = load_library(spawn.model.name)
         #: where a free step leads
-        self.predict = self._bound(library.shadow_before, self.BEFORE)
+        self.predict = self._bind(library.shadow_before, self.PREDICT_ARRAYS)
         #: take over what became of the step, and publish it
-        self.correct = self._bound(library.shadow_after, self.AFTER)
-        self._bound(library.shadow_spawn, self.SPAWN)()
+        self.correct = self._bind(library.shadow_after, self.CORRECT_ARRAYS)
+        self._bind(library.shadow_spawn, self.INITIALIZE_ARRAYS)()
         self.correct()
-        self.body = self._create(spawn.body)
-        self.go_back()
+        self.body_id = self._create_body(spawn.body)
+        self.reset_pose()
 
     @classmethod
-    def sizes(cls, model: Model) -> dict[str, int]:
+    def array_sizes(cls, model: Model) -> dict[str, int]:
         """How many numbers a vehicle has in which pieces."""
         slots = {"inputs": len(model.slots("input")), "outputs": len(model.slots("output"))}
-        slots["surroundings"] = len(model.surroundings)
+        slots["surroundings"] = len(model.environment_inputs)
         states = dict.fromkeys(("state", "start", "predicted"), len(model.states))
-        return {**states, **cls.PIECES, **slots, "path": 6, "anchor": 3, "leash": 3, "alarm": 1, "impulse": 1}
+        return {**states, **cls.ARRAY_SIZES, **slots, "path": 6, "anchor": 3, "leash": 3, "alarm": 1, "impulse": 1}
 
-    def _bound(self, function: Callable[..., None], names: Names) -> Callable[[], None]:
-        arguments, results = ([self._pieces[name] for name in side] for side in names)
-        return bound(function, arguments, results)
+    def _bind(self, function: Callable[..., None], names: ArrayNames) -> Callable[[], None]:
+        arguments, results = ([self._arrays[name] for name in side] for side in names)
+        return bind_arrays(function, arguments, results)
 
-    def _create(self, body: Body) -> int:
+    def _create_body(self, body: Body) -> int:
         """Make the body in Bullet; returns its number."""
-        shape, maximal = compound(body.boxes, self._client), self.IN_MAXIMAL_COORDINATES
+        shape, maximal = create_compound_shape(body.boxes, self._client), self.USE_MAXIMAL_COORDINATES
         number = pybullet.createMultiBody(body.mass, shape, -1, useMaximalCoordinates=maximal, physicsClientId=self._client)
         set_dynamics(self._client, number, -1, body)
         return int(number)
 
     @staticmethod
-    def enclosure(body: Body) -> Enclosure:
+    def bounding_box(body: Body) -> BoundingBox:
         """What holds the body in every attitude it can take."""
         radius = float(max(np.linalg.norm(box.corners(), axis=1).max() for box in body.boxes))
-        return Enclosure((-radius, -radius, -radius), (radius, radius, radius))
+        return BoundingBox((-radius, -radius, -radius), (radius, radius, radius))
 
-    def go_back(self) -> None:
+    def reset_pose(self) -> None:
         """Return the body in Bullet to where the step began."""
-        pose = self._pieces["pose"].tolist()
-        pybullet.resetBasePositionAndOrientation(self.body, pose[0:3], pose[3:7], self._client)
+        pose = self._arrays["pose"].tolist()
+        pybullet.resetBasePositionAndOrientation(self.body_id, pose[0:3], pose[3:7], self._client)
 
-    def engage(self, engaged: bool) -> None:
+    def set_active(self, active: bool) -> None:
         """Let Bullet take part in the motion, or not any more."""
-        if engaged:
-            self.go_back()
+        if active:
+            self.reset_pose()
         else:
-            parked = [PARKING + PARKING_SPACE * self.body, 0.0, 0.0]
-            pybullet.resetBasePositionAndOrientation(self.body, parked, UPRIGHT, self._client)
+            parked = [INACTIVE_POSITION + INACTIVE_SPACING * self.body_id, 0.0, 0.0]
+            pybullet.resetBasePositionAndOrientation(self.body_id, parked, IDENTITY_QUATERNION, self._client)
 
-    def fault(self) -> str:
+    def describe_invalid_state(self) -> str:
         """What keeps the vehicle from going on: an input that is not finite, or where the free step leads."""
-        names = [*self.model.slots("input"), *(variable.name for variable in self.model.surroundings)]
-        for name, value in zip(names, np.concatenate([self.inputs, self._pieces["surroundings"]]), strict=True):
+        names = [*self.model.slots("input"), *(variable.name for variable in self.model.environment_inputs)]
+        for name, value in zip(names, np.concatenate([self.inputs, self._arrays["surroundings"]]), strict=True):
             if not math.isfinite(value):
                 return f"{self.name}.{name} is {value}, expected a finite number"
-        predicted = self._pieces["predicted"]
+        predicted = self._arrays["predicted"]
         worst = int(np.argmax(np.nan_to_num(np.abs(predicted), nan=np.inf)))
         return f"{self.name}.{self.model.states[worst]} became {predicted[worst]:g}: the motion has exploded"
 
 
-class FreeBody(Shadow):
+class FreeBody(ContactBody):
     """A vehicle that moves freely in space; its frame in Bullet has the principal axes of inertia."""
 
-    PIECES = {**Shadow.PIECES, "torque": 3}
-    SPAWN: ClassVar[Names] = (("parameters", "axes"), Shadow.SPAWN[1])
-    BEFORE: ClassVar[Names] = (
-        (*_BEFORE, "axes"),
+    ARRAY_SIZES = {**ContactBody.ARRAY_SIZES, "torque": 3}
+    INITIALIZE_ARRAYS: ClassVar[ArrayNames] = (("parameters", "axes"), ContactBody.INITIALIZE_ARRAYS[1])
+    PREDICT_ARRAYS: ClassVar[ArrayNames] = (
+        (*_PREDICT_ARGUMENTS, "axes"),
         ("start", "predicted", "twist", "motion", "torque", "pose", "path", "alarm"),
     )
 
 
-class FloatingBody(Shadow):
+class FloatingBody(ContactBody):
     """A vessel that moves freely in space; the contact impulse of a step is carried over to the next one."""
 
-    PIECES = {**Shadow.PIECES, "torque": 3, "carried": 6, "previous": 6}
-    BEFORE = (
-        (*_BEFORE, "carried"),
+    ARRAY_SIZES = {**ContactBody.ARRAY_SIZES, "torque": 3, "carried": 6, "previous": 6}
+    PREDICT_ARRAYS = (
+        (*_PREDICT_ARGUMENTS, "carried"),
         ("start", "predicted", "twist", "motion", "torque", "pose", "previous", "path", "alarm"),
     )
-    AFTER = ((*Shadow.AFTER[0], "previous"), (*Shadow.AFTER[1], "carried"))
+    CORRECT_ARRAYS = ((*ContactBody.CORRECT_ARRAYS[0], "previous"), (*ContactBody.CORRECT_ARRAYS[1], "carried"))
 
-    def surface(self, wave_count: int, waves: np.ndarray) -> Callable[[float], float]:
+    def elevation_function(self, wave_count: int, waves: np.ndarray) -> Callable[[float], float]:
         """Return a function of time (s) for the height of the water (m, above still water) at the vessel.
 
         Args:
@@ -170,71 +173,71 @@ class FloatingBody(Shadow):
         """
         place, height = np.zeros(3), np.zeros(1)
         count = np.full(1, float(wave_count))
-        call = bound(load(self.model.name).shadow_surface, [place, count, waves], [height])
+        call = bind_arrays(load_library(self.model.name).shadow_surface, [place, count, waves], [height])
         where, found, here = place.data, height.data, self.outputs.data
 
         def elevation(time: float) -> float:
-            _write_vector(where, 0, here[0], here[1], time)
+            _pack_vector(where, 0, here[0], here[1], time)
             call()
             return found[0]
 
         return elevation
 
 
-class PlanarBody(Shadow):
+class PlanarBody(ContactBody):
     """A vessel in the horizontal plane: it has no roll and no pitch, and what presses on its deck does not move it.
 
     Bullet can hold its height only by lifting it as much as the load lets it sink. The load foreseen is that of the steps before;
     where Bullet finds another one, the step is made again with a better lift, found by the secant method.
     """
 
-    PIECES = {**Shadow.PIECES, "pressed": 3, "previous": 2}
-    IN_MAXIMAL_COORDINATES = True  # the inertia about the world's z axis is always the same
-    BEFORE = (
-        (*_BEFORE, "pressed"),
+    ARRAY_SIZES = {**ContactBody.ARRAY_SIZES, "pressed": 3, "previous": 2}
+    USE_MAXIMAL_COORDINATES = True  # the inertia about the world's z axis is always the same
+    PREDICT_ARRAYS = (
+        (*_PREDICT_ARGUMENTS, "pressed"),
         ("start", "predicted", "twist", "motion", "pose", "previous", "path", "alarm"),
     )
-    AFTER = ((*Shadow.AFTER[0], "previous"), (*Shadow.AFTER[1], "pressed"))
+    CORRECT_ARRAYS = ((*ContactBody.CORRECT_ARRAYS[0], "previous"), (*ContactBody.CORRECT_ARRAYS[1], "pressed"))
 
     @staticmethod
-    def enclosure(body: Body) -> Enclosure:
+    def bounding_box(body: Body) -> BoundingBox:
         corners = np.concatenate([box.corners() for box in body.boxes])
         radius = float(np.hypot(corners[:, 0], corners[:, 1]).max())
         low, high = float(corners[:, 2].min()), float(corners[:, 2].max())
-        return Enclosure((-radius, -radius, low), (radius, radius, high))
+        return BoundingBox((-radius, -radius, low), (radius, radius, high))
 
-    def _create(self, body: Body) -> int:
-        self._previous: Any = self._pieces["previous"].data
+    def _create_body(self, body: Body) -> int:
+        self._previous: Any = self._arrays["previous"].data
         #: lift and sinking (m/s) at the last attempt
-        self._tried = 0.0, 0.0
+        self._last_attempt = 0.0, 0.0
         never = 0.0  # Bullet's word for an infinite inertia
-        return super()._create(body._replace(inertia=(never, never, body.inertia[2])))
+        return super()._create_body(body._replace(inertia=(never, never, body.inertia[2])))
 
-    def held(self, repeats: int) -> bool:
+    def height_converged(self, repeats: int) -> bool:
         """Whether the step of Bullet can stay as it is after so many repeats; otherwise the twist has a better lift now."""
-        lift, sinking = self.twist[_LIFT], -self.motion[_LIFT]
-        (last_lift, last_sinking), self._tried = self._tried, (lift, sinking)
-        if not SINKING < abs(sinking) < math.inf:
+        lift, sinking = self.twist[_VERTICAL_VELOCITY], -self.bullet_twist[_VERTICAL_VELOCITY]
+        (last_lift, last_sinking), self._last_attempt = self._last_attempt, (lift, sinking)
+        if not MAX_SINK_RATE < abs(sinking) < math.inf:
             return True
         slope = (last_sinking - sinking) / (lift - last_lift) if repeats and lift != last_lift else 1.0
-        self.twist[_LIFT] = lift + sinking / min(max(slope, _LEAST_SLOPE), 1.0)
+        self.twist[_VERTICAL_VELOCITY] = lift + sinking / min(max(slope, _MIN_SLOPE), 1.0)
         return False
 
-    def keep_height(self) -> None:
+    def reset_height(self) -> None:
         """Before a step: undo what small heaves of the steps before have come to."""
-        if abs(self._previous[1]) > LARGEST_HEAVE:
-            self.go_back()
+        if abs(self._previous[1]) > MAX_HEAVE:
+            self.reset_pose()
             self._previous[1] = 0.0
 
 
-def body_class(model: Model) -> type[Shadow]:
+def body_class(model: Model) -> type[ContactBody]:
     """Return the class of bodies that move as the vehicles of `model` do."""
     if model.motion == "planar":
         return PlanarBody
     return FloatingBody if model.is_vessel else FreeBody
 
 
-def compound(boxes: Sequence[Box], client: int) -> int:
+def create_compound_shape(boxes: Sequence[Box], client: int) -> int:
     """A collision shape made of boxes."""
     return pybullet.createCollisionShapeArray(
         [pybullet.GEOM_BOX] * len(boxes),

@@ -9,7 +9,7 @@ from types import ModuleType
 _STANDARD_ERROR = 2
 
 
-def _import_quietly() -> ModuleType:
+def _import_without_stderr() -> ModuleType:
     kept, nowhere = os.dup(_STANDARD_ERROR), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, _STANDARD_ERROR)
     try:
@@ -21,9 +21,9 @@ def _import_quietly() -> ModuleType:
     return pybullet
 
 
-pybullet = _import_quietly()
+pybullet = _import_without_stderr()
 
-_spare: list[int] = []
+_preconnected_clients: list[int] = []
 
 
 def connect(owner: object) -> tuple[int, weakref.finalize]:
@@ -31,17 +31,17 @@ def connect(owner: object) -> tuple[int, weakref.finalize]:
 
     It ends with its owner too: Python does not see the 60 MB that a forgotten client holds.
     """
-    client = _connected()
+    client = _take_client()
     disconnect = weakref.finalize(owner, pybullet.disconnect, client)
     disconnect.atexit = False
     return client, disconnect
 
 
-def _connected() -> int:
-    return _spare.pop() if _spare else int(pybullet.connect(pybullet.DIRECT))
+def _take_client() -> int:
+    return _preconnected_clients.pop() if _preconnected_clients else int(pybullet.connect(pybullet.DIRECT))
 
 
-def keep_in_stock() -> None:
+def preconnect() -> None:
     """Connect a client for who will be forked from this process: most of its 25 ms go into memory touched for the first time."""
-    if not _spare:
-        _spare.append(_connected())
+    if not _preconnected_clients:
+        _preconnected_clients.append(_take_client())

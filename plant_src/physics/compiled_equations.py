@@ -20,45 +20,45 @@ from cosim.core.errors import InputError
 _PLATFORMS = {"linux": ("linux64", ".so"), "darwin": ("darwin64", ".dylib"), "win32": ("win64", ".dll")}
 
 
-def load(model: str) -> ctypes.PyDLL:
+def load_library(model: str) -> ctypes.PyDLL:
     """The shared library of `fmus/MODEL.fmu`. Its functions are short: they run without releasing the interpreter lock.
 
     Raises InputError when the FMU or its binary for this platform is missing.
     """
-    return ctypes.PyDLL(str(library(model)))
+    return ctypes.PyDLL(str(library_path(model)))
 
 
-def library(model: str) -> Path:
+def library_path(model: str) -> Path:
     """Where that library has been unpacked to."""
     fmu = resources.root() / "fmus" / f"{model}.fmu"
     try:
         changed = fmu.stat().st_mtime_ns
     except OSError as error:
-        raise _unreadable(model, fmu, error) from None
+        raise _unreadable_fmu_error(model, fmu, error) from None
     place = resources.cache_directory() / "plant"
-    path = _library(model, fmu, changed, place)
-    return path if path.exists() else _library.__wrapped__(model, fmu, changed, place)
+    path = _cached_library_path(model, fmu, changed, place)
+    return path if path.exists() else _cached_library_path.__wrapped__(model, fmu, changed, place)
 
 
 @cache
-def _library(model: str, fmu: Path, _changed: int, place: Path) -> Path:
+def _cached_library_path(model: str, fmu: Path, _changed: int, place: Path) -> Path:
     folder, ending = _PLATFORMS.get(sys.platform, (sys.platform, ".so"))
     member = f"binaries/{folder}/{model}{ending}"
     try:
         with ZipFile(fmu) as archive:
             content = archive.read(member)
     except (OSError, BadZipFile) as error:
-        raise _unreadable(model, fmu, error) from None
+        raise _unreadable_fmu_error(model, fmu, error) from None
     except KeyError:
         raise InputError(f'"{fmu}" has no "{member}"; build it on this platform with `cosim build`') from None
-    return _unpacked(content, place, f"{model}{ending}")
+    return _extract_to_cache(content, place, f"{model}{ending}")
 
 
-def _unreadable(model: str, fmu: Path, error: Exception) -> InputError:
+def _unreadable_fmu_error(model: str, fmu: Path, error: Exception) -> InputError:
     return InputError(f'the equations of the vehicle model "{model}" cannot be read from "{fmu}": {error}')
 
 
-def _unpacked(content: bytes, place: Path, name: str) -> Path:
+def _extract_to_cache(content: bytes, place: Path, name: str) -> Path:
     """A file with this content in the per-user cache; its path depends on the content, so it never changes under a user."""
     path = place / f"{sha256(content).hexdigest()[:20]}-{name}"
     if not path.exists():
@@ -69,7 +69,9 @@ def _unpacked(content: bytes, place: Path, name: str) -> Path:
     return path
 
 
-def bound(function: Callable[..., None], arguments: Sequence[np.ndarray], results: Sequence[np.ndarray]) -> Callable[[], None]:
+def bind_arrays(
+    function: Callable[..., None], arguments: Sequence[np.ndarray], results: Sequence[np.ndarray]
+) -> Callable[[], None]:
     """A call of `void f(const double *const in[], double *const out[])` on these contiguous arrays, without any conversion."""
     function.restype = None  # type: ignore[attr-defined]
     kept = (*arguments, *results)

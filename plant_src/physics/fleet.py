@@ -10,30 +10,30 @@ from typing import Any
 
 import numpy as np
 
-from ..placement import Platform, Spawn
-from ..vehicles.common.alarms import UNSOUND
-from .body import PlanarBody, Shadow, UnsoundError, body_class
-from .clearance import Clearance, Enclosure
+from ..placement import Platform, VehiclePlacement
+from ..vehicles.common.alarms import INVALID_STATE
+from .body import ContactBody, InvalidStateError, PlanarBody, body_class
+from .clearance import BoundingBox, Clearance
 from .client import pybullet
 from .contacts import Contacts
-from .memory import Memory
+from .memory import VehicleArrays
 
 #: so often a step of Bullet is made again at most
-MOST_REPEATS = 10
+MAX_REPEATS = 10
 
-_vector = struct.Struct("3d").unpack_from
-_ANGULAR = struct.calcsize("3d")  # where the angular part of a motion begins
-_write_motion = struct.Struct("6d").pack_into
+_unpack_vector = struct.Struct("3d").unpack_from
+_ANGULAR_OFFSET = struct.calcsize("3d")  # where the angular part of a motion begins
+_pack_twist = struct.Struct("6d").pack_into
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class FleetState:
     """The state of a fleet: Bullet's, which Bullet keeps under a number, and ours."""
 
     bullet: int
     memory: np.ndarray
     flags: np.ndarray
-    near: Sequence[bool]
+    is_near: Sequence[bool]
 
 
 class Fleet:
@@ -44,121 +44,126 @@ class Fleet:
     """
 
     def __init__(
-        self, client: int, vehicles: Sequence[Spawn], platforms: Sequence[Platform], step: np.ndarray, flags: np.ndarray
+        self,
+        client: int,
+        vehicles: Sequence[VehiclePlacement],
+        platforms: Sequence[Platform],
+        step: np.ndarray,
+        flags: np.ndarray,
     ):
         self._client, self._flags = client, flags
-        self._memory = memory = Memory([body_class(spawn.model).sizes(spawn.model) for spawn in vehicles])
-        self.shadows: list[Shadow] = [
+        self._memory = memory = VehicleArrays([body_class(spawn.model).array_sizes(spawn.model) for spawn in vehicles])
+        self.bodies: list[ContactBody] = [
             body_class(spawn.model)(client, spawn, pieces | {"step": step})
-            for spawn, pieces in zip(vehicles, memory.parts, strict=True)
+            for spawn, pieces in zip(vehicles, memory.of_vehicle, strict=True)
         ]
-        self.inputs, self.outputs = memory.whole["inputs"], memory.whole["outputs"]
-        self.contacts = Contacts(client, self.shadows, self.outputs, flags)
-        movable = [shadow.enclosure(spawn.body) for shadow, spawn in zip(self.shadows, vehicles, strict=True)]
-        fixed = [_enclosure(platform) for platform in platforms]
-        self.clearance = Clearance(movable, fixed, *(memory.whole[name] for name in ("path", "anchor", "leash")))
-        self._predict, self._correct = [shadow.predict for shadow in self.shadows], [shadow.correct for shadow in self.shadows]
+        self.inputs, self.outputs = memory.of_all_vehicles["inputs"], memory.of_all_vehicles["outputs"]
+        self.contacts = Contacts(client, self.bodies, self.outputs, flags)
+        movable = [shadow.bounding_box(spawn.body) for shadow, spawn in zip(self.bodies, vehicles, strict=True)]
+        fixed = [_platform_bounding_box(platform) for platform in platforms]
+        self.clearance = Clearance(movable, fixed, *(memory.of_all_vehicles[name] for name in ("path", "anchor", "leash")))
+        self._predict, self._correct = [shadow.predict for shadow in self.bodies], [shadow.correct for shadow in self.bodies]
         # memoryviews: numpy takes longer for so few numbers
-        self._alarms: Any = memory.whole["alarm"].data
-        self._impulses: Any = memory.whole["impulse"].data
+        self._alarms: Any = memory.of_all_vehicles["alarm"].data
+        self._impulses: Any = memory.of_all_vehicles["impulse"].data
         #: whether a vehicle may have left what it was near
-        self._leaving = True
-        self._let_bullet_take_note()
-        self._choose([True] * len(self.shadows))
+        self._near_vehicles_outdated = True
+        self._warm_up_inertia()
+        self._set_active_bodies([True] * len(self.bodies))
 
-    def _let_bullet_take_note(self) -> None:
+    def _warm_up_inertia(self) -> None:
         """A step in which nothing can meet: with the next one Bullet uses the inertia that it was given."""
         for engaged in (False, True):
-            for shadow in self.shadows:
-                shadow.engage(engaged)
+            for shadow in self.bodies:
+                shadow.set_active(engaged)
             if not engaged:
                 pybullet.stepSimulation(self._client)
 
-    def advance(self, share: float) -> None:
+    def advance(self, step_fraction: float) -> None:
         """One step, which is this share of the component's. Raises UnsoundError; if before the step, nothing has moved."""
         for predict in self._predict:
             predict()
-        if self._leaving or any(self._alarms):
-            self._look_around()
-        if self._engaged:
-            self._collide()
+        if self._near_vehicles_outdated or any(self._alarms):
+            self._update_near_vehicles()
+        if self._active_bodies:
+            self._solve_contacts()
         for correct in self._correct:
             correct()
-        if self._engaged:
-            self._find_contacts(share)
+        if self._active_bodies:
+            self._publish_contacts(step_fraction)
 
-    def _look_around(self) -> None:
+    def _update_near_vehicles(self) -> None:
         """Let Bullet take part for those that are near something."""
-        if UNSOUND in self._alarms:
-            raise UnsoundError(self.shadows[self._alarms.tolist().index(UNSOUND)].fault())
-        self._leaving = False
-        if not any(self._alarms) and self.clearance.holds():
+        if INVALID_STATE in self._alarms:
+            raise InvalidStateError(self.bodies[self._alarms.tolist().index(INVALID_STATE)].fault())
+        self._near_vehicles_outdated = False
+        if not any(self._alarms) and self.clearance.is_valid():
             return
-        near = self.clearance.survey()
-        if near != self._near:
-            for shadow, is_near, was_near in zip(self.shadows, near, self._near, strict=True):
+        near = self.clearance.find_near_vehicles()
+        if near != self._is_near:
+            for shadow, is_near, was_near in zip(self.bodies, near, self._is_near, strict=True):
                 if is_near != was_near:
-                    shadow.engage(is_near)
-            self._choose(near)
+                    shadow.set_active(is_near)
+            self._set_active_bodies(near)
 
-    def _choose(self, near: Sequence[bool]) -> None:
+    def _set_active_bodies(self, near: Sequence[bool]) -> None:
         """Make steps of Bullet ready, in which these vehicles take part."""
-        self._near = near
-        self._engaged = engaged = [shadow for shadow, is_near in zip(self.shadows, near, strict=True) if is_near]
-        self._told = [(shadow.body, shadow.twist, shadow.torque) for shadow in engaged]
-        self._asked = [(shadow.body, shadow.motion) for shadow in engaged]
-        self._planar = [shadow for shadow in engaged if isinstance(shadow, PlanarBody)]
+        self._is_near = near
+        self._active_bodies = engaged = [shadow for shadow, is_near in zip(self.bodies, near, strict=True) if is_near]
+        self._velocity_commands = [(shadow.body_id, shadow.twist, shadow.torque) for shadow in engaged]
+        self._velocity_results = [(shadow.body_id, shadow.bullet_twist) for shadow in engaged]
+        self._active_planar_bodies = [shadow for shadow in engaged if isinstance(shadow, PlanarBody)]
 
-    def _collide(self) -> None:
+    def _solve_contacts(self) -> None:
         """One step of Bullet."""
-        for vessel in self._planar:
-            vessel.keep_height()
+        for vessel in self._active_planar_bodies:
+            vessel.reset_height()
         self._step_bullet()
-        for repeats in range(MOST_REPEATS):
-            if all([vessel.held(repeats) for vessel in self._planar]):
+        for repeats in range(MAX_REPEATS):
+            if all([vessel.height_converged(repeats) for vessel in self._active_planar_bodies]):
                 return
-            for shadow in self._engaged:
-                shadow.go_back()
+            for shadow in self._active_bodies:
+                shadow.reset_pose()
             self._step_bullet()
 
     def _step_bullet(self) -> None:
         client = self._client
-        for body, twist, torque in self._told:
-            pybullet.resetBaseVelocity(body, _vector(twist), _vector(twist, _ANGULAR), client)
+        for body, twist, torque in self._velocity_commands:
+            pybullet.resetBaseVelocity(body, _unpack_vector(twist), _unpack_vector(twist, _ANGULAR_OFFSET), client)
             if torque is not None:
-                pybullet.applyExternalTorque(body, -1, _vector(torque), pybullet.WORLD_FRAME, client)
+                pybullet.applyExternalTorque(body, -1, _unpack_vector(torque), pybullet.WORLD_FRAME, client)
         pybullet.stepSimulation(client)
-        for body, motion in self._asked:
+        for body, motion in self._velocity_results:
             linear, angular = pybullet.getBaseVelocity(body, client)
-            _write_motion(motion, 0, *linear, *angular)
+            _pack_twist(motion, 0, *linear, *angular)
 
-    def _find_contacts(self, share: float) -> None:
+    def _publish_contacts(self, share: float) -> None:
         touching = 0
         if total := sum(self._impulses):
             if math.isnan(total):
-                culprit = next(shadow for shadow, value in zip(self.shadows, self._impulses, strict=True) if math.isnan(value))
-                raise UnsoundError(f"{culprit.name}: the contact forces are not finite")
+                culprit = next(shadow for shadow, value in zip(self.bodies, self._impulses, strict=True) if math.isnan(value))
+                raise InvalidStateError(f"{culprit.name}: the contact forces are not finite")
             touching = self.contacts.add(share)
-        self._leaving = touching < len(self._engaged)
+        self._near_vehicles_outdated = touching < len(self._active_bodies)
 
     # -- state ---------------------------------------------------------------------------------------------------------
 
-    def get_state(self) -> Snapshot:
-        return Snapshot(pybullet.saveState(self._client), self._memory.block.copy(), self._flags.copy(), self._near)
+    def get_state(self) -> FleetState:
+        return FleetState(pybullet.saveState(self._client), self._memory.buffer.copy(), self._flags.copy(), self._is_near)
 
-    def set_state(self, state: Snapshot) -> None:
+    def set_state(self, state: FleetState) -> None:
         pybullet.restoreState(state.bullet, physicsClientId=self._client)
-        self._memory.block[:], self._flags[:] = state.memory, state.flags
-        self._choose(state.near)
-        self.clearance.forget()
-        self._leaving = True
-        self.contacts.any = bool(state.flags.any())
+        self._memory.buffer[:], self._flags[:] = state.memory, state.flags
+        self._set_active_bodies(state.is_near)
+        self.clearance.invalidate()
+        self._near_vehicles_outdated = True
+        self.contacts.has_contacts = bool(state.flags.any())
 
-    def free_state(self, state: Snapshot) -> None:
+    def free_state(self, state: FleetState) -> None:
         pybullet.removeState(state.bullet, physicsClientId=self._client)
 
 
-def _enclosure(platform: Platform) -> Enclosure:
+def _platform_bounding_box(platform: Platform) -> BoundingBox:
     x, y, z = platform.position
     half_x, half_y, half_z = (edge / 2 for edge in platform.size)
-    return Enclosure((x - half_x, y - half_y, z - half_z), (x + half_x, y + half_y, z + half_z))
+    return BoundingBox((x - half_x, y - half_y, z - half_z), (x + half_x, y + half_y, z + half_z))

@@ -10,7 +10,7 @@ import numpy as np
 _Key = TypeVar("_Key", bound=Hashable)
 
 
-class Memory:
+class VehicleArrays:
     """Named pieces; in each the numbers of the first vehicle come first, then those of the second, and so on.
 
     `sizes` has for each vehicle how many numbers it needs in which pieces. `whole` maps the name of a piece to the numbers of
@@ -20,13 +20,15 @@ class Memory:
     def __init__(self, sizes: Sequence[Mapping[str, int]]):
         names = dict.fromkeys(name for size in sizes for name in size)
         totals = {name: sum(size.get(name, 0) for size in sizes) for name in names}
-        self.block = np.zeros(sum(totals.values()))
-        self.whole = _cut(self.block, totals)
-        shares = {name: _cut(self.whole[name], {k: size.get(name, 0) for k, size in enumerate(sizes)}) for name in names}
-        self.parts = [{name: shares[name][k] for name in size} for k, size in enumerate(sizes)]
+        self.buffer = np.zeros(sum(totals.values()))
+        self.of_all_vehicles = _split(self.buffer, totals)
+        shares = {
+            name: _split(self.of_all_vehicles[name], {k: size.get(name, 0) for k, size in enumerate(sizes)}) for name in names
+        }
+        self.of_vehicle = [{name: shares[name][k] for name in size} for k, size in enumerate(sizes)]
 
 
-def _cut(array: np.ndarray, sizes: Mapping[_Key, int]) -> dict[_Key, np.ndarray]:
+def _split(array: np.ndarray, sizes: Mapping[_Key, int]) -> dict[_Key, np.ndarray]:
     """Consecutive parts of an array."""
     ends = np.cumsum(list(sizes.values())).tolist()
     return {key: array[end - size : end] for (key, size), end in zip(sizes.items(), ends, strict=True)}

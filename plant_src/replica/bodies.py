@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..json_reader import Numbers
-from ..physics.body import compound, set_dynamics
+from ..physics.body import create_compound_shape, set_dynamics
 from ..physics.client import pybullet
 from ..vehicles.ar_drone import geometry as ar_drone
 from ..vehicles.ar_drone.parameters import AIRFRAME, CENTRE_OF_MASS, ROTOR_SENSES, ROTORS
-from ..vehicles.common.shapes import quaternion
+from ..vehicles.common.shapes import quaternion_from_matrix
 from ..vehicles.strider import geometry as strider
 from ..vehicles.strider.parameters import RUDDER_ARM
 
@@ -20,15 +20,15 @@ from ..vehicles.strider.parameters import RUDDER_ARM
 LINK_MASS = 0.1
 
 #: forward-right-down <-> forward-left-up
-_FLIP = np.diag([1.0, -1.0, -1.0])
+_FRD_TO_FLU = np.diag([1.0, -1.0, -1.0])
 
 _UP = np.array([0.0, 0.0, 1.0])
 
 #: (3, 8): four thrusts and four propeller torques -> torque about the centre of mass, forward-left-up
-_TORQUES = np.hstack((np.cross(ROTORS, _UP).T, np.outer(_UP, ROTOR_SENSES)))
+_TORQUE_MATRIX = np.hstack((np.cross(ROTORS, _UP).T, np.outer(_UP, ROTOR_SENSES)))
 
 #: (3, 3): angular velocity -> velocity of the centre of mass as seen from the origin of the model frame
-_LEVER = np.cross(np.eye(3), CENTRE_OF_MASS).T
+_LEVER_MATRIX = np.cross(np.eye(3), CENTRE_OF_MASS).T
 
 
 class Quadcopter:
@@ -40,18 +40,23 @@ class Quadcopter:
         turn = _about_z(initial[3])
         centre = np.array(initial[0:3]) + turn @ CENTRE_OF_MASS
         yaw = pybullet.getQuaternionFromEuler([0.0, 0.0, initial[3]])
-        _, orientation = pybullet.multiplyTransforms([0, 0, 0], yaw, [0, 0, 0], quaternion(self._axes))
+        _, orientation = pybullet.multiplyTransforms([0, 0, 0], yaw, [0, 0, 0], quaternion_from_matrix(self._axes))
         self.body = pybullet.createMultiBody(
-            ar_drone.BODY.mass, compound(ar_drone.BODY.boxes, client), -1, centre.tolist(), orientation, physicsClientId=client
+            ar_drone.BODY.mass,
+            create_compound_shape(ar_drone.BODY.boxes, client),
+            -1,
+            centre.tolist(),
+            orientation,
+            physicsClientId=client,
         )
         set_dynamics(client, self.body, -1, ar_drone.BODY)
-        linear, angular = turn @ (initial[4:7] + _LEVER @ initial[7:10]), turn @ initial[7:10]
+        linear, angular = turn @ (initial[4:7] + _LEVER_MATRIX @ initial[7:10]), turn @ initial[7:10]
         pybullet.resetBaseVelocity(self.body, linear.tolist(), angular.tolist(), physicsClientId=client)
 
     def apply(self, loads: np.ndarray) -> None:
         """Four thrusts (N) and four propeller torques (N m), for the coming step of Bullet, fixed in the world frame."""
         centre, to_world = self._pose()
-        force, torque = to_world[:, 2] * loads[0:4].sum(), to_world @ (_TORQUES @ loads)
+        force, torque = to_world[:, 2] * loads[0:4].sum(), to_world @ (_TORQUE_MATRIX @ loads)
         options = {"flags": pybullet.WORLD_FRAME, "physicsClientId": self._client}
         pybullet.applyExternalForce(self.body, -1, force.tolist(), centre.tolist(), **options)
         pybullet.applyExternalTorque(self.body, -1, torque.tolist(), **options)
@@ -63,8 +68,8 @@ class Quadcopter:
         """
         centre, to_world = self._pose()
         linear, angular = pybullet.getBaseVelocity(self.body, self._client)
-        position, from_original = centre - to_world @ CENTRE_OF_MASS, to_world @ _FLIP
-        velocity = linear - to_world @ (_LEVER @ (to_world.T @ angular))
+        position, from_original = centre - to_world @ CENTRE_OF_MASS, to_world @ _FRD_TO_FLU
+        velocity = linear - to_world @ (_LEVER_MATRIX @ (to_world.T @ angular))
         return np.concatenate((position, attitude(from_original), velocity)), from_original @ velocity + position
 
     def _pose(self) -> tuple[np.ndarray, np.ndarray]:
@@ -81,7 +86,7 @@ class Vessel:
 
     def __init__(self, client: int, initial: Numbers):
         """`initial`: x, y, yaw, surge and sway velocity, yaw rate."""
-        self._client, self.body = client, _chain(client)
+        self._client, self.body = client, _create_jointed_hull(client)
         velocity = (_about_z(initial[2])[:2, :2] @ np.array(initial[3:5])).tolist()
         for joint, rate in zip(self._JOINTS, (*velocity, initial[5]), strict=True):
             pybullet.setJointMotorControl2(self.body, joint, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client)
@@ -112,7 +117,7 @@ class Vessel:
         return [state[0] for state in states], [state[1] for state in states]
 
 
-def _chain(client: int) -> int:
+def _create_jointed_hull(client: int) -> int:
     """The hull at its height on joints for x, y and yaw."""
     hull, origin, upright = strider.BODY, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]
     return pybullet.createMultiBody(
@@ -122,7 +127,7 @@ def _chain(client: int) -> int:
         [0.0, 0.0, hull.height],
         upright,
         linkMasses=[LINK_MASS, LINK_MASS, hull.mass],
-        linkCollisionShapeIndices=[-1, -1, compound(hull.boxes, client)],
+        linkCollisionShapeIndices=[-1, -1, create_compound_shape(hull.boxes, client)],
         linkVisualShapeIndices=[-1] * 3,
         linkPositions=[origin] * 3,
         linkOrientations=[upright] * 3,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from .interface import OUTPUTS
-from .unit import Unit
+from .unit import ReplicaFmu
 
 
-class Bus(Unit):
+class Bus(ReplicaFmu):
     """Emits the 22 signals of the sample before, and zeros at first: the published handshake sends what it stored.
 
     Stepped ahead of the controllers it makes them see the plant of 10 ms ago. Without it, a connection with "delay": 1 does the
@@ -20,12 +20,12 @@ class Bus(Unit):
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
         self._names = [variable.name for variable in OUTPUTS]
-        self.inputs(*(f"plant.{name}" for name in self._names))
-        self.states(**{f"stored.{name}": 0.0 for name in self._names})
-        self.outputs(*self._names)
+        self.declare_inputs(*(f"plant.{name}" for name in self._names))
+        self.declare_states(**{f"stored.{name}": 0.0 for name in self._names})
+        self.declare_outputs(*self._names)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        value = self.value
+        value = self.values
         for name in self._names:
             value[name] = value[f"stored.{name}"]
             value[f"stored.{name}"] = value[f"plant.{name}"]

@@ -8,28 +8,30 @@ from __future__ import annotations
 
 from cosim.core.component import Variable
 
-from ..vehicles.common.interface import scalar, vector
+from ..vehicles.common.interface import scalar_variable, vector_variables
 
 ROTORS = range(1, 5)
 
 #: equation 10 of the paper
 INPUTS: tuple[Variable, ...] = (
-    *(scalar(f"uav.thrust[{i}]", "N", "along the quadcopter's body up, at the rotor") for i in ROTORS),
-    *(scalar(f"uav.torque[{i}]", "N.m", "of the propeller; turns the body about its up: + - + -") for i in ROTORS),
-    scalar("usv.thrust", "N", "propeller, along the vessel's body x"),
-    *vector("usv.rudder", "xy", "N", "rudder force, vessel body frame, at the rudder", "input"),
-    *vector("usv.water", "xy", "N", "hydrodynamic force, vessel body frame, at the centre of mass", "input"),
-    scalar("usv.water.n", "N.m", "hydrodynamic moment about z"),
+    *(scalar_variable(f"uav.thrust[{i}]", "N", "along the quadcopter's body up, at the rotor") for i in ROTORS),
+    *(scalar_variable(f"uav.torque[{i}]", "N.m", "of the propeller; turns the body about its up: + - + -") for i in ROTORS),
+    scalar_variable("usv.thrust", "N", "propeller, along the vessel's body x"),
+    *vector_variables("usv.rudder", "xy", "N", "rudder force, vessel body frame, at the rudder", "input"),
+    *vector_variables("usv.water", "xy", "N", "hydrodynamic force, vessel body frame, at the centre of mass", "input"),
+    scalar_variable("usv.water.n", "N.m", "hydrodynamic moment about z"),
 )
 
 #: equation 11 of the paper
 OUTPUTS: tuple[Variable, ...] = (
-    *vector("uav.position", "xyz", "m", "origin of the quadcopter's model frame, world frame"),
-    *vector("uav.attitude", ("phi", "theta", "psi"), "rad", "forward-right-down body frame"),
-    *vector("uav.velocity", "xyz", "m/s", "origin of the quadcopter's model frame, world frame (the paper says body frame)"),
-    *vector("uav.acceleration", "xyz", "m/s2", "as published: difference quotient of R v + position, no acceleration"),
-    *vector("usv.position", "xyz", "m", "centre of mass, world frame"),
-    *vector("usv.velocity", "xyz", "m/s", "centre of mass, world frame"),
-    *vector("usv.angular_velocity", "xyz", "rad/s", "world frame"),
-    *vector("usv.attitude", ("yaw",), "rad", "counter-clockwise, in (-pi, pi]"),
+    *vector_variables("uav.position", "xyz", "m", "origin of the quadcopter's model frame, world frame"),
+    *vector_variables("uav.attitude", ("phi", "theta", "psi"), "rad", "forward-right-down body frame"),
+    *vector_variables(
+        "uav.velocity", "xyz", "m/s", "origin of the quadcopter's model frame, world frame (the paper says body frame)"
+    ),
+    *vector_variables("uav.acceleration", "xyz", "m/s2", "as published: difference quotient of R v + position, no acceleration"),
+    *vector_variables("usv.position", "xyz", "m", "centre of mass, world frame"),
+    *vector_variables("usv.velocity", "xyz", "m/s", "centre of mass, world frame"),
+    *vector_variables("usv.angular_velocity", "xyz", "rad/s", "world frame"),
+    *vector_variables("usv.attitude", ("yaw",), "rad", "counter-clockwise, in (-pi, pi]"),
 )

@@ -13,16 +13,16 @@ import numpy as np
 
 from ..vehicles.ar_drone.parameters import THRUST_COEFFICIENT
 from .pid import Pid
-from .unit import Unit
+from .unit import ReplicaFmu
 
 MASS = 0.441  # kg, as the controller has it
 MAX_SPEED = 5000.0  # 1/min
 
-ORDER, CUT_OFF = 15, 2 * math.pi * 20.0  # of the Butterworth low-pass: rad/s
-_FILTER = [f"filter[{i}]" for i in range(1, ORDER + 1)]
+FILTER_ORDER, CUT_OFF_FREQUENCY = 15, 2 * math.pi * 20.0  # of the Butterworth low-pass: rad/s
+_FILTER_STATES = [f"filter[{i}]" for i in range(1, FILTER_ORDER + 1)]
 
 
-class InverseKinematics(Unit):
+class InverseKinematics(ReplicaFmu):
     """Tilt commands (rad) and throttle (%) that point the thrust along the commanded acceleration (m/s2).
 
     The vertical force comes from an altitude loop through a low-pass. It starts at `initial_force` (N): 0 as published, so that
@@ -33,79 +33,79 @@ class InverseKinematics(Unit):
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        self.inputs("altitude_command", "vehicle.position.z", "forward_acceleration", "right_acceleration")
-        self.parameters(initial_force=0.0)
-        self.states(**dict.fromkeys(_FILTER, 0.0))
-        self.outputs("phi_command", "theta_command", "throttle", "vertical_force")
-        self._altitude = self.pid("altitude", Pid(10.0, 10.0, 3.0, 40.0, lower=2.0, upper=7.0, clamping=True))
-        self._step_size, self._turn, self._gain = math.nan, np.eye(ORDER), np.zeros(ORDER)
+        self.declare_inputs("altitude_command", "vehicle.position.z", "forward_acceleration", "right_acceleration")
+        self.declare_parameters(initial_force=0.0)
+        self.declare_states(**dict.fromkeys(_FILTER_STATES, 0.0))
+        self.declare_outputs("phi_command", "theta_command", "throttle", "vertical_force")
+        self._altitude = self.register_pid("altitude", Pid(10.0, 10.0, 3.0, 40.0, lower=2.0, upper=7.0, clamping=True))
+        self._step_size, self._filter_matrix, self._filter_gain = math.nan, np.eye(FILTER_ORDER), np.zeros(FILTER_ORDER)
 
     def exit_initialization_mode(self) -> None:
-        force = self._altitude.integral = self.value["initial_force"]
-        self.value |= dict(zip(_FILTER, low_pass_at_rest(force).tolist(), strict=True))
+        force = self._altitude.integral = self.values["initial_force"]
+        self.values |= dict(zip(_FILTER_STATES, low_pass_steady_state(force).tolist(), strict=True))
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        value = self.value
+        value = self.values
         wanted = self._altitude.step(value["altitude_command"] - value["vehicle.position.z"], step_size)
-        z = value["vertical_force"] = self._smooth(wanted, step_size)
+        z = value["vertical_force"] = self._low_pass_step(wanted, step_size)
         x, y = MASS * value["forward_acceleration"], MASS * value["right_acceleration"]
         force = math.hypot(x, y, z)
         value["phi_command"], value["theta_command"] = math.atan2(y, z), -math.asin(x / force) if force else 0.0
         value["throttle"] = 100 * 60 / (MAX_SPEED * 2 * math.pi) * math.sqrt(force / (4 * THRUST_COEFFICIENT))
         return True
 
-    def _smooth(self, force: float, step_size: float) -> float:
+    def _low_pass_step(self, force: float, step_size: float) -> float:
         """The output of the low-pass at this sample; then its states advance."""
         if step_size != self._step_size:
-            self._step_size, (self._turn, self._gain) = step_size, low_pass(step_size)
-        state = np.array([self.value[name] for name in _FILTER])
-        self.value |= dict(zip(_FILTER, (self._turn @ state + self._gain * force).tolist(), strict=True))
+            self._step_size, (self._filter_matrix, self._filter_gain) = step_size, low_pass_matrices(step_size)
+        state = np.array([self.values[name] for name in _FILTER_STATES])
+        self.values |= dict(zip(_FILTER_STATES, (self._filter_matrix @ state + self._filter_gain * force).tolist(), strict=True))
         return float(state[-1])
 
 
-def low_pass(step_size: float) -> tuple[np.ndarray, np.ndarray]:
+def low_pass_matrices(step_size: float) -> tuple[np.ndarray, np.ndarray]:
     """M (15, 15) and g (15,) of x(k+1) = M x(k) + g u(k) for the Butterworth low-pass, by the published third-order method.
 
     It is a first-order section, then seven of second order with the states (derivative, output); the last state is the output.
     """
-    a, b = np.zeros((ORDER, ORDER)), np.zeros(ORDER)
-    a[0, 0], b[0] = -CUT_OFF, CUT_OFF
-    for k, row in enumerate(range(1, ORDER, 2), start=1):
-        damping = 2 * math.cos(k * math.pi / ORDER)
-        a[row, [row - 1, row, row + 1]] = CUT_OFF**2, -damping * CUT_OFF, -(CUT_OFF**2)
+    a, b = np.zeros((FILTER_ORDER, FILTER_ORDER)), np.zeros(FILTER_ORDER)
+    a[0, 0], b[0] = -CUT_OFF_FREQUENCY, CUT_OFF_FREQUENCY
+    for k, row in enumerate(range(1, FILTER_ORDER, 2), start=1):
+        damping = 2 * math.cos(k * math.pi / FILTER_ORDER)
+        a[row, [row - 1, row, row + 1]] = CUT_OFF_FREQUENCY**2, -damping * CUT_OFF_FREQUENCY, -(CUT_OFF_FREQUENCY**2)
         a[row + 1, row] = 1.0
-    first = step_size * np.eye(ORDER) + step_size**2 / 2 * a + step_size**3 / 6 * a @ a
-    return np.eye(ORDER) + first @ a, first @ b
+    first = step_size * np.eye(FILTER_ORDER) + step_size**2 / 2 * a + step_size**3 / 6 * a @ a
+    return np.eye(FILTER_ORDER) + first @ a, first @ b
 
 
-def low_pass_at_rest(value: float) -> np.ndarray:
+def low_pass_steady_state(value: float) -> np.ndarray:
     """States (15,) of the low-pass that has always had this input."""
-    return np.array([value if i % 2 == 0 else 0.0 for i in range(ORDER)])
+    return np.array([value if i % 2 == 0 else 0.0 for i in range(FILTER_ORDER)])
 
 
-class AccelerationProfiles(Unit):
+class AccelerationProfiles(ReplicaFmu):
     """The demo's accelerations (m/s2): 5 m forth and back along `forward`, 25 m along `right`, in 20 s; zero afterwards."""
 
     description = "Acceleration profiles of the published demo"
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        self.outputs("forward", "right")
+        self.declare_outputs("forward", "right")
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        self.value["forward"] = come_back(current_time) / 2
-        self.value["right"] = go_hover(current_time) / 4
+        self.values["forward"] = return_move_acceleration(current_time) / 2
+        self.values["right"] = stop_move_acceleration(current_time) / 4
         return True
 
 
-def come_back(time: float) -> float:
+def return_move_acceleration(time: float) -> float:
     """Acceleration (m/s2) of a minimum-jerk move of 10 m in 10 s and of the same move back."""
     s = time / 10 % 1
     forth = (60 * s - 180 * s**2 + 120 * s**3) / 10
     return forth if time < 10 else -forth if time < 20 else 0.0
 
 
-def go_hover(time: float) -> float:
+def stop_move_acceleration(time: float) -> float:
     """Acceleration (m/s2) to 10 m/s within 10 s, and to rest again within 10 s: 100 m."""
     s = time / 10 % 1
     faster = 30 * s**2 * (1 - s) ** 2

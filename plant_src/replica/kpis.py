@@ -22,7 +22,7 @@ def overshoots(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[
     The lines start where the vehicle started and at the waypoints before (`x`, `y`, m); a leg ends when the circle of `radius`
     (m) is entered. NaN for legs that are not finished.
     """
-    switches = [result.time[0], *_switches(result, vehicle, x, y, radius)]
+    switches = [result.time[0], *_waypoint_times(result, vehicle, x, y, radius)]
     position = np.column_stack([result[f"{vehicle}.position.{axis}"] for axis in "xy"])
     corners = [position[0], *np.column_stack([x, y])]
     legs = dict.fromkeys((f"leg[{i}]" for i in range(1, len(x) + 1)), math.nan)
@@ -43,7 +43,7 @@ def turns(
     turn        m  largest peak within `settling` of a waypoint
     least_turn  m  smallest of these peaks
     """
-    switches = _switches(result, target, x, y, radius)
+    switches = _waypoint_times(result, target, x, y, radius)
     distance, time = horizontal_distance(result, vehicle, target), result.time
     windows = [(time >= switch) & (time < switch + settling) for switch in (time[0], *switches)]
     peaks = [float(distance[window].max()) for window in windows[1:]]
@@ -55,7 +55,7 @@ def turns(
     }
 
 
-def _switches(result: Result, vehicle: str, x: Sequence[float], y: Sequence[float], radius: float) -> list[float]:
+def _waypoint_times(result: Result, vehicle: str, x: Sequence[float], y: Sequence[float], radius: float) -> list[float]:
     """When the waypoints that were reached were reached (s)."""
     reached = waypoints(result, vehicle, x, y, radius)
     return [float(reached[f"time[{i}]"]) for i in range(1, int(reached["reached"]) + 1)]

@@ -12,13 +12,13 @@ from typing import Any
 
 from .interface import ROTORS
 from .pid import Pid
-from .unit import Unit
+from .unit import ReplicaFmu
 
-POSITION = ("vehicle.position.x", "vehicle.position.y")
-TARGET = ("target.position.x", "target.position.y")
+POSITION_INPUTS = ("vehicle.position.x", "vehicle.position.y")
+TARGET_INPUTS = ("target.position.x", "target.position.y")
 
 
-class Vtol(Unit):
+class Vtol(ReplicaFmu):
     """Altitude reference (m, world): the command, from `landing_time` on the approach altitude, and 0 when well above the target.
 
     It remembers nothing: the descent ends where the horizontal error exceeds `landing_error` (m), and motors never stop.
@@ -28,40 +28,43 @@ class Vtol(Unit):
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        self.inputs(*POSITION, "vehicle.position.z", *TARGET)
-        self.parameters(altitude_command=1.0, landing_time=5.0, enabled=1.0, approach_altitude=1.0, landing_error=0.1)
-        self.outputs("altitude_reference", "horizontal_error")
+        self.declare_inputs(*POSITION_INPUTS, "vehicle.position.z", *TARGET_INPUTS)
+        self.declare_parameters(altitude_command=1.0, landing_time=5.0, enabled=1.0, approach_altitude=1.0, landing_error=0.1)
+        self.declare_outputs("altitude_reference", "horizontal_error")
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        value = self.value
-        position, target = ([value[name] for name in names] for names in (POSITION, TARGET))
+        value = self.values
+        position, target = ([value[name] for name in names] for names in (POSITION_INPUTS, TARGET_INPUTS))
         value["horizontal_error"] = math.dist(position, target)
         value["altitude_reference"] = self._reference(current_time)
         return True
 
     def _reference(self, time: float) -> float:
-        value = self.value
+        value = self.values
         if not value["enabled"] or time < value["landing_time"]:
             return value["altitude_command"]
         high = value["vehicle.position.z"] >= value["approach_altitude"] + 0.1
         return value["approach_altitude"] if high or value["horizontal_error"] > value["landing_error"] else 0.0
 
 
-class PositionController(Unit):
+class PositionController(ReplicaFmu):
     """Position and velocity loops: tilt commands phi (right side down) and theta (nose up) towards the target."""
 
     description = "Position and velocity loops"
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        self.inputs(*POSITION, "vehicle.velocity.x", "vehicle.velocity.y", "vehicle.attitude.psi", *TARGET)
-        self.outputs("phi_command", "theta_command")
-        self._x = self.pid("position_x", Pid(2.0, 1.1, lower=-2.0, upper=2.0, clamping=True))
-        self._y = self.pid("position_y", Pid(2.0, 1.1, lower=-2.0, upper=2.0))
-        self._u, self._v = self.pid("velocity_x", _tilt_loop()), self.pid("velocity_y", _tilt_loop())
+        self.declare_inputs(*POSITION_INPUTS, "vehicle.velocity.x", "vehicle.velocity.y", "vehicle.attitude.psi", *TARGET_INPUTS)
+        self.declare_outputs("phi_command", "theta_command")
+        self._x = self.register_pid("position_x", Pid(2.0, 1.1, lower=-2.0, upper=2.0, clamping=True))
+        self._y = self.register_pid("position_y", Pid(2.0, 1.1, lower=-2.0, upper=2.0))
+        self._u, self._v = (
+            self.register_pid("velocity_x", _create_tilt_pid()),
+            self.register_pid("velocity_y", _create_tilt_pid()),
+        )
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        value = self.value
+        value = self.values
         forward, left = self._error()
         u_command, v_command = self._x.step(forward, step_size), self._y.step(left, step_size)
         theta = -self._u.step(u_command - value["vehicle.velocity.x"], step_size)
@@ -71,35 +74,35 @@ class PositionController(Unit):
 
     def _error(self) -> tuple[float, float]:
         """Distance to the target (m) forward and to the left."""
-        x, y = (self.value[target] - self.value[own] for target, own in zip(TARGET, POSITION, strict=True))
-        cos, sin = math.cos(-self.value["vehicle.attitude.psi"]), math.sin(-self.value["vehicle.attitude.psi"])
+        x, y = (self.values[target] - self.values[own] for target, own in zip(TARGET_INPUTS, POSITION_INPUTS, strict=True))
+        cos, sin = math.cos(-self.values["vehicle.attitude.psi"]), math.sin(-self.values["vehicle.attitude.psi"])
         return x * cos + y * sin, y * cos - x * sin
 
 
-def _tilt_loop() -> Pid:
+def _create_tilt_pid() -> Pid:
     """Tilt (deg) from a velocity error (m/s)."""
     return Pid(19.6600401691244, 0.0, 0.259478709550943, 3.0476144677615, lower=-15.0, upper=15.0)
 
 
-class AltitudeController(Unit):
+class AltitudeController(ReplicaFmu):
     """Throttle (%) from the altitude error; there is no feed-forward of hovering, so the integral has to find it."""
 
     description = "Altitude loop"
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        self.inputs("altitude_reference", "vehicle.position.z")
-        self.outputs("throttle")
+        self.declare_inputs("altitude_reference", "vehicle.position.z")
+        self.declare_outputs("throttle")
         loop = Pid(170.242040782586, 28.86184465251, 50.0, 50.0, lower=35.0, upper=90.0, clamping=True)
-        self._loop = self.pid("altitude", loop)
+        self._loop = self.register_pid("altitude", loop)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        error = self.value["altitude_reference"] - self.value["vehicle.position.z"]
-        self.value["throttle"] = self._loop.step(error, step_size)
+        error = self.values["altitude_reference"] - self.values["vehicle.position.z"]
+        self.values["throttle"] = self._loop.step(error, step_size)
         return True
 
 
-class AttitudeController(Unit):
+class AttitudeController(ReplicaFmu):
     """Throttle differences (%) from the attitude errors."""
 
     description = "Roll, pitch and yaw loops"
@@ -107,8 +110,8 @@ class AttitudeController(Unit):
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
         angles = ("phi", "theta", "psi")
-        self.inputs(*(f"{angle}_command" for angle in angles), *(f"vehicle.attitude.{angle}" for angle in angles))
-        self.outputs("roll", "pitch", "yaw")
+        self.declare_inputs(*(f"{angle}_command" for angle in angles), *(f"vehicle.attitude.{angle}" for angle in angles))
+        self.declare_outputs("roll", "pitch", "yaw")
         yaw_gains = (0.665668467901894, 0.340149010656045, 0.313800354221384, 96.4244783671056)
         loops = (
             Pid(0.3217, 0.4324, 0.0583, 100.0, lower=-20.0, upper=20.0),
@@ -116,28 +119,28 @@ class AttitudeController(Unit):
             Pid(*yaw_gains, lower=-10.0, upper=10.0, clamping=True),
         )
         names = ("roll", "pitch", "yaw")
-        self._loops = [(a, n, self.pid(f"{n}_loop", loop)) for a, n, loop in zip(angles, names, loops, strict=True)]
+        self._loops = [(a, n, self.register_pid(f"{n}_loop", loop)) for a, n, loop in zip(angles, names, loops, strict=True)]
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         for angle, name, loop in self._loops:
-            error = self.value[f"{angle}_command"] - self.value[f"vehicle.attitude.{angle}"]
-            self.value[name] = loop.step(math.degrees(error), step_size)
+            error = self.values[f"{angle}_command"] - self.values[f"vehicle.attitude.{angle}"]
+            self.values[name] = loop.step(math.degrees(error), step_size)
         return True
 
 
-class Mixer(Unit):
+class Mixer(ReplicaFmu):
     """Throttle (%) of the rotors front, left, rear, right."""
 
     description = "Control mixing"
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        self.inputs("collective", "roll", "pitch", "yaw")
-        self.outputs(*(f"throttle[{i}]" for i in ROTORS))
+        self.declare_inputs("collective", "roll", "pitch", "yaw")
+        self.declare_outputs(*(f"throttle[{i}]" for i in ROTORS))
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        collective, roll, pitch, yaw = (self.value[name] for name in ("collective", "roll", "pitch", "yaw"))
+        collective, roll, pitch, yaw = (self.values[name] for name in ("collective", "roll", "pitch", "yaw"))
         sums = (collective - yaw + pitch, collective + yaw + roll, collective - yaw - pitch, collective + yaw - roll)
         for i, throttle in zip(ROTORS, sums, strict=True):
-            self.value[f"throttle[{i}]"] = min(100.0, max(0.0, throttle))
+            self.values[f"throttle[{i}]"] = min(100.0, max(0.0, throttle))
         return True

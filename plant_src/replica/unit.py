@@ -14,32 +14,32 @@ _PARAMETER: dict[str, Any] = {"causality": Fmi2Causality.parameter, "variability
 _STATE: dict[str, Any] = {"causality": Fmi2Causality.local}
 
 
-class Unit(Fmi2Slave):
+class ReplicaFmu(Fmi2Slave):
     """A PythonFMU class that keeps its variables in `value`, by name."""
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        self.value: dict[str, float] = {}
+        self.values: dict[str, float] = {}
 
-    def inputs(self, *names: str) -> None:
+    def declare_inputs(self, *names: str) -> None:
         """Declare inputs, which start at zero."""
         self._register(names, causality=Fmi2Causality.input)
 
-    def outputs(self, *names: str) -> None:
+    def declare_outputs(self, *names: str) -> None:
         """Declare outputs, which start at zero."""
         self._register(names, causality=Fmi2Causality.output)
 
-    def parameters(self, **values: float) -> None:
+    def declare_parameters(self, **values: float) -> None:
         """Declare parameters with their values."""
         self._register(values, **_PARAMETER)
-        self.value |= values
+        self.values |= values
 
-    def states(self, **values: float) -> None:
+    def declare_states(self, **values: float) -> None:
         """Declare memory with its start values."""
         self._register(values, **_STATE)
-        self.value |= values
+        self.values |= values
 
-    def pid(self, name: str, loop: Pid) -> Pid:
+    def register_pid(self, name: str, loop: Pid) -> Pid:
         """Declare gains and states of a loop."""
         for field in ("P", "I", "D", "N", "integral", "filtered"):
             kind = _PARAMETER if field.isupper() else _STATE
@@ -49,6 +49,6 @@ class Unit(Fmi2Slave):
 
     def _register(self, names: Iterable[str], **kind: Any) -> None:
         for name in names:
-            self.value[name] = 0.0
-            access = {"getter": partial(self.value.__getitem__, name), "setter": partial(self.value.__setitem__, name)}
+            self.values[name] = 0.0
+            access = {"getter": partial(self.values.__getitem__, name), "setter": partial(self.values.__setitem__, name)}
             self.register_variable(Real(name, **access, **kind))

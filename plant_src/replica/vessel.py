@@ -6,12 +6,12 @@ import math
 from typing import Any
 
 from .pid import Pid
-from .unit import Unit
+from .unit import ReplicaFmu
 
-LARGEST_COUNT = 32
+MAX_WAYPOINTS = 32
 
 
-class Waypoints(Unit):
+class Waypoints(ReplicaFmu):
     """Course (rad, in [0, 2 pi)) straight to the current waypoint; the next one when `acceptance_radius` (m) is entered.
 
     The test of the radius is one sample old, as published. The last waypoint stays current (published: undefined).
@@ -21,15 +21,15 @@ class Waypoints(Unit):
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        self.inputs("vehicle.position.x", "vehicle.position.y")
-        self.parameters(acceptance_radius=0.5, waypoint_count=1.0)
-        self.parameters(**{f"waypoint_{axis}[{i}]": 0.0 for axis in "xy" for i in range(1, LARGEST_COUNT + 1)})
-        self.states(was_inside=1.0, old_distance=0.0)
-        self.outputs("course_command", "waypoint")
-        self.value["waypoint"] = 1.0
+        self.declare_inputs("vehicle.position.x", "vehicle.position.y")
+        self.declare_parameters(acceptance_radius=0.5, waypoint_count=1.0)
+        self.declare_parameters(**{f"waypoint_{axis}[{i}]": 0.0 for axis in "xy" for i in range(1, MAX_WAYPOINTS + 1)})
+        self.declare_states(was_inside=1.0, old_distance=0.0)
+        self.declare_outputs("course_command", "waypoint")
+        self.values["waypoint"] = 1.0
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        value = self.value
+        value = self.values
         inside = float(value["old_distance"] <= value["acceptance_radius"])
         if inside > value["was_inside"] and value["waypoint"] < value["waypoint_count"]:
             value["waypoint"] += 1
@@ -40,22 +40,22 @@ class Waypoints(Unit):
         return True
 
 
-class Autopilot(Unit):
+class Autopilot(ReplicaFmu):
     """Thrust (N) proportional to the speed error, rudder angle (rad) by PD on the heading error taken the shorter way."""
 
     description = "Speed and heading control"
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        self.inputs("vehicle.velocity.x", "vehicle.velocity.y", "vehicle.attitude.yaw", "course_command")
-        self.parameters(speed_command=0.0)
-        self.outputs("thrust", "rudder_angle")
+        self.declare_inputs("vehicle.velocity.x", "vehicle.velocity.y", "vehicle.attitude.yaw", "course_command")
+        self.declare_parameters(speed_command=0.0)
+        self.declare_outputs("thrust", "rudder_angle")
         largest = math.radians(35)
-        self._speed = self.pid("speed", Pid(82.65, lower=-3.0, upper=3.0))
-        self._heading = self.pid("heading", Pid(0.5, 0.0, 0.6, 21.4165136740303, lower=-largest, upper=largest))
+        self._speed = self.register_pid("speed", Pid(82.65, lower=-3.0, upper=3.0))
+        self._heading = self.register_pid("heading", Pid(0.5, 0.0, 0.6, 21.4165136740303, lower=-largest, upper=largest))
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        value = self.value
+        value = self.values
         error = (value["vehicle.attitude.yaw"] - value["course_command"] + math.pi) % (2 * math.pi) - math.pi
         value["rudder_angle"] = self._heading.step(error, step_size)
         value["thrust"] = self._speed.step(value["speed_command"] - self._surge(), step_size)
@@ -63,5 +63,5 @@ class Autopilot(Unit):
 
     def _surge(self) -> float:
         """Velocity (m/s) along the heading."""
-        yaw = self.value["vehicle.attitude.yaw"]
-        return math.cos(yaw) * self.value["vehicle.velocity.x"] + math.sin(yaw) * self.value["vehicle.velocity.y"]
+        yaw = self.values["vehicle.attitude.yaw"]
+        return math.cos(yaw) * self.values["vehicle.velocity.x"] + math.sin(yaw) * self.values["vehicle.velocity.y"]

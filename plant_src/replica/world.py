@@ -17,30 +17,30 @@ from cosim.core.component import Component, Ports, Variable
 from cosim.core.errors import ComponentError, InputError, Problem, did_you_mean
 
 from .. import world_settings
-from ..physics.body import LARGEST_STATE, compound, set_dynamics
+from ..physics.body import MAX_STATE_NORM, create_compound_shape, set_dynamics
 from ..physics.client import connect, pybullet
-from ..placement import Platform, Spawn
+from ..placement import Platform, VehiclePlacement
 from ..scene import replay
 from ..vehicles.ar_drone.parameters import GRAVITY
 from ..vehicles.common.shapes import Box
 from .bodies import Quadcopter, Vessel
 from .interface import INPUTS, OUTPUTS
 
-MODELS = {"uav": "ar_drone", "usv": "strider"}
+VEHICLE_MODELS = {"uav": "ar_drone", "usv": "strider"}
 
 #: bodies may not overlap deeper than this at the start (m)
-LARGEST_OVERLAP = 1e-3
+MAX_INITIAL_OVERLAP = 1e-3
 
 _DISTANCE = 8  # field of Bullet's contact points
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class ReplicaState:
     """The state of a world: Bullet's, which Bullet keeps under a number, and ours."""
 
     bullet: int
     outputs: np.ndarray
-    moved: np.ndarray
+    acceleration_integral: np.ndarray
 
 
 class World(Component):
@@ -63,7 +63,7 @@ class World(Component):
         platforms: Mapping[str, Any] | None = None,
         sub_steps: int = 2,
     ):
-        spawns, boxes = _read(vehicles, {} if platforms is None else platforms, sub_steps)
+        spawns, boxes = _read_arguments(vehicles, {} if platforms is None else platforms, sub_steps)
         self._name, self._sub_steps, self._step_size = instance_name, sub_steps, math.nan
         self._inputs, self._outputs = np.zeros(len(INPUTS)), np.zeros(len(OUTPUTS))
         self._bound_inputs, self._bound_outputs = np.zeros(len(INPUTS)), np.zeros(len(OUTPUTS))
@@ -77,22 +77,22 @@ class World(Component):
     @staticmethod
     def scene(name: str, scenario: Mapping[str, Any]) -> dict[str, Any]:
         """What the 3-D replay draws of this world, see `scene.replay`."""
-        return replay.published(name, scenario)
+        return replay.published_simulator_scene(name, scenario)
 
-    def _populate(self, spawns: Mapping[str, Spawn], platforms: list[Platform]) -> None:
+    def _populate(self, spawns: Mapping[str, VehiclePlacement], platforms: list[Platform]) -> None:
         pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)
         for platform in platforms:
             _add_platform(self._client, platform)
         self._quadcopter = Quadcopter(self._client, spawns["uav"].parameters)
         self._vessel = Vessel(self._client, spawns["usv"].parameters)
-        self._refuse_overlaps()
-        self._moved = np.zeros(3)
+        self._check_overlaps()
+        self._acceleration_integral = np.zeros(3)
         self._publish(math.inf)
 
-    def _refuse_overlaps(self) -> None:
+    def _check_overlaps(self) -> None:
         pybullet.performCollisionDetection(self._client)
         depth = max((-point[_DISTANCE] for point in pybullet.getContactPoints(physicsClientId=self._client)), default=0.0)
-        if depth > LARGEST_OVERLAP:
+        if depth > MAX_INITIAL_OVERLAP:
             raise InputError(Problem(f"bodies overlap by {depth:.3g} m at the start", "vehicles", ("arguments", "vehicles")))
 
     # -- values --------------------------------------------------------------------------------------------------------
@@ -133,12 +133,12 @@ class World(Component):
     def do_step(self, time: float, step_size: float) -> None:
         if step_size != self._step_size:
             self._set_step_size(time, step_size)
-        self._refuse_unsound(INPUTS, self._inputs, time)
+        self._check_finite(INPUTS, self._inputs, time)
         self._quadcopter.apply(self._inputs[0:8])
         self._vessel.apply(self._inputs[8:14])
         pybullet.stepSimulation(self._client)
         self._publish(step_size)
-        self._refuse_unsound(OUTPUTS, self._outputs, time)
+        self._check_finite(OUTPUTS, self._outputs, time)
 
     def _set_step_size(self, time: float, step_size: float) -> None:
         if not 0 < step_size < math.inf:
@@ -149,12 +149,12 @@ class World(Component):
 
     def _publish(self, step_size: float) -> None:
         motion, moved = self._quadcopter.measure()
-        self._outputs[:] = np.concatenate((motion, (moved - self._moved) / step_size, self._vessel.measure()))
-        self._moved = moved
+        self._outputs[:] = np.concatenate((motion, (moved - self._acceleration_integral) / step_size, self._vessel.measure()))
+        self._acceleration_integral = moved
 
-    def _refuse_unsound(self, variables: tuple[Variable, ...], values: np.ndarray, time: float) -> None:
+    def _check_finite(self, variables: tuple[Variable, ...], values: np.ndarray, time: float) -> None:
         sizes = np.abs(values)
-        if not sizes.max() < LARGEST_STATE:
+        if not sizes.max() < MAX_STATE_NORM:
             worst = int(np.nan_to_num(sizes, nan=np.inf).argmax())
             raise ComponentError(self._name, "do_step", f"{variables[worst].name} is {values[worst]:g}", time)
 
@@ -165,22 +165,22 @@ class World(Component):
 
     # -- state ---------------------------------------------------------------------------------------------------------
 
-    def get_state(self) -> Snapshot:
-        return Snapshot(pybullet.saveState(self._client), self._outputs.copy(), self._moved.copy())
+    def get_state(self) -> ReplicaState:
+        return ReplicaState(pybullet.saveState(self._client), self._outputs.copy(), self._acceleration_integral.copy())
 
-    def set_state(self, state: Snapshot) -> None:
+    def set_state(self, state: ReplicaState) -> None:
         pybullet.restoreState(state.bullet, physicsClientId=self._client)
-        self._outputs[:], self._moved = state.outputs, state.moved.copy()
+        self._outputs[:], self._acceleration_integral = state.outputs, state.acceleration_integral.copy()
 
-    def free_state(self, state: Snapshot) -> None:
+    def free_state(self, state: ReplicaState) -> None:
         pybullet.removeState(state.bullet, physicsClientId=self._client)
 
 
-def _read(vehicles: Any, platforms: Any, sub_steps: Any) -> tuple[dict[str, Spawn], list[Platform]]:
+def _read_arguments(vehicles: Any, platforms: Any, sub_steps: Any) -> tuple[dict[str, VehiclePlacement], list[Platform]]:
     found = vehicles if isinstance(vehicles, Mapping) else {}
     problems = [
         Problem(f'expected the vehicles "uav" and "usv", found {sorted(found)}', "vehicles", ("arguments", "vehicles"))
-        for _ in range(found.keys() != MODELS.keys())
+        for _ in range(found.keys() != VEHICLE_MODELS.keys())
     ]
     if not isinstance(sub_steps, int) or isinstance(sub_steps, bool) or sub_steps < 1:
         problems.append(
@@ -188,13 +188,15 @@ def _read(vehicles: Any, platforms: Any, sub_steps: Any) -> tuple[dict[str, Spaw
         )
     if problems:
         raise InputError(problems)
-    modelled = {name: {**spec, "model": MODELS[name]} if isinstance(spec, Mapping) else spec for name, spec in vehicles.items()}
-    read = world_settings.read(modelled, platforms, {})
+    modelled = {
+        name: {**spec, "model": VEHICLE_MODELS[name]} if isinstance(spec, Mapping) else spec for name, spec in vehicles.items()
+    }
+    read = world_settings.read_world_settings(modelled, platforms, {})
     return {spawn.name: spawn for spawn in read.vehicles}, list(read.platforms)
 
 
 def _add_platform(client: int, platform: Platform) -> None:
     x, y, z = platform.size
-    shape = compound([Box((x / 2, y / 2, z / 2), (0.0, 0.0, 0.0))], client)
+    shape = create_compound_shape([Box((x / 2, y / 2, z / 2), (0.0, 0.0, 0.0))], client)
     body = pybullet.createMultiBody(0, shape, -1, platform.position, physicsClientId=client)
     set_dynamics(client, body, -1)

@@ -31,7 +31,7 @@ class View:
 
     eye: np.ndarray
     target: np.ndarray
-    angle: float = 0.6
+    field_of_view: float = 0.6
 
     def matrix(self) -> list[float]:
         """World to camera, as Bullet and OpenGL want it."""
@@ -39,7 +39,7 @@ class View:
 
     def projection(self, width: int, height: int, window: Window) -> list[float]:
         """Camera to a window of a picture of that size."""
-        pixel = 2 * NEAR * math.tan(self.angle / 2) / height
+        pixel = 2 * NEAR * math.tan(self.field_of_view / 2) / height
         left, right = ((x - width / 2) * pixel for x in (window.left, window.right))
         bottom, top = ((height / 2 - y) * pixel for y in (window.bottom, window.top))
         return list(pybullet.computeProjectionMatrix(left, right, bottom, top, NEAR, FAR))
@@ -54,26 +54,26 @@ class View:
     def pixels(self, places: np.ndarray, width: int, height: int) -> np.ndarray:
         """Where `places` (n, 3) in front of the camera appear in a picture: pixels from the left and from the top, (n, 2)."""
         right, up, forward = ((places - self.eye) @ self.axes().T).T
-        scale = height / (2 * math.tan(self.angle / 2))
+        scale = height / (2 * math.tan(self.field_of_view / 2))
         return np.stack([width / 2 + scale * right / forward, height / 2 - scale * up / forward], axis=1)
 
-    def window(self, centres: np.ndarray, radii: np.ndarray, width: int, height: int) -> Window:
+    def bounding_window(self, centres: np.ndarray, radii: np.ndarray, width: int, height: int) -> Window:
         """The part of a picture that holds all balls with `centres` (n, 3) and `radii` (n,) as far as they are seen."""
         places = (centres - self.eye) @ self.axes().T
-        seen = self._in_sight(places, radii, width / height)
+        seen = self._in_frustum(places, radii, width / height)
         if not seen.any():
             return Window(0, 0, 0, 0)
         (right, up, forward), radii = places[seen].T, radii[seen]
         if (forward - radii).min() <= NEAR:
             return Window(0, width, 0, height)
-        scale = height / (2 * math.tan(self.angle / 2))
-        across, down = (_spread(values, radii, forward) * scale for values in (right, -up))
-        return Window(*_pixels(across, width), *_pixels(down, height))
+        scale = height / (2 * math.tan(self.field_of_view / 2))
+        across, down = (_tangent_range(values, radii, forward) * scale for values in (right, -up))
+        return Window(*_pixel_range(across, width), *_pixel_range(down, height))
 
-    def _in_sight(self, places: np.ndarray, radii: np.ndarray, aspect: float) -> np.ndarray:
+    def _in_frustum(self, places: np.ndarray, radii: np.ndarray, aspect: float) -> np.ndarray:
         """Which balls at `places` (n, 3), camera axes, reach into the pyramid that the picture shows."""
         right, up, forward = places.T
-        upwards, sideways = self.angle / 2, math.atan(aspect * math.tan(self.angle / 2))
+        upwards, sideways = self.field_of_view / 2, math.atan(aspect * math.tan(self.field_of_view / 2))
         seen = forward + radii > NEAR
         for distance, angle in ((np.abs(right), sideways), (np.abs(up), upwards)):
             seen &= distance * math.cos(angle) - forward * math.sin(angle) < radii
@@ -82,17 +82,17 @@ class View:
     def mirrored(self) -> View:
         """The view from below the water whose picture, upside down, is what the water reflects."""
         flip = np.array([1.0, 1.0, -1.0])
-        return View(self.eye * flip, self.target * flip, self.angle)
+        return View(self.eye * flip, self.target * flip, self.field_of_view)
 
 
-def _spread(sideways: np.ndarray, radii: np.ndarray, forward: np.ndarray) -> np.ndarray:
+def _tangent_range(sideways: np.ndarray, radii: np.ndarray, forward: np.ndarray) -> np.ndarray:
     """Smallest and largest tangent of the angles under which balls appear."""
     ends = np.stack([sideways - radii, sideways + radii])
     tangents = np.stack([ends / (forward - radii), ends / (forward + radii)])
     return np.array([tangents.min(), tangents.max()])
 
 
-def _pixels(spread: np.ndarray, count: int) -> list[int]:
+def _pixel_range(spread: np.ndarray, count: int) -> list[int]:
     """The range of pixels about the middle of `count` that holds a spread of pixels."""
     low, high = np.clip([math.floor(spread[0] + count / 2) - 1, math.ceil(spread[1] + count / 2) + 1], 0, count).tolist()
     return [low, high]
@@ -100,12 +100,12 @@ def _pixels(spread: np.ndarray, count: int) -> list[int]:
 
 def overview(mission: Mission, row: int) -> View:
     """All paths, from high in the south-east; keeps still."""
-    return _framed(mission.places().reshape(-1, 3), np.array([0.45, -0.8, 0.27]), 0.8)
+    return _framing_view(mission.positions().reshape(-1, 3), np.array([0.45, -0.8, 0.27]), 0.8)
 
 
 def chase(mission: Mission, row: int) -> View:
     """Quadcopter and vessel, followed from the south at a constant distance."""
-    places = mission.places()[:, row]
+    places = mission.positions()[:, row]
     centre = places.mean(axis=0)
     spread = float(np.linalg.norm(places - centre, axis=1).max())
     return View(centre + (2.4 + 1.3 * spread) * np.array([0.55, -1.0, 0.36]), centre)
@@ -113,7 +113,7 @@ def chase(mission: Mission, row: int) -> View:
 
 def deck(mission: Mission, row: int) -> View:
     """The landing deck, from behind and above on the vessel itself."""
-    place, yaw = mission.vessel_places()[row], mission.vessel_yaw(row)
+    place, yaw = mission.vessel_positions()[row], mission.vessel_yaw(row)
     heading = np.array([math.cos(yaw), math.sin(yaw), 0.0])
     return View(place - 2.6 * heading + 1.5 * UP, place + 0.2 * heading + 0.45 * UP, 0.75)
 
@@ -121,17 +121,17 @@ def deck(mission: Mission, row: int) -> View:
 def landing(mission: Mission, row: int) -> View:
     """The last seconds before the touchdown, from the side; keeps still."""
     rows = mission.landing_rows()
-    places = mission.places()[:, rows].reshape(-1, 3)
-    travel = mission.vessel_places()[rows[-1]] - mission.vessel_places()[rows[0]]
+    places = mission.positions()[:, rows].reshape(-1, 3)
+    travel = mission.vessel_positions()[rows[-1]] - mission.vessel_positions()[rows[0]]
     side = np.array([travel[1], -travel[0], 0.0])
     length = float(np.linalg.norm(side))
     side = side / length if length > 0.5 else np.array([0.4, -0.92, 0.0])
     if side[1] > 0:  # with the trees behind
         side = -side
-    return _framed(places, side + 0.24 * UP, 0.45)
+    return _framing_view(places, side + 0.24 * UP, 0.45)
 
 
-def _framed(places: np.ndarray, direction: np.ndarray, margin: float, angle: float = 0.6) -> View:
+def _framing_view(places: np.ndarray, direction: np.ndarray, margin: float, angle: float = 0.6) -> View:
     """A view from `direction` that holds all `places` (n, 3), and `margin` (m) more, in a picture twice as wide as high."""
     centre = (places.min(axis=0) + places.max(axis=0)) / 2
     away = direction / np.linalg.norm(direction)

@@ -13,12 +13,12 @@ from cosim.core.errors import InputError
 from cosim.results import Result
 
 from .cameras import UP
-from .mission import Mission, recorded
+from .mission import Mission, mission_of_result
 from .render import Scene, find_camera
 
-PAGE = 7.16  # in, width of a page with two columns
-PIXELS = (960, 480)
-FAINTEST = 0.3
+PAGE_WIDTH = 7.16  # in, width of a page with two columns
+IMAGE_SIZE = (960, 480)
+MIN_OPACITY = 0.3
 
 
 def ghosts(
@@ -27,19 +27,19 @@ def ghosts(
     start: float | None = None,
     stop: float | None = None,
     interval: float = 1.0,
-    pixels: Sequence[int] = PIXELS,
+    pixels: Sequence[int] = IMAGE_SIZE,
 ) -> Figure:
     """The vehicles every `interval` (s) in one picture, the later the more solid, as in figure 17 of the paper.
 
     `camera` is one of "overview", "chase", "deck" and "landing" as it stands at the end. Shown are `start` to `stop` (s); without
     them, the seconds before the touchdown. `pixels` are width and height. The time (s) stands above each ghost.
     """
-    mission = recorded(result)
-    rows = _rows(mission, start, stop, interval)
+    mission = mission_of_result(result)
+    rows = _ghost_rows(mission, start, stop, interval)
     width, height = pixels
     with Scene(mission) as scene:
-        picture = scene.render(camera, rows, np.linspace(FAINTEST, 1.0, len(rows) + 1)[1:].tolist(), width, height)
-    figure = Figure(figsize=(PAGE, PAGE * height / width))
+        picture = scene.render(camera, rows, np.linspace(MIN_OPACITY, 1.0, len(rows) + 1)[1:].tolist(), width, height)
+    figure = Figure(figsize=(PAGE_WIDTH, PAGE_WIDTH * height / width))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.imshow(picture, aspect="auto", interpolation="none")
     axes.set_axis_off()
@@ -47,7 +47,7 @@ def ghosts(
     return figure
 
 
-def _rows(mission: Mission, start: float | None, stop: float | None, interval: float) -> list[int]:
+def _ghost_rows(mission: Mission, start: float | None, stop: float | None, interval: float) -> list[int]:
     """Rows `interval` apart, counted back from the last."""
     time, landing = mission.result.time, mission.landing_rows()
     last = time[landing[-1]] if stop is None else min(stop, time[-1])
@@ -62,7 +62,7 @@ def _write_times(axes: Axes, mission: Mission, rows: Sequence[int], camera: str,
     """The time above each ghost of the first vehicle."""
     view = find_camera(camera)(mission, rows[-1])
     vehicle = next(iter(mission.vehicles))
-    above = np.array([mission.place(vehicle, row) for row in rows]) + 0.22 * UP
+    above = np.array([mission.position(vehicle, row) for row in rows]) + 0.22 * UP
     for row, (x, y) in zip(rows, view.pixels(above, width, height).tolist(), strict=True):
         text = axes.text(x, y, f"{mission.result.time[row]:.1f} s", fontsize=7, color="#222222", ha="center", va="bottom")
         text.set(path_effects=[withStroke(linewidth=2, foreground="#FFFFFFB0")], clip_on=True)

@@ -15,10 +15,10 @@ from .light import Rays
 from .stage import AMBIENT, DIFFUSE, SUN, Picture
 
 SAND, GRASS = (0.80, 0.73, 0.55), (0.42, 0.55, 0.27)
-HIGHEST = 0.4  # m
+LAND_HEIGHT = 0.4  # m
 
 
-class Step(NamedTuple):
+class LandBox(NamedTuple):
     """A box of land, from corner to corner (m), and its colour."""
 
     low: Sequence[float]
@@ -26,10 +26,10 @@ class Step(NamedTuple):
     colour: Sequence[float]
 
 
-def bank(west: float, south: float, east: float, north: float, beach: float = 1.2) -> list[Step]:
+def bank(west: float, south: float, east: float, north: float, beach: float = 1.2) -> list[LandBox]:
     """Grass on a rectangle, and sand around it, `beach` (m) wide."""
-    sand = Step((west - beach, south - beach, 0.0), (east + beach, north + beach, 0.12), SAND)
-    return [sand, Step((west, south, 0.0), (east, north, HIGHEST), GRASS)]
+    sand = LandBox((west - beach, south - beach, 0.0), (east + beach, north + beach, 0.12), SAND)
+    return [sand, LandBox((west, south, 0.0), (east, north, LAND_HEIGHT), GRASS)]
 
 
 #: north and west of the lake
@@ -39,18 +39,18 @@ BANKS = (bank(-700.0, 34.0, 700.0, 634.0), bank(-720.0, -700.0, -20.0, 700.0))
 def add_land(picture: Picture, view: View, light: Rays) -> None:
     """Draw the banks where they are the nearest."""
     for steps in BANKS:
-        pixels = _footprint(view.eye, light.direction, steps[0])
+        pixels = _candidate_pixels(view.eye, light.direction, steps[0])
         for step in steps:
-            _draw(picture, step, view.eye, light, pixels)
+            _draw_box(picture, step, view.eye, light, pixels)
 
 
-def _footprint(eye: np.ndarray, direction: np.ndarray, step: Step) -> np.ndarray:
+def _candidate_pixels(eye: np.ndarray, direction: np.ndarray, step: LandBox) -> np.ndarray:
     """Indices of the pixels whose rays are above a step where they cross the water or the height of the land.
 
     Only rays that cross a corner from side to side are missed.
     """
     found = np.zeros(direction.shape[1:], bool)
-    for level in (0.0, HIGHEST):
+    for level in (0.0, LAND_HEIGHT):
         with np.errstate(divide="ignore", invalid="ignore"):
             reach = (level - float(eye[2])) / direction[2]
             x, y = (float(eye[i]) + reach * direction[i] for i in (0, 1))
@@ -58,7 +58,7 @@ def _footprint(eye: np.ndarray, direction: np.ndarray, step: Step) -> np.ndarray
     return np.flatnonzero(found)
 
 
-def _draw(picture: Picture, step: Step, eye: np.ndarray, light: Rays, pixels: np.ndarray) -> None:
+def _draw_box(picture: Picture, step: LandBox, eye: np.ndarray, light: Rays, pixels: np.ndarray) -> None:
     """Draw a step into those of the `pixels` where it is the nearest; a ray enters a box where it has passed three planes."""
     direction = light.direction.reshape(3, -1)[:, pixels]
     low, high = (np.asarray(corner - eye, np.float32)[:, None] for corner in (step.low, step.high))

@@ -19,10 +19,10 @@ def _colour(red: float, green: float, blue: float) -> np.ndarray:
     return np.array([[red], [green], [blue]], np.float32)
 
 
-ZENITH, HORIZON = _colour(0.36, 0.58, 0.84), _colour(0.86, 0.91, 0.95)
-HILLS_FAR, HILLS_NEAR = _colour(0.62, 0.72, 0.80), _colour(0.45, 0.58, 0.60)
-DEEP = _colour(0.10, 0.33, 0.40)
-HAZE = 450.0  # m, distance at which a solid keeps 1/e of its colour
+ZENITH_COLOUR, HORIZON_COLOUR = _colour(0.36, 0.58, 0.84), _colour(0.86, 0.91, 0.95)
+FAR_HILLS_COLOUR, NEAR_HILLS_COLOUR = _colour(0.62, 0.72, 0.80), _colour(0.45, 0.58, 0.60)
+WATER_COLOUR = _colour(0.10, 0.33, 0.40)
+HAZE_DISTANCE = 450.0  # m, distance at which a solid keeps 1/e of its colour
 
 #: ripples: direction (rad), wave number (1/m), slope
 RIPPLES = ((0.4, 2.3, 0.016), (1.5, 3.7, 0.013), (2.6, 5.9, 0.010), (0.9, 9.7, 0.008))
@@ -35,9 +35,9 @@ class Rays(NamedTuple):
     along_axis: np.ndarray
 
 
-def rays(view: View, width: int, height: int) -> Rays:
+def pixel_rays(view: View, width: int, height: int) -> Rays:
     """Rays through the centres of all pixels."""
-    half = math.tan(view.angle / 2)
+    half = math.tan(view.field_of_view / 2)
     right = (2 * (np.arange(width, dtype=np.float32) + 0.5) / width - 1) * half * width / height
     up = (1 - 2 * (np.arange(height, dtype=np.float32) + 0.5) / height) * half
     axes = view.axes().astype(np.float32)[:, :, None, None]
@@ -45,13 +45,13 @@ def rays(view: View, width: int, height: int) -> Rays:
     return Rays((axes[0] * right + axes[1] * up[:, None] + axes[2]) * along_axis, along_axis)
 
 
-def sky(direction: np.ndarray) -> np.ndarray:
+def sky_colour(direction: np.ndarray) -> np.ndarray:
     """Colour (3, n) of the sky and of two ranges of far hills in a direction (3, n)."""
     x, y, z = direction
     elevation = np.maximum(z, 0)
-    colour = HORIZON + (ZENITH - HORIZON) * np.sqrt(np.minimum(elevation * 1.4, 1))
+    colour = HORIZON_COLOUR + (ZENITH_COLOUR - HORIZON_COLOUR) * np.sqrt(np.minimum(elevation * 1.4, 1))
     place = (np.arctan2(y, x) * (AZIMUTHS.size / (2 * math.pi))).astype(np.int32)  # negative ones count from the end
-    for ridge, tint in RANGES:
+    for ridge, tint in HILL_RANGES:
         colour += (tint - colour) * np.clip((ridge[place] - elevation) * 700 + 0.5, 0, 1)
     return colour
 
@@ -63,7 +63,7 @@ def _ridge(azimuth: np.ndarray, phase: float, height: float) -> np.ndarray:
 
 
 AZIMUTHS = np.linspace(0, 2 * math.pi, 8192, endpoint=False, dtype=np.float32)  # finer than pixels
-RANGES = ((_ridge(AZIMUTHS, 3.0, 0.075), HILLS_FAR), (_ridge(AZIMUTHS, 7.0, 0.045), HILLS_NEAR))
+HILL_RANGES = ((_ridge(AZIMUTHS, 3.0, 0.075), FAR_HILLS_COLOUR), (_ridge(AZIMUTHS, 7.0, 0.045), NEAR_HILLS_COLOUR))
 
 
 def horizon_row(light: Rays) -> int:
@@ -79,25 +79,25 @@ def water_distance(view: View, light: Rays) -> np.ndarray:
     return distance * light.along_axis
 
 
-class Surface(NamedTuple):
+class WaterPixels(NamedTuple):
     """Water in n pixels of a picture: the pixels of the mirrored picture that they reflect (flat indices), the reflected sky
     (3, n) and the share of reflected light (n,)."""
 
     sources: np.ndarray
     sky: np.ndarray
-    share: np.ndarray
+    reflectance: np.ndarray
 
-    def part(self, which: np.ndarray) -> Surface:
+    def select(self, which: np.ndarray) -> WaterPixels:
         """Those of its pixels with these indices."""
-        return Surface(*(values[..., which] for values in self))
+        return WaterPixels(*(values[..., which] for values in self))
 
     def colour(self, mirrored: np.ndarray, cover: np.ndarray) -> np.ndarray:
         """Colour of the pixels (3, n) that reflect solids (height, width, 3), premultiplied by their cover (height, width)."""
         solids, hidden = mirrored.reshape(-1, 3)[self.sources].T, cover.ravel()[self.sources]
-        return DEEP + (solids + self.sky * (1 - hidden) - DEEP) * self.share
+        return WATER_COLOUR + (solids + self.sky * (1 - hidden) - WATER_COLOUR) * self.reflectance
 
 
-def surface(view: View, light: Rays, horizon: int) -> Surface:
+def water_pixels(view: View, light: Rays, horizon: int) -> WaterPixels:
     """The water in all pixels of the rows from `horizon` on."""
     height, width = light.along_axis.shape
     x, y, z = light.direction[:, horizon:].reshape(3, -1)
@@ -106,7 +106,7 @@ def surface(view: View, light: Rays, horizon: int) -> Surface:
     tilt = x * slope_x + y * slope_y
     reflected = np.stack([x - 2 * slope_x * z, y - 2 * slope_y * z, -z - 2 * tilt])
     share = 0.06 + 0.94 * (1 - np.clip(tilt - z, 0, 1)) ** 5
-    return Surface(_reflected_pixels(tilt.reshape(-1, width), height), sky(reflected), share)
+    return WaterPixels(_reflected_pixels(tilt.reshape(-1, width), height), sky_colour(reflected), share)
 
 
 def _reflected_pixels(tilt: np.ndarray, height: int) -> np.ndarray:

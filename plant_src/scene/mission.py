@@ -15,7 +15,7 @@ from ..catalogue import MODELS
 from ..kpis import touchdown_row
 from ..vehicles.common.shapes import Quaternion
 
-APPROACH = 8.0  # s before the touchdown that belong to the landing
+APPROACH_TIME = 8.0  # s before the touchdown that belong to the landing
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Mission:
     vehicles: Mapping[str, str]
     platforms: Mapping[str, Mapping[str, Sequence[float]]]
 
-    def place(self, vehicle: str, row: int) -> list[float]:
+    def position(self, vehicle: str, row: int) -> list[float]:
         """Position of a vehicle's centre of mass (m, world)."""
         return [float(self.result[f"{vehicle}.position.{axis}"][row]) for axis in "xyz"]
 
@@ -38,31 +38,31 @@ class Mission:
     def _path(self, vehicle: str) -> np.ndarray:
         return np.stack([self.result[f"{vehicle}.position.{axis}"] for axis in "xyz"], axis=1)
 
-    def places(self) -> np.ndarray:
+    def positions(self) -> np.ndarray:
         """Positions of all vehicles (m, world), shape (vehicles, rows, 3)."""
         return np.stack([self._path(vehicle) for vehicle in self.vehicles])
 
-    def _first(self, is_vessel: bool) -> str:
+    def _first_vehicle(self, is_vessel: bool) -> str:
         names = [name for name, model in self.vehicles.items() if MODELS[model].is_vessel == is_vessel]
         return names[0] if names else next(iter(self.vehicles))
 
-    def vessel_places(self) -> np.ndarray:
+    def vessel_positions(self) -> np.ndarray:
         """Positions of the vessel, shape (rows, 3); those of the only vehicle where there is no vessel."""
-        return self._path(self._first(is_vessel=True))
+        return self._path(self._first_vehicle(is_vessel=True))
 
     def vessel_yaw(self, row: int) -> float:
         """Heading of the vessel (rad)."""
-        return float(self.result[f"{self._first(is_vessel=True)}.attitude.yaw"][row])
+        return float(self.result[f"{self._first_vehicle(is_vessel=True)}.attitude.yaw"][row])
 
     def landing_rows(self) -> range:
         """Rows of the last seconds before the touchdown; of the run's last seconds where there is none."""
-        touchdown = touchdown_row(self.result, self._first(is_vessel=False))
+        touchdown = touchdown_row(self.result, self._first_vehicle(is_vessel=False))
         last = len(self.result.time) - 1 if touchdown is None else touchdown
-        first = int(np.searchsorted(self.result.time, self.result.time[last] - APPROACH))
+        first = int(np.searchsorted(self.result.time, self.result.time[last] - APPROACH_TIME))
         return range(first, last + 1)
 
 
-def recorded(result: Result) -> Mission:
+def mission_of_result(result: Result) -> Mission:
     """The mission of a result whose scenario holds a plant of this package. Raises InputError where it holds none."""
     components: Mapping[str, Any] = result.metadata.get("scenario", {}).get("components", {})
     for name, component in components.items():

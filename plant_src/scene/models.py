@@ -17,7 +17,7 @@ from ..vehicles.common.shapes import Quaternion, Vector
 from ..vehicles.strider import geometry as strider_geometry
 from ..vehicles.strider.parameters import DECK_TOP, DECK_X, DECK_Y
 
-UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
+IDENTITY_QUATERNION: Quaternion = (0.0, 0.0, 0.0, 1.0)
 ALONG_X: Quaternion = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))  # turns a cylinder's axis from z to x
 BETWEEN_ARMS: Quaternion = (0.0, 0.0, -math.sin(math.pi / 8), math.cos(math.pi / 8))  # x turned by -45 degrees about z
 WHITE, BLACK, GREY, SILVER = (0.95, 0.95, 0.95), (0.09, 0.09, 0.10), (0.35, 0.36, 0.38), (0.70, 0.72, 0.75)
@@ -35,10 +35,10 @@ class Part(NamedTuple):
     size: tuple[float, ...]
     position: Vector
     colour: Vector
-    orientation: Quaternion = UPRIGHT
+    orientation: Quaternion = IDENTITY_QUATERNION
     opacity: float = 1.0
 
-    def reach(self) -> float:
+    def bounding_radius(self) -> float:
         """Largest distance of its points from its centre (m)."""
         match self.shape:
             case "box":
@@ -49,7 +49,7 @@ class Part(NamedTuple):
                 return self.size[0]
 
 
-def ar_drone() -> list[Part]:
+def ar_drone_parts() -> list[Part]:
     """The quadcopter about its centre of mass: rotor arms along the body axes, the hull between front and right arm."""
     body = [
         Part("box", (0.26, 0.075, 0.045), (0.0, 0.0, 0.0), ORANGE, BETWEEN_ARMS),
@@ -59,11 +59,11 @@ def ar_drone() -> list[Part]:
         Part("box", (0.014, 2 * ROTORS[1, 1], 0.014), (0.0, 0.0, 0.0), BLACK),
     ]
     for (x, y, z), colour in zip(ROTORS.tolist(), (RED, SILVER, SILVER, RED), strict=True):
-        body += _rotor(x, y, z, colour)
+        body += _rotor_parts(x, y, z, colour)
     return body
 
 
-def _rotor(x: float, y: float, z: float, colour: Vector) -> list[Part]:
+def _rotor_parts(x: float, y: float, z: float, colour: Vector) -> list[Part]:
     leg, share = -FEET_HEIGHT, EDGE / math.sqrt(2) / ROTORS[0, 0]  # the feet stand a little inside the motors
     return [
         Part("cylinder", (0.012, leg), (share * x, share * y, -leg / 2), GREY),
@@ -73,7 +73,7 @@ def _rotor(x: float, y: float, z: float, colour: Vector) -> list[Part]:
     ]
 
 
-def strider() -> list[Part]:
+def strider_parts() -> list[Part]:
     """The catamaran about its centre of mass: two hulls, four struts, and the landing deck with its mark."""
     x, y, _ = strider_geometry.DECK_CENTRE
     length, width = DECK_X[1] - DECK_X[0], DECK_Y[1] - DECK_Y[0]
@@ -81,19 +81,19 @@ def strider() -> list[Part]:
     top = DECK_TOP - plate / 2
     parts = [
         Part("box", (length, width, plate), (x, y, top), GREY),
-        Part("box", strider_geometry.HOUSING, (x, y, top - plate / 2 - strider_geometry.HOUSING[2] / 2), BLUE),
+        Part("box", strider_geometry.HOUSING_SIZE, (x, y, top - plate / 2 - strider_geometry.HOUSING_SIZE[2] / 2), BLUE),
         Part("box", (0.004, 0.06, 0.09), (-0.46, 0.0, -0.11), BLACK),
         Part("cylinder", (0.008, 0.2), (-0.46, 0.0, 0.0), BLACK),
         Part("box", (0.16, 0.012, 0.012), (-0.40, 0.0, 0.09), BLACK),
-        *mark(x, y, DECK_TOP),
+        *landing_mark(x, y, DECK_TOP),
     ]
     for side in (-1.0, 1.0):
-        parts += _hull(side * strider_geometry.HULL_DISTANCE)
+        parts += _hull_parts(side * strider_geometry.HULL_OFFSET)
         parts += [_strut(end * 0.24, side, width / 2) for end in (-1.0, 1.0)]
     return parts
 
 
-def mark(x: float, y: float, z: float) -> list[Part]:
+def landing_mark(x: float, y: float, z: float) -> list[Part]:
     """The landing mark: white ring, white H."""
     disc = [Part("cylinder", (radius, 0.002), (x, y, z + rise), colour) for radius, rise, colour in _RINGS]
     bars = [Part("box", (0.20, 0.03, 0.002), (x, y + side * 0.06, z + 0.004), WHITE) for side in (-1.0, 1.0)]
@@ -103,7 +103,7 @@ def mark(x: float, y: float, z: float) -> list[Part]:
 _RINGS = ((0.24, 0.001, WHITE), (0.21, 0.002, GREY))
 
 
-def _hull(y: float) -> list[Part]:
+def _hull_parts(y: float) -> list[Part]:
     radius, half = 0.055, strider_geometry.HULL_LENGTH / 2
     z = strider_geometry.HULL_BOTTOM + radius - 0.03
     straight = 2 * (half - radius)
@@ -114,14 +114,14 @@ def _hull(y: float) -> list[Part]:
 
 def _strut(x: float, side: float, deck_edge: float) -> Part:
     """A bar from a hull up to the edge of the deck."""
-    outer, low, inner, high = strider_geometry.HULL_DISTANCE, -0.07, deck_edge - 0.02, DECK_TOP - 0.03
+    outer, low, inner, high = strider_geometry.HULL_OFFSET, -0.07, deck_edge - 0.02, DECK_TOP - 0.03
     run, rise = inner - outer, high - low
     angle = side * math.atan2(-run, rise)  # about x, from z towards the middle
     turn = (math.sin(angle / 2), 0.0, 0.0, math.cos(angle / 2))
     return Part("cylinder", (0.013, math.hypot(run, rise)), (x, side * (outer + inner) / 2, (low + high) / 2), SILVER, turn)
 
 
-def platform(size: Sequence[float], position: Sequence[float], plank: float = 0.25) -> Iterator[Part]:
+def platform_parts(size: Sequence[float], position: Sequence[float], plank: float = 0.25) -> Iterator[Part]:
     """A take-off deck of planks on posts, `size` and centre `position` in m as the plant has it."""
     (length, width, thickness), (x, y, z) = size, position
     count = max(1, round(width / plank))
@@ -135,16 +135,16 @@ def platform(size: Sequence[float], position: Sequence[float], plank: float = 0.
             yield Part("cylinder", (0.09, post), (x + east * length, y + north * width, post / 2), BARK)
 
 
-def trees(seed: int = 4) -> Iterator[Part]:
+def tree_parts(seed: int = 4) -> Iterator[Part]:
     """The trees on the banks north and west of the lake."""
     random = np.random.default_rng(seed)
     for x in np.arange(-44.0, 90.0, 3.4):
-        yield from tree(x + random.uniform(-1.2, 1.2), 37.5 + random.uniform(0.0, 9.0), random)
+        yield from single_tree_parts(x + random.uniform(-1.2, 1.2), 37.5 + random.uniform(0.0, 9.0), random)
     for y in np.arange(-34.0, 34.0, 3.6):
-        yield from tree(-23.0 - random.uniform(0.0, 9.0), y + random.uniform(-1.2, 1.2), random)
+        yield from single_tree_parts(-23.0 - random.uniform(0.0, 9.0), y + random.uniform(-1.2, 1.2), random)
 
 
-def tree(x: float, y: float, random: np.random.Generator) -> Iterator[Part]:
+def single_tree_parts(x: float, y: float, random: np.random.Generator) -> Iterator[Part]:
     """A trunk and a crown of a few balls, 4 to 7 m high."""
     height = random.uniform(4.0, 7.0)
     leaves = LEAVES[random.integers(len(LEAVES))]
@@ -155,7 +155,7 @@ def tree(x: float, y: float, random: np.random.Generator) -> Iterator[Part]:
         yield Part("sphere", (radius,), (x + float(east), y + float(north), level * height), leaves)
 
 
-def lake(platforms: Mapping[str, Mapping[str, Sequence[float]]]) -> list[Part]:
+def static_parts(platforms: Mapping[str, Mapping[str, Sequence[float]]]) -> list[Part]:
     """Everything that keeps still, but for land, water and sky (see `land` and `light`)."""
-    decks = [part for one in platforms.values() for part in platform(one["size"], one["position"])]
-    return [*trees(), *decks]
+    decks = [part for one in platforms.values() for part in platform_parts(one["size"], one["position"])]
+    return [*tree_parts(), *decks]

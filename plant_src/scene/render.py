@@ -11,33 +11,33 @@ from cosim.core.errors import InputError, did_you_mean
 
 from .cameras import CAMERAS, View
 from .land import add_land
-from .light import HAZE, HILLS_FAR, Rays, horizon_row, rays, sky, surface, water_distance
-from .looks import looks
+from .light import FAR_HILLS_COLOUR, HAZE_DISTANCE, Rays, horizon_row, pixel_rays, sky_colour, water_distance, water_pixels
+from .looks import vehicle_parts
 from .mission import Mission
-from .models import lake
-from .stage import Picture, Stage
+from .models import static_parts
+from .stage import Picture, SolidRenderer
 
 
 class Layer:
     """A picture that ghosts are painted on: colour times cover (height, width, 3), cover in 0 ... 1 and depth (m)."""
 
     def __init__(self, colour: np.ndarray, cover: np.ndarray, depth: np.ndarray):
-        self.colour, self.cover, self.depth = colour, cover, depth
+        self.colour, self.alpha, self.depth = colour, cover, depth
 
     @classmethod
-    def of(cls, solids: Picture) -> Layer:
+    def from_solids(cls, solids: Picture) -> Layer:
         """Solids in haze in front of nothing."""
         seen = np.isfinite(solids.depth)
         pixels = np.flatnonzero(seen)
-        haze = np.exp(-solids.depth.ravel()[pixels] / HAZE)
+        haze = np.exp(-solids.depth.ravel()[pixels] / HAZE_DISTANCE)
         own = solids.colour.reshape(-1, 3)[pixels].T * np.float32(1 / 255)
         colour = np.zeros((*seen.shape, 3), np.float32)
-        colour.reshape(-1, 3)[pixels] = (HILLS_FAR + (own - HILLS_FAR) * haze).T
+        colour.reshape(-1, 3)[pixels] = (FAR_HILLS_COLOUR + (own - FAR_HILLS_COLOUR) * haze).T
         return cls(colour, seen.astype(np.float32), solids.depth)
 
     def copy(self) -> Layer:
         """The same to paint on; ghosts leave the depth alone."""
-        return Layer(self.colour.copy(), self.cover.copy(), self.depth)
+        return Layer(self.colour.copy(), self.alpha.copy(), self.depth)
 
     def blend(self, ghost: Picture, share: float) -> np.ndarray:
         """Paint a ghost over what is behind it and not nearer than it; `share` 1 hides that, 0 is invisible.
@@ -45,54 +45,54 @@ class Layer:
         Returns the pixels (flat indices) where it is seen.
         """
         pixels = np.flatnonzero(ghost.depth < self.depth)
-        colour, cover = self.colour.reshape(-1, 3), self.cover.reshape(-1)
+        colour, cover = self.colour.reshape(-1, 3), self.alpha.reshape(-1)
         colour[pixels] += share * (ghost.colour.reshape(-1, 3)[pixels].astype(np.float32) / 255 - colour[pixels])
         cover[pixels] += share * (1 - cover[pixels])
         return pixels
 
 
-class Backdrop:
+class Background:
     """All that keeps still, as a view shows it; `size`: width and height, even.
 
     Water has half the resolution: ripples blur what it reflects anyway.
     """
 
-    def __init__(self, still: Stage, view: View, size: tuple[int, int]):
+    def __init__(self, still: SolidRenderer, view: View, size: tuple[int, int]):
         self.view, self.size = view, size
         half, mirrored = (size[0] // 2, size[1] // 2), view.mirrored()
-        light = rays(view, *size)
-        solids, depth = _solids(still, view, light), water_distance(view, light)
-        self.wet, self.horizon = depth < solids.depth, horizon_row(light)
-        self.below = Layer.of(_solids(still, mirrored, rays(mirrored, *half)))
-        self.surface = surface(view, rays(view, *half), self.horizon // 2)
-        solids.depth[self.wet] = np.inf
-        self.picture = self._painted(Layer.of(solids), light, np.minimum(solids.depth, depth))
+        light = pixel_rays(view, *size)
+        solids, depth = _static_solids(still, view, light), water_distance(view, light)
+        self.water_mask, self.horizon = depth < solids.depth, horizon_row(light)
+        self.mirrored = Layer.from_solids(_static_solids(still, mirrored, pixel_rays(mirrored, *half)))
+        self.surface = water_pixels(view, pixel_rays(view, *half), self.horizon // 2)
+        solids.depth[self.water_mask] = np.inf
+        self.picture = self._composite(Layer.from_solids(solids), light, np.minimum(solids.depth, depth))
 
-    def _painted(self, solids: Layer, light: Rays, depth: np.ndarray) -> Layer:
+    def _composite(self, solids: Layer, light: Rays, depth: np.ndarray) -> Layer:
         """Solids in front of water and sky."""
         width, height = self.size
         colour = np.empty((height, width, 3), np.float32)
-        water = self.surface.colour(self.below.colour, self.below.cover).reshape(3, -1, 1, width // 2, 1)
+        water = self.surface.colour(self.mirrored.colour, self.mirrored.alpha).reshape(3, -1, 1, width // 2, 1)
         colour.reshape(height // 2, 2, width // 2, 2, 3)[self.horizon // 2 :] = water.transpose(1, 2, 3, 4, 0)
-        colour[: self.horizon] = sky(light.direction[:, : self.horizon].reshape(3, -1)).T.reshape(-1, width, 3)
-        hidden = np.flatnonzero(solids.cover)
+        colour[: self.horizon] = sky_colour(light.direction[:, : self.horizon].reshape(3, -1)).T.reshape(-1, width, 3)
+        hidden = np.flatnonzero(solids.alpha)
         colour.reshape(-1, 3)[hidden] = solids.colour.reshape(-1, 3)[hidden]
         return Layer(colour, np.ones_like(depth), depth)
 
     def fits(self, view: View, size: tuple[int, int]) -> bool:
         """Whether it is what that view shows."""
         same = np.array_equal(view.eye, self.view.eye) and np.array_equal(view.target, self.view.target)
-        return same and view.angle == self.view.angle and size == self.size
+        return same and view.field_of_view == self.view.field_of_view and size == self.size
 
     def with_reflections(self, below: Layer, changed: np.ndarray) -> Layer:
         """The picture with what the water reflects from `below`, which has `changed` (height, width)."""
         layer, width = self.picture.copy(), self.size[0]
         touched = np.flatnonzero(changed.ravel()[self.surface.sources])
-        colour = self.surface.part(touched).colour(below.colour, below.cover).T
+        colour = self.surface.select(touched).colour(below.colour, below.alpha).T
         rows, columns = np.divmod(touched, width // 2)
         for i, j in np.ndindex(2, 2):
             pixels = (2 * (rows + self.horizon // 2) + i) * width + 2 * columns + j
-            wet = self.wet.ravel()[pixels]
+            wet = self.water_mask.ravel()[pixels]
             layer.colour.reshape(-1, 3)[pixels[wet]] = colour[wet]
         return layer
 
@@ -102,38 +102,38 @@ class Scene:
 
     def __init__(self, mission: Mission):
         self.mission = mission
-        self.still = Stage(lake(mission.platforms))
-        self.moving = Stage(*(looks(model) for model in mission.vehicles.values()))
-        self._last: Backdrop | None = None
+        self.static = SolidRenderer(static_parts(mission.platforms))
+        self.vehicles = SolidRenderer(*(vehicle_parts(model) for model in mission.vehicles.values()))
+        self._last_background: Background | None = None
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.still.__exit__()
-        self.moving.__exit__()
+        self.static.__exit__()
+        self.vehicles.__exit__()
 
     def render(
-        self, camera: str, rows: Sequence[int], shares: Sequence[float], width: int, height: int, fineness: int = 2
+        self, camera: str, rows: Sequence[int], opacities: Sequence[float], width: int, height: int, supersampling: int = 2
     ) -> np.ndarray:
         """The mission at `rows` in one picture, seen by `camera` at the last of them; uint8 (height, width, 3).
 
         `shares` says how opaque the vehicles of each row are. Every pixel is the mean of `fineness` by `fineness`; `width` and
         `height` are even.
         """
-        view, size = find_camera(camera)(self.mission, rows[-1]), (fineness * width, fineness * height)
-        backdrop = self._backdrop(view, size)
-        below = backdrop.below.copy()
-        reflected = self._paint(below, view.mirrored(), rows, shares)
+        view, size = find_camera(camera)(self.mission, rows[-1]), (supersampling * width, supersampling * height)
+        backdrop = self._background(view, size)
+        below = backdrop.mirrored.copy()
+        reflected = self._paint(below, view.mirrored(), rows, opacities)
         picture = backdrop.with_reflections(below, reflected)
-        self._paint(picture, view, rows, shares)
-        return _reduced(picture.colour, fineness)
+        self._paint(picture, view, rows, opacities)
+        return _downsample(picture.colour, supersampling)
 
-    def _backdrop(self, view: View, size: tuple[int, int]) -> Backdrop:
+    def _background(self, view: View, size: tuple[int, int]) -> Background:
         """What keeps still; the last one is kept for cameras that keep still as well."""
-        if self._last is None or not self._last.fits(view, size):
-            self._last = Backdrop(self.still, view, size)
-        return self._last
+        if self._last_background is None or not self._last_background.fits(view, size):
+            self._last_background = Background(self.static, view, size)
+        return self._last_background
 
     def _paint(self, layer: Layer, view: View, rows: Sequence[int], shares: Sequence[float]) -> np.ndarray:
         """Paint the vehicles of each row, with the shadows that they cast on each other; returns where they are seen."""
@@ -141,12 +141,12 @@ class Scene:
         seen = np.zeros((height, width), bool)
         for row, share in zip(rows, shares, strict=True):
             self._pose(row)
-            seen.reshape(-1)[layer.blend(self.moving.picture(view, width, height, shadow=True), share)] = True
+            seen.reshape(-1)[layer.blend(self.vehicles.render(view, width, height, shadow=True), share)] = True
         return seen
 
     def _pose(self, row: int) -> None:
         for thing, vehicle in enumerate(self.mission.vehicles):
-            self.moving.place(thing, self.mission.place(vehicle, row), self.mission.orientation(vehicle, row))
+            self.vehicles.set_pose(thing, self.mission.position(vehicle, row), self.mission.orientation(vehicle, row))
 
 
 def find_camera(name: str) -> Callable[[Mission, int], View]:
@@ -156,15 +156,15 @@ def find_camera(name: str) -> Callable[[Mission, int], View]:
     return CAMERAS[name]
 
 
-def _solids(still: Stage, view: View, light: Rays) -> Picture:
+def _static_solids(still: SolidRenderer, view: View, light: Rays) -> Picture:
     """What keeps still and is no water or sky."""
     height, width = light.along_axis.shape
-    picture = still.picture(view, width, height)
+    picture = still.render(view, width, height)
     add_land(picture, view, light)
     return picture
 
 
-def _reduced(colour: np.ndarray, fineness: int) -> np.ndarray:
+def _downsample(colour: np.ndarray, fineness: int) -> np.ndarray:
     """Each `fineness` by `fineness` pixels to one, as bytes."""
     height, width, _ = colour.shape
     mean = colour.reshape(height // fineness, fineness, width // fineness, fineness, 3).mean(axis=(1, 3))

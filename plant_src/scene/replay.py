@@ -11,30 +11,30 @@ from typing import Any
 
 import numpy as np
 
-from ..catalogue import VEHICLES
+from ..catalogue import VEHICLE_MODELS
 from ..environment import sea
 from ..environment.sea import Sea
-from .looks import looks
-from .models import platform
+from .looks import vehicle_parts
+from .models import platform_parts
 
 Scene = dict[str, Any]
 
 #: trails of multirotors and vessels, as the figures draw the first of each
-FLYING, SAILING = ("#0072b2", "#56b4e9", "#cc79a7", "#7a5fb5"), ("#d55e00", "#e69f00", "#009e73", "#b8860b")
+MULTIROTOR_COLOURS, VESSEL_COLOURS = ("#0072b2", "#56b4e9", "#cc79a7", "#7a5fb5"), ("#d55e00", "#e69f00", "#009e73", "#b8860b")
 
 #: at most so many vessels have a camera on board
-MOST_VIEWS = 3
+MAX_VIEWS = 3
 
 #: from a vessel's centre of mass (m): where the camera on board stands, and what it looks at
-ON_BOARD = {"eye": (-2.6, 0.0, 1.5), "target": (0.2, 0.0, 0.45)}
+ONBOARD_CAMERA = {"eye": (-2.6, 0.0, 1.5), "target": (0.2, 0.0, 0.45)}
 
 
-def world(name: str, scenario: Mapping[str, Any], models: Mapping[str, str] | None = None) -> Scene:
+def world_scene(name: str, scenario: Mapping[str, Any], models: Mapping[str, str] | None = None) -> Scene:
     """The scene of the world that is the component `name` of a scenario; `models`: those of its vehicles, if it names none."""
     arguments = scenario["components"][name].get("arguments", {})
     models = models or {vehicle: about["model"] for vehicle, about in arguments["vehicles"].items()}
     vehicles = {f"{name}.{vehicle}": model for vehicle, model in models.items()}
-    boxes = (platform(one["size"], one["position"]) for one in arguments.get("platforms", {}).values())
+    boxes = (platform_parts(one["size"], one["position"]) for one in arguments.get("platforms", {}).values())
     waves = _waves(sea(arguments.get("environment", {})))
     return {
         **_scene(vehicles, scenario),
@@ -48,9 +48,9 @@ def free(scenario: Mapping[str, Any], vehicles: Mapping[str, str]) -> Scene:
     return {**_scene(vehicles, scenario), "fixed": [], "water": {"waves": [], "gain": 1}}
 
 
-def published(name: str, scenario: Mapping[str, Any]) -> Scene:
+def published_simulator_scene(name: str, scenario: Mapping[str, Any]) -> Scene:
     """The scene of the published simulator's world (see `replica.interface`): the quadcopter's angles are turned to ours."""
-    scene = world(name, scenario, {"uav": "ar_drone", "usv": "strider"})
+    scene = world_scene(name, scenario, {"uav": "ar_drone", "usv": "strider"})
     uav, usv = (f"{name}.{vehicle}.attitude" for vehicle in ("uav", "usv"))
     attitudes: list[list[Any]] = [[f"{uav}.phi", f"-{uav}.theta", f"-{uav}.psi"], [0, 0, f"{usv}.yaw"]]
     for body, attitude in zip(scene["bodies"], attitudes, strict=True):
@@ -65,47 +65,47 @@ def _waves(found: Sea) -> list[Scene]:
 
 
 def _scene(vehicles: Mapping[str, str], scenario: Mapping[str, Any]) -> Scene:
-    colours = {False: cycle(FLYING), True: cycle(SAILING)}
-    bodies = [_body(name, vehicle, next(colours[_is_vessel(vehicle)])) for name, vehicle in vehicles.items()]
+    colours = {False: cycle(MULTIROTOR_COLOURS), True: cycle(VESSEL_COLOURS)}
+    bodies = [_body_scene(name, vehicle, next(colours[_is_vessel(vehicle)])) for name, vehicle in vehicles.items()]
     vessels = [name for name, vehicle in vehicles.items() if _is_vessel(vehicle)]
     flying = [name for name in vehicles if name not in vessels]
     colour_of = {body["name"]: body["colour"] for body in bodies}
     return {
         "bodies": bodies,
-        "views": [{"name": _view_name(vessel, vessels), "on": vessel, **ON_BOARD} for vessel in vessels[:MOST_VIEWS]],
-        "markers": list(_waypoints(scenario)),
+        "views": [{"name": _view_name(vessel, vessels), "on": vessel, **ONBOARD_CAMERA} for vessel in vessels[:MAX_VIEWS]],
+        "markers": list(_waypoint_markers(scenario)),
         "spans": [
-            {"signal": f"{name}.contact.touching", "label": f"{_short(name)} touches", "colour": colour_of[name]}
+            {"signal": f"{name}.contact.touching", "label": f"{_short_name(name)} touches", "colour": colour_of[name]}
             for name in flying
         ],
-        "plots": _plots(flying[:1], vessels[:1]),
+        "plots": _plot_patterns(flying[:1], vessels[:1]),
     }
 
 
 def _is_vessel(vehicle: str) -> bool:
-    return next(iter(VEHICLES[vehicle].values())).is_vessel
+    return next(iter(VEHICLE_MODELS[vehicle].values())).is_vessel
 
 
-def _short(name: str) -> str:
+def _short_name(name: str) -> str:
     return name.rpartition(".")[2]
 
 
 def _view_name(vessel: str, vessels: Sequence[str]) -> str:
-    return "Deck" if len(vessels) == 1 else f"Deck {_short(vessel)}"
+    return "Deck" if len(vessels) == 1 else f"Deck {_short_name(vessel)}"
 
 
-def _body(name: str, vehicle: str, colour: str) -> Scene:
+def _body_scene(name: str, vehicle: str, colour: str) -> Scene:
     return {
         "name": name,
-        "title": _short(name),
+        "title": _short_name(name),
         "colour": colour,
         "position": [f"{name}.position.{axis}" for axis in "xyz"],
         "orientation": [f"{name}.orientation.{axis}" for axis in "wxyz"],
-        "parts": [part._asdict() for part in looks(vehicle)],
+        "parts": [part._asdict() for part in vehicle_parts(vehicle)],
     }
 
 
-def _waypoints(scenario: Mapping[str, Any]) -> Iterator[Scene]:
+def _waypoint_markers(scenario: Mapping[str, Any]) -> Iterator[Scene]:
     """Waypoints by the names of the vessel autopilots' parameters, those of nested systems too."""
     for component in scenario["components"].values():
         parameters = component.get("parameters", {})
@@ -120,17 +120,17 @@ def _waypoints(scenario: Mapping[str, Any]) -> Iterator[Scene]:
                 yield {"position": (*place, 0.0), "radius": radius, "label": str(number)}
 
 
-def _plots(flying: Sequence[str], sailing: Sequence[str]) -> list[list[str]]:
+def _plot_patterns(flying: Sequence[str], sailing: Sequence[str]) -> list[list[str]]:
     """Height, path, force and attitude: patterns of signals, a list for each plot."""
     return [
-        [*_of(flying, "position.z"), *_of(sailing, "deck.position.z")],
-        [*_of(flying, "velocity.*")],
-        [*_of(flying, "attitude.*")],
-        [*_of(flying, "contact.force")],
-        [*_of(sailing, "attitude.yaw")],
-        [*_of(sailing, "velocity_body.*")],
+        [*_signals_of(flying, "position.z"), *_signals_of(sailing, "deck.position.z")],
+        [*_signals_of(flying, "velocity.*")],
+        [*_signals_of(flying, "attitude.*")],
+        [*_signals_of(flying, "contact.force")],
+        [*_signals_of(sailing, "attitude.yaw")],
+        [*_signals_of(sailing, "velocity_body.*")],
     ]
 
 
-def _of(names: Iterable[str], signal: str) -> list[str]:
+def _signals_of(names: Iterable[str], signal: str) -> list[str]:
     return [f"{name}.{signal}" for name in names]

@@ -24,15 +24,15 @@ class Picture(NamedTuple):
     depth: np.ndarray
 
 
-class Stage:
+class SolidRenderer:
     """Things made of parts, each of which can be placed as one. To be used in a `with` block."""
 
     def __init__(self, *things: Sequence[Part]):
         self.client = pybullet.connect(pybullet.DIRECT)
-        self.things = [[(self._create(part), part) for part in thing] for thing in things]
-        parts = [part for thing in self.things for _, part in thing]
+        self.objects = [[(self._create_body(part), part) for part in thing] for thing in things]
+        parts = [part for thing in self.objects for _, part in thing]
         self._centres = np.array([part.position for part in parts]).reshape(-1, 3)  # in the order of Bullet's numbers: 0, 1, ...
-        self._radii = np.array([part.reach() for part in parts])
+        self._bounding_radii = np.array([part.bounding_radius() for part in parts])
 
     def __enter__(self) -> Self:
         return self
@@ -40,7 +40,7 @@ class Stage:
     def __exit__(self, *_: object) -> None:
         pybullet.disconnect(self.client)
 
-    def _create(self, part: Part) -> int:
+    def _create_body(self, part: Part) -> int:
         sizes: dict[str, object]
         match part.shape:
             case "box":
@@ -59,26 +59,26 @@ class Stage:
             )
         )
 
-    def place(self, thing: int, position: Sequence[float], orientation: Quaternion) -> None:
+    def set_pose(self, thing: int, position: Sequence[float], orientation: Quaternion) -> None:
         """Put the frame of a thing to `position` (m, world) with `orientation` (x, y, z, w)."""
-        for body, part in self.things[thing]:
+        for body, part in self.objects[thing]:
             pose = pybullet.multiplyTransforms(position, orientation, part.position, part.orientation)
             pybullet.resetBasePositionAndOrientation(body, *pose, physicsClientId=self.client)
             self._centres[body] = pose[0]
 
-    def picture(self, view: View, width: int, height: int, shadow: bool = False) -> Picture:
+    def render(self, view: View, width: int, height: int, shadow: bool = False) -> Picture:
         """What `view` sees, in pixels; `shadow` lets things cast shadows on each other.
 
         Drawn is only where things are: TinyRenderer takes its time for every pixel.
         """
         whole = Picture(np.zeros((height, width, 3), np.uint8), np.full((height, width), np.inf, np.float32))
-        window = view.window(self._centres, self._radii, width, height)
+        window = view.bounding_window(self._centres, self._bounding_radii, width, height)
         if window.left < window.right and window.top < window.bottom:
             part = (slice(window.top, window.bottom), slice(window.left, window.right))
-            whole.colour[part], whole.depth[part] = self._drawn(view, width, height, window, shadow)
+            whole.colour[part], whole.depth[part] = self._render_window(view, width, height, window, shadow)
         return whole
 
-    def _drawn(self, view: View, width: int, height: int, window: Window, shadow: bool) -> Picture:
+    def _render_window(self, view: View, width: int, height: int, window: Window, shadow: bool) -> Picture:
         columns, rows = window.right - window.left, window.bottom - window.top
         _, _, colour, depth, found = pybullet.getCameraImage(
             columns,

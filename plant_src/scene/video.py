@@ -8,12 +8,12 @@ import numpy as np
 
 from cosim.results import Result
 
-from .mission import recorded
+from .mission import mission_of_result
 from .render import Scene
 
 
 def frames(result: Result, camera: str, moments: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray]:
     """A frame (uint8, height by width by 3) of the run for each of `moments` (s), seen by `camera`; `size`: width, height."""
-    with Scene(recorded(result)) as scene:
+    with Scene(mission_of_result(result)) as scene:
         for row in np.searchsorted(result.time, moments - 1e-9).tolist():
-            yield scene.render(camera, [row], [1.0], *size, fineness=1)
+            yield scene.render(camera, [row], [1.0], *size, supersampling=1)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from .noise import gauss_markov
-from .sampled import Measurement, SampledSensor, timing
-from .signals import parameter, real, seed_parameter
+from .noise import gauss_markov_factors
+from .sampled import Measurement, SampledSensor, timing_variables
+from .signals import real_parameter, real_variable, seed_parameter
 
 #: international standard atmosphere, ISO 2533: p = p0 (1 - L z / T0)^EXPONENT
 STANDARD_PRESSURE = 101325.0  # Pa
@@ -30,30 +30,30 @@ class Barometer(SampledSensor):
     may change in time like the weather. Inputs: `vehicle.position.z`.
     """
 
-    memory = (*SampledSensor.memory, "_drift")
-    random_numbers = 2
+    state_attributes = (*SampledSensor.state_attributes, "_drift")
+    random_number_count = 2
     _drift: float
 
     def __init__(self, instance_name: str, seed: int = 0):
         super().__init__(
             instance_name,
             [
-                real("vehicle.position.z", "m", "input"),
-                parameter("noise", "Pa", 1.2, "standard deviation of the white noise"),
-                parameter("drift", "Pa", 8.0, "standard deviation of the slow error"),
-                parameter("correlation_time", "s", 300.0, "of the slow error", 1e-3),
-                parameter("pressure_at_zero", "Pa", STANDARD_PRESSURE, "true pressure at z = 0", 5e4, 2e5),
+                real_variable("vehicle.position.z", "m", "input"),
+                real_parameter("noise", "Pa", 1.2, "standard deviation of the white noise"),
+                real_parameter("drift", "Pa", 8.0, "standard deviation of the slow error"),
+                real_parameter("correlation_time", "s", 300.0, "of the slow error", 1e-3),
+                real_parameter("pressure_at_zero", "Pa", STANDARD_PRESSURE, "true pressure at z = 0", 5e4, 2e5),
                 seed_parameter(seed),
-                real("pressure", "Pa", "output"),
-                real("altitude", "m", "output", description="of the centre of mass, from the pressure"),
-                *timing(50.0),
+                real_variable("pressure", "Pa", "output"),
+                real_variable("altitude", "m", "output", description="of the centre of mass, from the pressure"),
+                *timing_variables(50.0),
             ],
         )
 
     def measure(self, number: int, elapsed: float) -> Measurement:
         p, (white, slow) = self.parameters, self.noise[number]
         if elapsed:
-            keep, drive = gauss_markov(p["drift"], p["correlation_time"], elapsed)
+            keep, drive = gauss_markov_factors(p["drift"], p["correlation_time"], elapsed)
             self._drift = keep * self._drift + drive * slow
         else:
             self._drift = p["drift"] * slow

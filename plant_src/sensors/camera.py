@@ -10,24 +10,24 @@ from typing import Any
 
 import numpy as np
 
-from ..catalogue import VEHICLES
-from ..json_reader import Reader
+from ..catalogue import VEHICLE_MODELS
+from ..json_reader import JsonReader
 from ..physics.client import pybullet
 from ..scene.cameras import UP, View
-from ..scene.light import DEEP, HAZE, HORIZON, rays, sky
-from ..scene.looks import looks
-from ..scene.models import Part, platform
-from ..scene.stage import Stage
-from .frames import product, to_world
+from ..scene.light import HAZE_DISTANCE, HORIZON_COLOUR, WATER_COLOUR, pixel_rays, sky_colour
+from ..scene.looks import vehicle_parts
+from ..scene.models import Part, platform_parts
+from ..scene.stage import SolidRenderer
+from .frames import quaternion_product, to_world
 from .optics import camera_attitude
-from .sampled import Measurement, SampledSensor, timing
-from .signals import accept, parameter, pose_inputs, real
+from .sampled import Measurement, SampledSensor, timing_variables
+from .signals import pose_inputs, raise_problems, real_parameter, real_variable
 
-_POSE = 7  # numbers of a position and an orientation
+_POSE_SIZE = 7  # numbers of a position and an orientation
 
 
 @dataclass(frozen=True)
-class TiltedView(View):
+class OrientedView(View):
     """A view whose upward direction (world) is any."""
 
     up: np.ndarray = field(default_factory=lambda: UP)
@@ -62,53 +62,56 @@ class Camera(SampledSensor):
         platforms: Mapping[str, Any] | None = None,
         size: Sequence[int] = (320, 240),
     ):
-        reader = Reader()
+        reader = JsonReader()
         kinds = {
-            name: reader.choice(kind, ("vehicles", name), list(VEHICLES))
-            for name, kind in reader.named(vehicles, ("vehicles",)).items()
+            name: reader.choice(kind, ("vehicles", name), list(VEHICLE_MODELS))
+            for name, kind in reader.read_named_objects(vehicles, ("vehicles",)).items()
         }
         reader.choice(carrier, ("carrier",), list(kinds) or ["uav"])
         for i in (0, 1):
             reader.integer(size[i] if isinstance(size, list | tuple) and len(size) == 2 else size, ("size",), 8, 4096)
-        decks = [_platform(reader, name, spec) for name, spec in reader.named(platforms or {}, ("platforms",)).items()]
-        accept(reader)
+        decks = [
+            _platform_parts(reader, name, spec)
+            for name, spec in reader.read_named_objects(platforms or {}, ("platforms",)).items()
+        ]
+        raise_problems(reader)
         super().__init__(
             instance_name,
             [
                 *(variable for name in kinds for variable in pose_inputs(name)),
-                parameter("tilt", "rad", 0.0, "of the camera, from straight down to ahead", -math.pi, math.pi),
-                parameter("angle", "rad", 0.8, "opening from top to bottom", 0.05, 2.5),
-                real("mounting", "m", "parameter", (0.0, 0.0, 0.0), "place of the camera, body axes", shape=(3,)),
-                real("frames", "1", "output", description="pictures written so far"),
-                *timing(1.0),
+                real_parameter("tilt", "rad", 0.0, "of the camera, from straight down to ahead", -math.pi, math.pi),
+                real_parameter("angle", "rad", 0.8, "opening from top to bottom", 0.05, 2.5),
+                real_variable("mounting", "m", "parameter", (0.0, 0.0, 0.0), "place of the camera, body axes", shape=(3,)),
+                real_variable("frames", "1", "output", description="pictures written so far"),
+                *timing_variables(1.0),
             ],
         )
         self._folder, self._size, self._carrier = Path(folder), (int(size[0]), int(size[1])), list(kinds).index(carrier)
-        seen = [looks(kind) if name != carrier else [] for name, kind in kinds.items()]
-        self._stage = Stage(*seen, [part for deck in decks for part in deck])
+        seen = [vehicle_parts(kind) if name != carrier else [] for name, kind in kinds.items()]
+        self._stage = SolidRenderer(*seen, [part for deck in decks for part in deck])
 
     def measure(self, number: int, elapsed: float) -> Measurement:
         from matplotlib.image import imsave
 
         self._folder.mkdir(parents=True, exist_ok=True)
-        imsave(self._folder / f"{self.name}_{number:04d}.png", self.picture())
+        imsave(self._folder / f"{self.name}_{number:04d}.png", self.render())
         return (number + 1.0,), ()
 
-    def picture(self) -> np.ndarray:
+    def render(self) -> np.ndarray:
         """What the camera sees now: uint8 (height, width, 3)."""
-        for thing in range(len(self.inputs) // _POSE):
-            x, y, z, qw, qx, qy, qz = self.inputs[_POSE * thing : _POSE * (thing + 1)]
-            self._stage.place(thing, (x, y, z), (qx, qy, qz, qw))
+        for thing in range(len(self.inputs) // _POSE_SIZE):
+            x, y, z, qw, qx, qy, qz = self.inputs[_POSE_SIZE * thing : _POSE_SIZE * (thing + 1)]
+            self._stage.set_pose(thing, (x, y, z), (qx, qy, qz, qw))
         view = self._view()
-        solids, background = self._stage.picture(view, *self._size, shadow=True), _background(view, *self._size)
+        solids, background = self._stage.render(view, *self._size, shadow=True), _render_background(view, *self._size)
         return np.where(np.isfinite(solids.depth)[..., None], solids.colour, background)
 
     def _view(self) -> View:
-        pose = self.inputs[_POSE * self._carrier : _POSE * (self._carrier + 1)]
-        camera = product(pose[3:], camera_attitude(self.parameters["tilt"]))
+        pose = self.inputs[_POSE_SIZE * self._carrier : _POSE_SIZE * (self._carrier + 1)]
+        camera = quaternion_product(pose[3:], camera_attitude(self.parameters["tilt"]))
         eye = np.array(pose[:3]) + to_world(pose[3:], self.parameters["mounting"])
         ahead, up = (np.array(to_world(camera, axis)) for axis in ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0)))
-        return TiltedView(eye, eye + ahead, self.parameters["angle"], up)
+        return OrientedView(eye, eye + ahead, self.parameters["angle"], up)
 
     def free(self) -> None:
         if self._stage.client >= 0:
@@ -116,18 +119,18 @@ class Camera(SampledSensor):
             self._stage.client = -1
 
 
-def _background(view: View, width: int, height: int) -> np.ndarray:
+def _render_background(view: View, width: int, height: int) -> np.ndarray:
     """Water and sky, uint8 (height, width, 3): water that turns pale with distance, and the colours of the sky above it."""
-    direction = rays(view, width, height).direction.reshape(3, -1)
+    direction = pixel_rays(view, width, height).direction.reshape(3, -1)
     below = direction[2] < 0
     reach = np.where(below, float(view.eye[2]) / np.maximum(-direction[2], 1e-6), np.inf)
-    clear = np.exp(-reach / HAZE)
-    colour = np.where(below, HORIZON + (DEEP - HORIZON) * clear, sky(direction))
+    clear = np.exp(-reach / HAZE_DISTANCE)
+    colour = np.where(below, HORIZON_COLOUR + (WATER_COLOUR - HORIZON_COLOUR) * clear, sky_colour(direction))
     return np.rint(255 * np.clip(colour, 0, 1)).astype(np.uint8).T.reshape(height, width, 3)
 
 
-def _platform(reader: Reader, name: str, spec: Any) -> list[Part]:
+def _platform_parts(reader: JsonReader, name: str, spec: Any) -> list[Part]:
     path = ("platforms", name)
-    spec = reader.keys(spec, path, ("size", "position"), ())
+    spec = reader.read_object(spec, path, ("size", "position"), ())
     size, position = (reader.vector(spec.get(key, [1.0] * 3), (*path, key), "xyz") for key in ("size", "position"))
-    return list(platform(size, position))
+    return list(platform_parts(size, position))

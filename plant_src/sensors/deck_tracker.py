@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from .frames import Vector, to_world
 from .history import History
-from .signals import SignalComponent, parameter, pose_inputs, real, vector
+from .signals import SignalComponent, pose_inputs, real_parameter, real_variable, vector_variables
 
 
 class DeckTracker(SignalComponent):
@@ -18,7 +18,7 @@ class DeckTracker(SignalComponent):
     vehicle believes to be. Inputs: `vehicle` (the pose that navigation gives), `gnss` (of the deck) and `marker`, by their names.
     """
 
-    memory = ("_position", "_velocity", "_history", "_fix_time", "_sight_time")
+    state_attributes = ("_position", "_velocity", "_history", "_fix_time", "_sight_time")
     _position: Vector
     _velocity: Vector
 
@@ -27,20 +27,20 @@ class DeckTracker(SignalComponent):
             instance_name,
             [
                 *pose_inputs("vehicle"),
-                *vector("gnss.position", "xyz", "m", "input"),
-                *vector("gnss.velocity", "xyz", "m/s", "input"),
-                real("gnss.time", "s", "input"),
-                *vector("marker.position", "xyz", "m", "input"),
-                real("marker.time", "s", "input"),
-                parameter("fix_gain", "1", 0.2, "share of the position error that a fix takes away", 0.0, 1.0),
-                parameter("velocity_gain", "1", 0.6, "share of the velocity error that a fix takes away", 0.0, 1.0),
-                parameter("sight_gain", "1", 0.2, "share of the position error that a sight takes away", 0.0, 1.0),
-                *vector("position", "xyz", "m", "output"),
-                *vector("velocity", "xyz", "m/s", "output"),
+                *vector_variables("gnss.position", "xyz", "m", "input"),
+                *vector_variables("gnss.velocity", "xyz", "m/s", "input"),
+                real_variable("gnss.time", "s", "input"),
+                *vector_variables("marker.position", "xyz", "m", "input"),
+                real_variable("marker.time", "s", "input"),
+                real_parameter("fix_gain", "1", 0.2, "share of the position error that a fix takes away", 0.0, 1.0),
+                real_parameter("velocity_gain", "1", 0.6, "share of the velocity error that a fix takes away", 0.0, 1.0),
+                real_parameter("sight_gain", "1", 0.2, "share of the position error that a sight takes away", 0.0, 1.0),
+                *vector_variables("position", "xyz", "m", "output"),
+                *vector_variables("velocity", "xyz", "m/s", "output"),
             ],
         )
 
-    def begin(self) -> None:
+    def initialise(self) -> None:
         i = self.inputs
         self._position, self._velocity = (i[7], i[8], i[9]), (i[10], i[11], i[12])
         self._history, self._fix_time, self._sight_time = History(), i[13], i[17]
@@ -55,7 +55,7 @@ class DeckTracker(SignalComponent):
             then = self._history.at(time)
             if time == i[13]:
                 self._correct(i[7:10], then, self.parameters["fix_gain"])
-                self._velocity = _moved(self._velocity, i[10:13], then[3:6], self.parameters["velocity_gain"])
+                self._velocity = _corrected(self._velocity, i[10:13], then[3:6], self.parameters["velocity_gain"])
             if time == i[17]:
                 a, b, c = to_world(then[9:13], i[14:17])
                 self._correct((then[6] + a, then[7] + b, then[8] + c), then, self.parameters["sight_gain"])
@@ -63,10 +63,10 @@ class DeckTracker(SignalComponent):
         self.outputs = (*self._position, *self._velocity)
 
     def _correct(self, place: Sequence[float], then: Sequence[float], share: float) -> None:
-        self._position = _moved(self._position, place, then, share)
+        self._position = _corrected(self._position, place, then, share)
 
 
-def _moved(old: Sequence[float], wanted: Sequence[float], found: Sequence[float], share: float) -> Vector:
+def _corrected(old: Sequence[float], wanted: Sequence[float], found: Sequence[float], share: float) -> Vector:
     """Old values, changed by a share of how far what was found is from what was wanted."""
     x, y, z = (a + share * (b - c) for a, b, c in zip(old, wanted, found[:3], strict=True))
     return x, y, z

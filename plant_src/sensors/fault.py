@@ -9,22 +9,22 @@ from collections.abc import Callable, Mapping, Sequence
 
 from cosim.core.component import Variable
 from cosim.core.errors import did_you_mean
-from cosim.core.units import parse
+from cosim.core.units import parse_unit
 
-from ..json_reader import Reader
-from .signals import SignalComponent, accept, flag, parameter, read_seed, real, seed_parameter
+from ..json_reader import JsonReader
+from .signals import SignalComponent, boolean_variable, check_seed, raise_problems, real_parameter, real_variable, seed_parameter
 
 #: what happens to the affected signals
-MODES = ("normal", "frozen", "stuck", "missing")
+FAULT_MODES = ("normal", "frozen", "stuck", "missing")
 
 #: the factor of a signal by what its gain acts on: the signal itself, or its square
-GAIN_OF: Mapping[str, Callable[[float], float]] = {
+GAIN_FUNCTIONS: Mapping[str, Callable[[float], float]] = {
     "signal": lambda gain: gain,
     "square": lambda gain: math.copysign(math.sqrt(abs(gain)), gain),
 }
 
 _SIGNAL = re.compile(r"([A-Za-z_][\w.]*)(?:\[([1-9]\d*)\])?")
-_EARLY = 1e-9  # s, by which a delay may seem not to be over
+_TIME_TOLERANCE = 1e-9  # s, by which a delay may seem not to be over
 
 
 class SignalFault(SignalComponent):
@@ -45,103 +45,103 @@ class SignalFault(SignalComponent):
     A delay that becomes longer holds the outputs until it is filled. Raises InputError for bad arguments.
     """
 
-    memory = ("_step", "_history")
+    state_attributes = ("_step", "_history")
 
     def __init__(self, instance_name: str, signals: Mapping[str, str], gain_of: str = "signal", seed: int = 0):
-        shapes = _read(signals, gain_of, seed)
-        mode = Variable("mode", "String", "parameter", "tunable", "normal", description=", ".join(MODES))
-        variables = [variable for name, (unit, shape) in shapes.items() for variable in _channel(name, unit, shape)]
-        valid = flag("valid", "output", "false while the mode is missing")
+        shapes = _read_signals(signals, gain_of, seed)
+        mode = Variable("mode", "String", "parameter", "tunable", "normal", description=", ".join(FAULT_MODES))
+        variables = [variable for name, (unit, shape) in shapes.items() for variable in _signal_variables(name, unit, shape)]
+        valid = boolean_variable("valid", "output", "false while the mode is missing")
         super().__init__(
-            instance_name, [*variables, mode, parameter("delay", "s", 0.0, "of all signals"), seed_parameter(seed), valid]
+            instance_name, [*variables, mode, real_parameter("delay", "s", 0.0, "of all signals"), seed_parameter(seed), valid]
         )
-        self._names, self._factor = list(shapes), GAIN_OF[gain_of]
-        self.random_numbers = len(self.inputs)
+        self._names, self._factor = list(shapes), GAIN_FUNCTIONS[gain_of]
+        self.random_number_count = len(self.inputs)
 
-    def prepare(self) -> None:
+    def apply_parameters(self) -> None:
         mode = self.parameters["mode"]
-        if mode not in MODES:
-            raise ValueError(f'unknown mode "{mode}"{did_you_mean(mode, MODES)}')
-        affected = self._all("affected")
-        self._held = [mode != "normal" and one for one in affected]
-        self._stuck = self._all("value") if mode == "stuck" else None
-        self._factors = [self._factor(gain) for gain in self._all("gain")]
-        self._biases, self._sigmas = self._all("bias"), self._all("noise")
-        changed = any(self._held) or any(self._biases) or any(self._sigmas) or any(f != 1 for f in self._factors)
+        if mode not in FAULT_MODES:
+            raise ValueError(f'unknown mode "{mode}"{did_you_mean(mode, FAULT_MODES)}')
+        affected = self._parameters_of("affected")
+        self._is_held = [mode != "normal" and one for one in affected]
+        self._stuck = self._parameters_of("value") if mode == "stuck" else None
+        self._factors = [self._factor(gain) for gain in self._parameters_of("gain")]
+        self._biases, self._sigmas = self._parameters_of("bias"), self._parameters_of("noise")
+        changed = any(self._is_held) or any(self._biases) or any(self._sigmas) or any(f != 1 for f in self._factors)
         self._delay = self.parameters["delay"]
-        self._harmless = not changed and not self._delay
+        self._is_inactive = not changed and not self._delay
         self.flags = (not (mode == "missing" and any(affected)),)
 
-    def _all(self, kind: str) -> list:
+    def _parameters_of(self, kind: str) -> list:
         """The parameters of a kind of all signals, one after the other."""
         values = (self.parameters[f"{kind}.{name}"] for name in self._names)
         return [x for value in values for x in (value if isinstance(value, list) else [value])]
 
-    def begin(self) -> None:
+    def initialise(self) -> None:
         self._step, self._history = 0, deque([(self.start_time, self.inputs)])
         self.outputs = self.inputs
-        self._spoil(self.inputs)
+        self._apply_faults(self.inputs)
 
     def advance(self, now: float, step_size: float) -> None:
         self._step += 1
-        if self._harmless:
+        if self._is_inactive:
             self.outputs = self.inputs
             self._history[0] = now, self.inputs
             return
-        self._spoil(self._delayed(now))
+        self._apply_faults(self._delayed(now))
 
     def _delayed(self, now: float) -> Sequence[float]:
         """The inputs a delay ago, or the oldest that are known."""
         history = self._history
         history.append((now, self.inputs))
-        while len(history) > 1 and history[1][0] <= now - self._delay + _EARLY:
+        while len(history) > 1 and history[1][0] <= now - self._delay + _TIME_TOLERANCE:
             history.popleft()
         return history[0][1]
 
-    def _spoil(self, inputs: Sequence[float]) -> None:
+    def _apply_faults(self, inputs: Sequence[float]) -> None:
         row = self.noise[self._step]
         changes = zip(inputs, self._factors, self._biases, self._sigmas, row, strict=True)
         spoilt = [x * factor + bias + sigma * n for x, factor, bias, sigma, n in changes]
         held = self.outputs if self._stuck is None else self._stuck
-        self.outputs = [old if hold else new for new, old, hold in zip(spoilt, held, self._held, strict=True)]
+        self.outputs = [old if hold else new for new, old, hold in zip(spoilt, held, self._is_held, strict=True)]
 
 
-def _channel(name: str, unit: str, shape: tuple[int, ...]) -> list[Variable]:
+def _signal_variables(name: str, unit: str, shape: tuple[int, ...]) -> list[Variable]:
     def constant(value: float) -> object:
         return (value,) * shape[0] if shape else value
 
     def settable(kind: str, text: str, start: float = 0.0, of: str = unit) -> Variable:
-        return real(f"{kind}.{name}", of, "parameter", constant(start), text, shape=shape)
+        return real_variable(f"{kind}.{name}", of, "parameter", constant(start), text, shape=shape)
 
     affected = Variable(f"affected.{name}", "Boolean", "parameter", "tunable", constant(True), shape=shape)
     return [
-        real(f"input.{name}", unit, "input", shape=shape),
+        real_variable(f"input.{name}", unit, "input", shape=shape),
         settable("gain", "factor of the signal, or of its square", 1.0, "1"),
         settable("bias", "added to the signal"),
         settable("noise", "standard deviation of the noise added in each step"),
         settable("value", "of the signal while it is stuck"),
         affected,
-        real(name, unit, "output", shape=shape),
+        real_variable(name, unit, "output", shape=shape),
     ]
 
 
-def _read(signals: Mapping[str, str], gain_of: str, seed: int) -> dict[str, tuple[str, tuple[int, ...]]]:
+def _read_signals(signals: Mapping[str, str], gain_of: str, seed: int) -> dict[str, tuple[str, tuple[int, ...]]]:
     """Unit and shape of each signal. Raises InputError with all problems."""
-    reader = Reader()
+    reader = JsonReader()
     shapes: dict[str, tuple[str, tuple[int, ...]]] = {}
     for text, unit in reader.mapping(signals, ("signals",)).items():
         path = ("signals", text)
         if match := _SIGNAL.fullmatch(text):
             shapes[match[1]] = (unit, (int(match[2]),) if match[2] else ())
         else:
-            reader.complain(path, f'found "{text}", expected a name such as "rudder_angle" or "rotor_speed[4]"')
+            reader.add_problem(path, f'found "{text}", expected a name such as "rudder_angle" or "rotor_speed[4]"')
         try:
-            parse(str(unit) or "1")
+            parse_unit(str(unit) or "1")
         except ValueError as error:
-            reader.complain(path, f"found {unit!r}, expected a unit: {error}")
+            reader.add_problem(path, f"found {unit!r}, expected a unit: {error}")
     if signals == {}:
-        reader.complain(("signals",), "found no signal, expected at least one")
-    reader.choice(gain_of, ("gain_of",), list(GAIN_OF))
-    read_seed(reader, seed)
-    accept(reader)
+        reader.add_problem(("signals",), "found no signal, expected at least one")
+    reader.choice(gain_of, ("gain_of",), list(GAIN_FUNCTIONS))
+    check_seed(reader, seed)
+    raise_problems(reader)
     return shapes

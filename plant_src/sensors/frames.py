@@ -11,21 +11,21 @@ Quaternion = tuple[float, float, float, float]
 
 def to_world(q: Sequence[float], v: Sequence[float]) -> Vector:
     """A vector in body axes as one in world axes."""
-    return _turn(q[0], q[1], q[2], q[3], v)
+    return _rotate(q[0], q[1], q[2], q[3], v)
 
 
 def to_body(q: Sequence[float], v: Sequence[float]) -> Vector:
     """A vector in world axes as one in body axes."""
-    return _turn(q[0], -q[1], -q[2], -q[3], v)
+    return _rotate(q[0], -q[1], -q[2], -q[3], v)
 
 
-def _turn(w: float, x: float, y: float, z: float, v: Sequence[float]) -> Vector:
+def _rotate(w: float, x: float, y: float, z: float, v: Sequence[float]) -> Vector:
     a, b, c = v
     s, t, u = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
     return a + w * s + y * u - z * t, b + w * t + z * s - x * u, c + w * u + x * t - y * s
 
 
-def product(a: Sequence[float], b: Sequence[float]) -> Quaternion:
+def quaternion_product(a: Sequence[float], b: Sequence[float]) -> Quaternion:
     """The rotation b followed by a, in fixed axes."""
     w, x, y, z = a
     o, p, q, r = b
@@ -37,19 +37,19 @@ def product(a: Sequence[float], b: Sequence[float]) -> Quaternion:
     )
 
 
-def inverse(q: Sequence[float]) -> Quaternion:
+def inverse_quaternion(q: Sequence[float]) -> Quaternion:
     """World to body."""
     return q[0], -q[1], -q[2], -q[3]
 
 
-def unit(q: Sequence[float]) -> Quaternion:
+def normalised_quaternion(q: Sequence[float]) -> Quaternion:
     """The same direction, of length 1."""
     w, x, y, z = q
     length = math.sqrt(w * w + x * x + y * y + z * z)
     return w / length, x / length, y / length, z / length
 
 
-def rotation(v: Sequence[float]) -> Quaternion:
+def quaternion_from_rotation_vector(v: Sequence[float]) -> Quaternion:
     """The quaternion of a rotation vector (rad)."""
     x, y, z = v
     angle = math.sqrt(x * x + y * y + z * z)
@@ -57,16 +57,16 @@ def rotation(v: Sequence[float]) -> Quaternion:
     return math.cos(angle / 2), share * x, share * y, share * z
 
 
-def halfway(a: Sequence[float], b: Sequence[float]) -> Quaternion:
+def midpoint_attitude(a: Sequence[float], b: Sequence[float]) -> Quaternion:
     """The attitude in the middle of the shorter way from one to another."""
     w, x, y, z = a
     o, p, q, r = b
     if w * o + x * p + y * q + z * r >= 0:
-        return unit((w + o, x + p, y + q, z + r))
-    return unit((w - o, x - p, y - q, z - r))
+        return normalised_quaternion((w + o, x + p, y + q, z + r))
+    return normalised_quaternion((w - o, x - p, y - q, z - r))
 
 
-def angles(q: Sequence[float]) -> Vector:
+def euler_angles(q: Sequence[float]) -> Vector:
     """Roll, pitch and yaw (rad, ZYX)."""
     w, x, y, z = q
     roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
@@ -74,10 +74,14 @@ def angles(q: Sequence[float]) -> Vector:
     return roll, pitch, math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
-def from_angles(roll: float, pitch: float, yaw: float) -> Quaternion:
+def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quaternion:
     """The quaternion of roll, pitch and yaw (rad, ZYX)."""
-    about_z, about_y, about_x = rotation((0.0, 0.0, yaw)), rotation((0.0, pitch, 0.0)), rotation((roll, 0.0, 0.0))
-    return product(product(about_z, about_y), about_x)
+    about_z, about_y, about_x = (
+        quaternion_from_rotation_vector((0.0, 0.0, yaw)),
+        quaternion_from_rotation_vector((0.0, pitch, 0.0)),
+        quaternion_from_rotation_vector((roll, 0.0, 0.0)),
+    )
+    return quaternion_product(quaternion_product(about_z, about_y), about_x)
 
 
 def cross(a: Sequence[float], b: Sequence[float]) -> Vector:

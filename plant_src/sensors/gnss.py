@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..json_reader import Reader
-from .noise import gauss_markov
-from .parameters import SATELLITE
-from .sampled import Measurement, SampledSensor, timing
-from .signals import accept, flag, parameter, read_seed, seed_parameter, vector
+from ..json_reader import JsonReader
+from .noise import gauss_markov_factors
+from .parameters import GNSS_RECEIVERS
+from .sampled import Measurement, SampledSensor, timing_variables
+from .signals import boolean_variable, check_seed, raise_problems, real_parameter, seed_parameter, vector_variables
 
 
 class Gnss(SampledSensor):
@@ -20,35 +20,38 @@ class Gnss(SampledSensor):
     (of a vehicle or of a deck). Raises InputError for an unknown receiver.
     """
 
-    memory = (*SampledSensor.memory, "_drift")
-    random_numbers = 9
+    state_attributes = (*SampledSensor.state_attributes, "_drift")
+    random_number_count = 9
     _drift: Sequence[float]
 
     def __init__(self, instance_name: str, seed: int = 0, receiver: str = "standard"):
-        reader = Reader()
-        numbers = SATELLITE[reader.choice(receiver, ("receiver",), list(SATELLITE))]
-        read_seed(reader, seed)
-        accept(reader)
+        reader = JsonReader()
+        numbers = GNSS_RECEIVERS[reader.choice(receiver, ("receiver",), list(GNSS_RECEIVERS))]
+        check_seed(reader, seed)
+        raise_problems(reader)
         noise = [(name, numbers[name]) for name in numbers if name.endswith(("_noise", "_drift"))]
         super().__init__(
             instance_name,
             [
-                *vector("vehicle.position", "xyz", "m", "input"),
-                *vector("vehicle.velocity", "xyz", "m/s", "input"),
-                *(parameter(name, "m/s" if name[0:4] == "velo" else "m", value, "standard deviation") for name, value in noise),
-                parameter("correlation_time", "s", numbers["correlation_time"], "of the drift", 1e-3),
+                *vector_variables("vehicle.position", "xyz", "m", "input"),
+                *vector_variables("vehicle.velocity", "xyz", "m/s", "input"),
+                *(
+                    real_parameter(name, "m/s" if name[0:4] == "velo" else "m", value, "standard deviation")
+                    for name, value in noise
+                ),
+                real_parameter("correlation_time", "s", numbers["correlation_time"], "of the drift", 1e-3),
                 seed_parameter(seed),
-                flag("available", "parameter", "satellites are seen", True),
-                *vector("position", "xyz", "m", "output"),
-                *vector("velocity", "xyz", "m/s", "output"),
-                *timing(numbers["rate"], numbers["latency"]),
-                flag("valid", "output", "there is a solution"),
+                boolean_variable("available", "parameter", "satellites are seen", True),
+                *vector_variables("position", "xyz", "m", "output"),
+                *vector_variables("velocity", "xyz", "m/s", "output"),
+                *timing_variables(numbers["rate"], numbers["latency"]),
+                boolean_variable("valid", "output", "there is a solution"),
             ],
         )
 
     def measure(self, number: int, elapsed: float) -> Measurement:
         p, row = self.parameters, self.noise[number]
-        self._let_drift(elapsed, row[6:])
+        self._advance_drift(elapsed, row[6:])
         if not p["available"]:
             return (), (False,)
         noise = (p["horizontal_noise"],) * 2 + (p["vertical_noise"],) + (p["velocity_noise"],) * 3
@@ -56,7 +59,7 @@ class Gnss(SampledSensor):
         terms = zip(self.inputs, drift, noise, row, strict=False)
         return [true + slow + sigma * n for true, slow, sigma, n in terms], (True,)
 
-    def _let_drift(self, elapsed: float, row: Sequence[float]) -> None:
+    def _advance_drift(self, elapsed: float, row: Sequence[float]) -> None:
         """From the last sample to this one; the first one is as far off as any."""
         p = self.parameters
         time = p["correlation_time"]
@@ -64,5 +67,5 @@ class Gnss(SampledSensor):
         if not elapsed:
             self._drift = [sigma * n for sigma, n in zip(sigmas, row, strict=True)]
             return
-        factors = [gauss_markov(sigma, time, elapsed) for sigma in sigmas]
+        factors = [gauss_markov_factors(sigma, time, elapsed) for sigma in sigmas]
         self._drift = [keep * x + drive * n for x, (keep, drive), n in zip(self._drift, factors, row, strict=True)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 
-_EARLY = 1e-9  # s, by which a moment may seem to lie before its time
+_TIME_TOLERANCE = 1e-9  # s, by which a moment may seem to lie before its time
 
 
 class History:
@@ -24,7 +24,7 @@ class History:
         """The values at the first known moment that is not before `time` (s); the newest ones when all are."""
         found = self._entries[-1]
         for entry in reversed(self._entries):
-            if entry[0] < time - _EARLY:
+            if entry[0] < time - _TIME_TOLERANCE:
                 break
             found = entry
         return found[1]

@@ -14,17 +14,17 @@ from typing import NamedTuple
 
 from cosim.core.component import Variable
 
-from ..json_reader import Reader
-from .frames import Vector, halfway, to_body
-from .noise import Noise, gauss_markov
-from .parameters import INERTIAL, Numbers
-from .signals import SignalComponent, accept, parameter, read_seed, real, seed_parameter, vector
+from ..json_reader import JsonReader
+from .frames import Vector, midpoint_attitude, to_body
+from .noise import CounterBasedNoise, gauss_markov_factors
+from .parameters import IMU_DEVICES, Numbers
+from .signals import SignalComponent, check_seed, raise_problems, real_parameter, real_variable, seed_parameter, vector_variables
 
 GRAVITY = 9.81  # m/s2, as in the equations of the vehicles
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
-class _Triad(NamedTuple):
+class _TriadCoefficients(NamedTuple):
     """What three like axes need in a step."""
 
     matrix: Sequence[float] | None
@@ -44,62 +44,62 @@ class Imu(SignalComponent):
     `vehicle.orientation`, `vehicle.rates`. Raises InputError for an unknown device.
     """
 
-    random_numbers = 12
-    memory = ("_step", "_last", "_biases")
+    random_number_count = 12
+    state_attributes = ("_step", "_last", "_biases")
 
     def __init__(self, instance_name: str, seed: int = 0, device: str = "bmi088"):
-        reader = Reader()
-        device = reader.choice(device, ("device",), list(INERTIAL))
-        read_seed(reader, seed)
-        accept(reader)
+        reader = JsonReader()
+        device = reader.choice(device, ("device",), list(IMU_DEVICES))
+        check_seed(reader, seed)
+        raise_problems(reader)
         super().__init__(
             instance_name,
             [
-                *vector("vehicle.velocity", "xyz", "m/s", "input"),
-                *(real(f"vehicle.orientation.{part}", "1", "input", float(part == "w")) for part in "wxyz"),
-                *vector("vehicle.rates", "pqr", "rad/s", "input"),
-                *_triad("gyroscope", "rad/s", INERTIAL[device]["gyroscope"]),
-                *_triad("accelerometer", "m/s2", INERTIAL[device]["accelerometer"]),
+                *vector_variables("vehicle.velocity", "xyz", "m/s", "input"),
+                *(real_variable(f"vehicle.orientation.{part}", "1", "input", float(part == "w")) for part in "wxyz"),
+                *vector_variables("vehicle.rates", "pqr", "rad/s", "input"),
+                *_triad_parameters("gyroscope", "rad/s", IMU_DEVICES[device]["gyroscope"]),
+                *_triad_parameters("accelerometer", "m/s2", IMU_DEVICES[device]["accelerometer"]),
                 seed_parameter(seed),
-                *vector("acceleration", "xyz", "m/s2", "output", text="specific force"),
-                *vector("rates", "pqr", "rad/s", "output", text="angular velocity"),
+                *vector_variables("acceleration", "xyz", "m/s2", "output", text="specific force"),
+                *vector_variables("rates", "pqr", "rad/s", "output", text="angular velocity"),
             ],
         )
         self._step_size = 0.01
 
-    def prepare(self) -> None:
-        turn_on = Noise(6, "turn-on", self.name, self.parameters["seed"])[0]
+    def apply_parameters(self) -> None:
+        turn_on = CounterBasedNoise(6, "turn-on", self.name, self.parameters["seed"])[0]
         self._accelerometer = self._coefficients("accelerometer", turn_on[:3])
         self._gyroscope = self._coefficients("gyroscope", turn_on[3:])
 
-    def _coefficients(self, kind: str, turn_on: Sequence[float]) -> _Triad:
+    def _coefficients(self, kind: str, turn_on: Sequence[float]) -> _TriadCoefficients:
         p = {name.partition(".")[2]: value for name, value in self.parameters.items() if name.startswith(kind)}
         matrix, offset = p["matrix"], [c + p["turn_on_bias"] * n for c, n in zip(p["bias"], turn_on, strict=True)]
         sigma = p["bias_walk"] * math.sqrt(p["correlation_time"] / 2)
-        keep, drive = gauss_markov(sigma, p["correlation_time"], self._step_size)
+        keep, drive = gauss_markov_factors(sigma, p["correlation_time"], self._step_size)
         white = p["noise_density"] / math.sqrt(self._step_size)
-        return _Triad(
+        return _TriadCoefficients(
             None if tuple(matrix) == _IDENTITY else matrix, (offset[0], offset[1], offset[2]), white, keep, drive, p["range"]
         )
 
-    def begin(self) -> None:
-        self._step, self._last = 0, self.inputs
+    def initialise(self) -> None:
+        self._step, self._last_inputs = 0, self.inputs
         self._biases: Sequence[float] = (0.0,) * 6
-        self._measure((0.0, 0.0, GRAVITY), self.inputs[3:7], self.noise[0])
+        self._set_outputs((0.0, 0.0, GRAVITY), self.inputs[3:7], self.noise[0])
 
     def advance(self, now: float, step_size: float) -> None:
         if step_size != self._step_size:
             self._step_size = step_size
-            self.prepare()
+            self.apply_parameters()
         self._step += 1
-        row, last, new = self.noise[self._step], self._last, self.inputs
-        self._wander(row)
+        row, last, new = self.noise[self._step], self._last_inputs, self.inputs
+        self._advance_biases(row)
         h = step_size
         force = ((new[0] - last[0]) / h, (new[1] - last[1]) / h, (new[2] - last[2]) / h + GRAVITY)
-        self._last = new
-        self._measure(force, halfway(last[3:7], new[3:7]), row)
+        self._last_inputs = new
+        self._set_outputs(force, midpoint_attitude(last[3:7], new[3:7]), row)
 
-    def _wander(self, row: Sequence[float]) -> None:
+    def _advance_biases(self, row: Sequence[float]) -> None:
         """The biases from the last step to this one."""
         _, _, _, keep, drive, _ = self._accelerometer
         _, _, _, kept, driven, _ = self._gyroscope
@@ -107,13 +107,13 @@ class Imu(SignalComponent):
         x, y, z = keep * x + drive * row[6], keep * y + drive * row[7], keep * z + drive * row[8]
         self._biases = x, y, z, kept * p + driven * row[9], kept * q + driven * row[10], kept * r + driven * row[11]
 
-    def _measure(self, force: Vector, attitude: Sequence[float], row: Sequence[float]) -> None:
+    def _set_outputs(self, force: Vector, attitude: Sequence[float], row: Sequence[float]) -> None:
         """Outputs from the specific force in world axes and an attitude."""
-        x, y, z = _sensed(self._accelerometer, to_body(attitude, force), self._biases[:3], row)
-        self.outputs = (x, y, z, *_sensed(self._gyroscope, self.inputs[7:10], self._biases[3:], row[3:]))
+        x, y, z = _measured_axes(self._accelerometer, to_body(attitude, force), self._biases[:3], row)
+        self.outputs = (x, y, z, *_measured_axes(self._gyroscope, self.inputs[7:10], self._biases[3:], row[3:]))
 
 
-def _sensed(triad: _Triad, true: Sequence[float], bias: Sequence[float], row: Sequence[float]) -> Vector:
+def _measured_axes(triad: _TriadCoefficients, true: Sequence[float], bias: Sequence[float], row: Sequence[float]) -> Vector:
     matrix, (offset_x, offset_y, offset_z), sigma, _, _, limit = triad
     x, y, z = true
     if matrix:
@@ -127,14 +127,14 @@ def _sensed(triad: _Triad, true: Sequence[float], bias: Sequence[float], row: Se
     return max(-limit, min(limit, x)), max(-limit, min(limit, y)), max(-limit, min(limit, z))
 
 
-def _triad(kind: str, unit: str, numbers: Numbers) -> list[Variable]:
+def _triad_parameters(kind: str, unit: str, numbers: Numbers) -> list[Variable]:
     # densities are in unit/sqrt(Hz), which integer exponents of units cannot say
     return [
-        parameter(f"{kind}.noise_density", "", numbers["noise_density"], f"of white noise, {unit}/sqrt(Hz)"),
-        parameter(f"{kind}.bias_walk", "", numbers["bias_walk"], f"density that drives the bias, {unit}/s/sqrt(Hz)"),
-        parameter(f"{kind}.correlation_time", "s", numbers["correlation_time"], "of the wandering bias", 1e-3),
-        parameter(f"{kind}.turn_on_bias", unit, numbers["turn_on_bias"], "standard deviation of the bias at turn-on"),
-        parameter(f"{kind}.range", unit, numbers["range"], "largest value that is measured"),
-        real(f"{kind}.bias", unit, "parameter", (0.0,) * 3, "constant bias", shape=(3,)),
-        real(f"{kind}.matrix", "1", "parameter", _IDENTITY, "scale and misalignment, row by row", shape=(9,)),
+        real_parameter(f"{kind}.noise_density", "", numbers["noise_density"], f"of white noise, {unit}/sqrt(Hz)"),
+        real_parameter(f"{kind}.bias_walk", "", numbers["bias_walk"], f"density that drives the bias, {unit}/s/sqrt(Hz)"),
+        real_parameter(f"{kind}.correlation_time", "s", numbers["correlation_time"], "of the wandering bias", 1e-3),
+        real_parameter(f"{kind}.turn_on_bias", unit, numbers["turn_on_bias"], "standard deviation of the bias at turn-on"),
+        real_parameter(f"{kind}.range", unit, numbers["range"], "largest value that is measured"),
+        real_variable(f"{kind}.bias", unit, "parameter", (0.0,) * 3, "constant bias", shape=(3,)),
+        real_variable(f"{kind}.matrix", "1", "parameter", _IDENTITY, "scale and misalignment, row by row", shape=(9,)),
     ]

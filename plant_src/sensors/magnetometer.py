@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from .frames import angles, to_body
-from .sampled import Measurement, SampledSensor, timing
-from .signals import parameter, real, seed_parameter, vector
+from .frames import euler_angles, to_body
+from .sampled import Measurement, SampledSensor, timing_variables
+from .signals import real_parameter, real_variable, seed_parameter, vector_variables
 
 #: east, north and up (T): about 40 degrees north in Europe, from the World Magnetic Model 2025, rounded
-FIELD = (0.5e-6, 25.5e-6, -37.0e-6)
+EARTH_FIELD = (0.5e-6, 25.5e-6, -37.0e-6)
 
 
 class Magnetometer(SampledSensor):
@@ -20,22 +20,22 @@ class Magnetometer(SampledSensor):
     with a perfect level. The noise of 0.3 uT is typical of small sensors. Inputs: `vehicle.orientation`.
     """
 
-    random_numbers = 3
+    random_number_count = 3
 
     def __init__(self, instance_name: str, seed: int = 0):
         identity = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
         super().__init__(
             instance_name,
             [
-                *(real(f"vehicle.orientation.{part}", "1", "input", float(part == "w")) for part in "wxyz"),
-                real("earth", "T", "parameter", FIELD, "field of the Earth: east, north, up", shape=(3,)),
-                real("hard_iron", "T", "parameter", (0.0,) * 3, "field of the vehicle itself, body axes", shape=(3,)),
-                real("soft_iron", "1", "parameter", identity, "distortion by the vehicle, row by row", shape=(9,)),
-                parameter("noise", "T", 0.3e-6, "standard deviation of the white noise"),
+                *(real_variable(f"vehicle.orientation.{part}", "1", "input", float(part == "w")) for part in "wxyz"),
+                real_variable("earth", "T", "parameter", EARTH_FIELD, "field of the Earth: east, north, up", shape=(3,)),
+                real_variable("hard_iron", "T", "parameter", (0.0,) * 3, "field of the vehicle itself, body axes", shape=(3,)),
+                real_variable("soft_iron", "1", "parameter", identity, "distortion by the vehicle, row by row", shape=(9,)),
+                real_parameter("noise", "T", 0.3e-6, "standard deviation of the white noise"),
                 seed_parameter(seed),
-                *vector("field", "xyz", "T", "output", text="measured field"),
-                real("yaw", "rad", "output", description="heading"),
-                *timing(50.0),
+                *vector_variables("field", "xyz", "T", "output", text="measured field"),
+                real_variable("yaw", "rad", "output", description="heading"),
+                *timing_variables(50.0),
             ],
         )
 
@@ -48,7 +48,7 @@ class Magnetometer(SampledSensor):
         return (*field, self._heading(field)), ()
 
     def _heading(self, field: list[float]) -> float:
-        roll, pitch, _ = angles(self.inputs)
+        roll, pitch, _ = euler_angles(self.inputs)
         x, y, z = field
         left, up = y * math.cos(roll) - z * math.sin(roll), y * math.sin(roll) + z * math.cos(roll)
         forward = x * math.cos(pitch) + up * math.sin(pitch)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .frames import Vector, angles, inverse, product, to_body, to_world
-from .noise import uniform
-from .optics import camera_attitude, pixels, seen_from
-from .sampled import Measurement, SampledSensor, timing
-from .signals import flag, parameter, pose_inputs, real, seed_parameter, vector
+from .frames import Vector, euler_angles, inverse_quaternion, quaternion_product, to_body, to_world
+from .noise import normal_to_uniform
+from .optics import camera_attitude, project, to_camera_axes
+from .sampled import Measurement, SampledSensor, timing_variables
+from .signals import boolean_variable, pose_inputs, real_parameter, real_variable, seed_parameter, vector_variables
 
 
 class MarkerCamera(SampledSensor):
@@ -30,7 +30,7 @@ class MarkerCamera(SampledSensor):
     `deck`, each `position` and `orientation` ("plant.usv.deck" has the position, "plant.usv.orientation" the other).
     """
 
-    random_numbers = 7
+    random_number_count = 7
 
     def __init__(self, instance_name: str, seed: int = 0):
         super().__init__(
@@ -38,39 +38,39 @@ class MarkerCamera(SampledSensor):
             [
                 *pose_inputs("vehicle"),
                 *pose_inputs("deck"),
-                parameter("marker_size", "m", 0.4, "edge of the marker", 1e-3),
-                parameter("focal_length", "1", 320.0, "pixels", 1.0),
-                parameter("width", "1", 320.0, "pixels of a picture from left to right", 1.0),
-                parameter("height", "1", 240.0, "pixels of a picture from top to bottom", 1.0),
-                parameter("smallest", "1", 12.0, "pixels along an edge of the marker that can still be read"),
-                parameter("incidence", "rad", 1.2, "largest angle between view and normal of the marker", 0.0, math.pi / 2),
-                parameter("drop_out", "1", 0.02, "share of pictures in which the marker is overlooked", 0.0, 1.0),
-                parameter("pixel_noise", "1", 0.3, "standard deviation of a corner, pixels"),
-                parameter("tilt_ratio", "1", 3.0, "how much worse roll and pitch are seen than yaw"),
-                parameter("tilt", "rad", 0.0, "of the camera, from straight down to ahead", -math.pi, math.pi),
-                real("mounting", "m", "parameter", (0.0, 0.0, 0.0), "place of the camera, body axes", shape=(3,)),
+                real_parameter("marker_size", "m", 0.4, "edge of the marker", 1e-3),
+                real_parameter("focal_length", "1", 320.0, "pixels", 1.0),
+                real_parameter("width", "1", 320.0, "pixels of a picture from left to right", 1.0),
+                real_parameter("height", "1", 240.0, "pixels of a picture from top to bottom", 1.0),
+                real_parameter("smallest", "1", 12.0, "pixels along an edge of the marker that can still be read"),
+                real_parameter("incidence", "rad", 1.2, "largest angle between view and normal of the marker", 0.0, math.pi / 2),
+                real_parameter("drop_out", "1", 0.02, "share of pictures in which the marker is overlooked", 0.0, 1.0),
+                real_parameter("pixel_noise", "1", 0.3, "standard deviation of a corner, pixels"),
+                real_parameter("tilt_ratio", "1", 3.0, "how much worse roll and pitch are seen than yaw"),
+                real_parameter("tilt", "rad", 0.0, "of the camera, from straight down to ahead", -math.pi, math.pi),
+                real_variable("mounting", "m", "parameter", (0.0, 0.0, 0.0), "place of the camera, body axes", shape=(3,)),
                 seed_parameter(seed),
-                *vector("position", "xyz", "m", "output", text="centre of the deck, body axes"),
-                *(real(f"attitude.{angle}", "rad", "output") for angle in ("roll", "pitch", "yaw")),
-                *timing(30.0, 0.05),
-                flag("valid", "output", "the marker was found"),
+                *vector_variables("position", "xyz", "m", "output", text="centre of the deck, body axes"),
+                *(real_variable(f"attitude.{angle}", "rad", "output") for angle in ("roll", "pitch", "yaw")),
+                *timing_variables(30.0, 0.05),
+                boolean_variable("valid", "output", "the marker was found"),
             ],
         )
 
-    def prepare(self) -> None:
+    def apply_parameters(self) -> None:
         self._camera = camera_attitude(self.parameters["tilt"])
 
     def measure(self, number: int, elapsed: float) -> Measurement:
         row, attitude = self.noise[number], self.inputs[3:7]
         a, b, c = to_world(attitude, self.parameters["mounting"])
         place = (self.inputs[0] + a, self.inputs[1] + b, self.inputs[2] + c)
-        camera = product(attitude, self._camera)
-        if uniform(row[6]) < self.parameters["drop_out"] or not self._is_seen(place, camera):
+        camera = quaternion_product(attitude, self._camera)
+        if normal_to_uniform(row[6]) < self.parameters["drop_out"] or not self._marker_visible(place, camera):
             return (), (False,)
-        seen = seen_from(place, camera, self.inputs[7:10])
+        seen = to_camera_axes(place, camera, self.inputs[7:10])
         return (*self._position(seen, row), *self._attitude(seen[2], row[3:])), (True,)
 
-    def _is_seen(self, place: Vector, camera: Sequence[float]) -> bool:
+    def _marker_visible(self, place: Vector, camera: Sequence[float]) -> bool:
         p, deck, attitude = self.parameters, self.inputs[7:10], self.inputs[10:14]
         x, y, z = to_body(attitude, (place[0] - deck[0], place[1] - deck[1], place[2] - deck[2]))
         if z <= 0 or z < math.cos(p["incidence"]) * math.sqrt(x * x + y * y + z * z):
@@ -78,10 +78,10 @@ class MarkerCamera(SampledSensor):
         half = p["marker_size"] / 2
         for side in ((half, half), (half, -half), (-half, -half), (-half, half)):
             a, b, c = to_world(attitude, (*side, 0.0))
-            corner = seen_from(place, camera, (deck[0] + a, deck[1] + b, deck[2] + c))
-            if corner[2] <= 0 or not self._in_picture(*pixels(corner, p["focal_length"])):
+            corner = to_camera_axes(place, camera, (deck[0] + a, deck[1] + b, deck[2] + c))
+            if corner[2] <= 0 or not self._in_picture(*project(corner, p["focal_length"])):
                 return False
-        depth = seen_from(place, camera, deck)[2]
+        depth = to_camera_axes(place, camera, deck)[2]
         return p["focal_length"] * p["marker_size"] >= p["smallest"] * depth
 
     def _in_picture(self, right: float, down: float) -> bool:
@@ -98,6 +98,6 @@ class MarkerCamera(SampledSensor):
     def _attitude(self, depth: float, row: Sequence[float]) -> Vector:
         p = self.parameters
         sigma = p["pixel_noise"] * depth / (p["focal_length"] * p["marker_size"])
-        roll, pitch, yaw = angles(product(inverse(self.inputs[3:7]), self.inputs[10:14]))
+        roll, pitch, yaw = euler_angles(quaternion_product(inverse_quaternion(self.inputs[3:7]), self.inputs[10:14]))
         tilted = p["tilt_ratio"] * sigma
         return roll + tilted * row[0], pitch + tilted * row[1], yaw + sigma * row[2]

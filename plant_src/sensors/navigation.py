@@ -11,13 +11,24 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .frames import Quaternion, Vector, angles, cross, halfway, product, rotation, to_body, to_world, unit
+from .frames import (
+    Quaternion,
+    Vector,
+    cross,
+    euler_angles,
+    midpoint_attitude,
+    normalised_quaternion,
+    quaternion_from_rotation_vector,
+    quaternion_product,
+    to_body,
+    to_world,
+)
 from .history import History
 from .imu import GRAVITY
-from .magnetometer import FIELD
-from .signals import SignalComponent, parameter, real, vector
+from .magnetometer import EARTH_FIELD
+from .signals import SignalComponent, real_parameter, real_variable, vector_variables
 
-_MEMORY = (
+_STATE_ATTRIBUTES = (
     "_position",
     "_velocity",
     "_orientation",
@@ -38,7 +49,7 @@ class Navigation(SignalComponent):
     Inputs: `imu`, `gnss` and `magnetometer`, each by the names of its outputs. `earth` is the field (T) that it believes in.
     """
 
-    memory = _MEMORY
+    state_attributes = _STATE_ATTRIBUTES
     _position: Vector
     _velocity: Vector
     _orientation: Quaternion
@@ -49,34 +60,34 @@ class Navigation(SignalComponent):
         super().__init__(
             instance_name,
             [
-                *vector("imu.acceleration", "xyz", "m/s2", "input"),
-                *vector("imu.rates", "pqr", "rad/s", "input"),
-                *vector("gnss.position", "xyz", "m", "input"),
-                *vector("gnss.velocity", "xyz", "m/s", "input"),
-                real("gnss.time", "s", "input"),
-                *vector("magnetometer.field", "xyz", "T", "input"),
-                real("magnetometer.time", "s", "input"),
-                parameter("alignment_time", "s", 1.0, "in which the vehicle stands still and level"),
-                parameter("position_gain", "1", 0.3, "share of the position error that a fix takes away", 0.0, 1.0),
-                parameter("velocity_gain", "1", 0.15, "share of the velocity error that a fix takes away", 0.0, 1.0),
-                parameter("tilt_gain", "1", 0.03, "turn by a fix, times g, per velocity error", 0.0, 1.0),
-                parameter(
+                *vector_variables("imu.acceleration", "xyz", "m/s2", "input"),
+                *vector_variables("imu.rates", "pqr", "rad/s", "input"),
+                *vector_variables("gnss.position", "xyz", "m", "input"),
+                *vector_variables("gnss.velocity", "xyz", "m/s", "input"),
+                real_variable("gnss.time", "s", "input"),
+                *vector_variables("magnetometer.field", "xyz", "T", "input"),
+                real_variable("magnetometer.time", "s", "input"),
+                real_parameter("alignment_time", "s", 1.0, "in which the vehicle stands still and level"),
+                real_parameter("position_gain", "1", 0.3, "share of the position error that a fix takes away", 0.0, 1.0),
+                real_parameter("velocity_gain", "1", 0.15, "share of the velocity error that a fix takes away", 0.0, 1.0),
+                real_parameter("tilt_gain", "1", 0.03, "turn by a fix, times g, per velocity error", 0.0, 1.0),
+                real_parameter(
                     "heading_gain", "1", 0.02, "share of the heading error that a sample of the field takes away", 0.0, 1.0
                 ),
-                parameter("bias_gain", "1/s", 0.05, "change of the gyroscopes' bias per turn by a correction"),
-                real("earth", "T", "parameter", FIELD, "field of the Earth: east, north, up", shape=(3,)),
-                *vector("position", "xyz", "m", "output"),
-                *(real(f"orientation.{part}", "1", "output") for part in "wxyz"),
-                *(real(f"attitude.{angle}", "rad", "output") for angle in ("roll", "pitch", "yaw")),
-                *vector("velocity", "xyz", "m/s", "output"),
-                *vector("velocity_body", "uvw", "m/s", "output"),
-                *vector("rates", "pqr", "rad/s", "output"),
+                real_parameter("bias_gain", "1/s", 0.05, "change of the gyroscopes' bias per turn by a correction"),
+                real_variable("earth", "T", "parameter", EARTH_FIELD, "field of the Earth: east, north, up", shape=(3,)),
+                *vector_variables("position", "xyz", "m", "output"),
+                *(real_variable(f"orientation.{part}", "1", "output") for part in "wxyz"),
+                *(real_variable(f"attitude.{angle}", "rad", "output") for angle in ("roll", "pitch", "yaw")),
+                *vector_variables("velocity", "xyz", "m/s", "output"),
+                *vector_variables("velocity_body", "uvw", "m/s", "output"),
+                *vector_variables("rates", "pqr", "rad/s", "output"),
             ],
         )
 
-    def begin(self) -> None:
+    def initialise(self) -> None:
         i = self.inputs
-        self._position, self._velocity, self._orientation = (i[6], i[7], i[8]), (0.0, 0.0, 0.0), self._level()
+        self._position, self._velocity, self._orientation = (i[6], i[7], i[8]), (0.0, 0.0, 0.0), self._level_attitude()
         self._gyro_bias, self._force_bias = (i[3], i[4], i[5]), (i[0], i[1], i[2] - GRAVITY)
         self._history, self._aligned = History(), 1
         self._fix_time, self._field_time = i[12], i[16]
@@ -100,21 +111,23 @@ class Navigation(SignalComponent):
         i = self.inputs
         self._aligned += 1
         share = 1 / self._aligned
-        self._gyro_bias = _towards(self._gyro_bias, i[3:6], share)
-        self._force_bias = _towards(self._force_bias, (i[0], i[1], i[2] - GRAVITY), share)
-        self._position = _towards(self._position, i[6:9], share)
+        self._gyro_bias = _interpolate(self._gyro_bias, i[3:6], share)
+        self._force_bias = _interpolate(self._force_bias, (i[0], i[1], i[2] - GRAVITY), share)
+        self._position = _interpolate(self._position, i[6:9], share)
         self._correct_heading(share, 0.0)
 
-    def _level(self) -> Quaternion:
+    def _level_attitude(self) -> Quaternion:
         """Level, with the heading that the field has."""
         east, north, _ = self.parameters["earth"]
-        return rotation((0.0, 0.0, math.atan2(north, east) - math.atan2(self.inputs[14], self.inputs[13])))
+        return quaternion_from_rotation_vector((0.0, 0.0, math.atan2(north, east) - math.atan2(self.inputs[14], self.inputs[13])))
 
     def _integrate(self, h: float) -> None:
         """One step by rates and specific force."""
         i, (p, q, r), before = self.inputs, self._gyro_bias, self._orientation
-        self._orientation = unit(product(before, rotation(((i[3] - p) * h, (i[4] - q) * h, (i[5] - r) * h))))
-        x, y, z = self._force(halfway(before, self._orientation))
+        self._orientation = normalised_quaternion(
+            quaternion_product(before, quaternion_from_rotation_vector(((i[3] - p) * h, (i[4] - q) * h, (i[5] - r) * h)))
+        )
+        x, y, z = self._force(midpoint_attitude(before, self._orientation))
         u, v, w = self._velocity
         self._velocity = u + h * x, v + h * y, w + h * (z - GRAVITY)
         a, b, c = self._position
@@ -148,14 +161,14 @@ class Navigation(SignalComponent):
         """Correct the attitude by a rotation vector in world axes, and the bias of the gyroscopes with it."""
         (p, q, r), (a, b, c) = self._gyro_bias, to_body(self._orientation, by)
         self._gyro_bias = p - bias_gain * a, q - bias_gain * b, r - bias_gain * c
-        self._orientation = product(rotation(by), self._orientation)
+        self._orientation = quaternion_product(quaternion_from_rotation_vector(by), self._orientation)
 
     def _publish(self) -> None:
         q, (p, d, r), i = self._orientation, self._gyro_bias, self.inputs
         rates = (i[3] - p, i[4] - d, i[5] - r)
-        self.outputs = (*self._position, *q, *angles(q), *self._velocity, *to_body(q, self._velocity), *rates)
+        self.outputs = (*self._position, *q, *euler_angles(q), *self._velocity, *to_body(q, self._velocity), *rates)
 
 
-def _towards(old: Vector, new: Sequence[float], share: float) -> Vector:
+def _interpolate(old: Vector, new: Sequence[float], share: float) -> Vector:
     """A share of the way from one vector to another."""
     return old[0] + share * (new[0] - old[0]), old[1] + share * (new[1] - old[1]), old[2] + share * (new[2] - old[2])

@@ -8,10 +8,10 @@ from hashlib import sha256
 
 import numpy as np
 
-_BLOCK = 256  # rows drawn at a time
+_BLOCK_LENGTH = 256  # rows drawn at a time
 
 
-class Noise:
+class CounterBasedNoise:
     """Standard normal numbers in rows of `width`, all independent of each other.
 
     Row n follows from the key and n alone: numbers come from Philox (Salmon et al., "Parallel random numbers: as easy as
@@ -25,20 +25,20 @@ class Noise:
         self._block, self._rows = -1, [[0.0]]
 
     def __getitem__(self, number: int) -> Sequence[float]:
-        block, row = divmod(number, _BLOCK)
+        block, row = divmod(number, _BLOCK_LENGTH)
         if block != self._block:
             bits = np.random.Philox(key=self._key, counter=block << 64)
-            self._rows = np.random.Generator(bits).standard_normal((_BLOCK, self._width)).tolist()
+            self._rows = np.random.Generator(bits).standard_normal((_BLOCK_LENGTH, self._width)).tolist()
             self._block = block
         return self._rows[row]
 
 
-def uniform(normal: float) -> float:
+def normal_to_uniform(normal: float) -> float:
     """A standard normal number as one that is uniform between 0 and 1."""
     return 0.5 * math.erfc(-normal / math.sqrt(2))
 
 
-def gauss_markov(sigma: float, correlation_time: float, elapsed: float) -> tuple[float, float]:
+def gauss_markov_factors(sigma: float, correlation_time: float, elapsed: float) -> tuple[float, float]:
     """Factors (keep, drive) of x <- keep x + drive n, n standard normal: a first-order Gauss-Markov process, sampled exactly.
 
     Its standard deviation is `sigma` once it is stationary, its autocorrelation exp(-t / correlation_time).

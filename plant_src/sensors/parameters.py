@@ -16,7 +16,7 @@ _DEGREE, _MILLI_G, _HOUR = math.radians(1.0), 9.81e-3, 3600.0
 Numbers = Mapping[str, float]
 
 #: noise_density (unit/sqrt(Hz)), bias_walk (unit/s/sqrt(Hz)), correlation_time (s), turn_on_bias and range (unit); rad/s and m/s2
-INERTIAL: Mapping[str, Mapping[str, Numbers]] = {
+IMU_DEVICES: Mapping[str, Mapping[str, Numbers]] = {
     "bmi088": {
         "gyroscope": {
             "noise_density": 0.014 * _DEGREE,  # [BMI088]
@@ -56,7 +56,7 @@ INERTIAL: Mapping[str, Mapping[str, Numbers]] = {
 _CEP = 1 / math.sqrt(2 * math.log(2))
 
 #: white noise and slow error of the position (m), white noise of the velocity (m/s), correlation time (s), rate (Hz), latency (s)
-SATELLITE: Mapping[str, Numbers] = {
+GNSS_RECEIVERS: Mapping[str, Numbers] = {
     "standard": {
         "horizontal_noise": 0.1,  # [typical]
         "vertical_noise": 0.2,  # [typical]

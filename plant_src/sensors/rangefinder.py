@@ -6,17 +6,17 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..catalogue import VEHICLES
-from ..json_reader import Reader
-from ..physics.body import compound
+from ..catalogue import VEHICLE_MODELS
+from ..json_reader import JsonReader
+from ..physics.body import create_compound_shape
 from ..physics.client import pybullet
 from ..vehicles.common.shapes import Box
 from .frames import Vector, to_world
-from .sampled import Measurement, SampledSensor, timing
-from .signals import accept, flag, parameter, pose_inputs, read_seed, real, seed_parameter
+from .sampled import Measurement, SampledSensor, timing_variables
+from .signals import boolean_variable, check_seed, pose_inputs, raise_problems, real_parameter, real_variable, seed_parameter
 
-_POSE = 7  # numbers of a position and an orientation
-_HIT, _FRACTION = 0, 2  # fields of what Bullet says of a ray
+_POSE_SIZE = 7  # numbers of a position and an orientation
+_HIT_BODY, _HIT_FRACTION = 0, 2  # fields of what Bullet says of a ray
 
 
 class Rangefinder(SampledSensor):
@@ -33,7 +33,7 @@ class Rangefinder(SampledSensor):
     with all problems. Inputs: `vehicle.position`, `vehicle.orientation`.
     """
 
-    random_numbers = 1
+    random_number_count = 1
 
     def __init__(
         self,
@@ -43,39 +43,39 @@ class Rangefinder(SampledSensor):
         water: bool = True,
         seed: int = 0,
     ):
-        reader = Reader()
-        bodies = _vessels(reader, vessels or {})
-        boxes = _platforms(reader, platforms or {})
-        read_seed(reader, seed)
-        accept(reader)
+        reader = JsonReader()
+        bodies = _read_vessels(reader, vessels or {})
+        boxes = _read_platforms(reader, platforms or {})
+        check_seed(reader, seed)
+        raise_problems(reader)
         super().__init__(
             instance_name,
             [
                 *pose_inputs("vehicle"),
                 *(variable for name in bodies for variable in pose_inputs(name, "deck.position")),
-                parameter("noise_floor", "m", 0.02, "standard deviation close by"),
-                parameter("noise_share", "1", 0.01 / 3, "standard deviation per distance far away"),
-                parameter("nearest", "m", 0.1, "smallest distance that is measured"),
-                parameter("farthest", "m", 12.0, "largest distance that is measured"),
-                real("mounting", "m", "parameter", (0.0, 0.0, 0.0), "place on the vehicle, body axes", shape=(3,)),
-                real("direction", "1", "parameter", (0.0, 0.0, -1.0), "of the beam, body axes", shape=(3,)),
+                real_parameter("noise_floor", "m", 0.02, "standard deviation close by"),
+                real_parameter("noise_share", "1", 0.01 / 3, "standard deviation per distance far away"),
+                real_parameter("nearest", "m", 0.1, "smallest distance that is measured"),
+                real_parameter("farthest", "m", 12.0, "largest distance that is measured"),
+                real_variable("mounting", "m", "parameter", (0.0, 0.0, 0.0), "place on the vehicle, body axes", shape=(3,)),
+                real_variable("direction", "1", "parameter", (0.0, 0.0, -1.0), "of the beam, body axes", shape=(3,)),
                 seed_parameter(seed),
-                real("distance", "m", "output"),
-                *timing(100.0),
-                flag("valid", "output", "something is in reach"),
+                real_variable("distance", "m", "output"),
+                *timing_variables(100.0),
+                boolean_variable("valid", "output", "something is in reach"),
             ],
         )
         self._water = water
         self._client = pybullet.connect(pybullet.DIRECT)
         for size, position in boxes:
-            self._add([Box((size[0] / 2, size[1] / 2, size[2] / 2), (0.0, 0.0, 0.0))], position)
-        self._bodies = [self._add(body, (0.0, 0.0, 0.0)) for body in bodies.values()]
+            self._add_body([Box((size[0] / 2, size[1] / 2, size[2] / 2), (0.0, 0.0, 0.0))], position)
+        self._bodies = [self._add_body(body, (0.0, 0.0, 0.0)) for body in bodies.values()]
 
-    def _add(self, boxes: Sequence[Box], position: Sequence[float]) -> int:
-        shape = compound(boxes, self._client)
+    def _add_body(self, boxes: Sequence[Box], position: Sequence[float]) -> int:
+        shape = create_compound_shape(boxes, self._client)
         return int(pybullet.createMultiBody(0, shape, -1, position, physicsClientId=self._client))
 
-    def prepare(self) -> None:
+    def apply_parameters(self) -> None:
         length = math.hypot(*self.parameters["direction"])
         if not length:
             raise ValueError("found a direction of length 0")
@@ -97,12 +97,12 @@ class Rangefinder(SampledSensor):
 
     def _to_solids(self, start: Vector, beam: Vector) -> float:
         for number, body in enumerate(self._bodies, 1):
-            x, y, z, qw, qx, qy, qz = self.inputs[_POSE * number : _POSE * (number + 1)]
+            x, y, z, qw, qx, qy, qz = self.inputs[_POSE_SIZE * number : _POSE_SIZE * (number + 1)]
             pybullet.resetBasePositionAndOrientation(body, (x, y, z), (qx, qy, qz, qw), physicsClientId=self._client)
         reach = self.parameters["farthest"] * 1.01
         end = [place + reach * part for place, part in zip(start, beam, strict=True)]
         (found,) = pybullet.rayTest(start, end, physicsClientId=self._client)
-        return found[_FRACTION] * reach if found[_HIT] >= 0 else math.inf
+        return found[_HIT_FRACTION] * reach if found[_HIT_BODY] >= 0 else math.inf
 
     def _to_water(self, start: Vector, beam: Vector) -> float:
         return -start[2] / beam[2] if self._water and start[2] > 0 > beam[2] else math.inf
@@ -113,15 +113,15 @@ class Rangefinder(SampledSensor):
             self._client = -1
 
 
-def _vessels(reader: Reader, vessels: Any) -> dict[str, Sequence[Box]]:
+def _read_vessels(reader: JsonReader, vessels: Any) -> dict[str, Sequence[Box]]:
     """The shapes of each vessel in its axes, from the centre of its deck."""
-    known = {name: next(iter(models.values())) for name, models in VEHICLES.items()}
+    known = {name: next(iter(models.values())) for name, models in VEHICLE_MODELS.items()}
     valid = [name for name, model in known.items() if model.is_vessel]
-    named = reader.named(vessels, ("vessels",)).items()
-    return {name: _from_deck(known[reader.choice(kind, ("vessels", name), valid)].body.boxes) for name, kind in named}
+    named = reader.read_named_objects(vessels, ("vessels",)).items()
+    return {name: _relative_to_deck(known[reader.choice(kind, ("vessels", name), valid)].body.boxes) for name, kind in named}
 
 
-def _from_deck(boxes: Sequence[Box]) -> Sequence[Box]:
+def _relative_to_deck(boxes: Sequence[Box]) -> Sequence[Box]:
     """Shapes moved so that the middle of the top of the first one, which is the deck, is the origin.
 
     The deck is what all vessels publish; where their centre of mass is depends on the payload of some.
@@ -131,12 +131,12 @@ def _from_deck(boxes: Sequence[Box]) -> Sequence[Box]:
     return [box._replace(position=(box.position[0] - a, box.position[1] - b, box.position[2] - top)) for box in boxes]
 
 
-def _platforms(reader: Reader, platforms: Any) -> Sequence[tuple[Sequence[float], Sequence[float]]]:
+def _read_platforms(reader: JsonReader, platforms: Any) -> Sequence[tuple[Sequence[float], Sequence[float]]]:
     """Edges and centre of each platform (m)."""
     found = []
-    for name, spec in reader.named(platforms, ("platforms",)).items():
+    for name, spec in reader.read_named_objects(platforms, ("platforms",)).items():
         path = ("platforms", name)
-        spec = reader.keys(spec, path, ("size", "position"), ())
+        spec = reader.read_object(spec, path, ("size", "position"), ())
         vectors = [reader.vector(spec.get(key, [1.0] * 3), (*path, key), "xyz") for key in ("size", "position")]
         found.append((vectors[0], vectors[1]))
     return found

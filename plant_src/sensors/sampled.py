@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from cosim.core.component import Variable
 
-from .signals import SignalComponent, parameter, real
+from .signals import SignalComponent, real_parameter, real_variable
 
 #: part of a sample, and s, by which a moment may seem to lie before its time
-_EARLY_SAMPLE, _EARLY = 1e-6, 1e-9
+_SAMPLE_TOLERANCE, _TIME_TOLERANCE = 1e-6, 1e-9
 
 Measurement = tuple[Sequence[float], Sequence[bool]]
 
@@ -21,7 +21,7 @@ class SampledSensor(SignalComponent):
     Sample 0 is there from the start. The last real output is the `time` (s) at which the sample that is shown was taken.
     """
 
-    memory: tuple[str, ...] = ("_number", "_taken", "_pending")
+    state_attributes: tuple[str, ...] = ("_number", "_taken", "_pending")
 
     def measure(self, number: int, elapsed: float) -> Measurement:
         """Real outputs (without `time`) and flags of sample `number`, `elapsed` (s) after the last sample (0: the first one).
@@ -30,31 +30,31 @@ class SampledSensor(SignalComponent):
         """
         raise NotImplementedError
 
-    def begin(self) -> None:
-        self._number, self._taken, self._pending = 0, self.start_time, deque[tuple[float, float, Measurement]]()
+    def initialise(self) -> None:
+        self._number, self._sample_time, self._pending = 0, self.start_time, deque[tuple[float, float, Measurement]]()
         self.outputs = (0.0,) * len(self.outputs)
-        self._show(self.start_time, self.measure(0, 0.0))
+        self._publish(self.start_time, self.measure(0, 0.0))
 
     def advance(self, now: float, step_size: float) -> None:
-        number = int((now - self.start_time) * self.parameters["rate"] + _EARLY_SAMPLE)
+        number = int((now - self.start_time) * self.parameters["rate"] + _SAMPLE_TOLERANCE)
         if number > self._number:
-            measurement = self.measure(number, now - self._taken)
-            self._number, self._taken = number, now
-            self._pending.append((now + self.parameters["latency"] - _EARLY, now, measurement))
+            measurement = self.measure(number, now - self._sample_time)
+            self._number, self._sample_time = number, now
+            self._pending.append((now + self.parameters["latency"] - _TIME_TOLERANCE, now, measurement))
         while self._pending and self._pending[0][0] <= now:
             _, taken, measurement = self._pending.popleft()
-            self._show(taken, measurement)
+            self._publish(taken, measurement)
 
-    def _show(self, taken: float, measurement: Measurement) -> None:
+    def _publish(self, taken: float, measurement: Measurement) -> None:
         values, self.flags = measurement
         if values:
             self.outputs = (*values, taken)
 
 
-def timing(rate: float, latency: float = 0.0) -> list[Variable]:
+def timing_variables(rate: float, latency: float = 0.0) -> list[Variable]:
     """The parameters of a sampled sensor, and its output `time`, which comes last."""
     return [
-        real("rate", "Hz", "parameter", rate, "samples per second", minimum=1e-3, variability="fixed"),
-        parameter("latency", "s", latency, "from the sample to its output"),
-        real("time", "s", "output", description="when the sample was taken"),
+        real_variable("rate", "Hz", "parameter", rate, "samples per second", minimum=1e-3, variability="fixed"),
+        real_parameter("latency", "s", latency, "from the sample to its output"),
+        real_variable("time", "s", "output", description="when the sample was taken"),
     ]

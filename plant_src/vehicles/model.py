@@ -10,10 +10,10 @@ import numpy as np
 
 from cosim.core.component import Causality, Variable
 
-from .common.interface import SURROUNDINGS
+from .common.interface import ENVIRONMENT_INPUTS
 from .common.shapes import Body, Box, Vector
 from .multirotor.airframe import Airframe
-from .multirotor.interface import INERTIA
+from .multirotor.interface import INERTIA_INDICES
 
 Boxes = Callable[[np.ndarray], tuple[Box, ...]]
 
@@ -34,43 +34,43 @@ class Model:
     is_vessel: bool = False
     vehicle: str = ""
     motion: str = "6dof"
-    constants: int | None = None
+    constant_count: int | None = None
     #: of a multirotor, which may have another mass and inertia, and its shapes for a rotation to the body frame
     airframe: Airframe | None = None
     boxes: Boxes | None = None
 
     @property
-    def rotor_plane(self) -> Vector | None:
+    def rotor_centre(self) -> Vector | None:
         """Centre of the rotors in the body frame (m), of a multirotor."""
-        return self.airframe.rotor_plane if self.airframe else None
+        return self.airframe.rotor_centre if self.airframe else None
 
     def body_with(self, parameters: Mapping[str, float]) -> Body:
         """The body in Bullet of a vehicle with these parameters. Raises InputError when there is no such body."""
         if self.airframe is None or self.boxes is None:
             return self.body
         inertia = np.zeros((3, 3))
-        for name, (i, j) in INERTIA.items():
+        for name, (i, j) in INERTIA_INDICES.items():
             inertia[i, j] = inertia[j, i] = parameters[name]
         return replace(self.airframe, mass=parameters["mass"], inertia=inertia).body(self.boxes)
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
         """What a vehicle of this model has in a world."""
-        return tuple(variable for variable in self.interface if variable.name not in SURROUNDINGS)
+        return tuple(variable for variable in self.interface if variable.name not in ENVIRONMENT_INPUTS)
 
     @cached_property
-    def surroundings(self) -> tuple[Variable, ...]:
+    def environment_inputs(self) -> tuple[Variable, ...]:
         """What the environment does to it: the last inputs of the equations."""
-        return tuple(variable for variable in self.interface if variable.name in SURROUNDINGS)
+        return tuple(variable for variable in self.interface if variable.name in ENVIRONMENT_INPUTS)
 
-    def reals(self, causality: Causality) -> list[Variable]:
+    def real_variables(self, causality: Causality) -> list[Variable]:
         """The real variables of a causality, in order."""
         return [variable for variable in self.variables if variable.causality == causality and variable.type == "Float64"]
 
     def slots(self, causality: Causality) -> list[str]:
         """Names of the real scalars of a causality, in order."""
-        return [slot for variable in self.reals(causality) for slot in variable.slots]
+        return [slot for variable in self.real_variables(causality) for slot in variable.scalar_names]
 
-    def starts(self, causality: Causality) -> list[float]:
+    def start_values(self, causality: Causality) -> list[float]:
         """Start values of the real scalars of a causality, in order."""
-        return np.concatenate([np.zeros(0), *(np.ravel(variable.start) for variable in self.reals(causality))]).tolist()
+        return np.concatenate([np.zeros(0), *(np.ravel(variable.start) for variable in self.real_variables(causality))]).tolist()

@@ -33,26 +33,26 @@ class BulletCalls:
     def replay(self) -> float:
         """CPU microseconds per macro step of the loop's calls; their results have to be the same, up to the last contact."""
         begin, loop, end = self.calls[: self.first], self.calls[self.first : self.last], self.calls[self.last :]
-        _make(begin)
+        _execute(begin)
         began = process_time()
-        results = _make(loop)
+        results = _execute(loop)
         seconds = process_time() - began
-        _make(end)
+        _execute(end)
         assert results == [call.result for call in loop]
         return seconds / self.steps * 1e6
 
 
-def _make(calls: Sequence[BulletCall]) -> list[Any]:
+def _execute(calls: Sequence[BulletCall]) -> list[Any]:
     return [function(*arguments, **options) for function, arguments, options, _ in calls]
 
 
-def record(load: Callable[[], Any]) -> BulletCalls:
+def record_calls(load: Callable[[], Any]) -> BulletCalls:
     """Fly the scenario that `load` assembles and keep its calls of PyBullet."""
     calls: list[BulletCall] = []
     marks: list[int] = []
     with pytest.MonkeyPatch.context() as patch:
         for name, function in getmembers(pybullet, isbuiltin):
-            patch.setattr(pybullet, name, _recorded(function, calls))
+            patch.setattr(pybullet, name, _recording_wrapper(function, calls))
         assembly = load()
         run = simulate(assembly.system, assembly.settings, [lambda *_: marks.append(len(calls))])
     if run.failure:
@@ -60,7 +60,7 @@ def record(load: Callable[[], Any]) -> BulletCalls:
     return BulletCalls(calls, marks[0], marks[-1], run.macro_steps)
 
 
-def _recorded(function: Callable[..., Any], calls: list[BulletCall]) -> Callable[..., Any]:
+def _recording_wrapper(function: Callable[..., Any], calls: list[BulletCall]) -> Callable[..., Any]:
     def recorded(*arguments: Any, **options: Any) -> Any:
         result = function(*arguments, **options)
         calls.append(BulletCall(function, arguments, options, result))

@@ -8,35 +8,35 @@ from pathlib import Path
 
 from measure import Stopwatch
 
-from cosim.components.fmi import FmuFile, instantiate
+from cosim.components.fmi import FmuFile, create_component
 from cosim.core.system import Connection, Endpoint, System
-from cosim.engine import Kind, available
+from cosim.engine import ExecutorKind, native_available
 from cosim.engine.run_loop import Settings, simulate
 
 STEP = Fraction(1, 100)
 
 
-def ring(fmu: Path, size: int) -> System:
+def ring_system(fmu: Path, size: int) -> System:
     """`size` instances, the outputs of each feed the inputs of the next, side by side in one stage (Jacobi)."""
     file = FmuFile(fmu)
     names = [f"s{i}" for i in range(size)]
     inputs = [variable.name for variable in file.description.variables if variable.causality == "input"]
     pairs = zip(names, [*names[1:], *names[:1]], strict=True)
     wires = [Connection(Endpoint(a, f"y{name[1:]}"), Endpoint(b, name)) for a, b in pairs for name in inputs]
-    return System({name: instantiate(file, name) for name in names}, wires, (tuple(names),))
+    return System({name: create_component(file, name) for name in names}, wires, (tuple(names),))
 
 
-def alone(fmu: Path) -> System:
+def single_fmu_system(fmu: Path) -> System:
     """One instance, its inputs unconnected."""
-    return System({"s0": instantiate(FmuFile(fmu), "s0")}, (), (("s0",),))
+    return System({"s0": create_component(FmuFile(fmu), "s0")}, (), (("s0",),))
 
 
-def cost(system: System, steps: int, recorded: Sequence[str], executor: Kind) -> float:
+def cpu_per_step(system: System, steps: int, recorded: Sequence[str], executor: ExecutorKind) -> float:
     """CPU microseconds per macro step."""
-    return watched(system, steps, recorded, executor).cpu
+    return measure_run(system, steps, recorded, executor).cpu
 
 
-def watched(system: System, steps: int, recorded: Sequence[str], executor: Kind) -> Stopwatch:
+def measure_run(system: System, steps: int, recorded: Sequence[str], executor: ExecutorKind) -> Stopwatch:
     """One simulation. A ring of lags has to stay at 1 exactly."""
     columns = {name: Endpoint(*name.split(".")) for name in recorded}
     watch = Stopwatch()
@@ -47,10 +47,10 @@ def watched(system: System, steps: int, recorded: Sequence[str], executor: Kind)
     return watch
 
 
-def executors() -> list[Kind]:
+def executors() -> list[ExecutorKind]:
     """The executors of this installation, the fastest first."""
-    return ["native", "python"] if available() else ["python"]
+    return ["native", "python"] if native_available() else ["python"]
 
 
-def label(executor: Kind) -> str:
+def executor_label(executor: ExecutorKind) -> str:
     return f"cosim, {executor}"

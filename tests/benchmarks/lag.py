@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 from cosim.export.fmu.archive import content_token, write_archive
 from cosim.export.fmu.block import Block, BlockVariable
-from cosim.export.fmu.model_description import model_description, to_bytes
+from cosim.export.fmu.model_description import model_description_xml, to_bytes
 from cosim.export.fmu.package import compile_binary, fmi_headers
 
 PROGRAMS = Path(__file__).parent / "programs"
@@ -23,7 +23,7 @@ def lag_fmu(folder: Path, fmi_version: int = 2, width: int = 1) -> Path:
     variables = [*(_variable(f"u{i}", "input") for i in numbers), *(_variable(f"y{i}", "output") for i in numbers)]
     block = Block(identifier, "a benchmark", variables, 0.01, {})
     token = content_token(sources[name] for name in sorted(sources))
-    files = {"modelDescription.xml": _independent(model_description(block, fmi_version, token, ["width.c"]))}
+    files = {"modelDescription.xml": _without_dependencies(model_description_xml(block, fmi_version, token, ["width.c"]))}
     files |= compile_binary(identifier, fmi_version, sources, ["width.c"])
     return write_archive(files, folder / f"{identifier}_fmi{fmi_version}.fmu")
 
@@ -32,7 +32,7 @@ def _variable(name: str, causality: str) -> BlockVariable:
     return BlockVariable(name, name, "Float64", causality, "continuous", 0.0)  # type: ignore[arg-type]
 
 
-def _independent(description: bytes) -> bytes:
+def _without_dependencies(description: bytes) -> bytes:
     """The description with the statement that no output depends on anything at once, which some importers insist on."""
     root = ElementTree.fromstring(description)  # noqa: S314 - written by ourselves
     for unknown in (*root.iter("Unknown"), *root.iter("Output"), *root.iter("InitialUnknown")):

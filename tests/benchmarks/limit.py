@@ -12,7 +12,7 @@ from cosim.export.fmu.compiler import find_compiler
 from cosim.export.fmu.package import fmi_headers
 
 
-class Limit:
+class CLimit:
     """The program, compiled for one FMU."""
 
     def __init__(self, fmu: Path, folder: Path):

@@ -15,7 +15,7 @@ Cost = Callable[[], float]
 
 
 @dataclass(frozen=True)
-class Row:
+class MedianCost:
     """Median cost, and the median of its ratios to the first contender of the same round."""
 
     name: str
@@ -23,22 +23,22 @@ class Row:
     ratio: float
 
 
-def compare(contenders: Mapping[str, Cost], rounds: int = ROUNDS) -> list[Row]:
+def measure_rounds(contenders: Mapping[str, Cost], rounds: int = ROUNDS) -> list[MedianCost]:
     """Measure all contenders once in every round; the first is what the others are compared with."""
     costs = [{name: cost() for name, cost in contenders.items()} for _ in range(rounds)]
     first = next(iter(contenders))
     return [
-        Row(name, median(found[name] for found in costs), median(found[name] / found[first] for found in costs))
+        MedianCost(name, median(found[name] for found in costs), median(found[name] / found[first] for found in costs))
         for name in contenders
     ]
 
 
-def heading(title: str, unit: str = "CPU us per step") -> None:
+def print_heading(title: str, unit: str = "CPU us per step") -> None:
     print(f"\n{title}: median of {ROUNDS} rounds in turns, load average {os.getloadavg()[0]:.2f}")
     print(f"  {'workload':24}{'who':28}{unit:>16}{'ratio':>9}")
 
 
-def show(workload: str, rows: list[Row]) -> dict[str, float]:
+def print_rows(workload: str, rows: list[MedianCost]) -> dict[str, float]:
     """Print the rows of a workload; returns the ratios."""
     for row in rows:
         print(f"  {workload:24}{row.name:28}{row.cost:16.4g}{row.ratio:9.3g}", flush=True)

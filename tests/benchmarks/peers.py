@@ -27,9 +27,9 @@ from statistics import median
 import importer
 from environments import environment, versions
 from lag import lag_fmu
-from limit import Limit
+from limit import CLimit
 
-from cosim.engine import Kind
+from cosim.engine import ExecutorKind
 
 DRIVERS = Path(__file__).parent / "peers"
 TIME_LIMIT = 300.0
@@ -49,7 +49,7 @@ class Peer:
         return max(self.fewest, self.budget // size)
 
 
-COSIM: Mapping[Kind, Peer] = {
+COSIM: Mapping[ExecutorKind, Peer] = {
     "native": Peer("ring_cosim.py", [], 1_000_000),
     "python": Peer("ring_cosim.py", [], 100_000),
 }
@@ -78,7 +78,7 @@ class Cost:
 Contender = Callable[[int], Cost]  # from the size of the ring
 
 
-def in_c(limit: Limit, ring: bool = True) -> Contender:
+def run_c_limit(limit: CLimit, ring: bool = True) -> Contender:
     """Stepped by the program of the C limit; without `ring` the FMU is the whole ring."""
 
     def run(size: int) -> Cost:
@@ -88,28 +88,28 @@ def in_c(limit: Limit, ring: bool = True) -> Contender:
     return run
 
 
-def driven(python: Path, peer: Peer, fmu: Path, *more: str) -> Contender:
+def run_driver(python: Path, peer: Peer, fmu: Path, *more: str) -> Contender:
     """Stepped by a driver, which answers in JSON."""
 
     def run(size: int) -> Cost:
-        return Cost(**json.loads(answer(python, peer, fmu, size, peer.steps(size), *more)))
+        return Cost(**json.loads(driver_output(python, peer, fmu, size, peer.steps(size), *more)))
 
     return run
 
 
-def packed(python: Path, peer: Peer, fmu: Path, folder: Path) -> Contender:
+def run_packed(python: Path, peer: Peer, fmu: Path, folder: Path) -> Contender:
     """A driver packs the ring into an FMU, once for each size."""
 
     @cache
     def container(size: int) -> Contender:
         target = folder / f"container{size}.fmu"
-        answer(python, peer, fmu, size, target)
-        return in_c(Limit(target, folder), ring=False)
+        driver_output(python, peer, fmu, size, target)
+        return run_c_limit(CLimit(target, folder), ring=False)
 
     return lambda size: container(size)(size)
 
 
-def answer(python: Path, peer: Peer, *arguments: object) -> str:
+def driver_output(python: Path, peer: Peer, *arguments: object) -> str:
     """The last line that a driver writes. Raises SubprocessError when it fails or does not end."""
     command = [python, DRIVERS / peer.driver, *arguments]
     done = subprocess.run([*map(str, command)], capture_output=True, text=True, timeout=TIME_LIMIT, check=True)
@@ -127,15 +127,15 @@ class Comparison:
         self._folder, self._fmu = folder, lag_fmu(folder)
         self.versions: dict[str, str] = {}
         self.absent: dict[str, str] = {}
-        self._contenders: dict[str, Contender] = {LIMIT: in_c(Limit(self._fmu, folder))}
+        self._contenders: dict[str, Contender] = {LIMIT: run_c_limit(CLimit(self._fmu, folder))}
         for executor, peer in COSIM.items():
             if executor in importer.executors():
-                self._contenders[importer.label(executor)] = driven(Path(sys.executable), peer, self._fmu, executor)
+                self._contenders[importer.executor_label(executor)] = run_driver(Path(sys.executable), peer, self._fmu, executor)
         for name, peer in PEERS.items():
             if name in names:
-                self._admit(name, peer, environments / peer.requirements[0])
+                self._add_peer(name, peer, environments / peer.requirements[0])
 
-    def _admit(self, name: str, peer: Peer, folder: Path) -> None:
+    def _add_peer(self, name: str, peer: Peer, folder: Path) -> None:
         try:
             python = environment(folder, peer.requirements)
         except subprocess.CalledProcessError as error:
@@ -143,9 +143,9 @@ class Comparison:
             return
         self.versions[name] = versions(python, peer.requirements)
         if peer.driver.startswith("pack_"):
-            self._contenders[name] = packed(python, peer, self._fmu, self._folder)
+            self._contenders[name] = run_packed(python, peer, self._fmu, self._folder)
         else:
-            self._contenders[name] = driven(python, peer, self._fmu)
+            self._contenders[name] = run_driver(python, peer, self._fmu)
 
     def measure(self, size: int, rounds: int) -> dict[str, Cost]:
         """Medians of a ring; who fails once is not asked again."""
@@ -155,7 +155,7 @@ class Comparison:
                 if not costs or not isnan(costs[-1].cpu):
                     costs.append(self._cost(name, size))
         print(f"ring {size}: done", file=sys.stderr, flush=True)
-        return {name: costs[-1] if isnan(costs[-1].cpu) else middle(costs) for name, costs in found.items()}
+        return {name: costs[-1] if isnan(costs[-1].cpu) else median_cost(costs) for name, costs in found.items()}
 
     def _cost(self, name: str, size: int) -> Cost:
         try:
@@ -165,7 +165,7 @@ class Comparison:
             return Cost()
 
 
-def middle(costs: Sequence[Cost]) -> Cost:
+def median_cost(costs: Sequence[Cost]) -> Cost:
     return Cost(*(median(getattr(cost, field) for cost in costs) for field in ("cpu", "wall", "last")))
 
 

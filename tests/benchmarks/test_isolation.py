@@ -16,13 +16,13 @@ from time import perf_counter
 import pytest
 from importer import STEP, executors
 from lag import lag_fmu
-from measure import ROUNDS, heading
+from measure import ROUNDS, print_heading
 
-from cosim.components.fmi import FmuFile, Isolation, instantiate
+from cosim.components.fmi import FmuFile, Isolation, create_component
 from cosim.core.system import Endpoint, System
-from cosim.core.time_grid import Grid
-from cosim.engine import Kind, Recorder, compile_plan, executor_kind
-from cosim.engine.run_loop import Run, Settings, simulate
+from cosim.core.time_grid import TimeGrid
+from cosim.engine import ExecutorKind, Recorder, compile_plan, executor_class
+from cosim.engine.run_loop import Settings, SimulationOutcome, simulate
 
 STEPS, BATCH, WIDTH, STARTS = 5_000, 50, 16, 20
 #: what is promised on a quiet machine: us per FMU and step over in process, ms to start
@@ -36,10 +36,10 @@ def lags(fmu: Path, size: int, isolation: Isolation | None) -> System:
     """`size` FMUs with 16 inputs and outputs each, unconnected."""
     file = FmuFile(fmu)
     names = [f"s{i}" for i in range(size)]
-    return System({name: instantiate(file, name, isolation=isolation) for name in names}, (), (tuple(names),))
+    return System({name: create_component(file, name, isolation=isolation) for name in names}, (), (tuple(names),))
 
 
-def run(system: System, steps: int, executor: Kind, look: Callable[[int, int], None] | None = None) -> Run:
+def run(system: System, steps: int, executor: ExecutorKind, look: Callable[[int, int], None] | None = None) -> SimulationOutcome:
     columns = {"y": Endpoint("s0", "y1")}
     settings = Settings(Fraction(0), steps * STEP, STEP, columns, executor=executor)
     outcome = simulate(system, settings, [look] if look else [])
@@ -57,11 +57,11 @@ def microseconds(reach: Callable[[int], object]) -> float:
     return median(durations) / BATCH * 1e6
 
 
-def per_step(fmu: Path, isolation: Isolation | None, kind: Kind) -> float:
+def per_step(fmu: Path, isolation: Isolation | None, kind: ExecutorKind) -> float:
     """Wall time in us of a macro step of one FMU."""
     system = lags(fmu, 1, isolation)
-    plan = compile_plan(system, Grid.of(Fraction(0), STEPS * STEP, STEP), [Endpoint("s0", "y1")])
-    executor = executor_kind(kind)(plan, Recorder(plan, {"y": Endpoint("s0", "y1")}))
+    plan = compile_plan(system, TimeGrid.from_times(Fraction(0), STEPS * STEP, STEP), [Endpoint("s0", "y1")])
+    executor = executor_class(kind)(plan, Recorder(plan, {"y": Endpoint("s0", "y1")}))
     try:
         executor.instantiate()
         executor.initialize()
@@ -89,7 +89,7 @@ def round_trip() -> float:
 @pytest.mark.parametrize("version", [2, 3], ids=["fmi2", "fmi3"])
 def test_steps(version, tmp_path):
     fmu = lag_fmu(tmp_path, version, WIDTH)
-    heading(f"one FMI {version}.0 FMU, {WIDTH} inputs and outputs, {STEPS} steps", "median us per step")
+    print_heading(f"one FMI {version}.0 FMU, {WIDTH} inputs and outputs, {STEPS} steps", "median us per step")
     for executor in executors():
         rounds = [(per_step(fmu, None, executor), per_step(fmu, Isolation(), executor), round_trip()) for _ in range(ROUNDS)]
         here, apart, floor = (median(column) for column in zip(*rounds, strict=True))
@@ -103,7 +103,7 @@ def test_steps(version, tmp_path):
 
 def test_starts(tmp_path):
     fmu = lag_fmu(tmp_path, 2, WIDTH)
-    heading(f"to extract, load and instantiate {STARTS} instances of one FMU", "ms each")
+    print_heading(f"to extract, load and instantiate {STARTS} instances of one FMU", "ms each")
     run(lags(fmu, 1, Isolation()), 1, "auto")  # imports
     costs = {}
     for name, isolation in (("in process", None), ("apart", Isolation()), ("sandbox", Isolation(sandbox=True))):
@@ -127,6 +127,6 @@ def test_memory(tmp_path):
         found.append(max(own_memory(worker) for worker in workers))
 
     run(lags(lag_fmu(tmp_path, 2, WIDTH), 4, Isolation()), 100, "auto", look)
-    heading("memory of a worker that no other process has", "MB")
+    print_heading("memory of a worker that no other process has", "MB")
     print(f"  {found[-1] / 1e6:.1f} (at the start {found[0] / 1e6:.1f})")
     assert found[-1] < 30e6

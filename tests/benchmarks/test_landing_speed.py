@@ -6,7 +6,7 @@ from time import perf_counter
 
 import pytest
 
-from cosim.studies.execution.local import LocalEngine
+from cosim.studies.execution.local import LocalRunner
 from cosim.studies.sweep import Sweep
 
 pytestmark = pytest.mark.benchmark
@@ -23,15 +23,15 @@ def spent():
 def costs(sweep, workers, count):
     """Processor time and wall time (s) of so many landings, the start of the engine included."""
     began, before = perf_counter(), spent()
-    with LocalEngine(sweep.study.order, workers) as engine:
+    with LocalRunner(sweep.study.order, workers) as engine:
         jobs = [sweep.study.job(sweep.design[k * len(sweep) // count].settings) for k in range(count)]
-        assert not any(record.failure for record in engine.results(jobs))
+        assert not any(record.failure for record in engine.run_jobs(jobs))
     return spent() - before, perf_counter() - began
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_cost_of_a_landing(workers):
-    sweep = Sweep.of("landing_envelope")
+    sweep = Sweep.from_file("landing_envelope")
     start_cpu, start_wall = costs(sweep, workers, 2)
     cpu, wall = costs(sweep, workers, RUNS)
     cpu, wall = (cpu - start_cpu) / (RUNS - 2), (wall - start_wall) / (RUNS - 2)

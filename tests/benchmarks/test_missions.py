@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bullet_calls import record
-from importer import executors, label
-from measure import Stopwatch, compare, heading, show
+from bullet_calls import record_calls
+from importer import executor_label, executors
+from measure import Stopwatch, measure_rounds, print_heading, print_rows
 
 import cosim
-from cosim.engine import Kind
+from cosim.engine import ExecutorKind
 from cosim.engine.run_loop import simulate
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -29,7 +29,7 @@ DISTANCE = 100.0
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]
 
 
-def flown(scenario: str | Path, executor: Kind, **changes: Any) -> float:
+def flown(scenario: str | Path, executor: ExecutorKind, **changes: Any) -> float:
     """CPU microseconds per macro step of the stepping loop of one flight."""
     assembly = cosim.load(scenario)
     watch = Stopwatch()
@@ -41,38 +41,38 @@ def flown(scenario: str | Path, executor: Kind, **changes: Any) -> float:
 
 def flights(scenario: str | Path) -> dict[str, Callable[[], float]]:
     """The contenders of a mission: every executor, and the first of them without recording."""
-    contenders = {label(executor): lambda e=executor: flown(scenario, e) for executor in executors()}
+    contenders = {executor_label(executor): lambda e=executor: flown(scenario, e) for executor in executors()}
     return contenders | {"cosim, nothing recorded": lambda: flown(scenario, executors()[0], columns={})}
 
 
 def test_demo1_against_the_bare_calls_of_pybullet(monkeypatch):
     """The floor is Bullet taking part in every step; the second row holds the calls that are still made."""
-    made = record(lambda: cosim.load("demo1_box"))
+    made = record_calls(lambda: cosim.load("demo1_box"))
     (clearance,) = (module for name, module in sys.modules.items() if name.endswith(".plant_src.clearance"))
     monkeypatch.setattr(clearance, "NEAR", 1e9)
-    everywhere = record(lambda: cosim.load("demo1_box"))
+    everywhere = record_calls(lambda: cosim.load("demo1_box"))
     monkeypatch.undo()
-    heading("demo1_box, 40 s")
+    print_heading("demo1_box, 40 s")
     floors = {"PyBullet in every step": everywhere.replay, "PyBullet's calls made": made.replay}
-    ratios = show("demo1_box", compare({**floors, **flights("demo1_box")}))
+    ratios = print_rows("demo1_box", measure_rounds({**floors, **flights("demo1_box")}))
     assert max(ratios.values()) < LARGEST_RATIO
 
 
 def test_free_flight():
-    heading("free_flight, 40 s on FMUs alone")
-    ratios = show("free_flight", compare(flights("free_flight")))
+    print_heading("free_flight, 40 s on FMUs alone")
+    ratios = print_rows("free_flight", measure_rounds(flights("free_flight")))
     assert ratios["cosim, nothing recorded"] < 2
 
 
 def test_pairs_of_vehicles(tmp_path):
-    heading("pairs of quadcopter and vessel in one world, 40 s")
+    print_heading("pairs of quadcopter and vessel in one world, 40 s")
     for pairs in (1, 2, 4):
         scenario = tmp_path / f"pairs{pairs}.json"
         scenario.write_text(json.dumps(with_pairs(pairs)))
-        calls = record(lambda scenario=scenario: cosim.load(scenario))
+        calls = record_calls(lambda scenario=scenario: cosim.load(scenario))
         contenders = {"PyBullet's calls alone": calls.replay}
-        contenders |= {label(executor): lambda s=scenario, e=executor: flown(s, e) for executor in executors()}
-        assert max(show(f"pairs: {pairs}", compare(contenders)).values()) < LARGEST_RATIO
+        contenders |= {executor_label(executor): lambda s=scenario, e=executor: flown(s, e) for executor in executors()}
+        assert max(print_rows(f"pairs: {pairs}", measure_rounds(contenders)).values()) < LARGEST_RATIO
 
 
 def with_pairs(count: int) -> dict[str, Any]:

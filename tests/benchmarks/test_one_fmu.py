@@ -6,10 +6,10 @@ Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_one_fmu.py
 from __future__ import annotations
 
 import pytest
-from importer import alone, cost, executors, label, ring
+from importer import cpu_per_step, executor_label, executors, ring_system, single_fmu_system
 from lag import lag_fmu
-from limit import Limit
-from measure import compare, heading, show
+from limit import CLimit
+from measure import measure_rounds, print_heading, print_rows
 
 STEPS = 100_000
 WIDTH = 1000
@@ -21,19 +21,19 @@ pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]
 @pytest.mark.parametrize("version", [2, 3], ids=["fmi2", "fmi3"])
 def test_one_fmu(version, tmp_path):
     fmu = lag_fmu(tmp_path, version)
-    limit = Limit(fmu, tmp_path)
+    limit = CLimit(fmu, tmp_path)
     contenders = {"C limit": lambda: limit(1, STEPS, ring=False)}
     for executor in executors():
-        contenders[label(executor)] = lambda e=executor: cost(alone(fmu), STEPS, ["s0.y1"], e)
-    heading(f"one FMI {version}.0 FMU, {STEPS} steps, one signal recorded")
-    assert max(show("one FMU", compare(contenders)).values()) < LARGEST_RATIO
+        contenders[executor_label(executor)] = lambda e=executor: cpu_per_step(single_fmu_system(fmu), STEPS, ["s0.y1"], e)
+    print_heading(f"one FMI {version}.0 FMU, {STEPS} steps, one signal recorded")
+    assert max(print_rows("one FMU", measure_rounds(contenders)).values()) < LARGEST_RATIO
 
 
 def test_wide_fmus(tmp_path):
     fmu = lag_fmu(tmp_path, width=WIDTH)
-    limit = Limit(fmu, tmp_path)
-    heading(f"ring of 2 FMUs, {WIDTH} connections from each to the other, one signal recorded")
+    limit = CLimit(fmu, tmp_path)
+    print_heading(f"ring of 2 FMUs, {WIDTH} connections from each to the other, one signal recorded")
     contenders = {"C limit": lambda: limit(2, 20_000, width=WIDTH)}
     for executor in executors():
-        contenders[label(executor)] = lambda e=executor: cost(ring(fmu, 2), 5_000, ["s0.y1"], e)
-    assert max(show(f"{WIDTH} inputs, outputs", compare(contenders)).values()) < LARGEST_RATIO
+        contenders[executor_label(executor)] = lambda e=executor: cpu_per_step(ring_system(fmu, 2), 5_000, ["s0.y1"], e)
+    assert max(print_rows(f"{WIDTH} inputs, outputs", measure_rounds(contenders)).values()) < LARGEST_RATIO

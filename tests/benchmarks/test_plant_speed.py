@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from measure import Row, compare, heading, show
+from measure import MedianCost, measure_rounds, print_heading, print_rows
 
 from cosim.core.component import Ports
-from cosim.engine.initialization import take_start_values
+from cosim.engine.initialization import copy_start_values
 from plant_src.physics.client import pybullet
 from plant_src.world import World
 
@@ -57,19 +57,20 @@ class Bound:
         ports = [self._ports(causality) for causality in ("input", "output")]
         self.world.bind(*ports)
         self.world.enter_initialization_mode(0.0, 1e6)
-        take_start_values(self.world, ports[0])
+        copy_start_values(self.world, ports[0])
         self.world.exit_initialization_mode()
         for name in vehicles:
             if name.startswith("uav"):
                 self.world.set(f"{name}.rotor_speed", [speed] * 4)
         self.clock = ctypes.c_double(0.0)
-        (self.call,) = self.world.turn(self.clock, STEP)
+        (self.call,) = self.world.prepare_step_calls(self.clock, STEP)
 
     def _ports(self, causality: str) -> Ports:
         variables = [variable for variable in self.world.variables if variable.causality == causality]
         dtypes = dict.fromkeys(variable.dtype for variable in variables)
         return Ports(
-            variables, {dtype: np.zeros(sum(len(v.slots) for v in variables if v.dtype == dtype), dtype) for dtype in dtypes}
+            variables,
+            {dtype: np.zeros(sum(len(v.scalar_names) for v in variables if v.dtype == dtype), dtype) for dtype in dtypes},
         )
 
     def run(self, steps: int) -> float:
@@ -102,7 +103,7 @@ def landed(bound: Bound) -> Callable[[], float]:
 
 
 def test_one_pair() -> None:
-    heading("one pair of quadcopter and vessel")
+    print_heading("one pair of quadcopter and vessel")
     six = {"motion": "6dof"}
     contenders = {
         "PyBullet alone, in flight": raw(1, FLYING),
@@ -113,8 +114,8 @@ def test_one_pair() -> None:
         "6 DOF in weather, in flight": flight(Bound(pairs(1, FLYING, **six), WEATHER, HOVER)),
         "6 DOF in weather, landed": landed(Bound(pairs(1, LANDED, **six), WEATHER)),
     }
-    rows = compare(contenders)
-    show("one pair", rows)
+    rows = measure_rounds(contenders)
+    print_rows("one pair", rows)
     for row in rows:
         if row.name in LIMITS:
             print(f"  {row.name}: {row.cost:.1f} us, at most {LIMITS[row.name]:g} us wanted on a machine of its own")
@@ -125,10 +126,10 @@ def test_one_pair() -> None:
 def raw(count: int, height: float) -> Callable[[], float]:
     """PyBullet alone with the same bodies: read every vehicle, push every vehicle, step, ask for contacts."""
     world = World("plant", pairs(count, height))
-    client, shadows = world._client, world._fleet.shadows
+    client, shadows = world._client, world._fleet.bodies
     pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP, physicsClientId=client)
     weight = 9.81 * 0.443892 if height == LANDED else 0.0
-    upwards = {shadow.body: weight if shadow.model.is_vessel else -weight for shadow in shadows}
+    upwards = {shadow.body_id: weight if shadow.model.is_vessel else -weight for shadow in shadows}
 
     def step() -> None:
         for body, force in upwards.items():
@@ -158,11 +159,11 @@ def many(count: int, height: float) -> Callable[[], float]:
 @pytest.mark.parametrize("height", [FLYING, LANDED], ids=["in flight", "landed"])
 def test_many_pairs(height: float) -> None:
     """Linear in the number of pairs."""
-    heading(f"N planar pairs, {'in flight' if height == FLYING else 'landed'}")
-    costs: dict[int, Row] = {}
+    print_heading(f"N planar pairs, {'in flight' if height == FLYING else 'landed'}")
+    costs: dict[int, MedianCost] = {}
     for count in PAIRS:
-        rows = compare({"PyBullet alone": raw(count, height), "plant": many(count, height)}, rounds=3)
-        show(f"pairs: {count}", rows)
+        rows = measure_rounds({"PyBullet alone": raw(count, height), "plant": many(count, height)}, rounds=3)
+        print_rows(f"pairs: {count}", rows)
         costs[count] = rows[1]
     per_pair = {count: row.cost / count for count, row in costs.items()}
     print("  us per pair: " + ", ".join(f"{count}: {cost:.1f}" for count, cost in per_pair.items()))
@@ -171,13 +172,13 @@ def test_many_pairs(height: float) -> None:
 
 def test_many_pairs_in_weather() -> None:
     """Six degrees of freedom, sea state 3, gusts."""
-    heading("N pairs in weather, in flight")
+    print_heading("N pairs in weather, in flight")
     per_pair = {}
     for count in (1, 4, 16, 64):
         bound = Bound(pairs(count, FLYING, motion="6dof"), WEATHER, HOVER)
         bound.run(20)
-        (row,) = compare({"plant": lambda b=bound, n=count: b.run(max(20, 400 // n))}, rounds=3)
-        show(f"pairs: {count}", [row])
+        (row,) = measure_rounds({"plant": lambda b=bound, n=count: b.run(max(20, 400 // n))}, rounds=3)
+        print_rows(f"pairs: {count}", [row])
         per_pair[count] = row.cost / count
     print("  us per pair: " + ", ".join(f"{count}: {cost:.1f}" for count, cost in per_pair.items()))
     assert per_pair[64] < 2 * per_pair[1]

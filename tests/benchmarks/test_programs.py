@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from bullet_calls import record
+from bullet_calls import record_calls
 from fmpy.validation import validate_fmu
-from importer import cost, executors, ring
+from importer import cpu_per_step, executors, ring_system
 from lag import lag_fmu
-from limit import Limit
+from limit import CLimit
 from peers import write_into
 
 import cosim
@@ -29,14 +29,14 @@ def test_the_lag_is_a_valid_fmu(version, width, tmp_path):
 def test_importer_and_limit_step_the_same_ring(version, tmp_path):
     """Both measurements contain a check that all values stay at 1 exactly."""
     fmu = lag_fmu(tmp_path, version, width=3)
-    assert Limit(fmu, tmp_path)(4, 100, width=3, recorded=12) > 0
+    assert CLimit(fmu, tmp_path)(4, 100, width=3, recorded=12) > 0
     for executor in executors():
-        assert cost(ring(fmu, 4), 100, [f"s{i}.y{j}" for i in range(4) for j in (1, 2, 3)], executor) > 0
+        assert cpu_per_step(ring_system(fmu, 4), 100, [f"s{i}.y{j}" for i in range(4) for j in (1, 2, 3)], executor) > 0
 
 
 def test_the_replayed_calls_of_a_mission_are_the_mission():
     """The replay contains a check that Bullet answers every call as it did in flight."""
-    calls = record(lambda: cosim.load("demo1_box", stop_time=2.0))
+    calls = record_calls(lambda: cosim.load("demo1_box", stop_time=2.0))
     assert calls.steps == 200
     assert {call.function.__name__ for call in calls.calls[calls.first : calls.last]} >= {"stepSimulation", "resetBaseVelocity"}
     assert calls.replay() > 0

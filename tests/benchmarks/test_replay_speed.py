@@ -7,7 +7,7 @@ import os
 from statistics import median
 
 import pytest
-from browser import ALL_OF_IT, browser
+from browser import SOFTWARE_RENDERING_FLAGS, open_browser
 
 import cosim
 from cosim.report.replay import write_replay
@@ -33,10 +33,10 @@ def page(tmp_path_factory):
     return file.as_uri()
 
 
-@pytest.mark.parametrize(("drawn", "flags"), [("3-D only", ()), ("all of the page", ALL_OF_IT)])
+@pytest.mark.parametrize(("drawn", "flags"), [("3-D only", ()), ("all of the page", SOFTWARE_RENDERING_FLAGS)])
 def test_frames_per_second(page, drawn, flags):
     print(f"\nreplay of Demo 1, {drawn} by SwiftShader, median of {ROUNDS} rounds, load average {os.getloadavg()[0]:.2f}")
-    with browser(flags) as opened:
+    with open_browser(flags) as opened:
         tab = opened.new_page(viewport=WINDOW)
         tab.goto(page)
         tab.wait_for_selector("#replay[data-ready]")

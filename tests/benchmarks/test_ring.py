@@ -6,10 +6,10 @@ Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_ring.py
 from __future__ import annotations
 
 import pytest
-from importer import cost, executors, label, ring
+from importer import cpu_per_step, executor_label, executors, ring_system
 from lag import lag_fmu
-from limit import Limit
-from measure import compare, heading, show
+from limit import CLimit
+from measure import measure_rounds, print_heading, print_rows
 
 SIZES = (2, 8, 32, 128, 1024)
 #: steps times FMUs
@@ -23,14 +23,16 @@ pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]
 @pytest.mark.parametrize("version", [2, 3], ids=["fmi2", "fmi3"])
 def test_ring(version, recorded, tmp_path):
     fmu = lag_fmu(tmp_path, version)
-    limit = Limit(fmu, tmp_path)
+    limit = CLimit(fmu, tmp_path)
     choices = executors()
-    heading(f"ring of FMI {version}.0 FMUs, {recorded} recorded")
+    print_heading(f"ring of FMI {version}.0 FMUs, {recorded} recorded")
     for size in SIZES:
         names = [f"s{i}.y1" for i in range(1 if recorded == "one signal" else size)]
         contenders = {"C limit": lambda size=size, names=names: limit(size, BUDGETS["native"] // size, recorded=len(names))}
         for executor in choices:
             steps = max(200, BUDGETS[executor] // size)
-            contenders[label(executor)] = lambda s=size, n=steps, r=names, e=executor: cost(ring(fmu, s), n, r, e)
-        ratios = show(f"ring {size}", compare(contenders))
+            contenders[executor_label(executor)] = lambda s=size, n=steps, r=names, e=executor: cpu_per_step(
+                ring_system(fmu, s), n, r, e
+            )
+        ratios = print_rows(f"ring {size}", measure_rounds(contenders))
         assert all(ratio < LARGEST_RATIO[name] for name, ratio in ratios.items())

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable
 
 import pytest
-from measure import compare, heading, show
+from measure import measure_rounds, print_heading, print_rows
 
 COMMANDS = {
     "python -c pass": ["-c", "pass"],
@@ -25,11 +25,11 @@ pytestmark = pytest.mark.benchmark
 
 
 def test_startup(tmp_path):
-    heading("whole processes", "CPU ms")
+    print_heading("whole processes", "CPU ms")
     contenders: dict[str, Callable[[], float]] = {
         name: lambda words=words: cpu_milliseconds([sys.executable, *words], tmp_path) for name, words in COMMANDS.items()
     }
-    ratios = show("process", compare(contenders))
+    ratios = print_rows("process", measure_rounds(contenders))
     assert all(ratios[name] < largest for name, largest in LARGEST_RATIO.items())
 
 

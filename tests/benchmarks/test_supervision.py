@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from measure import compare, heading, show
+from measure import measure_rounds, print_heading, print_rows
 
 pytestmark = pytest.mark.benchmark
 
@@ -17,10 +17,10 @@ def loop_milliseconds(isolation, folder):
 
 
 def test_supervision(tmp_path):
-    heading("stepping loop of Demo 1", "wall ms")
+    print_heading("stepping loop of Demo 1", "wall ms")
     contenders = {
         f"--isolation {isolation}": lambda isolation=isolation: loop_milliseconds(isolation, tmp_path / isolation)
         for isolation in ("none", "run")
     }
-    ratios = show("demo1_box", compare(contenders, rounds=9))
+    ratios = print_rows("demo1_box", measure_rounds(contenders, rounds=9))
     assert ratios["--isolation run"] < 1.2  # noise; the goal is 1.01

@@ -9,13 +9,13 @@ import pytest
 
 import cosim
 from cosim.components.fmi import FmuFile
-from cosim.engine.run_loop import simulation
+from cosim.engine.run_loop import simulating
 from cosim.results import Result
 from cosim.results.kpi import evaluate_kpis
-from cosim.scenario import assemble
-from cosim.scenario.nested_systems import find, load
-from cosim.studies.execution.job import Job, Order
-from cosim.studies.execution.local import LocalEngine
+from cosim.scenario import prepare
+from cosim.scenario.nested_systems import find_scenario, load_scenario
+from cosim.studies.execution.job import Job, StudyContext
+from cosim.studies.execution.local import LocalRunner
 
 pytestmark = pytest.mark.benchmark
 
@@ -48,7 +48,7 @@ def job(number):
 
 
 def prepared_files(scenario):
-    root = load(scenario).root
+    root = load_scenario(scenario).root
     paths = {node.folder / node.spec.components[name].fmu for node, name in root.leaves() if node.spec.components[name].fmu}
     files = {path.resolve(): FmuFile(path) for path in paths}
     for file in files.values():
@@ -58,8 +58,8 @@ def prepared_files(scenario):
 
 def bare(job, scenario, files):
     """A run in this process, of FMUs that are unpacked."""
-    assembly = assemble(scenario, job.settings, prepared={path: file.lent() for path, file in files.items()})
-    with simulation(assembly.system, assembly.settings) as run:
+    assembly = prepare(scenario, job.settings, loaded_fmus={path: file.lent() for path, file in files.items()})
+    with simulating(assembly.system, assembly.settings) as run:
         evaluate_kpis(Result(run.recording), assembly.kpis())
 
 
@@ -77,10 +77,10 @@ def milliseconds(work, *arguments):
 
 def test_overhead_of_a_run():
     """Runs in turns; the smallest times are those that met the least of what else the machine does."""
-    scenario = find("demo1_box")
+    scenario = find_scenario("demo1_box")
     files = prepared_files(scenario)
     times = {"bare, FMUs unpacked": [], "cosim.run": [], "a run of a sweep": []}
-    with LocalEngine(Order(scenario, scenario.parent, fmus=tuple(map(str, files))), 1) as engine:
+    with LocalRunner(StudyContext(scenario, scenario.parent, fmus=tuple(map(str, files))), 1) as engine:
         for number in range(RUNS):
             times["bare, FMUs unpacked"].append(milliseconds(bare, job(number), scenario, files))
             times["cosim.run"].append(milliseconds(cosim.run, scenario, job(number).settings))
@@ -94,11 +94,11 @@ def test_overhead_of_a_run():
 
 def wall(order, workers, busy, count=8):
     """Wall time (s) of runs of 1.2 s each."""
-    with LocalEngine(order, workers) as engine:
-        list(engine.results([Job("first", {"sleeper.number": -1.0, "/stop_time": 0.01})] * workers))
+    with LocalRunner(order, workers) as engine:
+        list(engine.run_jobs([Job("first", {"sleeper.number": -1.0, "/stop_time": 0.01})] * workers))
         began = perf_counter()
         made = [Job(str(number), {"sleeper.number": number, "sleeper.busy": busy}) for number in range(count)]
-        assert not any(record.failure for record in engine.results(made))
+        assert not any(record.failure for record in engine.run_jobs(made))
         return perf_counter() - began
 
 
@@ -109,7 +109,7 @@ def test_efficiency_of_two_workers(tmp_path, busy):
     (tmp_path / "sleeper.py").write_text(SLEEPER)
     content = {"name": "s", "stop_time": 1.0, "step_size": 0.01, "components": {"sleeper": {"python": "sleeper.py:Sleeper"}}}
     (tmp_path / "s.json").write_text(json.dumps(content))
-    order = Order(tmp_path / "s.json", tmp_path)
+    order = StudyContext(tmp_path / "s.json", tmp_path)
     found = sorted(wall(order, 1, busy) / (2 * wall(order, 2, busy)) for _ in range(3))
     print(
         f"\n  efficiency of two workers, {'computing' if busy else 'waiting'}: {found[1]:.3f} ({found[0]:.3f} ... {found[2]:.3f})"

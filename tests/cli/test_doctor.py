@@ -11,7 +11,7 @@ from importlib import metadata
 
 import pytest
 
-from cosim.engine import available as native_available
+from cosim.engine import native_available as native_available
 
 METADATA = """Metadata-Version: 2.1
 Name: fmi-cosim

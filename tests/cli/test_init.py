@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from cosim import __version__
-from cosim.cli.commands.init import origin, requirement
+from cosim.cli.commands.init import pip_origin, pip_requirement
 
 
 def run(*command, cwd):
@@ -86,14 +86,14 @@ def test_a_run_leaves_the_figure_and_the_replay_that_the_readme_promises(project
 )
 def test_the_requirements_name_where_pip_got_this_cosim_from(source, line):
     """On no index is a package of this name, so that its version alone could not be installed."""
-    assert requirement(source) == line
+    assert pip_requirement(source) == line
 
 
 def test_the_requirements_are_installed_first_and_the_name_stands_in_the_readme(made, project):
     commands = [line.strip() for line in made.stdout.partition("Next:\n")[2].splitlines()]
     assert commands[1] == "pip install -r requirements.txt" and commands[-1] == "python -m pytest"
     named = [line for line in (project / "requirements.txt").read_text().splitlines() if not line.startswith("#")]
-    assert named == [requirement(origin()), "pytest"]
+    assert named == [pip_requirement(pip_origin()), "pytest"]
     assert (project / "README.md").read_text().startswith("# my controllers\n")
 
 

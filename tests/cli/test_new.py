@@ -17,7 +17,7 @@ import pytest
 
 from cosim.cli import main
 from cosim.core import resources
-from cosim.report.scene import scene_of
+from cosim.report.scene import build_scene
 from cosim.results import Result
 
 MADE = {
@@ -126,7 +126,7 @@ def test_the_folder_can_be_given_to_somebody_else(tmp_path):
 def test_a_run_leaves_a_figure_and_a_replay(sailed):
     runs = sailed("python") / "runs/my_keeper"
     assert (runs / "course.png").is_file()
-    assert scene_of(json.loads((runs / "run.json").read_text()))["bodies"][0]["name"] == "vessel"
+    assert build_scene(json.loads((runs / "run.json").read_text()))["bodies"][0]["name"] == "vessel"
     done = cosim("replay", runs, cwd=sailed("python"))
     assert (done.returncode, done.stderr) == (0, "")
 

@@ -6,7 +6,7 @@ import sys
 import time
 
 import pytest
-from busy import busy_fmu
+from busy import slow_fmu
 
 from cosim.results import Result
 
@@ -37,7 +37,7 @@ def test_the_factor_may_be_left_out(tmp_path, probes):
 
 
 def test_a_run_that_must_not_be_late_ends_with_what_it_has(tmp_path):
-    slow = busy_fmu(tmp_path, "slow", 0.05, True)
+    slow = slow_fmu(tmp_path, "slow", 0.05, True)
     code, _, err = cosim_run(tmp_path, [slow], "--real-time", "--late", "fail")
     assert code == 1
     assert "too slow for 1 times real time: t = 0.01 s was reached 0.0" in err
@@ -46,7 +46,7 @@ def test_a_run_that_must_not_be_late_ends_with_what_it_has(tmp_path):
 
 def test_a_crash_on_a_thread_names_the_suspects(tmp_path):
     """On one thread the culprit itself is named, which is how to find it."""
-    fmus = [busy_fmu(tmp_path, "good", 2e-4, True), busy_fmu(tmp_path, "bad", 2e-4, True, "FATAL_TIME=0.105")]
+    fmus = [slow_fmu(tmp_path, "good", 2e-4, True), slow_fmu(tmp_path, "bad", 2e-4, True, "FATAL_TIME=0.105")]
     code, _, err = cosim_run(tmp_path, fmus, parallel=True)
     assert code == 1
     assert "one of c0, c1: a step side by side failed at t = 0.11 s: the process was ended by signal 6 (SIGABRT" in err

@@ -7,7 +7,7 @@ from zipfile import ZipFile
 
 import pytest
 
-from cosim.components.fmi.preflight.validation import validate as examine
+from cosim.components.fmi.preflight.validation import validate_fmu as examine
 from cosim.core import resources
 
 FMUS = sorted(resources.root().glob("fmus/**/*.fmu"))

@@ -5,7 +5,7 @@ from collections import deque
 
 import numpy as np
 
-from cosim.components.object_state import remember
+from cosim.components.object_state import snapshot
 
 
 class Filter:
@@ -39,7 +39,7 @@ class Controller:
 def test_what_was_computed_once_is_computed_again():
     controller = Controller()
     controller.step(0.3)
-    restore = remember(controller)
+    restore = snapshot(controller)
     first = [controller.step(u) for u in (1.0, 2.0, 4.0)]
     for _ in range(2):
         controller.forget_names()
@@ -53,7 +53,7 @@ def test_what_was_computed_once_is_computed_again():
 def test_parts_stay_the_objects_that_others_know():
     controller = Controller()
     inner, weights, gains = controller.filter, controller.weights, controller.table["gains"]
-    restore = remember(controller)
+    restore = snapshot(controller)
     controller.filter, controller.weights, controller.table = Filter(), np.zeros(2), {}
     inner(5.0)
     gains.clear()
@@ -66,7 +66,7 @@ def test_parts_stay_the_objects_that_others_know():
 
 def test_what_is_left_out_stays():
     controller = Controller()
-    restore = remember(controller, {"last"})
+    restore = snapshot(controller, {"last"})
     controller.step(3.0)
     restore()
     assert controller.last == 3.0

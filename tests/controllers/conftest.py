@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from controller_fmu import Controller
+from controller_fmu import ControllerFmu
 from fmpy import extract
 
 ROOT = Path(__file__).parents[2]
@@ -26,12 +26,12 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], str]:
 
 
 @pytest.fixture
-def controller(unpacked: Callable[[str], str]) -> Iterator[Callable[..., Controller]]:
+def controller(unpacked: Callable[[str], str]) -> Iterator[Callable[..., ControllerFmu]]:
     """`controller(NAME, parameters)` is an initialized instance of `fmus/NAME.fmu`."""
-    instances: list[Controller] = []
+    instances: list[ControllerFmu] = []
 
-    def instantiate(name: str, parameters: Mapping[str, Any] | None = None) -> Controller:
-        instances.append(Controller(unpacked(name), parameters or {}))
+    def instantiate(name: str, parameters: Mapping[str, Any] | None = None) -> ControllerFmu:
+        instances.append(ControllerFmu(unpacked(name), parameters or {}))
         return instances[-1]
 
     yield instantiate

@@ -9,10 +9,10 @@ from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 
 PERIOD = 0.01
-PYTHON = {"Real": float, "Integer": int, "Enumeration": int, "Boolean": bool}
+PYTHON_TYPES = {"Real": float, "Integer": int, "Enumeration": int, "Boolean": bool}
 
 
-class Controller:
+class ControllerFmu:
     """The FMU unpacked to `folder`: `step` runs the tick at the present time on the given inputs and returns all outputs."""
 
     def __init__(self, folder: str, parameters: Mapping[str, Any]):
@@ -38,10 +38,10 @@ class Controller:
             if isinstance(value, list):
                 self.set({f"{name}[{i}]": v for i, v in enumerate(value, 1)})
             else:
-                self._call("set", self.variables[name], [PYTHON[self.variables[name].type](value)])
+                self._call("set", self.variables[name], [PYTHON_TYPES[self.variables[name].type](value)])
 
     def get(self, name: str) -> Any:
-        return PYTHON[self.variables[name].type](self._call("get", self.variables[name])[0])
+        return PYTHON_TYPES[self.variables[name].type](self._call("get", self.variables[name])[0])
 
     def step(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
         self.set(inputs)

@@ -52,7 +52,7 @@ class Pid:
         return y
 
 
-class Position:
+class PositionReference:
     """Errors are rotated into the heading frame (forward, left); tilt commands in degrees inside, rad outside."""
 
     def __init__(self, p: dict[str, float]):
@@ -77,7 +77,7 @@ class Position:
         return {"pitch_command": math.radians(forward), "roll_command": -math.radians(left)}
 
 
-class Altitude:
+class AltitudeReference:
     """The integral starts at the throttle that carries the weight: 4 CT omega^2 = m g."""
 
     def __init__(self, p: dict[str, float]):
@@ -89,7 +89,7 @@ class Altitude:
         return {"throttle": self.pid(i["altitude_reference"] - i["vehicle.position.z"], reset=i["reset"])}
 
 
-class Attitude:
+class AttitudeReference:
     """All three loops work in degrees; the yaw error is taken the short way round."""
 
     def __init__(self, p: dict[str, float]):
@@ -108,7 +108,7 @@ class Attitude:
         }
 
 
-def mix(i: dict[str, float]) -> dict[str, float]:
+def mix_rotor_speeds(i: dict[str, float]) -> dict[str, float]:
     """Rotors 1 front, 2 left, 3 rear, 4 right; throttle 0..100 % is 0..5000 rpm."""
     common, roll, pitch, yaw = (i[k] for k in ("throttle", "roll_difference", "pitch_difference", "yaw_difference"))
     rotors = (common - pitch + yaw, common + roll - yaw, common + pitch + yaw, common - roll - yaw)
@@ -149,7 +149,7 @@ class Guidance:
         }
 
 
-class Speed:
+class SpeedReference:
     """Proportional thrust."""
 
     def __init__(self, p: dict[str, float]):
@@ -159,7 +159,7 @@ class Speed:
         return {"thrust": self.pid(i["speed_reference"] - i["vehicle.velocity_body.u"])}
 
 
-class Heading:
+class HeadingReference:
     """PD rudder on heading minus reference, the short way round."""
 
     def __init__(self, p: dict[str, float]):
@@ -174,7 +174,7 @@ class Autopilot:
     """Guidance, then both loops on its references."""
 
     def __init__(self, p: dict[str, Any]):
-        self.guidance, self.loops = Guidance(p), (Speed(p), Heading(p))
+        self.guidance, self.loops = Guidance(p), (SpeedReference(p), HeadingReference(p))
 
     def __call__(self, i: dict[str, Any]) -> dict[str, Any]:
         references = self.guidance(i)
@@ -184,7 +184,7 @@ class Autopilot:
         return outputs
 
 
-def slew(value: float, destination: float, rate: float) -> float:
+def rate_limited(value: float, destination: float, rate: float) -> float:
     return value + clamp(destination - value, -rate * T, rate * T)
 
 
@@ -249,7 +249,7 @@ class Vtol:
             destination = down + self.p["approach_height"]
         elif self.mode == "descend":
             destination, rate = down - self.p["press_depth"], self.p["descent_rate"] * (self.error <= self.p["landing_error"])
-        self.altitude = self.position[2] if self.share < 1 else slew(self.altitude, destination, rate)
+        self.altitude = self.position[2] if self.share < 1 else rate_limited(self.altitude, destination, rate)
         speed = [i[f"target.velocity.{a}"] if self.p["velocity_feed_forward"] and not going_up else 0.0 for a in "xy"]
         return {
             "position_reference.x": self.home[0] if going_up else deck[0],

@@ -96,13 +96,13 @@ INPUTS: dict[str, dict[str, float | tuple[float, float]]] = {
     },
 }
 REFERENCES: dict[str, Callable[..., Any]] = {
-    "position_controller": fact_sheet.Position,
-    "altitude_controller": fact_sheet.Altitude,
-    "attitude_controller": fact_sheet.Attitude,
-    "mixer": lambda parameters: fact_sheet.mix,
+    "position_controller": fact_sheet.PositionReference,
+    "altitude_controller": fact_sheet.AltitudeReference,
+    "attitude_controller": fact_sheet.AttitudeReference,
+    "mixer": lambda parameters: fact_sheet.mix_rotor_speeds,
     "waypoint_guidance": fact_sheet.Guidance,
-    "speed_controller": fact_sheet.Speed,
-    "heading_controller": fact_sheet.Heading,
+    "speed_controller": fact_sheet.SpeedReference,
+    "heading_controller": fact_sheet.HeadingReference,
     "strider_autopilot": fact_sheet.Autopilot,
 }
 RESETTABLE = {"position_controller", "altitude_controller", "attitude_controller"}

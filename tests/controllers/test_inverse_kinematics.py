@@ -9,12 +9,12 @@ from typing import Any
 import fact_sheet
 import numpy as np
 import pytest
-from controller_fmu import Controller
+from controller_fmu import ControllerFmu
 from scipy.signal import butter, sosfilt, sosfilt_zi
 from scipy.spatial.transform import Rotation
 
 import cosim
-from cosim.api import checks, execute
+from cosim.api import evaluate_scenario_checks, execute
 from cosim.core import resources
 from cosim.results import Result
 
@@ -72,7 +72,7 @@ def random_ticks(rng: np.random.Generator, count: int = 600) -> list[dict[str, f
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_it_computes_what_the_paper_says(controller: Callable[..., Controller], seed: int) -> None:
+def test_it_computes_what_the_paper_says(controller: Callable[..., ControllerFmu], seed: int) -> None:
     rng = np.random.default_rng(seed)
     gains = {name: value * float(rng.uniform(0.7, 1.3)) if seed else value for name, value in GAINS.items()}
     fmu, reference = controller("inverse_kinematics", gains), Reference(gains)
@@ -82,12 +82,12 @@ def test_it_computes_what_the_paper_says(controller: Callable[..., Controller], 
             assert found[name] == pytest.approx(value, rel=1e-9, abs=1e-9), f"{name} at tick {k}"
 
 
-def test_shipped_gains_are_those_of_the_fact_sheet(controller: Callable[..., Controller]) -> None:
+def test_shipped_gains_are_those_of_the_fact_sheet(controller: Callable[..., ControllerFmu]) -> None:
     fmu = controller("inverse_kinematics")
     assert {name: fmu.get(name) for name in GAINS} == GAINS
 
 
-def test_it_starts_at_hover(controller: Callable[..., Controller]) -> None:
+def test_it_starts_at_hover(controller: Callable[..., ControllerFmu]) -> None:
     fmu = controller("inverse_kinematics")
     for _ in range(50):
         found = fmu.step({"altitude_command": 2.0, "vehicle.position.z": 2.0})
@@ -96,7 +96,7 @@ def test_it_starts_at_hover(controller: Callable[..., Controller]) -> None:
         assert (found["roll_command"], found["pitch_command"]) == (0.0, 0.0)
 
 
-def test_reset_goes_back_to_the_start(controller: Callable[..., Controller]) -> None:
+def test_reset_goes_back_to_the_start(controller: Callable[..., ControllerFmu]) -> None:
     command = {"acceleration_command.x": 1.0, "altitude_command": 3.0, "vehicle.position.z": 2.0}
     fmu, fresh = controller("inverse_kinematics"), controller("inverse_kinematics")
     for _ in range(30):
@@ -113,7 +113,7 @@ def test_reset_goes_back_to_the_start(controller: Callable[..., Controller]) -> 
     [(0.0, "x", "pitch", 1), (0.0, "y", "roll", -1), (math.pi / 2, "x", "roll", 1), (math.pi / 2, "y", "pitch", 1)],
 )
 def test_it_tilts_towards_the_acceleration_in_the_world(
-    controller: Callable[..., Controller], yaw: float, axis: str, tilted: str, sign: int
+    controller: Callable[..., ControllerFmu], yaw: float, axis: str, tilted: str, sign: int
 ) -> None:
     still = {"altitude_command": 2.0, "vehicle.position.z": 2.0, "yaw_command": yaw}
     found = controller("inverse_kinematics").step({**still, f"acceleration_command.{axis}": 1.0})
@@ -139,7 +139,7 @@ def test_the_profiles_are_their_closed_forms() -> None:
 def demo() -> Result:
     assembly = cosim.load("demo3_inverse_kinematics")
     result = execute(assembly)
-    outcomes = checks(assembly, result)
+    outcomes = evaluate_scenario_checks(assembly, result)
     assert len(outcomes) == 4
     assert [outcome.check["kpi"] for outcome in outcomes if not outcome.passed] == []
     return result

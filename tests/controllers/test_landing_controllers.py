@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from helpers import wire
+from helpers import connection
 
 import cosim
 from cosim.core import resources
@@ -44,7 +44,7 @@ def hover_above_the_deck(folder, controller, unread=()):
                 "parameters": {"vtol.landing_time": 10.0, "vtol.landing_error": 0.0},
             },
         },
-        "connections": [wire("plant", "uav.vehicle"), wire("uav.rotor_speed", "plant.rotor_speed")],
+        "connections": [connection("plant", "uav.vehicle"), connection("uav.rotor_speed", "plant.rotor_speed")],
         "inputs": [{"file": "deck.csv", "to": {name: to for name, to in motion.items() if name not in unread}}],
         "algorithm": {"stages": [["uav"], ["plant"]]},
     }

@@ -6,7 +6,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
-from controller_fmu import Controller
+from controller_fmu import ControllerFmu
 from fmpy import extract
 
 from cosim.core.errors import InputError
@@ -48,7 +48,7 @@ def test_modules_of_the_same_name_do_not_meet(tmp_path: Path) -> None:
     for number in (1.0, 2.0):
         folder = tmp_path / str(number)
         fmu = write_python_fmu(oracle(folder, number), folder / "oracle.fmu")
-        instances.append(Controller(str(extract(str(fmu), str(folder / "unpacked"))), {}))
+        instances.append(ControllerFmu(str(extract(str(fmu), str(folder / "unpacked"))), {}))
     assert [instance.step({})["y"] for instance in instances] == [1.5, 2.5]
     assert [instance.step({})["y"] for instance in instances] == [1.5, 2.5]
     for instance in instances:

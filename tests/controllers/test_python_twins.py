@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from controller_fmu import PERIOD, Controller
+from controller_fmu import PERIOD, ControllerFmu
 from fmpy import extract
 
 import cosim
@@ -69,8 +69,8 @@ class InProcess:
         return {name: self.component.get(name) for name in self.outputs}
 
 
-def exported(name: str, parameters: dict[str, Any], folder: Path) -> Controller:
-    return Controller(str(extract(str(ROOT / f"fmus/python/{name}.fmu"), str(folder / name))), parameters)
+def exported(name: str, parameters: dict[str, Any], folder: Path) -> ControllerFmu:
+    return ControllerFmu(str(extract(str(ROOT / f"fmus/python/{name}.fmu"), str(folder / name))), parameters)
 
 
 def random_parameters(variables: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
@@ -95,7 +95,7 @@ def random_inputs(variables: dict[str, Any], rng: np.random.Generator) -> list[d
     return ticks
 
 
-def test_random_inputs_pass_through_all_flight_modes(controller: Callable[..., Controller]) -> None:
+def test_random_inputs_pass_through_all_flight_modes(controller: Callable[..., ControllerFmu]) -> None:
     rng = np.random.default_rng(1)
     vtol = controller("vtol", random_parameters(controller("vtol").variables, rng))
     flown = [vtol.step(inputs) for inputs in random_inputs(vtol.variables, rng)]
@@ -111,7 +111,7 @@ def assert_same(name: str, found: dict[str, Any], expected: dict[str, Any], tick
 
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("name", TWINS)
-def test_in_process_is_as_in_modelica(controller: Callable[..., Controller], name: str, seed: int) -> None:
+def test_in_process_is_as_in_modelica(controller: Callable[..., ControllerFmu], name: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     parameters = random_parameters(controller(name).variables, rng)
     modelica, python = controller(name, parameters), InProcess(name, parameters)
@@ -120,7 +120,7 @@ def test_in_process_is_as_in_modelica(controller: Callable[..., Controller], nam
 
 
 @pytest.mark.parametrize("name", TWINS)
-def test_exported_is_as_in_modelica(controller: Callable[..., Controller], tmp_path: Path, name: str) -> None:
+def test_exported_is_as_in_modelica(controller: Callable[..., ControllerFmu], tmp_path: Path, name: str) -> None:
     rng = np.random.default_rng(3)
     parameters = random_parameters(controller(name).variables, rng)
     modelica, python = controller(name, parameters), exported(name, parameters, tmp_path)
@@ -130,8 +130,8 @@ def test_exported_is_as_in_modelica(controller: Callable[..., Controller], tmp_p
 
 
 @pytest.mark.parametrize("name", TWINS)
-def test_interfaces_are_the_same(controller: Callable[..., Controller], tmp_path: Path, name: str) -> None:
-    def interface(instance: Controller) -> dict[str, tuple[Any, ...]]:
+def test_interfaces_are_the_same(controller: Callable[..., ControllerFmu], tmp_path: Path, name: str) -> None:
+    def interface(instance: ControllerFmu) -> dict[str, tuple[Any, ...]]:
         shown = (v for v in instance.variables.values() if v.causality != "local")
         return {v.name: (kind(v.type), v.causality, v.variability, v.unit, start(v)) for v in shown}
 

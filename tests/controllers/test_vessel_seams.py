@@ -131,7 +131,7 @@ def test_a_foreign_heading_controller_flies_demo1(tmp_path: Path) -> None:
     system = with_block(tmp_path, "heading", {"python": str(tmp_path / "own.py:RateDamped")})
     assembly = cosim.load("demo1_box", nested("demo1_box", system))
     result = cosim.api.execute(assembly)
-    assert all(outcome.passed for outcome in cosim.api.checks(assembly, result))
+    assert all(outcome.passed for outcome in cosim.api.evaluate_scenario_checks(assembly, result))
     assert not np.array_equal(result["usv.rudder_angle"], cosim.run("demo1_box")["usv.rudder_angle"])
 
 

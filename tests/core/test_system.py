@@ -1,12 +1,12 @@
-from fakes import Fake, gain, inputs, outputs
-from helpers import system
+from fakes import FakeComponent, gain, inputs, outputs
+from helpers import make_system
 
 from cosim.core.component import Variable
-from cosim.core.units import parse
+from cosim.core.units import parse_unit
 
 
 def typed(causality, kind, **more):
-    return Fake([Variable("v", kind, causality, **more)], lambda values, t, h: None)
+    return FakeComponent([Variable("v", kind, causality, **more)], lambda values, t, h: None)
 
 
 def texts(built):
@@ -14,12 +14,12 @@ def texts(built):
 
 
 def test_a_sound_system_has_no_problems():
-    assert texts(system({"a": gain(), "b": gain()}, "a.y > b.u, b.y > a.u")) == []
+    assert texts(make_system({"a": gain(), "b": gain()}, "a.y > b.u, b.y > a.u")) == []
 
 
 def test_all_problems_are_found_at_once():
     components = {"a": gain(), "b": gain(), "c": gain()}
-    built = system(components, "a.y > b.u, c.y > b.u, a.z > c.u, a.u > c.u, a.y > d.u", stages=[("a", "e"), ("b",)])
+    built = make_system(components, "a.y > b.u, c.y > b.u, a.z > c.u, a.u > c.u, a.y > d.u", stages=[("a", "e"), ("b",)])
     assert texts(built) == [
         'unknown component "e"; valid: a, b, c',
         'component "c" is in no stage, so it would never step',
@@ -31,31 +31,31 @@ def test_all_problems_are_found_at_once():
 
 
 def test_an_output_is_no_target():
-    assert texts(system({"a": gain(), "b": gain()}, "a.y > b.y")) == ["b.y is of causality output, expected an input"]
+    assert texts(make_system({"a": gain(), "b": gain()}, "a.y > b.y")) == ["b.y is of causality output, expected an input"]
 
 
 def test_a_component_steps_once():
-    built = system({"a": gain()}, stages=[("a",), ("a",)])
+    built = make_system({"a": gain()}, stages=[("a",), ("a",)])
     assert texts(built) == ['component "a" stands in the stages twice']
 
 
 def test_different_quantities_are_not_connected():
-    a = Fake(outputs("y", unit=parse("m")), lambda values, t, h: None)
-    b = Fake(inputs("u", unit=parse("rad")), lambda values, t, h: None)
-    (text,) = texts(system({"a": a, "b": b}, "a.y > b.u"))
+    a = FakeComponent(outputs("y", unit=parse_unit("m")), lambda values, t, h: None)
+    b = FakeComponent(inputs("u", unit=parse_unit("rad")), lambda values, t, h: None)
+    (text,) = texts(make_system({"a": a, "b": b}, "a.y > b.u"))
     assert text == 'a.y cannot feed b.u: units "m" and "rad" measure different quantities'
 
 
 def test_types_that_would_lose_something_are_not_connected():
     for source, target in [("Float64", "Int32"), ("Int64", "Int32"), ("Boolean", "Float64"), ("String", "Float64")]:
-        built = system({"a": typed("output", source), "b": typed("input", target)}, "a.v > b.v")
+        built = make_system({"a": typed("output", source), "b": typed("input", target)}, "a.v > b.v")
         assert texts(built) == [f"a.v cannot feed b.v: type {source} does not become {target}"]
 
 
 def test_types_that_lose_nothing_are_connected():
     for source, target in [("Int32", "Float64"), ("Float32", "Float64"), ("Int32", "Int64"), ("Enumeration", "Int64")]:
-        assert texts(system({"a": typed("output", source), "b": typed("input", target)}, "a.v > b.v")) == []
+        assert texts(make_system({"a": typed("output", source), "b": typed("input", target)}, "a.v > b.v")) == []
 
 
 def test_arrays_have_a_slot_for_each_element():
-    assert Variable("m", shape=(2, 2)).slots == ("m[1,1]", "m[1,2]", "m[2,1]", "m[2,2]")
+    assert Variable("m", shape=(2, 2)).scalar_names == ("m[1,1]", "m[1,2]", "m[2,1]", "m[2,2]")

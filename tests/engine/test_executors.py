@@ -6,23 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fakes import Fake
-from helpers import end
+from fakes import FakeComponent
+from helpers import endpoint
 
-from cosim.components.fmi import FmuFile, Isolation, instantiate
+from cosim.components.fmi import FmuFile, Isolation, create_component
 from cosim.core.component import DTYPES, Variable
 from cosim.core.errors import ComponentError
 from cosim.core.system import Connection, Endpoint, Group, System, incompatibility
-from cosim.core.time_grid import exact
-from cosim.core.units import parse
-from cosim.engine import EXECUTORS, available
-from cosim.engine.parallel import Crew
+from cosim.core.time_grid import exact_fraction
+from cosim.core.units import parse_unit
+from cosim.engine import EXECUTORS, native_available
+from cosim.engine.parallel import ThreadPool
 from cosim.engine.run_loop import Settings, simulate
 
-pytestmark = pytest.mark.skipif(not available(), reason="the native executor was not built")
+pytestmark = pytest.mark.skipif(not native_available(), reason="the native executor was not built")
 
 NUMBERS = [name for name in DTYPES if name not in ("String", "Binary", "Clock")]
-UNITS = {"rad": parse("rad"), "deg": parse("deg")}
+UNITS = {"rad": parse_unit("rad"), "deg": parse_unit("deg")}
 
 
 def machine(seed):
@@ -39,7 +39,7 @@ def machine(seed):
             values[f"y_{name}"] = _mixed(name, values[f"u_{name}"], draw)
         values["y_String"] = values["u_String"][-6:] + draw.choice("abc")
 
-    return Fake(variables, step)
+    return FakeComponent(variables, step)
 
 
 def _mixed(name, value, draw):
@@ -59,11 +59,11 @@ def random_system(seed, extra=()):
     components = {f"m{i}": machine(100 * seed + i) for i in range(5)} | dict(extra)
     ends = {
         causality: [
-            Endpoint(n, s) for n, c in components.items() for v in c.variables if v.causality == causality for s in v.slots
+            Endpoint(n, s) for n, c in components.items() for v in c.variables if v.causality == causality for s in v.scalar_names
         ]
         for causality in ("input", "output")
     }
-    places = System(components).place
+    places = System(components).find_element
     connections = []
     for target in ends["input"]:
         sources = [e for e in ends["output"] if not incompatibility(places(e).variable, places(target).variable)]
@@ -71,7 +71,7 @@ def random_system(seed, extra=()):
             connections.append(Connection(draw.choice(sources), target, draw.choice([0, 0, 0, 1, 3])))
     names = draw.sample(list(components), len(components))
     stages = ((names[0], Group("g", ((names[1],), (names[2], names[3])))), tuple(names[4:]))
-    periods = {names[1]: exact(0.02), names[4]: exact(0.05)}
+    periods = {names[1]: exact_fraction(0.02), names[4]: exact_fraction(0.05)}
     return System(components, connections, stages, periods), [str(e) for e in ends["output"]]
 
 
@@ -85,7 +85,14 @@ def bits(recording):
 def recorded(kind, build, share=1.0, interval="1/100"):
     system, outputs = build()
     chosen = outputs[: max(1, int(share * len(outputs)))]
-    settings = Settings(exact(0), exact(1), exact(0.01), {n: end(n) for n in chosen}, exact(interval), executor=kind)
+    settings = Settings(
+        exact_fraction(0),
+        exact_fraction(1),
+        exact_fraction(0.01),
+        {n: endpoint(n) for n in chosen},
+        exact_fraction(interval),
+        executor=kind,
+    )
     outcome = simulate(system, settings)
     assert outcome.failure is None, outcome.failure
     return bits(outcome.recording)
@@ -102,7 +109,7 @@ def test_random_systems(seed, share, interval):
 def test_random_systems_with_foreign_fmus_of_all_types(seed, probes):
     def build(isolation=None):
         files = [FmuFile(path) for path in probes.values()] * 2
-        fmus = {f"f{i}": instantiate(file, f"f{i}", isolation=isolation) for i, file in enumerate(files)}
+        fmus = {f"f{i}": create_component(file, f"f{i}", isolation=isolation) for i, file in enumerate(files)}
         return random_system(seed, fmus)
 
     def build_apart():
@@ -118,11 +125,11 @@ def test_random_systems_with_foreign_fmus_of_all_types(seed, probes):
 @pytest.mark.parametrize("seed", range(4))
 def test_random_systems_with_fmus_on_threads(seed, kind, probes, monkeypatch):
     crews = []
-    monkeypatch.setattr("cosim.engine.executor.Crew", lambda *arguments: crews.append(Crew(*arguments)) or crews[-1])
+    monkeypatch.setattr("cosim.engine.executor.Crew", lambda *arguments: crews.append(ThreadPool(*arguments)) or crews[-1])
 
     def build(parallel):
         files = [FmuFile(path) for path in probes.values()]
-        built, outputs = random_system(seed, {f"f{i}": instantiate(file, f"f{i}") for i, file in enumerate(3 * files)})
+        built, outputs = random_system(seed, {f"f{i}": create_component(file, f"f{i}") for i, file in enumerate(3 * files)})
         return replace(built, parallel=parallel), outputs
 
     assert recorded(kind, lambda: build(True)) == recorded(kind, lambda: build(False))
@@ -139,12 +146,15 @@ def test_a_value_that_is_not_finite_is_blamed_on_its_source(kind):
             raise ComponentError("b", "do_step", "cannot digest this", t)
 
     def built(*stages):
-        a = Fake([Variable("y", causality="output")], step)
-        b = Fake([Variable("u", causality="input", start=0.0)], consume)
-        return System({"a": a, "b": b}, [Connection(end("a.y"), end("b.u"))], stages)
+        a = FakeComponent([Variable("y", causality="output")], step)
+        b = FakeComponent([Variable("u", causality="input", start=0.0)], consume)
+        return System({"a": a, "b": b}, [Connection(endpoint("a.y"), endpoint("b.u"))], stages)
 
     for stages in ([("a", "b")], [("a",), ("b",)]):
-        outcome = simulate(built(*stages), Settings(exact(0), exact(1), exact(0.01), {"a.y": end("a.y")}, executor=kind))
+        outcome = simulate(
+            built(*stages),
+            Settings(exact_fraction(0), exact_fraction(1), exact_fraction(0.01), {"a.y": endpoint("a.y")}, executor=kind),
+        )
         assert str(outcome.failure) == 'a: do_step failed at t = 0.05 s: the output "y" is nan, and b.u reads it'
         assert len(outcome.recording.time) == 6
 
@@ -158,12 +168,12 @@ def test_the_largest_floats_are_finite_and_the_next_ones_are_not(kind, copies, t
             values.update(dict.fromkeys(values, -float(largest)) | {f"y{copies - 1}": last if t > 0.045 else 0.0})
 
         names = [f"y{i}" for i in range(copies)]
-        a = Fake([Variable(name, type_, "output") for name in names], step)
-        b = Fake([Variable(name, type_, "input", start=0.0) for name in names], lambda values, t, h: None)
+        a = FakeComponent([Variable(name, type_, "output") for name in names], step)
+        b = FakeComponent([Variable(name, type_, "input", start=0.0) for name in names], lambda values, t, h: None)
         wires = [Connection(Endpoint("a", name), Endpoint("b", name)) for name in names]
         return System({"a": a, "b": b}, wires, [("a", "b")])
 
-    settings = Settings(exact(0), exact(0.1), exact(0.01), executor=kind)
+    settings = Settings(exact_fraction(0), exact_fraction(0.1), exact_fraction(0.01), executor=kind)
     assert simulate(built(float(largest)), settings).failure is None
     for last in (float("inf"), -float("inf"), float("nan")):
         y = f"y{copies - 1}"
@@ -173,8 +183,11 @@ def test_the_largest_floats_are_finite_and_the_next_ones_are_not(kind, copies, t
 
 @pytest.mark.parametrize("kind", EXECUTORS)
 def test_values_that_nobody_reads_may_be_anything(kind):
-    source = Fake([Variable("y", causality="output")], lambda v, t, h: v.update(y=float("inf")))
-    outcome = simulate(System({"a": source}, (), (("a",),)), Settings(exact(0), exact(1), exact(0.1), {"a.y": end("a.y")}))
+    source = FakeComponent([Variable("y", causality="output")], lambda v, t, h: v.update(y=float("inf")))
+    outcome = simulate(
+        System({"a": source}, (), (("a",),)),
+        Settings(exact_fraction(0), exact_fraction(1), exact_fraction(0.1), {"a.y": endpoint("a.y")}),
+    )
     assert outcome.failure is None
     assert np.isinf(outcome.recording.columns["a.y"][1:]).all()
 
@@ -183,6 +196,9 @@ def test_values_that_nobody_reads_may_be_anything(kind):
 def test_many_rows_do_not_fit_into_one_chunk(kind, monkeypatch):
     monkeypatch.setattr("cosim.process.run_files.row_store.CHUNK", 1000)
     monkeypatch.setattr("cosim.process.run_files.row_store.LARGE", 0)
-    count = Fake([Variable("y", causality="output")], lambda v, t, h: v.update(y=v["y"] + 1), start={"y": 0.0})
-    outcome = simulate(System({"a": count}, (), (("a",),)), Settings(exact(0), exact(10000), exact(1), {"a.y": end("a.y")}))
+    count = FakeComponent([Variable("y", causality="output")], lambda v, t, h: v.update(y=v["y"] + 1), start={"y": 0.0})
+    outcome = simulate(
+        System({"a": count}, (), (("a",),)),
+        Settings(exact_fraction(0), exact_fraction(10000), exact_fraction(1), {"a.y": endpoint("a.y")}),
+    )
     assert outcome.recording.columns["a.y"].tolist() == list(range(10001))

@@ -4,17 +4,17 @@ import json
 
 import numpy as np
 import pytest
-from fakes import Fake, gain, inputs, integrator, outputs
-from helpers import run, system, wire
+from fakes import FakeComponent, gain, inputs, integrator, outputs
+from helpers import connection, make_system, run_system
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 
 from cosim.api import load
-from cosim.components.python_class import PythonSlave
+from cosim.components.python_class import PythonFmuComponent
 from cosim.core import resources
 from cosim.core.component import StepResult
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.system import Endpoint, Group, Iteration
-from cosim.core.time_grid import exact
+from cosim.core.time_grid import exact_fraction
 from cosim.engine import EXECUTORS
 from cosim.engine.run_loop import Settings, simulate
 
@@ -24,7 +24,9 @@ FMUS = resources.root() / "fmus"
 
 def oscillator():
     """x' = v, v' = -x - d v in three components: two explicit Euler integrators and the force."""
-    force = Fake([*inputs("x", "v"), *outputs("y")], lambda values, t, h: values.update(y=-values["x"] - 0.1 * values["v"]))
+    force = FakeComponent(
+        [*inputs("x", "v"), *outputs("y")], lambda values, t, h: values.update(y=-values["x"] - 0.1 * values["v"])
+    )
     return {"x": integrator(1.0), "v": integrator(0.0), "f": force}
 
 
@@ -43,17 +45,19 @@ def implicit_euler(steps, h):
 @pytest.mark.usefixtures("executor")
 @pytest.mark.parametrize("stages", [(("x", "v", "f"),), (("f",), ("v",), ("x",))], ids=["Jacobi", "Gauss-Seidel"])
 def test_the_last_round_solves_the_implicit_equations_whatever_the_order(stages):
-    recording = run(system(oscillator(), WIRES, [(Group("all", stages, "auto", TIGHT),)]), 2, "1/10", ["x.y", "v.y"])
+    recording = run_system(make_system(oscillator(), WIRES, [(Group("all", stages, "auto", TIGHT),)]), 2, "1/10", ["x.y", "v.y"])
     found = np.column_stack([recording.columns["x.y"], recording.columns["v.y"]])[1:]
     np.testing.assert_allclose(found, implicit_euler(20, 0.1), rtol=0, atol=1e-11)
 
 
 @pytest.mark.usefixtures("executor")
 def test_components_outside_are_not_repeated_and_are_read_once():
-    count = Fake(outputs("y"), lambda values, t, h: values.update(y=values["y"] + 1))
+    count = FakeComponent(outputs("y"), lambda values, t, h: values.update(y=values["y"] + 1))
     inner = Group("inner", (("a", "b"),), "auto", TIGHT)
-    parts = {"count": count, "a": Fake([*inputs("u", "w"), *outputs("y")], _half), "b": gain(0.5)}
-    recording = run(system(parts, "count.y > a.u, b.y > a.w, a.y > b.u", [("count",), (inner,)]), 3, 1, ["count.y", "a.y"])
+    parts = {"count": count, "a": FakeComponent([*inputs("u", "w"), *outputs("y")], _half), "b": gain(0.5)}
+    recording = run_system(
+        make_system(parts, "count.y > a.u, b.y > a.w, a.y > b.u", [("count",), (inner,)]), 3, 1, ["count.y", "a.y"]
+    )
     assert recording.columns["count.y"].tolist() == [0, 1, 2, 3]
     np.testing.assert_allclose(recording.columns["a.y"], np.arange(4) / 0.75, atol=1e-12)  # y = u + y / 4
 
@@ -64,10 +68,10 @@ def _half(values, t, h):
 
 @pytest.mark.usefixtures("executor")
 def test_a_delayed_value_arrives_once_in_a_step_however_many_rounds_it_takes():
-    count = Fake(outputs("y"), lambda values, t, h: values.update(y=values["y"] + 1))
-    parts = {"count": count, "a": Fake([*inputs("u", "w"), *outputs("y")], _half), "b": gain(0.5)}
+    count = FakeComponent(outputs("y"), lambda values, t, h: values.update(y=values["y"] + 1))
+    parts = {"count": count, "a": FakeComponent([*inputs("u", "w"), *outputs("y")], _half), "b": gain(0.5)}
     group = Group("all", (("count", "a", "b"),), "auto", TIGHT)
-    recording = run(system(parts, "count.y >2 a.u, b.y > a.w, a.y > b.u", [(group,)]), 6, 1, ["a.y"])
+    recording = run_system(make_system(parts, "count.y >2 a.u, b.y > a.w, a.y > b.u", [(group,)]), 6, 1, ["a.y"])
     np.testing.assert_allclose(recording.columns["a.y"][1:], np.array([0, 0, 0, 1, 2, 3]) / 0.75, atol=1e-12)
 
 
@@ -79,9 +83,9 @@ def test_only_the_last_round_may_ask_to_end_the_simulation():
         values["y"] = 8 - 0.5 * values["u"] + t
         return StepResult(t + h, terminate_requested=values["y"] > 6.5)
 
-    parts = {"s": gain(0.8), "h": Fake([*inputs("u"), *outputs("y")], step)}
-    built = system(parts, "s.y > h.u, h.y > s.u", [(Group("all", (("h",), ("s",)), "auto", TIGHT),)])
-    recording = run(built, 5, 1, ["h.y"])
+    parts = {"s": gain(0.8), "h": FakeComponent([*inputs("u"), *outputs("y")], step)}
+    built = make_system(parts, "s.y > h.u, h.y > s.u", [(Group("all", (("h",), ("s",)), "auto", TIGHT),)])
+    recording = run_system(built, 5, 1, ["h.y"])
     np.testing.assert_allclose(recording.columns["h.y"][1:], (8 + np.arange(3)) / 1.4, atol=1e-11)  # 5.7, 6.4, 7.1: the end
 
 
@@ -102,9 +106,9 @@ class Derivative(Fmi2Slave):
 @pytest.mark.usefixtures("executor")
 def test_python_components_return_to_all_that_they_hold():
     """x' = y by implicit Euler: x (1 + h + 0.05) = last x (1 + 0.05)."""
-    parts = {"x": integrator(1.0), "d": PythonSlave(Derivative(instance_name="d"), "d")}
-    built = system(parts, "x.y > d.u, d.y > x.u", [(Group("all", (("d",), ("x",)), "auto", TIGHT),)])
-    recording = run(built, 1, "1/10", ["x.y"])
+    parts = {"x": integrator(1.0), "d": PythonFmuComponent(Derivative(instance_name="d"), "d")}
+    built = make_system(parts, "x.y > d.u, d.y > x.u", [(Group("all", (("d",), ("x",)), "auto", TIGHT),)])
+    recording = run_system(built, 1, "1/10", ["x.y"])
     np.testing.assert_allclose(recording.columns["x.y"], (1.05 / 1.15) ** np.arange(11), atol=1e-11)
 
 
@@ -112,16 +116,16 @@ def test_python_components_return_to_all_that_they_hold():
 def test_loops_stand_inside_loops():
     inner = Group("inner", (("v", "f"),), "auto", TIGHT)
     outer = Group("outer", ((inner,), ("x",)), "auto", TIGHT)
-    recording = run(system(oscillator(), WIRES, [(outer,)]), 1, "1/10", ["x.y"])
+    recording = run_system(make_system(oscillator(), WIRES, [(outer,)]), 1, "1/10", ["x.y"])
     np.testing.assert_allclose(recording.columns["x.y"][1:], implicit_euler(10, 0.1)[:, 0], rtol=0, atol=1e-11)
 
 
 @pytest.mark.usefixtures("executor")
 def test_what_never_agrees_is_named_with_the_place_and_the_time():
-    grows = Fake([*inputs("u"), *outputs("y")], lambda values, t, h: values.update(y=2 * values["u"] + 1))
+    grows = FakeComponent([*inputs("u"), *outputs("y")], lambda values, t, h: values.update(y=2 * values["u"] + 1))
     group = Group("loop", (("a",), ("b",)), "auto", Iteration(1e-6, 7))
     with pytest.raises(ComponentError) as failure:
-        run(system({"a": grows, "b": gain()}, "b.y > a.u, a.y > b.u", [(group,)]), 1, "1/10", ["b.y"])
+        run_system(make_system({"a": grows, "b": gain()}, "b.y > a.u, a.y > b.u", [(group,)]), 1, "1/10", ["b.y"])
     expected = "loop: iteration failed at t = 0 s: after 7 rounds these outputs still change by more than 1e-06: b.y, a.y"
     assert str(failure.value) == expected
 
@@ -130,7 +134,7 @@ def test_what_cannot_return_to_a_state_is_refused_and_so_are_periods():
     stuck = gain()
     stuck.has_state = False
     group = Group("loop", (("a", "b"),), "auto", TIGHT)
-    faulty = system({"a": stuck, "b": gain()}, "a.y > b.u", [(group,)], periods={"b": exact("1/5")})
+    faulty = make_system({"a": stuck, "b": gain()}, "a.y > b.u", [(group,)], periods={"b": exact_fraction("1/5")})
     assert [problem.message for problem in faulty.problems()] == [
         'the stages of loop are iterated, but "a" cannot return to a state (FMI: canGetAndSetFMUState)',
         'the stages of loop are iterated, so "b" cannot have a period of its own',
@@ -146,7 +150,7 @@ def vessel_and_helmsman(folder, iteration):
             "usv": {"fmu": str(FMUS / "strider.fmu"), "parameters": {"initial.velocity_body.u": 0.5, "thrust": 0.1}},
             "helm": {"fmu": str(FMUS / "fmi3" / "heading_controller.fmu"), "parameters": {"heading_reference": 0.3}},
         },
-        "connections": [wire("usv", "helm.vehicle"), wire("helm.rudder_angle", "usv.rudder_angle")],
+        "connections": [connection("usv", "helm.vehicle"), connection("helm.rudder_angle", "usv.rudder_angle")],
         "algorithm": {"stages": [["helm"], ["usv"]], **iteration},
     }
     path = folder / "voyage.json"
@@ -160,7 +164,9 @@ def voyages(tmp_path):
         assembly = load(vessel_and_helmsman(tmp_path, iteration))
         ends = [Endpoint("usv", f"position.{axis}") for axis in "xy"] + [Endpoint("helm", "rudder_angle")]
         columns = {str(found): found for found in ends}
-        outcome = simulate(assembly.system, Settings(exact(0), exact(5), exact("0.05"), columns, executor=kind))
+        outcome = simulate(
+            assembly.system, Settings(exact_fraction(0), exact_fraction(5), exact_fraction("0.05"), columns, executor=kind)
+        )
         assert outcome.failure is None, outcome.failure
         return np.column_stack(list(outcome.recording.columns.values()))
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from fakes import Fake
-from helpers import end, system
+from fakes import FakeComponent
+from helpers import endpoint, make_system
 
 from cosim.core.component import Variable
-from cosim.core.time_grid import Grid, exact
+from cosim.core.time_grid import TimeGrid, exact_fraction
 from cosim.engine import compile_plan
 
 INT = np.dtype(np.int32)
@@ -29,7 +29,7 @@ VARIABLES = {
     ],
 )
 def test_variables_that_one_fmi_call_can_get_lie_together(chosen, order):
-    component = Fake([VARIABLES[name] for name in chosen], lambda values, t, h: None)
-    grid = Grid.of(exact(0), exact(1), exact(1))
-    plan = compile_plan(system({"a": component}), grid, [end(f"a.{name}") for name in chosen])
-    assert [variable.name for variable in plan.signals.ports["a"].variables] == order
+    component = FakeComponent([VARIABLES[name] for name in chosen], lambda values, t, h: None)
+    grid = TimeGrid.from_times(exact_fraction(0), exact_fraction(1), exact_fraction(1))
+    plan = compile_plan(make_system({"a": component}), grid, [endpoint(f"a.{name}") for name in chosen])
+    assert [variable.name for variable in plan.outputs.ports["a"].variables] == order

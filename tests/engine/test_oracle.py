@@ -4,14 +4,14 @@ import math
 import random
 
 import pytest
-from fakes import Fake, inputs, outputs
-from helpers import run
+from fakes import FakeComponent, inputs, outputs
+from helpers import run_system
 
-from cosim.core.system import Connection, Endpoint, Group, System, members
-from cosim.core.time_grid import exact
-from cosim.core.units import parse
+from cosim.core.system import Connection, Endpoint, Group, System, component_names
+from cosim.core.time_grid import exact_fraction
+from cosim.core.units import parse_unit
 
-UNITS = {name: parse(name) for name in ("rad", "deg", "m", "mm", "degC", "K")} | {"": None}
+UNITS = {name: parse_unit(name) for name in ("rad", "deg", "m", "mm", "degC", "K")} | {"": None}
 STEPS = 12
 
 pytestmark = pytest.mark.usefixtures("executor")
@@ -31,7 +31,7 @@ def mixer(seed, units):
             values[f"y{j}"] = mixed(seed, j, t, h, given)
 
     sides = [side(f"{letter}{j}", unit=UNITS[units[j]])[0] for side, letter in ((inputs, "u"), (outputs, "y")) for j in places]
-    return Fake(sides, step, start={f"y{j}": seed + 0.1 * j for j in places})
+    return FakeComponent(sides, step, start={f"y{j}": seed + 0.1 * j for j in places})
 
 
 def in_stages(draw, members_):
@@ -59,7 +59,7 @@ def random_system(seed):
     grouped = draw.sample(names, draw.choice([0, 0, 1, 2]))
     outside = [name for name in names if name not in grouped]
     stages = in_stages(draw, outside + ([Group("g", in_stages(draw, grouped))] if grouped else []))
-    periods = {name: exact(f"{count}/10") for name in names if (count := draw.choice([1, 1, 1, 2, 3])) > 1}
+    periods = {name: exact_fraction(f"{count}/10") for name in names if (count := draw.choice([1, 1, 1, 2, 3])) > 1}
     components = {name: mixer(i, units[name]) for i, name in enumerate(names)}
     return System(components, connections, stages, periods), units
 
@@ -87,10 +87,10 @@ class Oracle:
 
     def stages(self, stages, inside, n):
         for stage in stages:
-            groups = [set(members(member.stages)) for member in stage if isinstance(member, Group)]
+            groups = [set(component_names(member.stages)) for member in stage if isinstance(member, Group)]
             for connection in self.system.connections:
                 ends = {connection.source.component, connection.target.component}
-                reads_now = connection.target.component in members([stage]) and connection.source.component in inside
+                reads_now = connection.target.component in component_names([stage]) and connection.source.component in inside
                 if reads_now and not any(ends <= group for group in groups):
                     self.read(connection)
             for member in stage:
@@ -98,7 +98,7 @@ class Oracle:
                     self.step(member, n)
             for member in stage:
                 if isinstance(member, Group):
-                    self.stages(member.stages, set(members(member.stages)), n)
+                    self.stages(member.stages, set(component_names(member.stages)), n)
 
     def read(self, connection):
         source, target = connection.source.component, connection.target.component
@@ -110,9 +110,9 @@ class Oracle:
         self.u[target][j] = value if (factor, offset) == (1.0, 0.0) else factor * value + offset
 
     def step(self, name, n):
-        count = int(self.system.periods.get(name, exact("1/10")) / exact("1/10"))
+        count = int(self.system.periods.get(name, exact_fraction("1/10")) / exact_fraction("1/10"))
         if n % count == 0:
-            h = float(exact("1/10") * count)
+            h = float(exact_fraction("1/10") * count)
             given = self.u[name]
             self.y[name] = [mixed(self.seeds[name], j, n / 10, h, given) for j in range(len(given))]
 
@@ -122,7 +122,7 @@ def test_random_systems_do_what_stages_units_delays_and_periods_say(first):
     for seed in range(first, first + 10):
         system, units = random_system(seed)
         names = [f"{name}.y{j}" for name in units for j in range(len(units[name]))]
-        recording = run(system, STEPS * exact("1/10"), "1/10", names)
+        recording = run_system(system, STEPS * exact_fraction("1/10"), "1/10", names)
         for n, row in enumerate(Oracle(system, units).rows()):
             found = {name: recording.columns[name][n] for name in names}
             assert found == {f"{name}.y{j}": row[name][j] for name in units for j in range(len(units[name]))}, (seed, n)

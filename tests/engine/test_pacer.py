@@ -8,12 +8,12 @@ from threading import Timer
 
 import numpy as np
 import pytest
-from fakes import Fake, counter, outputs
-from helpers import end, system
+from fakes import FakeComponent, counter, outputs
+from helpers import endpoint, make_system
 
 import cosim.engine.pacer
 from cosim.core.errors import InputError, LateError
-from cosim.core.time_grid import Grid, exact
+from cosim.core.time_grid import TimeGrid, exact_fraction
 from cosim.engine.pacer import Pacer
 from cosim.engine.run_loop import Settings, simulate
 
@@ -21,9 +21,9 @@ pytestmark = pytest.mark.usefixtures("executor")
 
 
 def paced(component, stop, factor=1.0, **more):
-    columns = {"a.y": end("a.y")}
-    settings = Settings(Fraction(0), exact(stop), exact("0.01"), columns, real_time=factor, **more)
-    return simulate(system({"a": component}), settings)
+    columns = {"a.y": endpoint("a.y")}
+    settings = Settings(Fraction(0), exact_fraction(stop), exact_fraction("0.01"), columns, real_time=factor, **more)
+    return simulate(make_system({"a": component}), settings)
 
 
 def slow(seconds, steps):
@@ -34,7 +34,7 @@ def slow(seconds, steps):
         if values["y"] <= steps:
             time.sleep(seconds)
 
-    return Fake(outputs("y"), step)
+    return FakeComponent(outputs("y"), step)
 
 
 @pytest.fixture
@@ -70,7 +70,7 @@ def test_pace_changes_no_result():
 
 
 def test_deadlines_do_not_drift(clock):
-    pacer = Pacer(Grid.of(Fraction(0), Fraction(10**6), Fraction(1, 60)), 1.0, "warn")
+    pacer = Pacer(TimeGrid.from_times(Fraction(0), Fraction(10**6), Fraction(1, 60)), 1.0, "warn")
     pacer.start()
     for n in range(1, 6001):
         clock.now += 1_000_000  # every step takes 1 ms
@@ -79,7 +79,7 @@ def test_deadlines_do_not_drift(clock):
 
 
 def test_lateness_is_measured_and_caught_up(clock):
-    pacer = Pacer(Grid.of(Fraction(0), Fraction(1), Fraction(1, 100)), 2.0, "warn")
+    pacer = Pacer(TimeGrid.from_times(Fraction(0), Fraction(1), Fraction(1, 100)), 2.0, "warn")
     pacer.start()
     for n in range(1, 101):
         clock.now += 12_000_000 if n == 10 else 1_000_000

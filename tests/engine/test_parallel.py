@@ -3,13 +3,13 @@
 from fractions import Fraction
 
 import pytest
-from busy import busy_fmu
-from helpers import end, system
+from busy import slow_fmu
+from helpers import endpoint, make_system
 
-from cosim.components.fmi import FmuFile, instantiate
+from cosim.components.fmi import FmuFile, create_component
 from cosim.core.errors import ComponentError
-from cosim.core.time_grid import exact
-from cosim.engine.parallel import Crew
+from cosim.core.time_grid import exact_fraction
+from cosim.engine.parallel import ThreadPool
 from cosim.engine.run_loop import Event, Settings, simulate
 
 pytestmark = pytest.mark.usefixtures("executor")
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.usefixtures("executor")
 def long(tmp_path_factory):
     """Two FMU files with steps of 0.3 ms."""
     folder = tmp_path_factory.mktemp("busy")
-    return [busy_fmu(folder, name, 3e-4, wait=True) for name in ("a", "b")]
+    return [slow_fmu(folder, name, 3e-4, wait=True) for name in ("a", "b")]
 
 
 @pytest.fixture(autouse=True)
@@ -30,10 +30,10 @@ def two_processors(monkeypatch):
 def flown(files, parallel, wires="", stop="0.3", events=(), start_values=None):
     """The run of one component per file: c0, c1, ... in one stage."""
     loaded = {path: FmuFile(path) for path in files}
-    components = {f"c{i}": instantiate(loaded[path], f"c{i}") for i, path in enumerate(files)}
-    columns = {f"{name}.{output}": end(f"{name}.{output}") for name in components for output in ("y", "i_out", "e_out")}
-    built = system(components, wires, parallel=parallel, start_values=start_values or {})
-    return simulate(built, Settings(Fraction(0), exact(stop), exact("0.01"), columns, events=events))
+    components = {f"c{i}": create_component(loaded[path], f"c{i}") for i, path in enumerate(files)}
+    columns = {f"{name}.{output}": endpoint(f"{name}.{output}") for name in components for output in ("y", "i_out", "e_out")}
+    built = make_system(components, wires, parallel=parallel, start_values=start_values or {})
+    return simulate(built, Settings(Fraction(0), exact_fraction(stop), exact_fraction("0.01"), columns, events=events))
 
 
 def on_threads(run):
@@ -50,7 +50,7 @@ def test_long_steps_of_two_files_are_taken_at_the_same_time(long):
 
 
 def test_short_steps_are_not_worth_a_thread(probes, tmp_path):
-    quick = [busy_fmu(tmp_path, name, 0.0) for name in ("a", "b")]
+    quick = [slow_fmu(tmp_path, name, 0.0) for name in ("a", "b")]
     assert on_threads(flown(quick, "auto")) == set()
     assert len(on_threads(flown(quick, True))) == 1
 
@@ -64,7 +64,7 @@ def test_one_file_steps_one_instance_at_a_time_unless_the_scenario_says_so(long)
 
 
 def test_results_are_those_of_one_thread(long):
-    events = [Event(exact("0.1"), {"c1": {"fail_time": 1e6}}), Event(exact("0.02"), {"c2": {"i_in": 3}})]
+    events = [Event(exact_fraction("0.1"), {"c1": {"fail_time": 1e6}}), Event(exact_fraction("0.02"), {"c2": {"i_in": 3}})]
     starts = {"c0": {"y_start": 0.5}}
     serial, parallel = (flown([*long, long[0]], way, RING, events=events, start_values=starts) for way in (False, True))
     assert serial.failure is None and parallel.failure is None
@@ -81,9 +81,9 @@ def test_a_failure_on_a_thread_names_component_function_and_time(long):
 
 
 def test_a_crew_returns_outcomes_in_order_and_raises_what_was_raised():
-    crew = Crew(2, lambda x: 1 / x)
-    assert crew.run([1, 2, 4]) == [1, 0.5, 0.25]
+    crew = ThreadPool(2, lambda x: 1 / x)
+    assert crew.map([1, 2, 4]) == [1, 0.5, 0.25]
     with pytest.raises(ZeroDivisionError):
-        crew.run([1, 0, 4])
-    assert crew.run([4, 2]) == [0.25, 0.5]
+        crew.map([1, 0, 4])
+    assert crew.map([4, 2]) == [0.25, 0.5]
     crew.close()

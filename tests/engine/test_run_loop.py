@@ -8,21 +8,21 @@ from contextlib import contextmanager
 from fractions import Fraction
 
 import pytest
-from fakes import Fake, counter, gain, inputs, integrator, outputs
-from helpers import end, run, system
+from fakes import FakeComponent, counter, gain, inputs, integrator, outputs
+from helpers import endpoint, make_system, run_system
 
-from cosim.components.fmi import FmuFile, instantiate
+from cosim.components.fmi import FmuFile, create_component
 from cosim.core.component import StepResult, Variable
 from cosim.core.errors import ComponentError, InputError
-from cosim.core.time_grid import exact
-from cosim.engine.run_loop import Event, Settings, problems, simulate
-from cosim.process.float_mode import changed, traps
+from cosim.core.time_grid import exact_fraction
+from cosim.engine.run_loop import Event, Settings, find_problems, simulate
+from cosim.process.float_mode import enabled_traps, is_changed
 
 pytestmark = pytest.mark.usefixtures("executor")
 
 
 def settings(stop=3, step=1, record=("a.y",), **more):
-    return Settings(Fraction(0), exact(stop), exact(step), {name: end(name) for name in record}, **more)
+    return Settings(Fraction(0), exact_fraction(stop), exact_fraction(step), {name: endpoint(name) for name in record}, **more)
 
 
 def failing(at, failure):
@@ -31,44 +31,44 @@ def failing(at, failure):
             raise failure
         values["y"] += 1
 
-    return Fake(outputs("y"), step)
+    return FakeComponent(outputs("y"), step)
 
 
 def test_the_life_cycle_in_order():
     component = counter()
-    simulate(system({"a": component}, start_values={"a": {"y": 5.0}}), settings())
+    simulate(make_system({"a": component}, start_values={"a": {"y": 5.0}}), settings())
     assert component.calls == ["set y", "enter", "exit", "step 0", "step 1", "step 2", "terminate", "free"]
 
 
 def test_row_zero_holds_the_initial_outputs_and_the_last_row_the_stop_time():
-    recording = run(system({"a": counter()}), 3, 1, ["a.y"])
+    recording = run_system(make_system({"a": counter()}), 3, 1, ["a.y"])
     assert recording.time.tolist() == [0, 1, 2, 3]
     assert recording.columns["a.y"].tolist() == [0, 1, 2, 3]
 
 
 def test_recording_can_be_sparser_than_stepping():
-    outcome = simulate(system({"a": counter()}), settings(6, record_interval=exact(3)))
+    outcome = simulate(make_system({"a": counter()}), settings(6, record_interval=exact_fraction(3)))
     assert outcome.recording.time.tolist() == [0, 3, 6]
     assert outcome.recording.columns["a.y"].tolist() == [0, 3, 6]
 
 
 def test_an_event_acts_before_the_step_that_starts_there():
-    built = system({"a": integrator()})
-    recording = run(built, 4, 1, ["a.y"], [Event(exact(2), {"a": {"u": 1.0}})])
+    built = make_system({"a": integrator()})
+    recording = run_system(built, 4, 1, ["a.y"], [Event(exact_fraction(2), {"a": {"u": 1.0}})])
     assert recording.columns["a.y"].tolist() == [0, 0, 0, 1, 2]
 
 
 def test_an_event_after_the_end_does_not_happen():
-    recording = run(system({"a": integrator()}), 2, 1, ["a.y"], [Event(exact(3), {"a": {"u": 1.0}})])
+    recording = run_system(make_system({"a": integrator()}), 2, 1, ["a.y"], [Event(exact_fraction(3), {"a": {"u": 1.0}})])
     assert recording.columns["a.y"].tolist() == [0, 0, 0]
 
 
 def test_events_must_lie_on_the_grid_and_set_what_can_be_set():
     fixed = Variable("k", causality="parameter", variability="fixed", start=1.0)
-    a = Fake([*inputs("u", "free"), *outputs("y"), fixed], lambda values, t, h: None)
-    events = [Event(exact(0.5), {"a": {"free": 1.0}}), Event(exact(1), {"a": {"u": 1.0, "k": 2.0}})]
+    a = FakeComponent([*inputs("u", "free"), *outputs("y"), fixed], lambda values, t, h: None)
+    events = [Event(exact_fraction(0.5), {"a": {"free": 1.0}}), Event(exact_fraction(1), {"a": {"u": 1.0, "k": 2.0}})]
     with pytest.raises(InputError) as refusal:
-        simulate(system({"a": a, "b": gain()}, "b.y > a.u"), settings(events=events))
+        simulate(make_system({"a": a, "b": gain()}, "b.y > a.u"), settings(events=events))
     assert [problem.message for problem in refusal.value.problems] == [
         "a.u is fed by a connection, an event cannot set it",
         "a.k is neither a tunable parameter nor an input, an event cannot set it",
@@ -77,7 +77,7 @@ def test_events_must_lie_on_the_grid_and_set_what_can_be_set():
 
 
 def test_periods_must_fit_the_step_and_the_duration():
-    built = system({"a": counter(), "b": counter()}, periods={"a": exact(1.5), "b": exact(2)})
+    built = make_system({"a": counter(), "b": counter()}, periods={"a": exact_fraction(1.5), "b": exact_fraction(2)})
     with pytest.raises(InputError) as refusal:
         simulate(built, settings())
     assert [problem.message for problem in refusal.value.problems] == [
@@ -89,20 +89,20 @@ def test_periods_must_fit_the_step_and_the_duration():
 def test_a_refused_system_is_freed_all_the_same():
     component = counter()
     with pytest.raises(InputError):
-        simulate(system({"a": component}), settings(stop="1/3"))
+        simulate(make_system({"a": component}), settings(stop="1/3"))
     assert component.calls == ["free"]
 
 
 def test_a_failure_keeps_the_rows_until_then_and_frees_everybody():
     a, b = failing(2, ComponentError("a", "do_step", "no more", 2.0)), counter()
-    outcome = simulate(system({"a": a, "b": b}), settings(5))
+    outcome = simulate(make_system({"a": a, "b": b}), settings(5))
     assert str(outcome.failure) == "a: do_step failed at t = 2 s: no more"
     assert outcome.recording.columns["a.y"].tolist() == [0, 1, 2]
     assert b.calls[-1] == "free"
 
 
 def test_an_interrupt_keeps_the_rows_too():
-    outcome = simulate(system({"a": failing(2, KeyboardInterrupt())}), settings(5))
+    outcome = simulate(make_system({"a": failing(2, KeyboardInterrupt())}), settings(5))
     assert isinstance(outcome.failure, KeyboardInterrupt)
     assert outcome.recording.time.tolist() == [0, 1, 2]
 
@@ -111,14 +111,14 @@ def test_a_component_may_end_the_simulation():
     def step(values, t, h):
         return StepResult(t + h, terminate_requested=True) if t >= 1 else None
 
-    outcome = simulate(system({"a": Fake(outputs("y"), step), "b": counter()}), settings(5, record=["b.y"]))
+    outcome = simulate(make_system({"a": FakeComponent(outputs("y"), step), "b": counter()}), settings(5, record=["b.y"]))
     assert outcome.termination == ("a", 2.0, True)
     assert outcome.recording.columns["b.y"].tolist() == [0, 1, 2]
 
 
 def test_observers_see_progress_and_the_end():
     seen = []
-    simulate(system({"a": counter()}), settings(1000), [lambda finished, total: seen.append((finished, total))])
+    simulate(make_system({"a": counter()}), settings(1000), [lambda finished, total: seen.append((finished, total))])
     assert seen[0] == (0, 1000)
     assert seen[-1] == (1000, 1000)
     assert len(seen) == 101
@@ -126,9 +126,9 @@ def test_observers_see_progress_and_the_end():
 
 def test_what_no_disk_could_hold_is_refused_before_it_is_begun():
     with pytest.raises(InputError, match=r"3\d* rows of 1 signals take about .* GB are free in .*; make the step longer"):
-        simulate(system({"a": counter()}), settings(30, exact("1/1000000000000")))
-    sparse = settings(30, exact("1/1000000000000"), record_interval=exact(30))
-    assert problems(system({"a": counter()}), sparse) == []
+        simulate(make_system({"a": counter()}), settings(30, exact_fraction("1/1000000000000")))
+    sparse = settings(30, exact_fraction("1/1000000000000"), record_interval=exact_fraction(30))
+    assert find_problems(make_system({"a": counter()}), sparse) == []
 
 
 def flush_small_numbers(library):
@@ -166,12 +166,12 @@ def test_results_do_not_depend_on_the_floating_point_mode_of_the_caller(probe, c
     """Nor is a component blamed for it; afterwards the caller has his mode again."""
 
     def of_a_run():
-        built = system({"a": instantiate(FmuFile(probe), "a")}, start_values={"a": {"u": 1 / 3}})
-        return run(built, 1, "1/10", ["a.y"]).columns["a.y"].tobytes()
+        built = make_system({"a": create_component(FmuFile(probe), "a")}, start_values={"a": {"u": 1 / 3}})
+        return run_system(built, 1, "1/10", ["a.y"]).columns["a.y"].tobytes()
 
     usual = of_a_run()
     with floating_point_mode(change):
-        mode = changed(), traps()
+        mode = is_changed(), enabled_traps()
         assert of_a_run() == usual
-        assert (changed(), traps()) == mode != (False, 0)
-    assert (changed(), traps()) == (False, 0)
+        assert (is_changed(), enabled_traps()) == mode != (False, 0)
+    assert (is_changed(), enabled_traps()) == (False, 0)

@@ -127,7 +127,7 @@ def fmu(block: Block, version: int, tmp_path_factory: pytest.TempPathFactory) ->
     return write_fmu(block, version, tmp_path_factory.mktemp(f"fmi{version}") / "sample.fmu")
 
 
-class Instance:
+class FmuInstance:
     """An instance of an FMU under FMPy, the same for FMI 2.0 and 3.0: arrays by their names, messages kept."""
 
     def __init__(self, folder: str, guid: str | None = None, messages: list[str] | None = None):
@@ -149,7 +149,7 @@ class Instance:
     def _log(self, text: bytes) -> None:
         self.messages.append(text.decode())
 
-    def initialize(self, start: float = 0.0, stop: float | None = None, **values: Any) -> Instance:
+    def initialize(self, start: float = 0.0, stop: float | None = None, **values: Any) -> FmuInstance:
         self.enter(start, stop)
         for name, value in values.items():
             self.set(name, value)
@@ -198,19 +198,19 @@ class Instance:
     def deserialize(self, content: bytes) -> Any:
         return (self.fmu.deSerializeFMUstate if self.version == 2 else self.fmu.deserializeFMUState)(content)
 
-    def everything(self) -> dict[str, Any]:
+    def all_values(self) -> dict[str, Any]:
         names = {name.partition("[")[0] for name in self.variables}
         return {name: self.get(name) for name in sorted(names - {"time"})}
 
 
 @pytest.fixture
-def start(fmu: Path, tmp_path: Path) -> Iterator[Callable[..., Instance]]:
+def instantiate_sample(fmu: Path, tmp_path: Path) -> Iterator[Callable[..., FmuInstance]]:
     """Instantiates the sample FMU; frees all instances in the end."""
     folder = extract(str(fmu), str(tmp_path / "extracted"))
-    instances: list[Instance] = []
+    instances: list[FmuInstance] = []
 
-    def instantiate(**arguments: Any) -> Instance:
-        instances.append(Instance(folder, **arguments))
+    def instantiate(**arguments: Any) -> FmuInstance:
+        instances.append(FmuInstance(folder, **arguments))
         return instances[-1]
 
     yield instantiate

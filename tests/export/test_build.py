@@ -12,9 +12,9 @@ from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
 from cosim.core.errors import InputError
-from cosim.export.build import build, build_one, cached_fmu, read_manifest
-from cosim.export.build_check import check
-from cosim.export.sources import find_sources, snake_case, source_of, tool_version
+from cosim.export.build import build, build_to, cached_fmu, read_manifest
+from cosim.export.build_check import check_fmus
+from cosim.export.sources import classify_source, find_sources, snake_case, tool_version
 
 EQUATIONS = """
 from pathlib import Path
@@ -108,7 +108,7 @@ def root(built_once, tmp_path):
 
 
 def messages(root):
-    return [str(problem) for problem in check(root)]
+    return [str(problem) for problem in check_fmus(root)]
 
 
 def test_every_source_becomes_its_fmus(built_once):
@@ -166,11 +166,11 @@ def test_two_sources_of_one_fmu_are_refused(root):
 @pytest.mark.parametrize("folder", ["plant_src/vehicles/raft", "plant_src/replica/forces/sail", "plant_src/wind"])
 def test_equations_are_found_anywhere_in_the_plant_and_named_by_their_folder(tmp_path, folder):
     (source,) = find_sources(write(tmp_path, {f"{folder}/equations.py": EQUATIONS, "elsewhere/equations.py": EQUATIONS}))
-    assert (source.key, source.kind.name) == (folder.split("/")[-1], "equations")
+    assert (source.manifest_key, source.kind.name) == (folder.split("/")[-1], "equations")
 
 
 def test_a_fresh_build_passes_the_check(built_once):
-    assert check(built_once) == []
+    assert check_fmus(built_once) == []
 
 
 def test_the_check_finds_a_changed_source(root):
@@ -237,24 +237,24 @@ def test_the_check_says_when_a_source_no_longer_builds(root):
 def test_a_damaged_manifest_is_refused(root):
     (root / "fmus/manifest.json").write_text("{")
     with pytest.raises(InputError, match=r"manifest\.json: is no JSON"):
-        check(root)
+        check_fmus(root)
 
 
 def test_one_file_is_built_anywhere(tmp_path):
     source = write(tmp_path, {"doubler.py": CLASS}) / "doubler.py"
-    fmu = build_one(source, None, tmp_path / "elsewhere/d.fmu")
+    fmu = build_to(source, None, tmp_path / "elsewhere/d.fmu")
     assert simulate_fmu(str(fmu), stop_time=0.1, output_interval=0.1, start_values={"x": 4.0})["y"][-1] == 8.0
 
 
 def test_python_classes_are_fmi2_only(tmp_path):
     source = write(tmp_path, {"doubler.py": CLASS}) / "doubler.py"
     with pytest.raises(InputError, match=r"doubler\.py: a PythonFMU class cannot be exported as FMI 3\.0"):
-        build_one(source, None, tmp_path / "d.fmu", fmi_version=3)
+        build_to(source, None, tmp_path / "d.fmu", fmi_version=3)
 
 
 def test_other_files_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"controller\.slx: cannot be exported; expected a \.mo or \.py file"):
-        source_of(Path("controller.slx"))
+        classify_source(Path("controller.slx"))
 
 
 @pytest.mark.parametrize(
@@ -268,7 +268,7 @@ def test_other_files_are_refused(tmp_path):
 def test_faulty_equations_are_refused(tmp_path, text, message):
     source = write(tmp_path, {"raft/equations.py": text}) / "raft/equations.py"
     with pytest.raises(InputError, match=message):
-        build_one(source, None, tmp_path / "raft.fmu")
+        build_to(source, None, tmp_path / "raft.fmu")
 
 
 def test_a_missing_extra_is_named():

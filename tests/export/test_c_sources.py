@@ -15,8 +15,8 @@ from fmpy.validation import validate_fmu
 
 from cosim.core.errors import InputError
 from cosim.core.resources import root
-from cosim.export.build import build, build_one, read_manifest
-from cosim.export.build_check import check
+from cosim.export.build import build, build_to, read_manifest
+from cosim.export.build_check import check_fmus
 from cosim.export.sources import find_sources
 
 KEEPER = root() / "controllers/c/speed_keeper"
@@ -43,7 +43,7 @@ def test_it_validates_and_carries_its_sources(folder, tmp_path):
     replace(folder / "speed_keeper.c", '#include "fmi2Functions.h"', '#include "own.h"')
     (folder / "own.h").write_text('#include "fmi2Functions.h"\n')
     (folder / "notes.txt").write_text("not for others")
-    fmu = build_one(folder, None, tmp_path / "keeper.fmu")
+    fmu = build_to(folder, None, tmp_path / "keeper.fmu")
     assert validate_fmu(str(fmu)) == []
     headers = {"fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"}
     with ZipFile(fmu) as archive:
@@ -53,13 +53,13 @@ def test_it_validates_and_carries_its_sources(folder, tmp_path):
 
 
 def test_the_same_sources_make_the_same_bytes(folder, tmp_path):
-    first, second = (build_one(source, None, tmp_path / f"{source.name}.fmu") for source in (folder, KEEPER))
+    first, second = (build_to(source, None, tmp_path / f"{source.name}.fmu") for source in (folder, KEEPER))
     assert first.read_bytes() == second.read_bytes()
 
 
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="needs cmake")
 def test_its_sources_alone_build_it_elsewhere(folder, tmp_path):
-    fmu = build_one(folder, None, tmp_path / "keeper.fmu")
+    fmu = build_to(folder, None, tmp_path / "keeper.fmu")
     unpacked = Path(extract(str(fmu), str(tmp_path / "unpacked")))
     shutil.rmtree(unpacked / "binaries")
     build_platform_binary(unpacked, generator="Unix Makefiles")
@@ -75,7 +75,7 @@ def test_several_files_are_compiled_together(folder, description, tmp_path):
         "double limited(double value, double limit) { return value < limit ? value : limit / 2; }\n"
     )
     replace(description, '<File name="speed_keeper.c"/>', '<File name="speed_keeper.c"/><File name="limited.c"/>')
-    fmu = build_one(folder, None, tmp_path / "keeper.fmu")
+    fmu = build_to(folder, None, tmp_path / "keeper.fmu")
     assert simulate_fmu(str(fmu), stop_time=0.1, output=["thrust"])["thrust"][-1] == 1.5
 
 
@@ -85,16 +85,16 @@ def test_building_writes_manifest_and_check_agrees(folder, description, tmp_path
     entry = read_manifest(tmp_path)["c/keeper"]
     assert list(entry["sources"]) == ["controllers/c/keeper/modelDescription.xml", "controllers/c/keeper/speed_keeper.c"]
     assert set(entry["tools"]) == {"fmpy", "compiler"}
-    assert check(tmp_path) == []
+    assert check_fmus(tmp_path) == []
     replace(description, "Keeps a speed", "Keeps one speed")
-    assert [str(problem) for problem in check(tmp_path)] == [
+    assert [str(problem) for problem in check_fmus(tmp_path)] == [
         'controllers/c/keeper/modelDescription.xml: changed since "c/keeper" was built; run `cosim build`'
     ]
 
 
 def test_every_folder_is_found_and_named_after_itself(folder, tmp_path):
     shutil.copytree(folder, folder.with_name("other"))
-    assert [source.key for source in find_sources(tmp_path)] == ["c/keeper", "c/other"]
+    assert [source.manifest_key for source in find_sources(tmp_path)] == ["c/keeper", "c/other"]
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_every_folder_is_found_and_named_after_itself(folder, tmp_path):
 def test_a_faulty_description_is_refused(folder, description, tmp_path, old, new, message):
     replace(description, old, new)
     with pytest.raises(InputError, match=rf"(?s)modelDescription\.xml: .*{message}"):
-        build_one(folder, None, tmp_path / "keeper.fmu")
+        build_to(folder, None, tmp_path / "keeper.fmu")
     assert not (tmp_path / "keeper.fmu").exists()
 
 
@@ -123,19 +123,19 @@ def test_model_exchange_alone_is_refused(folder, description, tmp_path):
     before, after = text[: text.index("<CoSimulation")], text[text.index("</CoSimulation>") + len("</CoSimulation>") :]
     description.write_text(f'{before}<ModelExchange modelIdentifier="keeper"/>{after}')
     with pytest.raises(InputError, match=r"modelDescription\.xml: has no <CoSimulation>"):
-        build_one(folder, None, tmp_path / "keeper.fmu")
+        build_to(folder, None, tmp_path / "keeper.fmu")
 
 
 def test_compiler_errors_are_shown_with_their_line(folder, tmp_path):
     replace(folder / "speed_keeper.c", "#include <math.h>", "#include <math.h>\nint wrong = thrust;")
     with pytest.raises(InputError, match=r"speed_keeper: speed_keeper\.c:8:\d+: error: .thrust. undeclared"):
-        build_one(folder, None, tmp_path / "keeper.fmu")
+        build_to(folder, None, tmp_path / "keeper.fmu")
 
 
 def test_a_missing_function_is_named(folder, tmp_path):
     replace(folder / "speed_keeper.c", "static double limited(", "extern double limited(double, double);\nstatic double unused(")
     with pytest.raises(InputError, match="undefined reference to `limited'"):
-        build_one(folder, None, tmp_path / "keeper.fmu")
+        build_to(folder, None, tmp_path / "keeper.fmu")
 
 
 def cosim(*arguments, cwd):

@@ -12,10 +12,10 @@ from fmpy.model_description import read_build_description
 
 from cosim.components.fmi import FmuFile
 from cosim.core.errors import InputError
-from cosim.core.units import KNOWN, parse
+from cosim.core.units import KNOWN_UNITS, parse_unit
 from cosim.export.fmu.block import Block, BlockVariable
 from cosim.export.fmu.interface import check_block
-from cosim.export.fmu.model_description import model_description
+from cosim.export.fmu.model_description import model_description_xml
 
 
 def variables(fmu):
@@ -31,14 +31,14 @@ def test_causality_variability_and_limits_arrive(fmu):
 
 
 def test_units_are_defined_by_their_base_units(fmu):
-    assert variables(fmu)["gain"].unit == parse("1/s")
-    assert variables(fmu)["vehicle.position.x"].unit == KNOWN["m"]
+    assert variables(fmu)["gain"].unit == parse_unit("1/s")
+    assert variables(fmu)["vehicle.position.x"].unit == KNOWN_UNITS["m"]
 
 
 def test_units_with_factor_and_offset_are_exact():
     names = ["deg", "degC", "kg.m2/s3", "rev"]
     block = Block("units", "", [BlockVariable(n, n, "Float64", "local", "continuous", unit=n) for n in names], 0.01, {})
-    text = model_description(block, 2, "", ["model.c"]).decode()
+    text = model_description_xml(block, 2, "", ["model.c"]).decode()
     assert f'<BaseUnit rad="1" factor="{pi / 180!r}" />' in text
     assert '<BaseUnit K="1" offset="273.15" />' in text
     assert '<BaseUnit kg="1" m="2" s="-3" />' in text

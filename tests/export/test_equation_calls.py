@@ -12,7 +12,7 @@ import pytest
 from test_equations import Compiled
 
 from cosim.core.component import Variable
-from cosim.export.equations.c_code import Callee, c_function, called
+from cosim.export.equations.c_code import Callee, call_in_c, function_body
 from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import ContinuousModel
 from cosim.export.equations.wide_sum import sum_over_rows
@@ -89,7 +89,7 @@ def test_casadi_computes_the_same_sum() -> None:
 def test_a_table_that_lies_among_the_arguments_is_not_copied() -> None:
     callee, parameters = waves(), ca.SX.sym("p", 2 * ROWS + 1)
     total = callee(parameters[0:2], ca.SX(3), ca.reshape(parameters[1:], ROWS, 2))
-    text = c_function(ca.Function("probe", [parameters], [total]))
+    text = function_body(ca.Function("probe", [parameters], [total]))
     assert "in[0] + 1}" in text
     assert f"in[0][{2 * ROWS}]" not in text
 
@@ -98,10 +98,10 @@ def test_a_called_function_is_a_function_in_c(tmp_path: Path) -> None:
     """Also by one that is called itself, with several arguments and results in any order."""
     a, b = ca.SX.sym("a", 2), ca.SX.sym("b")
     inner = ca.Function("inner", [a, b], [a * b, a[0] - b])
-    scaled, difference = called(inner, a[[1, 0]], 2 * b)
+    scaled, difference = call_in_c(inner, a[[1, 0]], 2 * b)
     outer = ca.Function("outer", [b, a], [ca.sum1(scaled) + difference])
-    (total,) = called(outer, b, a)
-    probe = ca.Function("probe", [a, b], [ca.vertcat(total, called(inner, a, b)[1], called(inner, a, total)[0])])
+    (total,) = call_in_c(outer, b, a)
+    probe = ca.Function("probe", [a, b], [ca.vertcat(total, call_in_c(inner, a, b)[1], call_in_c(inner, a, total)[0])])
     block = as_block(model(lambda x, u, p: u), [probe])
     text = block.files["model.c"]
     assert text.count("static void inner(") == text.count("static void outer(") == 1

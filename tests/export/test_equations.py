@@ -15,7 +15,7 @@ import pytest
 
 from cosim.core import resources
 from cosim.core.component import Variable
-from cosim.core.units import parse
+from cosim.core.units import parse_unit
 from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import ContinuousModel, static_model
 from cosim.export.fmu.block import Block
@@ -30,11 +30,11 @@ def oscillator() -> ContinuousModel:
         "Two forces on a spring",
         (
             Variable("stiffness", causality="parameter", variability="fixed", start=4.0),
-            Variable("initial.x", causality="parameter", variability="fixed", start=1.0, unit=parse("m")),
-            Variable("force", causality="input", start=(0.0, 0.5), shape=(2,), unit=parse("N")),
-            Variable("x", causality="output", unit=parse("m")),
+            Variable("initial.x", causality="parameter", variability="fixed", start=1.0, unit=parse_unit("m")),
+            Variable("force", causality="input", start=(0.0, 0.5), shape=(2,), unit=parse_unit("N")),
+            Variable("x", causality="output", unit=parse_unit("m")),
             Variable("left", "Boolean", "output", "discrete"),
-            Variable("energy", causality="output", unit=parse("J")),
+            Variable("energy", causality="output", unit=parse_unit("J")),
         ),
         ("x", "v"),
         lambda parameters: ca.vertcat(parameters[1], 0),
@@ -176,8 +176,8 @@ def spring(tmp_path: Path) -> Compiled:
     """A force that follows a displacement at once."""
     variables = (
         Variable("stiffness", causality="parameter", variability="tunable", start=4.0),
-        Variable("x", causality="input", start=0.5, unit=parse("m")),
-        Variable("force", causality="output", unit=parse("N")),
+        Variable("x", causality="input", start=0.5, unit=parse_unit("m")),
+        Variable("force", causality="output", unit=parse_unit("N")),
         Variable("pulls", "Boolean", "output", "discrete"),
     )
     model = static_model("spring", "Spring", variables, lambda x, k: ca.vertcat(-k * x, x > 0))

@@ -8,7 +8,7 @@ import pytest
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
-from cosim.components.fmi import FmuFile, instantiate
+from cosim.components.fmi import FmuFile, create_component
 from cosim.core.component import Ports
 from cosim.core.errors import InputError
 from cosim.export.foreign.python_class import write_python_fmu
@@ -85,7 +85,7 @@ def test_the_description_is_completed(python_fmu):
 
 
 def test_its_state_can_be_restored(python_fmu):
-    component = instantiate(FmuFile(python_fmu), "one")
+    component = create_component(FmuFile(python_fmu), "one")
     try:
         component.bind(Ports((), {}), Ports((), {}))
         component.enter_initialization_mode(0.0, 1.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from plant_fmu import PlantFmu
 from scipy.spatial.transform import Rotation
-from worlds import PLATFORM, PLATFORM_TOP, REST_HEIGHT, Trial, quadcopter
+from worlds import PLATFORM, PLATFORM_TOP, REST_HEIGHT, WorldHarness, quadcopter_settings
 
 from cosim.core.errors import InputError
 from plant_src.world import World
@@ -56,7 +56,7 @@ def test_free_of_torque_it_keeps_angular_momentum_and_energy() -> None:
 def test_it_stands_level_and_presses_with_its_weight() -> None:
     """Bullet knows it in other axes; its feet are where they were."""
     place = [0.1, -0.2, PLATFORM_TOP + 0.05 + REST_HEIGHT]
-    trial = Trial({"uav": quadcopter(place, yaw=0.3, parameters=HEAVY)}, {"pad": PLATFORM}).step(200)
+    trial = WorldHarness({"uav": quadcopter_settings(place, yaw=0.3, parameters=HEAVY)}, {"pad": PLATFORM}).step(200)
     assert trial["uav.contact.force"] == pytest.approx(MASS * 9.81, rel=1e-6)
     assert trial.vector("uav.attitude", ("roll", "pitch", "yaw")) == pytest.approx([0, 0, 0.3], abs=2e-3)
     assert trial["uav.position.z"] == pytest.approx(PLATFORM_TOP + REST_HEIGHT, abs=1e-3)
@@ -65,8 +65,8 @@ def test_it_stands_level_and_presses_with_its_weight() -> None:
 def test_a_blow_on_the_rim_turns_it_about_its_own_axes() -> None:
     """One of its feet has touched: the change of angular momentum is that of an impulse there."""
     motion = {"yaw": 0.3, "rates": [0.5, 0.8, 0.0], "velocity_body": [0.0, 0.0, -1.0]}
-    uav = quadcopter([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT + 0.12], parameters=HEAVY, **motion)
-    trial = Trial({"uav": uav}, {"pad": PLATFORM})
+    uav = quadcopter_settings([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT + 0.12], parameters=HEAVY, **motion)
+    trial = WorldHarness({"uav": uav}, {"pad": PLATFORM})
     trial["uav.external_force.z"] = MASS * 9.81
     momenta = []
     while not trial["uav.contact.touching"]:
@@ -91,4 +91,4 @@ def test_a_blow_on_the_rim_turns_it_about_its_own_axes() -> None:
 )
 def test_impossible_bodies_are_refused_with_their_path(parameters: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        World("plant", {"uav": quadcopter([0.0, 0.0, 2.0], parameters=parameters)})
+        World("plant", {"uav": quadcopter_settings([0.0, 0.0, 2.0], parameters=parameters)})

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from mission_recording import SINK, STOP, TAKE_OFF, TOUCHDOWN, mission, replaced
+from mission_recording import DESCENT_RATE, STOP, TAKE_OFF, TOUCHDOWN, mission_result, with_signals
 
 from cosim.core.errors import InputError
 from cosim.results import Result
@@ -12,7 +12,7 @@ from cosim.results.kpi import evaluate_kpis
 from plant_src.kpis import final, landing, motors, tracking, waypoints
 
 DECK = {"vehicle": "plant.uav", "deck": "plant.usv.deck"}
-TIME = mission().time
+TIME = mission_result().time
 
 
 def contacts(*spans):
@@ -22,12 +22,12 @@ def contacts(*spans):
 
 
 def test_a_landing_is_measured_where_it_happens():
-    kpis = landing(mission(offset=(0.03, 0.04)), **DECK)
+    kpis = landing(mission_result(offset=(0.03, 0.04)), **DECK)
     assert kpis == pytest.approx(
         {
             "time": TOUCHDOWN,
             "lateral_error": 0.05,
-            "touchdown_speed": SINK,
+            "touchdown_speed": DESCENT_RATE,
             "tangential_speed": 0.1,
             "slide": 0.0,
             "bounces": 0,
@@ -39,45 +39,45 @@ def test_a_landing_is_measured_where_it_happens():
 
 
 def test_touchdown_speed_is_relative_to_a_heaving_deck():
-    heaving = mission(plant__usv__deck__velocity__z=np.full_like(TIME, 0.2))
-    assert landing(heaving, **DECK)["touchdown_speed"] == pytest.approx(SINK + 0.2)
+    heaving = mission_result(plant__usv__deck__velocity__z=np.full_like(TIME, 0.2))
+    assert landing(heaving, **DECK)["touchdown_speed"] == pytest.approx(DESCENT_RATE + 0.2)
 
 
 def test_without_a_landing_nothing_is_a_number():
-    kpis = landing(mission(**contacts()), **DECK)
+    kpis = landing(mission_result(**contacts()), **DECK)
     assert (kpis.pop("bounces"), kpis.pop("landed_at_end")) == (0, False)
     assert all(math.isnan(value) for value in kpis.values())
-    assert kpis.keys() == landing(mission(), **DECK).keys() - {"bounces", "landed_at_end"}
+    assert kpis.keys() == landing(mission_result(), **DECK).keys() - {"bounces", "landed_at_end"}
 
 
 def test_waiting_on_the_deck_is_no_landing():
-    waiting = mission(**contacts((0.0, STOP + 1)))
+    waiting = mission_result(**contacts((0.0, STOP + 1)))
     assert math.isnan(landing(waiting, **DECK)["time"])
     assert landing(waiting, **DECK)["landed_at_end"] is False
 
 
 def test_a_start_just_above_the_deck_is_no_landing():
-    dropped = replaced(mission(**contacts((0.03, STOP + 1))), plant__uav__contact__touching=TIME >= 0.03)
+    dropped = with_signals(mission_result(**contacts((0.03, STOP + 1))), plant__uav__contact__touching=TIME >= 0.03)
     assert math.isnan(landing(dropped, **DECK)["time"])
 
 
 def test_leaving_the_deck_and_coming_back_is_one():
-    back = mission(**contacts((0.0, 2.0), (7.0, STOP + 1)))
+    back = mission_result(**contacts((0.0, 2.0), (7.0, STOP + 1)))
     assert landing(back, **DECK)["time"] == 7.0
 
 
 def test_a_start_in_the_air_can_land():
-    flying = mission(plant__uav__contact__touching=TIME >= TOUCHDOWN)
+    flying = mission_result(plant__uav__contact__touching=TIME >= TOUCHDOWN)
     assert landing(flying, **DECK)["time"] == TOUCHDOWN
 
 
 def test_bounces_are_counted():
-    bouncing = mission(**contacts((12.0, 12.1), (12.2, 12.3), (12.35, STOP + 1)))
+    bouncing = mission_result(**contacts((12.0, 12.1), (12.2, 12.3), (12.35, STOP + 1)))
     assert landing(bouncing, **DECK)["bounces"] == 2
 
 
 def test_leaving_for_good_is_not_landed_at_the_end():
-    kpis = landing(mission(**contacts((12.0, 15.0))), **DECK)
+    kpis = landing(mission_result(**contacts((12.0, 15.0))), **DECK)
     assert (kpis["landed_at_end"], kpis["bounces"]) == (False, 0)
     assert math.isnan(kpis["final_lateral_error"])
     assert kpis["lateral_error"] == pytest.approx(0.05)
@@ -87,7 +87,7 @@ def carried(yaw, forward, left):
     """A quadcopter on a turning deck, at this place in the vessel's axes."""
     x, y = forward * np.cos(yaw) - left * np.sin(yaw), forward * np.sin(yaw) + left * np.cos(yaw)
     places = {"plant__uav__position__x": TIME + x, "plant__uav__position__y": y}
-    return mission(yaw=yaw, **places)
+    return mission_result(yaw=yaw, **places)
 
 
 def test_a_turning_deck_carries_without_a_slide():
@@ -103,70 +103,72 @@ def test_a_slide_is_the_largest_way_across_the_deck():
 
 def test_the_way_after_leaving_the_deck_is_no_slide():
     away = carried(yaw=0.0 * TIME, forward=0.1 + np.maximum(0, TIME - 15), left=0.0)
-    assert landing(replaced(away, **contacts((12.0, 15.0))), **DECK)["slide"] == pytest.approx(0.0, abs=1e-12)
+    assert landing(with_signals(away, **contacts((12.0, 15.0))), **DECK)["slide"] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_result_from_its_file_has_the_same_kpis(tmp_path):
-    mission().to_csv(tmp_path / "result.csv")
-    assert landing(Result.from_csv(tmp_path / "result.csv"), **DECK) == landing(mission(), **DECK)
+    mission_result().to_csv(tmp_path / "result.csv")
+    assert landing(Result.from_csv(tmp_path / "result.csv"), **DECK) == landing(mission_result(), **DECK)
 
 
 def test_waypoints_are_reached_one_after_the_other():
-    kpis = waypoints(mission(), "plant.usv", x=[5.0, 10.0], y=[0.29, 0.0], radius=0.5)
+    kpis = waypoints(mission_result(), "plant.usv", x=[5.0, 10.0], y=[0.29, 0.0], radius=0.5)
     assert kpis == {"reached": 2, "all_reached": True, "time[1]": 4.6, "time[2]": 9.5}
 
 
 def test_a_waypoint_out_of_turn_does_not_count():
-    kpis = waypoints(mission(), "plant.usv", x=[10.0, 5.0, 15.0], y=[0.0, 0.0, 0.0], radius=0.5)
+    kpis = waypoints(mission_result(), "plant.usv", x=[10.0, 5.0, 15.0], y=[0.0, 0.0, 0.0], radius=0.5)
     assert (kpis["reached"], kpis["all_reached"], kpis["time[1]"]) == (1, False, 9.5)
     assert math.isnan(kpis["time[2]"])
     assert math.isnan(kpis["time[3]"])
 
 
 def test_a_waypoint_out_of_reach_is_not_reached():
-    kpis = waypoints(mission(), "plant.usv", x=[5.0], y=[0.6], radius=0.5)
+    kpis = waypoints(mission_result(), "plant.usv", x=[5.0], y=[0.6], radius=0.5)
     assert (kpis["reached"], kpis["all_reached"]) == (0, False)
 
 
 def test_tracking_is_the_distance_in_its_window():
-    swinging = mission(plant__uav__position__x=TIME, plant__uav__position__y=0.4 * np.sin(2 * np.pi * TIME))
+    swinging = mission_result(plant__uav__position__x=TIME, plant__uav__position__y=0.4 * np.sin(2 * np.pi * TIME))
     kpis = tracking(swinging, "plant.uav", "plant.usv", start=8.0, stop=11.99)
     assert kpis == pytest.approx({"rms": 0.4 / math.sqrt(2), "max": 0.4}, rel=1e-12)
 
 
 def test_tracking_lasts_until_the_end_and_leaves_the_start_out():
-    assert tracking(mission(offset=(0.0, 0.2)), "plant.uav", "plant.usv", start=9.0) == pytest.approx({"rms": 0.2, "max": 0.2})
-    assert tracking(mission(offset=(0.0, 0.2)), "plant.uav", "plant.usv", start=0.0)["max"] > 5.0
+    assert tracking(mission_result(offset=(0.0, 0.2)), "plant.uav", "plant.usv", start=9.0) == pytest.approx(
+        {"rms": 0.2, "max": 0.2}
+    )
+    assert tracking(mission_result(offset=(0.0, 0.2)), "plant.uav", "plant.usv", start=0.0)["max"] > 5.0
 
 
 def test_tracking_of_nothing_is_no_number():
-    assert all(math.isnan(value) for value in tracking(mission(), "plant.uav", "plant.usv", start=99.0).values())
+    assert all(math.isnan(value) for value in tracking(mission_result(), "plant.uav", "plant.usv", start=99.0).values())
 
 
 def test_motors_stop_when_the_last_of_them_does():
-    late = mission(**{"uav__rotor_speed[3]": np.where(TIME < 12.5, 500.0, 0.0)})
+    late = mission_result(**{"uav__rotor_speed[3]": np.where(TIME < 12.5, 500.0, 0.0)})
     kpis = motors(late, "uav.rotor_speed")
     assert kpis == {"stopped_at_end": True, "stop_time": 12.5, "final_speed": 0.0, "max_speed": 500.0}
 
 
 def test_motors_that_start_again_have_not_stopped():
-    again = mission(**{"uav__rotor_speed[2]": np.where((TIME > 13) & (TIME < 19.99), 0.0, 300.0)})
+    again = mission_result(**{"uav__rotor_speed[2]": np.where((TIME > 13) & (TIME < 19.99), 0.0, 300.0)})
     kpis = motors(again, "uav.rotor_speed")
     assert (kpis["stopped_at_end"], kpis["final_speed"]) == (False, 300.0)
     assert math.isnan(kpis["stop_time"])
 
 
 def test_motors_that_never_ran_stopped_at_the_start():
-    idle = mission(**{f"uav__rotor_speed[{i}]": np.zeros_like(TIME) for i in range(1, 5)})
+    idle = mission_result(**{f"uav__rotor_speed[{i}]": np.zeros_like(TIME) for i in range(1, 5)})
     assert motors(idle, "uav.rotor_speed")["stop_time"] == 0.0
 
 
 def test_names_that_are_not_there_are_refused():
     with pytest.raises(InputError, match=r'KPI "landing": no signal "plant.uva.contact.vessel" .* "plant.uav.contact.vessel"'):
-        evaluate_kpis(mission(), [("landing", landing, {**DECK, "vehicle": "plant.uva"})])
+        evaluate_kpis(mission_result(), [("landing", landing, {**DECK, "vehicle": "plant.uva"})])
     with pytest.raises(InputError, match=r'KPI "motors": no signal "uav.rotors\[1\]"'):
-        evaluate_kpis(mission(), [("motors", motors, {"rotor_speed": "uav.rotors"})])
+        evaluate_kpis(mission_result(), [("motors", motors, {"rotor_speed": "uav.rotors"})])
 
 
 def test_the_final_value_of_a_signal():
-    assert final(mission(), "plant.uav.position.z") == {"value": mission()["plant.uav.position.z"][-1]}
+    assert final(mission_result(), "plant.uav.position.z") == {"value": mission_result()["plant.uav.position.z"][-1]}

@@ -8,12 +8,12 @@ from typing import Any
 
 import pybullet
 import pytest
-from worlds import PLATFORM, Trial, quadcopter, vessel
+from worlds import PLATFORM, WorldHarness, quadcopter_settings, vessel_settings
 
 from cosim.core.errors import ComponentError, InputError
 from plant_src.world import World
 
-UAV = quadcopter([0.0, 0.0, 2.0])
+UAV = quadcopter_settings([0.0, 0.0, 2.0])
 
 
 def refused(**arguments: Any) -> InputError:
@@ -30,14 +30,14 @@ def refused(**arguments: Any) -> InputError:
         ({"position": [0.0, 0.0, 2.0]}, 'vehicles.uav: "model" is missing'),
         ({"model": "ar_drone"}, 'vehicles.uav: "position" is missing'),
         ({**UAV, "yow": 1.0}, r'vehicles.uav.yow: unknown key "yow"; did you mean "yaw"\?'),
-        (quadcopter([0.0, 0.0]), r"vehicles.uav.position: found \[0.0, 0.0\], expected a list of 3 numbers \[x, y, z\]"),
-        (vessel([0.0, 0.0, 0.1]), r"vehicles.uav.position: found .* expected a list of 2 numbers \[x, y\]"),
-        (quadcopter([0.0, math.nan, 2.0]), "vehicles.uav.position: found nan, expected a finite number"),
+        (quadcopter_settings([0.0, 0.0]), r"vehicles.uav.position: found \[0.0, 0.0\], expected a list of 3 numbers \[x, y, z\]"),
+        (vessel_settings([0.0, 0.0, 0.1]), r"vehicles.uav.position: found .* expected a list of 2 numbers \[x, y\]"),
+        (quadcopter_settings([0.0, math.nan, 2.0]), "vehicles.uav.position: found nan, expected a finite number"),
         ({**UAV, "yaw": "north"}, "vehicles.uav.yaw: found 'north', expected a finite number"),
         ({**UAV, "yaw": True}, "vehicles.uav.yaw: found True, expected a finite number"),
         ({**UAV, "rates": [0.0, 1.0]}, r"vehicles.uav.rates: .* expected a list of 3 numbers \[p, q, r\]"),
         (
-            vessel([0.0, 0.0], velocity_body=[1.0, 0.0, 0.5]),
+            vessel_settings([0.0, 0.0], velocity_body=[1.0, 0.0, 0.5]),
             "vehicles.uav.velocity_body: found velocity_body.w = 0.5; a strider does not move that way",
         ),
         ("ar_drone", r"vehicles.uav: found 'ar_drone', expected an object \{...\}"),
@@ -80,7 +80,7 @@ def test_names_of_vehicles_can_be_parts_of_variable_names() -> None:
 
 def test_all_problems_are_reported_together_with_their_paths() -> None:
     error = refused(
-        vehicles={"uav": {**UAV, "model": "helicopter"}, "usv": vessel([0.0])},
+        vehicles={"uav": {**UAV, "model": "helicopter"}, "usv": vessel_settings([0.0])},
         platforms={"start": {**PLATFORM, "size": [0.0, 1.0, 1.0]}},
         environment={"wind": 3.0},
     )
@@ -93,14 +93,14 @@ def test_all_problems_are_reported_together_with_their_paths() -> None:
 
 
 def test_vehicles_may_not_start_inside_each_other() -> None:
-    error = refused(vehicles={"uav": quadcopter([0.0, 0.0, 0.27]), "usv": vessel([0.0, 0.0])})
+    error = refused(vehicles={"uav": quadcopter_settings([0.0, 0.0, 0.27]), "usv": vessel_settings([0.0, 0.0])})
     assert "overlap" in str(error)
     assert "vehicles.uav" in str(error) and "vehicles.usv" in str(error)
 
 
 def test_a_refused_world_leaves_no_client_behind() -> None:
     clients = [pybullet.isConnected(k) for k in range(20)]
-    refused(vehicles={"a": vessel([0.0, 0.0]), "b": vessel([0.1, 0.0])})
+    refused(vehicles={"a": vessel_settings([0.0, 0.0]), "b": vessel_settings([0.1, 0.0])})
     assert [pybullet.isConnected(k) for k in range(20)] == clients
 
 
@@ -114,14 +114,14 @@ def test_a_world_that_nobody_has_any_more_leaves_no_client_behind() -> None:
     """As in a notebook: a scenario was loaded and not run."""
     gc.collect()
     clients = [pybullet.isConnected(k) for k in range(20)]
-    Trial({"uav": UAV}).step(3)
+    WorldHarness({"uav": UAV}).step(3)
     gc.collect()
     assert [pybullet.isConnected(k) for k in range(20)] == clients
 
 
 def test_initial_outputs_are_the_arguments() -> None:
     start = {"position": [1.0, 2.0, 3.0], "yaw": math.pi / 2, "velocity_body": [1.0, 0.0, 0.5], "rates": [0.1, 0.2, 0.3]}
-    trial = Trial({"uav": {"model": "ar_drone", **start}})
+    trial = WorldHarness({"uav": {"model": "ar_drone", **start}})
     assert trial.vector("uav.position") == pytest.approx([1.0, 2.0, 3.0])
     assert trial.vector("uav.attitude", ("roll", "pitch", "yaw")) == pytest.approx([0.0, 0.0, math.pi / 2])
     assert trial.vector("uav.velocity") == pytest.approx([0.0, 1.0, 0.5])
@@ -130,7 +130,7 @@ def test_initial_outputs_are_the_arguments() -> None:
 
 
 def test_the_deck_lies_where_the_fact_sheet_puts_it() -> None:
-    trial = Trial({"usv": vessel([1.0, 2.0], yaw=math.pi / 2, rates=[0.0, 0.0, 0.5])})
+    trial = WorldHarness({"usv": vessel_settings([1.0, 2.0], yaw=math.pi / 2, rates=[0.0, 0.0, 0.5])})
     assert trial.vector("usv.deck.position") == pytest.approx([1.0 - 0.002, 2.0 - 0.0135, 0.2689])
     assert trial.vector("usv.deck.velocity") == pytest.approx([0.5 * 0.0135, -0.5 * 0.002, 0.0])
 
@@ -141,17 +141,17 @@ def test_the_deck_lies_where_the_fact_sheet_puts_it() -> None:
 )
 def test_signs_of_the_attitude(angle: str, faster: tuple[int, ...], slower: tuple[int, ...]) -> None:
     """Positive roll lifts the left side, positive pitch lowers the nose, positive yaw is counter-clockwise from above."""
-    trial = Trial({"uav": UAV})
+    trial = WorldHarness({"uav": UAV})
     trial["uav.rotor_speed"] = [345.0 + 7.0 * (k in faster) - 7.0 * (k in slower) for k in (1, 2, 3, 4)]
     trial.step(5)
     assert trial[f"uav.attitude.{angle}"] > 1e-4
 
 
 def test_variables_follow_the_contract() -> None:
-    trial = Trial({"uav": UAV, "usv": vessel([0.0, 0.0])})
+    trial = WorldHarness({"uav": UAV, "usv": vessel_settings([0.0, 0.0])})
     variables = {variable.name: variable for variable in trial.world.variables}
     assert variables["uav.rotor_speed"].shape == (4,)
-    assert variables["uav.rotor_speed"].slots[0] == "uav.rotor_speed[1]"
+    assert variables["uav.rotor_speed"].scalar_names[0] == "uav.rotor_speed[1]"
     assert variables["usv.deck.velocity.z"].unit.name == "m/s"
     assert variables["usv.contact.touching"].type == "Boolean"
     assert {v.causality for v in variables.values()} == {"input", "output"}
@@ -167,20 +167,20 @@ def test_variables_follow_the_contract() -> None:
     ],
 )
 def test_a_vehicle_that_cannot_go_on_is_named(name: str, value: Any, message: str) -> None:
-    trial = Trial({"uav": UAV, "usv": vessel([0.0, 0.0])}).step(3)
+    trial = WorldHarness({"uav": UAV, "usv": vessel_settings([0.0, 0.0])}).step(3)
     trial[name] = value
     with pytest.raises(ComponentError, match=message):
         trial.step()
 
 
 def test_a_step_size_is_positive() -> None:
-    trial = Trial({"uav": UAV})
+    trial = WorldHarness({"uav": UAV})
     with pytest.raises(ComponentError, match=r"found step size 0.0, expected a positive number"):
         trial.step(1, 0.0)
 
 
 def test_unknown_variables_are_refused_with_the_nearest_name() -> None:
-    trial = Trial({"uav": UAV})
+    trial = WorldHarness({"uav": UAV})
     with pytest.raises(ComponentError, match=r'no variable "uav.rotor_sped"; did you mean "uav.rotor_speed"\?'):
         trial["uav.rotor_sped"] = [0.0] * 4
     with pytest.raises(ComponentError, match=r"uav.position.x is an output"):

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
-from validation import Measured
-from worlds import Trial
+from validation import MeasurementCheck
+from worlds import WorldHarness
 
 import cosim
 from cosim.export.foreign.python_class import write_python_fmu
@@ -79,7 +79,7 @@ def speeds() -> list[float]:
 
 def in_process(names: list[str]) -> Iterator[list[Any]]:
     """What the world itself publishes on the same flight, the initial values first."""
-    trial = Trial(**ARGUMENTS)
+    trial = WorldHarness(**ARGUMENTS)
     trial["usv.thrust"] = 1.0
     yield [trial[name] for name in names]
     for speed in speeds():
@@ -88,7 +88,7 @@ def in_process(names: list[str]) -> Iterator[list[Any]]:
         yield [trial[name] for name in names]
 
 
-def test_the_fmu_computes_what_the_world_does(importer: Importer, measured: Measured) -> None:
+def test_the_fmu_computes_what_the_world_does(importer: Importer, measured: MeasurementCheck) -> None:
     names = importer.names + importer.flags
     expected = list(in_process(names))
     assert importer.values() == expected[0]
@@ -101,7 +101,7 @@ def test_the_fmu_computes_what_the_world_does(importer: Importer, measured: Meas
 
 
 @pytest.mark.parametrize("begun", [0, 60, 140, 152, 230])
-def test_states_are_returned_to_bit_for_bit(importer: Importer, begun: int, measured: Measured) -> None:
+def test_states_are_returned_to_bit_for_bit(importer: Importer, begun: int, measured: MeasurementCheck) -> None:
     """On the platform, in flight, about touchdown, at rest."""
     plan = speeds()
     for speed in plan[:begun]:

@@ -3,33 +3,35 @@
 import time
 
 import pytest
-from browser import browser
+from browser import open_browser
 
 import cosim
 
 
 @pytest.fixture(scope="session")
-def flight():
+def flight_result():
     """Demo 1 until shortly after the landing: one of its five checks is not met, it has not been round the box."""
     return cosim.run("demo1_box", stop_time=16)
 
 
 @pytest.fixture(scope="session")
 def chromium():
-    with browser() as opened:
+    with open_browser() as opened:
         yield opened
 
 
-class Visit:
+class PageVisit:
     """A page opened from disk, and what it asked for and complained about."""
 
     def __init__(self, browser, file):
         self.context = browser.new_context(viewport={"width": 640, "height": 480})
         self.page = self.context.new_page()
-        self.requests, self.complaints, self.url = [], [], file.absolute().as_uri()
+        self.requests, self.console_messages, self.url = [], [], file.absolute().as_uri()
         self.page.on("request", lambda request: self.requests.append(request.url))
-        self.page.on("console", lambda said: self.complaints.append(said.text) if said.type in ("error", "warning") else None)
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on(
+            "console", lambda said: self.console_messages.append(said.text) if said.type in ("error", "warning") else None
+        )
+        self.page.on("pageerror", lambda error: self.console_messages.append(str(error)))
         self.page.goto(self.url)
         self.page.wait_for_selector("#replay[data-ready]", timeout=60_000)
 
@@ -49,7 +51,7 @@ class Visit:
     def check(self):
         """The page has asked for nothing but itself, and complained of nothing."""
         assert self.requests == [self.url]
-        assert [text for text in self.complaints if "GPU stall" not in text] == []
+        assert [text for text in self.console_messages if "GPU stall" not in text] == []
 
     @property
     def time(self):
@@ -62,12 +64,12 @@ class Visit:
 
 
 @pytest.fixture(scope="module")
-def visit(chromium):
+def open_page(chromium):
     """Opens files in the browser; at the end none may have asked for anything else or complained."""
     visits = []
 
     def opened(file):
-        visits.append(Visit(chromium, file))
+        visits.append(PageVisit(chromium, file))
         return visits[-1]
 
     yield opened

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.recording import Recording
-from cosim.report.figures import STYLE, draw, draw_figures, save
+from cosim.report.figures import STYLE, draw_figure, draw_figures, save_figure
 from cosim.results import Result
 
 TIME = np.arange(200) / 100
@@ -69,7 +69,7 @@ def test_files_carry_neither_date_nor_version(tmp_path):
 
 def test_the_style_holds_while_drawing_and_is_gone_afterwards():
     before = dict(matplotlib.rcParams)
-    figure = draw(RESULT, "curve", curve, {"signal": "x"})
+    figure = draw_figure(RESULT, "curve", curve, {"signal": "x"})
     assert figure.axes[0].xaxis.label.get_size() == STYLE["axes.labelsize"]
     assert figure.axes[0].lines[0].get_color().upper() in ("0072B2", "#0072B2")
     assert dict(matplotlib.rcParams) == before
@@ -82,26 +82,26 @@ def test_a_failing_figure_is_named():
     with pytest.raises(
         ComponentError, match=r'^figure "paths": broken failed: ValueError: no such thing \(test_figure_files.py:[0-9]+\)$'
     ):
-        draw(RESULT, "paths", broken, {})
+        draw_figure(RESULT, "paths", broken, {})
 
 
 def test_wrong_arguments_are_refused():
     with pytest.raises(InputError, match=r'figure "curve": .*; did you mean "signal"\?'):
-        draw(RESULT, "curve", curve, {"signals": "x"})
+        draw_figure(RESULT, "curve", curve, {"signals": "x"})
 
 
 def test_something_that_is_no_figure_is_refused():
     with pytest.raises(ComponentError, match=r'figure "curve": .* returned NoneType, expected a matplotlib.figure.Figure'):
-        draw(RESULT, "curve", lambda result: None, {})
+        draw_figure(RESULT, "curve", lambda result: None, {})
 
 
 def test_a_failed_write_leaves_the_former_file(tmp_path):
     path = tmp_path / "curve.png"
     path.write_bytes(b"former")
-    figure = draw(RESULT, "curve", curve, {"signal": "x"})
+    figure = draw_figure(RESULT, "curve", curve, {"signal": "x"})
     figure.axes[0].lines[0].set_linestyle((0, (1.0, -1.0, 0.0, 0.0)))
     with pytest.raises(ValueError, match="non-negative"):
-        save(figure, path)
+        save_figure(figure, path)
     assert path.read_bytes() == b"former"
     assert list(tmp_path.iterdir()) == [path]
 

@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from cosim.report.tables import number_text, print_kpis
+from cosim.report.tables import format_number, print_kpis
 from cosim.results.checks import evaluate_checks
 
 KPIS = {"landing.lateral_error": 0.0868369, "landing.landed_at_end": True, "waypoints.time[1]": math.nan, "landing.bounces": 2}
@@ -82,4 +82,4 @@ def test_without_kpis_there_is_no_table():
     [(0.1234567, "0.1235"), (12345.678, "1.235e+04"), (1e-9, "1e-09"), (False, "no"), (7, "7"), (math.inf, "inf")],
 )
 def test_numbers_are_short(value, text):
-    assert number_text(value) == text
+    assert format_number(value) == text

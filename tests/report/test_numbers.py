@@ -4,11 +4,11 @@ import csv
 
 from matplotlib.figure import Figure
 
-from cosim.report.numbers import write_numbers
+from cosim.report.numbers import write_figure_data
 
 
 def table(figure, folder):
-    assert write_numbers(figure, folder / "numbers.csv")
+    assert write_figure_data(figure, folder / "numbers.csv")
     with (folder / "numbers.csv").open(newline="") as file:
         return [tuple(row) for row in csv.reader(file)]
 
@@ -48,5 +48,5 @@ def test_bars_are_listed_by_their_names(tmp_path):
 def test_a_figure_without_numbers_makes_no_file(tmp_path):
     figure = Figure()
     figure.add_subplot().imshow([[0, 1]])
-    assert not write_numbers(figure, tmp_path / "numbers.csv")
+    assert not write_figure_data(figure, tmp_path / "numbers.csv")
     assert list(tmp_path.iterdir()) == []

@@ -130,7 +130,7 @@ def test_a_folder_without_a_run_is_refused(tmp_path):
 
 
 def test_data_in_a_page_cannot_end_its_element():
-    text = pages.embedded({"name": "</script><!--<script>", "missing": float("nan")})
+    text = pages.embed_json({"name": "</script><!--<script>", "missing": float("nan")})
     assert "<" not in text
     assert json.loads(text) == {"name": "</script><!--<script>", "missing": None}
 

@@ -7,7 +7,7 @@ import pytest
 
 from cosim.core.errors import InputError
 from cosim.core.recording import Recording
-from cosim.report.runs import figures_of, read_run
+from cosim.report.runs import load_figures, read_run
 from cosim.results import Result, write_run
 
 FIGURE = """
@@ -42,13 +42,13 @@ def test_what_was_written_is_read_back(tmp_path):
 
 def test_figures_are_found_beside_the_scenario(tmp_path):
     result = read_run(write(tmp_path))
-    ((name, function, arguments),) = figures_of(result)
+    ((name, function, arguments),) = load_figures(result)
     assert name == "curve"
     assert function(result, **arguments).axes[0].lines[0].get_ydata().tolist() == [0.0, 0.25, 1.0]
 
 
 def test_a_run_without_figures_has_none(tmp_path):
-    assert figures_of(read_run(write(tmp_path, scenario={}))) == []
+    assert load_figures(read_run(write(tmp_path, scenario={}))) == []
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path):
@@ -69,11 +69,11 @@ def test_a_run_of_an_unknown_place_is_refused(tmp_path):
     del about["scenario_file"]
     (run / "run.json").write_text(json.dumps(about))
     with pytest.raises(InputError, match="run the scenario again"):
-        figures_of(read_run(run))
+        load_figures(read_run(run))
 
 
 def test_a_scenario_that_is_gone_is_refused(tmp_path):
     result = read_run(write(tmp_path))
     (tmp_path / "scenario/own_figures.py").unlink()
     with pytest.raises(InputError, match=r'"own_figures\.py" does not exist'):
-        figures_of(result)
+        load_figures(result)

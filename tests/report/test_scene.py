@@ -9,13 +9,13 @@ import pytest
 from cosim.api import load
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.resources import root
-from cosim.report.scene import scene_of
+from cosim.report.scene import build_scene
 
 SHIPPED = sorted((root() / "scenarios").glob("*.json"))
 
 
 def scene(file):
-    return scene_of({"scenario": json.loads(Path(file).read_text()), "scenario_file": str(file)})
+    return build_scene({"scenario": json.loads(Path(file).read_text()), "scenario_file": str(file)})
 
 
 @pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
@@ -28,7 +28,7 @@ def test_every_shipped_scenario_has_vehicles_to_show(file):
 
 
 def test_signals_of_the_scene_are_recorded(flight):
-    found = scene_of(flight.metadata)
+    found = build_scene(flight.metadata)
     for body in found["bodies"]:
         assert all(name in flight for name in (*body["position"], *body["orientation"]))
     assert all(span["signal"] in flight for span in found["spans"])
@@ -82,7 +82,7 @@ def test_any_component_may_have_a_scene_and_the_scenario_one_more(tmp_path):
         "python": "lamp.py:night",
         "arguments": {"bodies": [{"name": "moon", "position": [0, 0, 9], "orientation": [1, 0, 0, 0]}]},
     }
-    found = scene_of(lamp(tmp_path, scene=more))["bodies"]
+    found = build_scene(lamp(tmp_path, scene=more))["bodies"]
     assert [body["title"] for body in found] == ["a", "moon"]
     assert found[0]["parts"][0]["opacity"] == 1
 
@@ -90,14 +90,14 @@ def test_any_component_may_have_a_scene_and_the_scenario_one_more(tmp_path):
 def test_a_method_that_happens_to_be_called_scene_is_left_alone(tmp_path):
     about = lamp(tmp_path)
     (tmp_path / "lamp.py").write_text("class Lamp:\n    def scene(self):\n        return 'backstage'\n")
-    assert scene_of(about)["bodies"] == []
+    assert build_scene(about)["bodies"] == []
 
 
 def test_no_scene_and_no_scenario_are_nothing_to_draw(tmp_path):
     shutil.copy(root() / "controllers/python/course_keeper.py", tmp_path)
     components = {"keeper": {"python": "course_keeper.py:CourseKeeper"}}
-    assert scene_of({"scenario": {"components": components}, "scenario_file": str(tmp_path / "s.json")})["bodies"] == []
-    assert scene_of({})["water"] is None
+    assert build_scene({"scenario": {"components": components}, "scenario_file": str(tmp_path / "s.json")})["bodies"] == []
+    assert build_scene({})["water"] is None
 
 
 WRONG = {
@@ -116,7 +116,7 @@ WRONG = {
 @pytest.mark.parametrize(("answer", "message"), WRONG.items())
 def test_a_wrong_answer_names_the_component(tmp_path, answer, message):
     with pytest.raises(ComponentError, match=message):
-        scene_of(lamp(tmp_path, answer))
+        build_scene(lamp(tmp_path, answer))
 
 
 def test_a_scene_that_cannot_be_asked_is_refused_before_the_run(tmp_path):
@@ -134,4 +134,4 @@ def test_a_missing_file_is_named(tmp_path):
     about = lamp(tmp_path)
     (tmp_path / "lamp.py").unlink()
     with pytest.raises(InputError, match=r'file "lamp.py" does not exist'):
-        scene_of(about)
+        build_scene(about)

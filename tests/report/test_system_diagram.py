@@ -5,7 +5,7 @@ from itertools import combinations
 
 import pytest
 
-from cosim.report.diagram import HEIGHT, WIDTH, diagram
+from cosim.report.diagram import HEIGHT, WIDTH, build_diagram
 
 
 def component(name, period=None):
@@ -30,12 +30,12 @@ def boxes(drawn):
 
 
 def test_stages_run_from_left_to_right():
-    box = boxes(diagram(SYSTEM))
+    box = boxes(build_diagram(SYSTEM))
     assert box["uav.path"].x == box["usv"].x < box["uav.mixer"].x < box["plant"].x
 
 
 def test_no_boxes_overlap_and_all_lie_inside():
-    drawn = diagram(SYSTEM)
+    drawn = build_diagram(SYSTEM)
     for one, other in combinations(drawn.boxes, 2):
         assert abs(one.x - other.x) >= WIDTH or abs(one.y - other.y) >= HEIGHT
     for box in drawn.boxes:
@@ -44,26 +44,26 @@ def test_no_boxes_overlap_and_all_lie_inside():
 
 
 def test_the_frame_of_a_nested_system_holds_its_components_and_no_other():
-    drawn = diagram(SYSTEM)
+    drawn = build_diagram(SYSTEM)
     (frame,) = drawn.frames
     inside = {b.name for b in drawn.boxes if frame.x < b.x < frame.x + frame.width and frame.y < b.y < frame.y + frame.height}
     assert (frame.name, inside) == ("uav", {"uav.path", "uav.mixer"})
 
 
 def test_connections_of_a_pair_are_one_wire_that_lists_them():
-    wires = diagram(SYSTEM).wires
+    wires = build_diagram(SYSTEM).wires
     assert sorted(wire.connections for wire in wires) == [1, 1, 1, 2]
     (feedback,) = (wire for wire in wires if wire.connections == 2)
-    assert feedback.about.splitlines() == [
+    assert feedback.tooltip.splitlines() == [
         "plant.uav.position.x → uav.path.x  [m]",
         "plant.uav.position.y → uav.path.y  [m]  (delay 1)",
     ]
 
 
 def test_a_wire_begins_and_ends_at_its_boxes():
-    drawn = diagram(SYSTEM)
+    drawn = build_diagram(SYSTEM)
     box = boxes(drawn)
-    (path,) = (wire.path for wire in drawn.wires if wire.about.startswith("usv"))
+    (path,) = (wire.path for wire in drawn.wires if wire.tooltip.startswith("usv"))
     numbers = [float(number) for number in re.findall(r"-?[\d.]+", path)]
     assert numbers[:2] == pytest.approx([box["usv"].x + WIDTH, box["usv"].y + HEIGHT / 2])
     assert numbers[-2:] == pytest.approx([box["plant"].x, box["plant"].y + HEIGHT / 2])
@@ -71,8 +71,8 @@ def test_a_wire_begins_and_ends_at_its_boxes():
 
 def test_a_period_is_told():
     system = {**SYSTEM, "components": [component("usv", 0.05)], "stages": [["usv"]], "connections": []}
-    assert diagram(system).boxes[0].about == "usv\n../fmus/usv.fmu\n2 inputs, 3 outputs, every 0.05 s"
+    assert build_diagram(system).boxes[0].tooltip == "usv\n../fmus/usv.fmu\n2 inputs, 3 outputs, every 0.05 s"
 
 
 def test_an_empty_system_is_an_empty_diagram():
-    assert diagram({"components": [], "stages": [], "connections": []}).boxes == []
+    assert build_diagram({"components": [], "stages": [], "connections": []}).boxes == []

@@ -8,7 +8,7 @@ import pytest
 
 from cosim.core.errors import CosimError, InputError
 from cosim.core.recording import Recording
-from cosim.report.frames import Job, rendered
+from cosim.report.frames import RenderJob, render_frames
 from cosim.report.video import write_video
 from cosim.results import Result
 
@@ -62,8 +62,8 @@ def test_two_seconds_can_be_read_back(tmp_path, source):
 
 
 def collected(source, processes):
-    job = Job(source, RESULT, "chase", np.linspace(0.0, 2.0, 7), (16, 8))
-    return np.array(list(rendered(job, processes)))
+    job = RenderJob(source, RESULT, "chase", np.linspace(0.0, 2.0, 7), (16, 8))
+    return np.array(list(render_frames(job, processes)))
 
 
 def test_several_processes_render_the_same_in_the_same_order(source):

@@ -13,7 +13,7 @@ import pytest
 from cosim.core.errors import InputError
 from cosim.core.recording import Recording
 from cosim.results import Result, mcap_files
-from cosim.results.mcap_files import poses, write_mcap
+from cosim.results.mcap_files import find_poses, write_mcap
 
 mcap_reader = pytest.importorskip("mcap.reader")
 protobuf = pytest.importorskip("mcap_protobuf.decoder")
@@ -97,7 +97,7 @@ def test_poses_are_transforms_from_the_world(file):
 
 
 def test_what_has_no_orientation_has_no_pose():
-    assert poses(recording()) == ["plant.uav"]
+    assert find_poses(recording()) == ["plant.uav"]
 
 
 def test_signals_are_nested_by_their_names(file):

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.results.files import pieces
+from cosim.results.files import iterate_chunks
 
 STATISTICS = Path("/proc/self/statm")
 
@@ -14,7 +14,7 @@ STATISTICS = Path("/proc/self/statm")
 @pytest.mark.parametrize("count", [0, 1, 9, 10, 11, 25])
 def test_pieces_cover_everything_once(count):
     values = np.arange(count)
-    parts = [values[piece] for piece in pieces([values, values], 10)]
+    parts = [values[piece] for piece in iterate_chunks([values, values], 10)]
     assert [x for part in parts for x in part.tolist()] == list(range(count))
     assert all(0 < len(part) <= 10 for part in parts)
 
@@ -30,7 +30,7 @@ def test_a_file_that_was_read_takes_no_memory_any_more(tmp_path):
     np.full(2_000_000, 1.0).tofile(tmp_path / "rows")
     values = np.memmap(tmp_path / "rows", rows, "r")["y"]
     before, total = resident(), 0.0
-    for piece in pieces([values], 10_000):
+    for piece in iterate_chunks([values], 10_000):
         total += values[piece].sum()
     assert total == 1_000_000
     assert resident() - before < 8_000_000  # of 16 000 000
@@ -39,5 +39,5 @@ def test_a_file_that_was_read_takes_no_memory_any_more(tmp_path):
 def test_values_are_there_again_when_they_are_read_again(tmp_path):
     np.arange(100_000.0).tofile(tmp_path / "rows")
     values = np.memmap(tmp_path / "rows", np.float64, "r")
-    sums = [sum(values[piece].sum() for piece in pieces([values], 1000)) for _ in range(2)]
+    sums = [sum(values[piece].sum() for piece in iterate_chunks([values], 1000)) for _ in range(2)]
     assert sums == [values.sum()] * 2 == [99_999 * 50_000.0] * 2

@@ -10,7 +10,7 @@ import pytest
 from cosim.core.errors import InputError
 from cosim.core.recording import Recording
 from cosim.results import Kpis, Result, write_run
-from cosim.results.checks import held_checks
+from cosim.results.checks import evaluate_all_checks
 
 
 @pytest.fixture
@@ -82,7 +82,7 @@ def test_a_result_is_shown_as_what_ran_and_its_kpis(result):
         "  landing.landed_at_end  True",
         "  landing.bounces        2",
     ]
-    checks = held_checks(kpis, [{"kpi": "landing.bounces", "max": 1}, {"kpi": "landing.landed_at_end", "equals": True}])
+    checks = evaluate_all_checks(kpis, [{"kpi": "landing.bounces", "max": 1}, {"kpi": "landing.landed_at_end", "equals": True}])
     assert repr(Result(result.recording, checks=checks)).splitlines()[1:] == [
         "1 of 2 checks passed:",
         "  landing.bounces is 2, expected max 1",

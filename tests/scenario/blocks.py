@@ -92,7 +92,7 @@ class Typed(Fmi2Slave):
         return True
 
 
-class Broken(Block):
+class FailingBlock(Block):
     """Fails in its third step, with a message of its own first."""
 
     def __init__(self, **arguments):
@@ -107,7 +107,7 @@ class Broken(Block):
         return True
 
 
-class Panicking(Broken):
+class BaseExceptionBlock(FailingBlock):
     """Fails in its first step, as what libraries in Rust raise."""
 
     def do_step(self, current_time, step_size):

@@ -11,7 +11,7 @@ import pytest
 BLOCKS = Path(__file__).parent / "blocks.py"
 
 
-class Folder:
+class ScenarioFolder:
     """A temporary folder with scenario files."""
 
     def __init__(self, path: Path):
@@ -32,5 +32,5 @@ class Folder:
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Folder:
-    return Folder(tmp_path)
+def folder(tmp_path: Path) -> ScenarioFolder:
+    return ScenarioFolder(tmp_path)

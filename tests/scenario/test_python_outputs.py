@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from helpers import run, system
+from helpers import make_system, run_system
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Integer, Real, String
 
-from cosim.components.python_class import PythonSlave
+from cosim.components.python_class import PythonFmuComponent
 from cosim.core.errors import ComponentError
 
 START = {Real: 0.0, Integer: 0, Boolean: False, String: ""}
@@ -22,7 +22,7 @@ def last(kind, value):
             self.y = value
             return True
 
-    return run(system({"a": PythonSlave(Giver(instance_name="a"), "a")}), 1, 1, ["a.y"]).columns["a.y"][-1]
+    return run_system(make_system({"a": PythonFmuComponent(Giver(instance_name="a"), "a")}), 1, 1, ["a.y"]).columns["a.y"][-1]
 
 
 @pytest.mark.parametrize(

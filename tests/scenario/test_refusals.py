@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers import wire
+from helpers import connection
 
 import cosim
 from cosim.core import resources
@@ -72,14 +72,14 @@ def test_everything_that_is_wrong_is_said_at_once(folder):
         ({"algorithm": {"stages": [["a"], ["b"]]}}, '$.algorithm.stages: unknown component "b"; valid: a'),
         ({"algorithm": {"stages": []}}, '$.algorithm.stages: component "a" is in no stage'),
         ({"algorithm": {"kind": "magic", "stages": [["a"]]}}, "$.algorithm.kind: expected 'staged'"),
-        ({"connections": [wire("a.y", "a.u", delay=-1)]}, "$.connections[0].delay: expected greater than or equal to 0"),
-        ({"connections": [wire("a.y", "a.u", delay=1.5)]}, "$.connections[0].delay: expected a valid integer"),
-        ({"connections": [wire("a.y", "a")]}, "$.connections[0]: input a.u has no matching output a.y.u"),
-        ({"connections": [wire("a.u", "a.u")]}, "$.connections[0].from: a.u is an input, expected an output"),
-        ({"connections": [wire("a.y", "a.y")]}, "$.connections[0].to: a.y is an output, expected an input"),
-        ({"connections": [wire("a.yy", "a.u")]}, 'component "a" has no output "yy"; did you mean "y"?'),
-        ({"connections": [wire("aa.y", "a.u")]}, 'unknown component "aa"; did you mean "a"?'),
-        ({"connections": [wire("a.y", "a.u")] * 2}, "input a.u is connected twice: it is already fed by a.y"),
+        ({"connections": [connection("a.y", "a.u", delay=-1)]}, "$.connections[0].delay: expected greater than or equal to 0"),
+        ({"connections": [connection("a.y", "a.u", delay=1.5)]}, "$.connections[0].delay: expected a valid integer"),
+        ({"connections": [connection("a.y", "a")]}, "$.connections[0]: input a.u has no matching output a.y.u"),
+        ({"connections": [connection("a.u", "a.u")]}, "$.connections[0].from: a.u is an input, expected an output"),
+        ({"connections": [connection("a.y", "a.y")]}, "$.connections[0].to: a.y is an output, expected an input"),
+        ({"connections": [connection("a.yy", "a.u")]}, 'component "a" has no output "yy"; did you mean "y"?'),
+        ({"connections": [connection("aa.y", "a.u")]}, 'unknown component "aa"; did you mean "a"?'),
+        ({"connections": [connection("a.y", "a.u")] * 2}, "input a.u is connected twice: it is already fed by a.y"),
         ({"kpis": [{"name": "k", "python": "none.py:f"}]}, '$.kpis[0]: file "none.py" does not exist'),
         ({"checks": [{"kpi": "k.x", "max": 1}]}, '$.checks[0].kpi: no KPI "k.x"'),
         ({"checks": [{"kpi": "k.x"}]}, 'expected at least one of "min", "max", "equals"'),
@@ -107,7 +107,7 @@ def test_one_wrong_thing_is_one_line(folder, change, line):
     ],
 )
 def test_a_component_without_a_sound_source_is_one_line_and_nothing_else_is_said_about_it(folder, component, line):
-    found = refused(folder, {"a": component, "b": folder.block("Gain")}, [wire("a.y", "b.u"), wire("b.y", "a.u")])
+    found = refused(folder, {"a": component, "b": folder.block("Gain")}, [connection("a.y", "b.u"), connection("b.y", "a.u")])
     assert len(found) == 1
     assert line in found[0]
 
@@ -196,7 +196,7 @@ def test_a_period_inside_a_nested_system_is_found_in_its_file(folder):
 def test_units_of_different_quantities_are_refused(folder):
     fmus = resources.root() / "fmus"
     components = {name: {"fmu": str(fmus / f"{name}.fmu")} for name in ("vtol", "attitude_controller")}
-    (line,) = refused(folder, components, [wire("vtol.altitude_reference", "attitude_controller.roll_command")])
+    (line,) = refused(folder, components, [connection("vtol.altitude_reference", "attitude_controller.roll_command")])
     assert line.endswith(
         'vtol.altitude_reference cannot feed attitude_controller.roll_command: units "m" and "rad" measure different quantities'
     )
@@ -223,7 +223,12 @@ def test_problems_of_a_python_component_stand_at_its_arguments(folder):
 
 def test_incompatible_units_and_types_are_refused(folder, probes):
     xml = {"a": {"fmu": str(probes[2])}, "b": {"fmu": str(probes[3])}}
-    wires = [wire("a.s_out", "b.u"), wire("a.b_out", "b.int8_in"), wire("b.uint64_out", "a.u"), wire("a.i_out", "b.f_in")]
+    wires = [
+        connection("a.s_out", "b.u"),
+        connection("a.b_out", "b.int8_in"),
+        connection("b.uint64_out", "a.u"),
+        connection("a.i_out", "b.f_in"),
+    ]
     assert [line.split(": ", 2)[2] for line in refused(folder, xml, wires)] == [
         "a.s_out cannot feed b.u: type String does not become Float64",
         "a.b_out cannot feed b.int8_in: type Boolean does not become Int8",
@@ -234,7 +239,9 @@ def test_incompatible_units_and_types_are_refused(folder, probes):
 
 def test_a_prefix_without_a_matching_output_names_the_input(folder):
     components = {"pilot": folder.block("Controller"), "gain": folder.block("Gain")}
-    (line,) = refused(folder, {**components, "plant": folder.block("Plant")}, [wire("plant.ship.position", "pilot.vehicle")])
+    (line,) = refused(
+        folder, {**components, "plant": folder.block("Plant")}, [connection("plant.ship.position", "pilot.vehicle")]
+    )
     assert "input pilot.vehicle.position.x has no matching output plant.ship.position.position.x" in line
 
 
@@ -255,7 +262,7 @@ def test_a_system_that_contains_itself_is_refused(folder):
 def test_a_port_that_does_not_exist_is_refused_with_the_nearest(folder):
     folder.write({"components": {"g": folder.block("Gain")}, "ports": {"inputs": {"command": "g.u"}}}, "n.json")
     components = {"a": {"system": "n.json"}, "b": folder.block("Gain")}
-    (line,) = refused(folder, components, [wire("b.y", "a.comand")])
+    (line,) = refused(folder, components, [connection("b.y", "a.comand")])
     assert 'nested system "a" has no input port "comand"; did you mean "command"?' in line
 
 
@@ -285,7 +292,7 @@ def test_a_nested_system_with_times_is_refused_and_not_read_for_ever(folder):
 
 @pytest.mark.parametrize("components", [None, [], 3, {}])
 def test_without_components_nothing_else_is_said_about_them(folder, components):
-    content = {"name": "x", "stop_time": 1, "step_size": 1, "connections": [wire("a.y", "b.u")]}
+    content = {"name": "x", "stop_time": 1, "step_size": 1, "connections": [connection("a.y", "b.u")]}
     if components is not None:
         content["components"] = components
     (line,) = lines(folder.write({**content, "algorithm": {"stages": [["a"]]}, "record": {"signals": ["a.y"]}}))

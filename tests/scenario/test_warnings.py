@@ -1,20 +1,20 @@
 """Scenarios that can run, though something in them is probably a mistake."""
 
 import pytest
-from helpers import wire
+from helpers import connection
 
 import cosim
 from cosim.core import resources
-from cosim.scenario.warnings import doubts
+from cosim.scenario.warnings import find_warnings
 
 SHIPPED = sorted((resources.root() / "scenarios").glob("*.json"))
-BOTH = [wire("plant.ship", "pilot.vehicle"), wire("pilot.motor", "plant.ship.motor")]
+BOTH = [connection("plant.ship", "pilot.vehicle"), connection("pilot.motor", "plant.ship.motor")]
 
 
 def doubted(file):
     assembly = cosim.load(file)
     try:
-        return [str(problem).partition(": $.")[2] for problem in doubts(assembly)]
+        return [str(problem).partition(": $.")[2] for problem in find_warnings(assembly)]
     finally:
         assembly.free()
 

@@ -1,10 +1,10 @@
 """Names, prefixes, ports: what a scenario's connections and parameters mean."""
 
 import pytest
-from helpers import wire
+from helpers import connection
 
 import cosim
-from cosim.core.time_grid import exact
+from cosim.core.time_grid import exact_fraction
 
 WHOLE_PLANT = """
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
@@ -20,7 +20,7 @@ class Whole(Fmi2Slave):
         return True
 """
 
-PAIR = [wire("plant.ship", "pilot.vehicle"), wire("pilot.motor", "plant.ship.motor")]
+PAIR = [connection("plant.ship", "pilot.vehicle"), connection("pilot.motor", "plant.ship.motor")]
 
 
 def columns(file, **more):
@@ -45,15 +45,17 @@ def test_prefixes_connect_what_the_reader_declares(folder):
 
 def test_components_step_in_the_listed_order_unless_told_otherwise(folder):
     gains = {"a": folder.block("Gain", parameters={"u": 1.0}), "b": folder.block("Gain")}
-    listed = folder.scenario(gains, [wire("a.y", "b.u")], stop_time=1)
+    listed = folder.scenario(gains, [connection("a.y", "b.u")], stop_time=1)
     assert columns(listed)["b.y"] == [0, 4]
-    together = folder.scenario(gains, [wire("a.y", "b.u")], stop_time=1, algorithm={"kind": "staged", "stages": [["a", "b"]]})
+    together = folder.scenario(
+        gains, [connection("a.y", "b.u")], stop_time=1, algorithm={"kind": "staged", "stages": [["a", "b"]]}
+    )
     assert columns(together)["b.y"] == [0, 0]
 
 
 def test_a_connection_of_single_variables_beats_a_prefix(folder):
     components = {"pilot": folder.block("Controller"), "gain": folder.block("Gain"), "plant": folder.block("Plant")}
-    file = folder.scenario(components, [*PAIR, wire("gain.y", "plant.ship.motor[2]")])
+    file = folder.scenario(components, [*PAIR, connection("gain.y", "plant.ship.motor[2]")])
     assembly = cosim.load(file)
     fed = {str(c.target): str(c.source) for c in assembly.system.connections}
     assembly.free()
@@ -63,7 +65,7 @@ def test_a_connection_of_single_variables_beats_a_prefix(folder):
 
 def test_an_input_below_a_prefix_without_output_may_be_set_by_a_parameter(folder):
     plant = folder.block("Plant", parameters={"ship.motor[2]": 5.0})
-    file = folder.scenario({"gain": folder.block("Gain"), "plant": plant}, [wire("gain.y", "plant.ship.motor[1]")])
+    file = folder.scenario({"gain": folder.block("Gain"), "plant": plant}, [connection("gain.y", "plant.ship.motor[1]")])
     assert columns(file)["plant.ship.position.y"] == [1, 6, 11, 16]
 
 
@@ -71,7 +73,7 @@ def test_a_component_alone_is_a_prefix_too(folder):
     folder.write({"components": {"head": folder.block("Controller")}, "ports": {"inputs": {"vehicle": "head.vehicle"}}}, "n.json")
     (folder.path / "plant.py").write_text(WHOLE_PLANT)
     components = {"plant": {"python": "plant.py:Whole"}, "pilot": {"system": "n.json"}}
-    assembly = cosim.load(folder.scenario(components, [wire("plant", "pilot.vehicle")]))
+    assembly = cosim.load(folder.scenario(components, [connection("plant", "pilot.vehicle")]))
     assembly.free()
     assert [f"{c.source} > {c.target}" for c in assembly.system.connections] == [
         "plant.position.x > pilot.head.vehicle.position.x"
@@ -83,7 +85,7 @@ def test_a_port_may_mean_variables_that_only_some_of_its_readers_have(folder):
     folder.write({"components": components, "ports": {"inputs": {"vehicle": ["head.vehicle", "tail.gains"]}}}, "n.json")
     file = folder.scenario(
         {"plant": folder.block("Plant"), "pilot": {"system": "n.json"}},
-        [wire("plant.ship.position.x", "pilot.vehicle.position.x")],
+        [connection("plant.ship.position.x", "pilot.vehicle.position.x")],
     )
     assembly = cosim.load(file)
     assembly.free()
@@ -94,7 +96,7 @@ def nested(folder):
     folder.write(
         {
             "components": {"head": folder.block("Controller", parameters={"gain": [1, 1]}), "tail": folder.block("Gain")},
-            "connections": [wire("head.motor[2]", "tail.u")],
+            "connections": [connection("head.motor[2]", "tail.u")],
             "ports": {
                 "inputs": {"vehicle": ["head.vehicle"], "offset": "head.offset"},
                 "outputs": {"motor": "head.motor", "extra": "tail.y"},
@@ -160,7 +162,7 @@ def test_a_held_profile_jumps_at_its_rows(folder):
 @pytest.mark.parametrize(("step_size", "count"), [("1/10", 9), ("1/100", 90), ("1/1000", 900)])
 def test_a_held_profile_jumps_exactly_there_whatever_times_are_rounded_to(folder, step_size, count):
     """0.7 + 0.1 is less than 0.8."""
-    step = exact(step_size)
+    step = exact_fraction(step_size)
     rows = "".join(f"{float(n * step)!r},{n}\n" for n in range(count + 1))
     (folder.path / "profile.csv").write_text(f"time,step\n{rows}")
     inputs = [{"file": "profile.csv", "to": {"step": "a.u"}, "interpolation": "hold"}]

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 #: a process may take so long to start on a busy machine (s)
-PATIENCE = 60.0
+START_TIMEOUT = 60.0
 
 
-class Cluster:
+class DaskCluster:
     """Processes and files of a cluster, in a folder."""
 
     def __init__(self, folder: Path, workers: int):
@@ -24,9 +24,9 @@ class Cluster:
         self._file = folder / "scheduler.json"
         self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", self._file)
         self.address: str = self._wait_for_file()["address"]
-        self.workers = [self.worker() for _ in range(workers)]
+        self.workers = [self.start_worker() for _ in range(workers)]
 
-    def worker(self, **environment: str) -> subprocess.Popen[bytes]:
+    def start_worker(self, **environment: str) -> subprocess.Popen[bytes]:
         """One more worker with one thread, and with a folder of its own for what it is sent."""
         words = (self.address, "--no-nanny", "--nthreads", 1, "--host", "127.0.0.1", "--local-directory", self.folder / "scratch")
         return self._start("worker", *words, **environment)
@@ -38,7 +38,7 @@ class Cluster:
             return subprocess.Popen(command, cwd=self.folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=variables)
 
     def _wait_for_file(self) -> dict[str, Any]:
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + START_TIMEOUT
         while time.monotonic() < end:
             if self._file.exists() and (text := self._file.read_text()).rstrip().endswith("}"):
                 return dict(json.loads(text))
@@ -52,8 +52,8 @@ class Cluster:
 
 
 @contextmanager
-def cluster(folder: Path, workers: int = 2) -> Iterator[Cluster]:
-    made = Cluster(folder, workers)
+def running_cluster(folder: Path, workers: int = 2) -> Iterator[DaskCluster]:
+    made = DaskCluster(folder, workers)
     try:
         yield made
     finally:

@@ -7,20 +7,20 @@ from typing import Any
 
 import pytest
 from fault_fmu import build_library
-from lag_sweeps import Lag, Make
+from lag_sweeps import LagProject, MakeLagProject
 
 
 @pytest.fixture(scope="session")
-def make_lag(tmp_path_factory: pytest.TempPathFactory) -> Make:
+def make_lag(tmp_path_factory: pytest.TempPathFactory) -> MakeLagProject:
     """A new folder with the lag and its scenario."""
     library: Path = build_library(2, tmp_path_factory.mktemp("library"))
 
-    def make(**more: Any) -> Lag:
-        return Lag.made(tmp_path_factory.mktemp("lag"), library, **more)
+    def make(**more: Any) -> LagProject:
+        return LagProject.create(tmp_path_factory.mktemp("lag"), library, **more)
 
     return make
 
 
 @pytest.fixture
-def lag(make_lag: Make) -> Lag:
+def lag(make_lag: MakeLagProject) -> LagProject:
     return make_lag()

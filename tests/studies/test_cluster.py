@@ -6,15 +6,15 @@ import shutil
 import time
 
 import pytest
-from clusters import Cluster, cluster
-from lag_sweeps import SEGV, alive, descendants
+from clusters import DaskCluster, running_cluster
+from lag_sweeps import SEGV_ORDER, descendants, is_alive
 
 import cosim
 from cosim.core.resources import root
 
 pytest.importorskip("distributed")
 
-LEVELS = {f"run {run}": {"lag.y_start": 1 + run / 100, "lag.fault": SEGV if run == 3 else ""} for run in range(8)}
+LEVELS = {f"run {run}": {"lag.y_start": 1 + run / 100, "lag.fault": SEGV_ORDER if run == 3 else ""} for run in range(8)}
 FACTORS = [{"name": "level", "levels": LEVELS}]
 #: runs of about a tenth of a second
 SLOW = {
@@ -25,7 +25,7 @@ SLOW = {
 
 @pytest.fixture(scope="session")
 def two_workers(tmp_path_factory):
-    with cluster(tmp_path_factory.mktemp("cluster")) as made:
+    with running_cluster(tmp_path_factory.mktemp("cluster")) as made:
         yield made
 
 
@@ -70,15 +70,15 @@ def test_a_worker_with_another_cosim_is_refused(lag, tmp_path):
     shutil.copytree(root() / "cosim", tmp_path / "other" / "cosim", ignore=shutil.ignore_patterns("__pycache__", "_bundle"))
     with (tmp_path / "other/cosim/__init__.py").open("a") as file:
         file.write('\n__version__ = "0.0.9"\n')
-    with cluster(tmp_path, workers=0) as made:
-        made.workers.append(made.worker(PYTHONPATH=str(tmp_path / "other")))
+    with running_cluster(tmp_path, workers=0) as made:
+        made.workers.append(made.start_worker(PYTHONPATH=str(tmp_path / "other")))
         done = lag.call("sweep", lag.write(factors=FACTORS), "--scheduler", made.address)
     assert done.code == 2
     assert "has cosim 0.0.9 (" in done.err
     assert f"expected {cosim.__version__} (" in done.err
 
 
-def begin(lag, made: Cluster):
+def begin(lag, made: DaskCluster):
     """A sweep on a cluster, with some runs finished."""
     process = lag.start("sweep", lag.write(**SLOW), "--scheduler", made.address)
     end = time.monotonic() + 60
@@ -90,24 +90,24 @@ def begin(lag, made: Cluster):
 
 @pytest.mark.long
 def test_killed_workers_are_replaced(lag, tmp_path):
-    with cluster(tmp_path) as made:
+    with running_cluster(tmp_path) as made:
         process = begin(lag, made)
         victim, below = made.workers[0], descendants(made.workers[0].pid)
         victim.kill()
         victim.wait()
-        made.workers.append(made.worker())
+        made.workers.append(made.start_worker())
         _, err = process.communicate(timeout=120)
         assert process.returncode == 0, err
         assert not any("failure" in record for record in lag.records())
         assert len({record["key"] for record in lag.records()}) == len(lag.records()) == 30
-        assert not any(map(alive, below))
+        assert not any(map(is_alive, below))
 
 
 @pytest.mark.long
 def test_after_the_scheduler_was_killed_another_one_finishes_the_sweep(lag, tmp_path):
     (tmp_path / "first").mkdir()
     (tmp_path / "second").mkdir()
-    with cluster(tmp_path / "first") as made:
+    with running_cluster(tmp_path / "first") as made:
         process = begin(lag, made)
         made.scheduler.kill()
         _, err = process.communicate(timeout=120)
@@ -115,7 +115,7 @@ def test_after_the_scheduler_was_killed_another_one_finishes_the_sweep(lag, tmp_
         assert "the connection to the scheduler" in err
         before = lag.records()
         assert 3 <= len(before) < 30
-    with cluster(tmp_path / "second") as made:
+    with running_cluster(tmp_path / "second") as made:
         assert lag.call("sweep", "sweep.json", "--scheduler", made.address).code == 0
     assert lag.records()[: len(before)] == before
     assert len({record["key"] for record in lag.records()}) == len(lag.records()) == 30

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cosim.studies.design import design
+from cosim.studies.design import build_design
 from cosim.studies.schema import DISTRIBUTIONS, SweepSpec
 
 ARGUMENTS = {
@@ -34,7 +34,7 @@ RANGE = {"name": "r", "set": "a.r", "range": {"min": 2.0, "max": 32.0}}
 
 
 def made(*factors, **more):
-    return design(SweepSpec.model_validate({"name": "d", "scenario": "s.json", "factors": list(factors), **more}))
+    return build_design(SweepSpec.model_validate({"name": "d", "scenario": "s.json", "factors": list(factors), **more}))
 
 
 def sampled(kind, runs, *factors, seed=1):

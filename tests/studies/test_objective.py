@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from cosim.studies.objective import constraint, expression
+from cosim.studies.objective import parse_constraint, parse_expression
 
 VALUES = {"landing.error": 0.5, "waypoints.time[2]": 8.0, "gain": 3.0, "flown": True, "lost": math.nan}
 
@@ -22,18 +22,18 @@ VALUES = {"landing.error": 0.5, "waypoints.time[2]": 8.0, "gain": 3.0, "flown": 
     ],
 )
 def test_arithmetic(text, value):
-    assert expression(text)(VALUES) == pytest.approx(value)
+    assert parse_expression(text)(VALUES) == pytest.approx(value)
 
 
 @pytest.mark.parametrize("text", ["1 / (gain - 3)", "sqrt(-gain)", "log(0)", "1e300 ** 2", "(-8) ** 0.5", "missing + 1"])
 def test_what_has_no_value_is_nan(text):
-    assert math.isnan(expression(text)(VALUES))
+    assert math.isnan(parse_expression(text)(VALUES))
 
 
 @pytest.mark.parametrize("text", ["max(0, lost)", "min(lost, 1)", "lost ** 0", "1 ** lost", "min(1, max(lost, 2))"])
 def test_a_part_without_a_value_leaves_the_whole_without(text):
     """Python's own functions lose sight of NaN, some depending on the order."""
-    assert math.isnan(expression(text)(VALUES))
+    assert math.isnan(parse_expression(text)(VALUES))
 
 
 @pytest.mark.parametrize(
@@ -59,27 +59,27 @@ def test_a_part_without_a_value_leaves_the_whole_without(text):
 )
 def test_anything_else_is_refused(text, message):
     with pytest.raises(ValueError, match=re.escape(message)):
-        expression(text)
+        parse_expression(text)
 
 
 def test_unknown_names_come_with_the_nearest():
-    assert expression("gian + 1").unknown(VALUES) == 'no KPI or parameter "gian"; did you mean "gain"?'
-    assert expression("gain + landing.error").unknown(VALUES) == ""
+    assert parse_expression("gian + 1").unknown_name_problem(VALUES) == 'no KPI or parameter "gian"; did you mean "gain"?'
+    assert parse_expression("gain + landing.error").unknown_name_problem(VALUES) == ""
 
 
 @pytest.mark.parametrize(
     ("text", "violation"), [("gain <= 3", 0.0), ("gain <= 2.5", 0.5), ("gain >= 5 * landing.error", 0.0), ("gain + 1 >= 6", 2.0)]
 )
 def test_constraints_say_by_how_much_they_are_not_met(text, violation):
-    assert constraint(text).violation(VALUES) == violation
+    assert parse_constraint(text).violation(VALUES) == violation
 
 
 @pytest.mark.parametrize("text", ["log(0) <= 1", "min(1, lost) <= 1"])
 def test_a_side_without_a_value_violates_without_limit(text):
-    assert constraint(text).violation(VALUES) == math.inf
+    assert parse_constraint(text).violation(VALUES) == math.inf
 
 
 @pytest.mark.parametrize("text", ["gain", "gain < 3", "1 <= gain <= 2", "gain == 3"])
 def test_other_comparisons_are_refused(text):
     with pytest.raises(ValueError, match="expected a comparison with <= or >="):
-        constraint(text)
+        parse_constraint(text)

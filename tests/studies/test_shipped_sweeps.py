@@ -5,7 +5,7 @@ import json
 import pytest
 
 from cosim.core import resources
-from cosim.scenario import assemble
+from cosim.scenario import prepare
 from cosim.studies.sweep import Sweep
 from cosim.studies.tune import Tuning
 
@@ -15,17 +15,17 @@ FILES = sorted(resources.root().glob("scenarios/sweeps/*.json"))
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_a_shipped_file_can_be_run(file):
     if "minimize" in json.loads(file.read_text()):
-        tuning = Tuning.of(file.stem)
+        tuning = Tuning.from_file(file.stem)
         study, settings = (
             tuning.study,
             {**tuning.spec.cases[0], **tuning.settings({p.name: p.min for p in tuning.spec.parameters})},
         )
     else:
-        sweep = Sweep.of(file.stem)
+        sweep = Sweep.from_file(file.stem)
         study, settings = sweep.study, next(iter(sweep.design)).settings
         assert sweep.criteria
     assert str(study.bundle.scenario) in study.bundle.files
-    assembly = assemble(study.read.scenario, study.job(settings).settings)
+    assembly = prepare(study.study_file.scenario, study.job(settings).settings)
     assert assembly.kpis()
     assembly.free()
 

@@ -11,7 +11,7 @@ import sys
 import time
 
 import pytest
-from lag_sweeps import alive, descendants
+from lag_sweeps import descendants, is_alive
 
 RUNS = 14
 #: runs of about a tenth of a second
@@ -52,7 +52,7 @@ def test_a_killed_sweep_goes_on_where_it_was(lag, going):
     going.wait()
     before = lag.records()
     assert 1 <= len(before) < RUNS
-    wait_until(lambda: not any(map(alive, below)))
+    wait_until(lambda: not any(map(is_alive, below)))
     assert_completed(lag)
     assert lag.records()[: len(before)] == before
 
@@ -78,7 +78,7 @@ def test_an_interrupt_keeps_what_is_finished(lag, going):
     assert going.returncode == 130, err
     assert len(lag.table()) == len(lag.records())
     assert f"{len(lag.records())} of {RUNS} runs" in out
-    wait_until(lambda: not any(map(alive, below)), 10)
+    wait_until(lambda: not any(map(is_alive, below)), 10)
     assert_completed(lag)
 
 

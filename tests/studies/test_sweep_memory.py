@@ -9,7 +9,7 @@ import pytest
 from lag_sweeps import descendants
 
 from cosim.studies.execution.job import Record
-from cosim.studies.execution.run_store import Ledger
+from cosim.studies.execution.run_store import RunStore
 from cosim.studies.sweep import Sweep
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(1800)]
@@ -34,8 +34,8 @@ def test_100_000_runs_take_less_than_300_megabytes(lag):
     sweep = lag.write(factors=[{"name": "y", "set": "lag.y_start", **half}, {"name": "T", "set": "lag.T", "values": [0.5, 1.0]}])
     folder = lag.folder / "runs/sweep"
     folder.mkdir(parents=True)
-    with Ledger(folder) as ledger:
-        for number, job in enumerate(Sweep.of(sweep).jobs()):
+    with RunStore(folder) as ledger:
+        for number, job in enumerate(Sweep.from_file(sweep).jobs()):
             if number < RUNS - LAST:
                 ledger.add(Record(job.key, {"end.value": 0.8 + 1e-6 * number}, seconds=0.0123))
     process = lag.start("sweep", sweep, "--workers", 2)

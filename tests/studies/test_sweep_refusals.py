@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from cosim.cli import cli
 from cosim.core.errors import InputError
-from cosim.studies.document import read
+from cosim.studies.document import read_study
 from cosim.studies.schema import SweepSpec, TuneSpec
 from cosim.studies.tune import Tuning
 
@@ -22,7 +22,7 @@ def problems(folder, kind, content):
     file = folder / "study.json"
     file.write_text(json.dumps({"name": "s", "scenario": "demo1_box", **content}))
     with pytest.raises(InputError) as refusal:
-        Tuning.of(file) if kind is TuneSpec else read(file, kind)
+        Tuning.from_file(file) if kind is TuneSpec else read_study(file, kind)
     return [str(problem).removeprefix(str(file)) for problem in refusal.value.problems]
 
 
@@ -99,7 +99,7 @@ def test_what_is_changed_further_is_not(tmp_path, factors, common):
     (tmp_path / "s.json").write_text(
         json.dumps({"name": "s", "scenario": "demo1_box", "factors": varied(factors), "settings": common})
     )
-    read(tmp_path / "s.json", SweepSpec)
+    read_study(tmp_path / "s.json", SweepSpec)
 
 
 def varied(factors):

@@ -7,10 +7,10 @@ import math
 
 import pytest
 from fault_fmu import lag_output
-from lag_sweeps import SEGV
+from lag_sweeps import SEGV_ORDER
 
 #: 5 % of the runs end their process
-RUNS, CRASHES = 40, {3: SEGV, 23: "DoStep 6 abort"}
+RUNS, CRASHES = 40, {3: SEGV_ORDER, 23: "DoStep 6 abort"}
 STARTS = [1 + run / 100 for run in range(RUNS)]
 
 
@@ -138,7 +138,7 @@ def test_another_scenario_makes_other_runs(lag):
 
 @pytest.mark.long
 def test_failures_are_kept_until_they_are_to_be_tried_again(lag):
-    sweep = lag.write(factors=[{"name": "fault", "set": "lag.fault", "values": ["", SEGV]}])
+    sweep = lag.write(factors=[{"name": "fault", "set": "lag.fault", "values": ["", SEGV_ORDER]}])
     for words, made in (((), 2), ((), 2), (("--retry-failed",), 3)):
         assert lag.call("sweep", sweep, *words).code == 1
         assert len(lag.records()) == made

@@ -7,12 +7,12 @@ import math
 
 import pytest
 from fault_fmu import lag_output
-from lag_sweeps import SEGV
+from lag_sweeps import SEGV_ORDER
 
 import cosim
 from cosim.core.errors import InputError
 from cosim.studies.execution.job import Record
-from cosim.studies.execution.run_store import Ledger
+from cosim.studies.execution.run_store import RunStore
 from cosim.studies.tune import Tuning
 
 PARAMETER = {"name": "T", "set": "lag.T", "min": 0.02, "max": 2.0, "scale": "log"}
@@ -51,9 +51,9 @@ def with_kpis(lag, body):
 def tuned(lag, **content):
     """The best trial, all trials, and how many runs they took."""
     minimize = "abs(end.value - 0.5)"
-    tuning = Tuning.of(lag.write("tune", **{"parameters": [PARAMETER], "minimize": minimize, "method": SEARCH, **content}))
-    engine = HereAndNow(tuning.study.order)
-    with Ledger(lag.folder) as ledger:
+    tuning = Tuning.from_file(lag.write("tune", **{"parameters": [PARAMETER], "minimize": minimize, "method": SEARCH, **content}))
+    engine = HereAndNow(tuning.study.context)
+    with RunStore(lag.folder) as ledger:
         best = tuning.run(ledger, engine, lambda record: None)
     return best, tuning.trials, engine.runs
 
@@ -165,7 +165,11 @@ def test_an_interrupt_in_the_first_generation_leaves_earlier_files_alone(lag, mo
 def test_the_command_prints_how_to_run_the_best_and_says_when_all_crash(lag):
     """Every point fails in its second case, so the first one is as good as any."""
     lag.write(
-        "tune", parameters=[PARAMETER], minimize="end.value", cases=[{}, {"lag.fault": SEGV}], method=SEARCH | {"evaluations": 3}
+        "tune",
+        parameters=[PARAMETER],
+        minimize="end.value",
+        cases=[{}, {"lag.fault": SEGV_ORDER}],
+        method=SEARCH | {"evaluations": 3},
     )
     done = lag.call("tune", "tune.json")
     assert done.code == 1

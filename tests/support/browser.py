@@ -10,11 +10,11 @@ import pytest
 FLAGS = ("--enable-unsafe-swiftshader", "--no-sandbox", "--disable-quic", "--no-first-run")
 FLAGS += ("--disable-background-networking", "--disable-component-update", "--disable-sync")
 #: the page itself is drawn as if there were a graphics card, which takes the processor longer still
-ALL_OF_IT = ("--use-gl=angle", "--use-angle=swiftshader")
+SOFTWARE_RENDERING_FLAGS = ("--use-gl=angle", "--use-angle=swiftshader")
 
 
 @contextmanager
-def browser(flags: Sequence[str] = ALL_OF_IT) -> Iterator:
+def open_browser(flags: Sequence[str] = SOFTWARE_RENDERING_FLAGS) -> Iterator:
     """Playwright's Browser of an installed Chromium; skips the test where either is missing."""
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")

@@ -9,19 +9,19 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import fmpy
-from foreign import FOREIGN, HEADERS
+from foreign import HEADERS, PROBE_SOURCES
 
 SOURCE = Path(__file__).parents[1] / "engine/busy.c"
 
 
-def busy_fmu(folder: Path, name: str, seconds: float, wait: bool = False, *macros: str) -> Path:
+def slow_fmu(folder: Path, name: str, seconds: float, wait: bool = False, *macros: str) -> Path:
     """The FMI 2.0 probe with a doStep that takes so long, working or waiting (see busy.c, also for further macros)."""
     compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
     library, target = folder / f"{name}.so", folder / f"{name}.fmu"
     defined = [f"BUSY_NS={round(seconds * 1e9)}LL", *(["WAIT"] if wait else []), *macros]
-    flags = ["-shared", "-fPIC", "-O2", "-w", *(f"-D{macro}" for macro in defined), f"-I{HEADERS}", f"-I{FOREIGN}"]
+    flags = ["-shared", "-fPIC", "-O2", "-w", *(f"-D{macro}" for macro in defined), f"-I{HEADERS}", f"-I{PROBE_SOURCES}"]
     subprocess.run([compiler, *flags, SOURCE, "-o", library], check=True)
     with ZipFile(target, "w") as archive:
-        archive.write(FOREIGN / "probe2.xml", "modelDescription.xml")
+        archive.write(PROBE_SOURCES / "probe2.xml", "modelDescription.xml")
         archive.write(library, f"binaries/{fmpy.platform}/probe.so")
     return target

@@ -18,8 +18,8 @@ HERE = Path(__file__).parents[1] / "system/faults"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 PLATFORMS = {2: fmpy.platform, 3: fmpy.platform_tuple}
 #: macro step (s) and number of steps of every run here; the FMUs' DefaultExperiment says the same
-STEP, COUNT = 0.01, 10
-NOTHING: Mapping[str, str] = {}
+STEP, STEP_COUNT = 0.01, 10
+NO_CHANGES: Mapping[str, str] = {}
 #: functions that have another name in FMI 3.0
 IN_FMI3 = {"Instantiate": "InstantiateCoSimulation", "GetReal": "GetFloat64", "SetReal": "SetFloat64"}
 
@@ -57,7 +57,7 @@ class FaultFmus:
     libraries: dict[int, Path]
     folder: Path
 
-    def __call__(self, version: int, order: str = "", name: str = "lag", changes: Mapping[str, str] = NOTHING) -> Path:
+    def __call__(self, version: int, order: str = "", name: str = "lag", changes: Mapping[str, str] = NO_CHANGES) -> Path:
         target = self.folder / f"{name}.fmu"
         where, _, rest = order.partition(" ")
         order = f"{IN_FMI3.get(where, where) if version == 3 else where} {rest}"
@@ -81,7 +81,7 @@ def scenario(folder: Path, fmu: Path, deadlines: dict[str, float] | None = None,
     """A scenario with the FMU as its component `lag`; `more` replaces keys."""
     content = {
         "name": "fault",
-        "stop_time": STEP * COUNT,
+        "stop_time": STEP * STEP_COUNT,
         "step_size": STEP,
         "components": {"lag": {"fmu": str(fmu)}},
         **({"deadlines": deadlines} if deadlines else {}),

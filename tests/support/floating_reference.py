@@ -24,7 +24,7 @@ def skew(v: np.ndarray) -> np.ndarray:
     return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
 
 
-def felt(sea: Sea, x: float, y: float, yaw: float, time: float) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+def wave_kinematics(sea: Sea, x: float, y: float, yaw: float, time: float) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
     """Elevation, slopes, velocity and acceleration of the water, as the hull feels them."""
     k = sea.frequency**2 / GRAVITY
     kx, ky = k * np.cos(sea.direction), k * np.sin(sea.direction)
@@ -45,7 +45,7 @@ def rigid_coriolis(spin: np.ndarray) -> np.ndarray:
 
 
 def flow_coriolis(relative: np.ndarray) -> np.ndarray:
-    momentum, matrix = p.FLOW_MASS @ relative, np.zeros((6, 6))
+    momentum, matrix = p.CORIOLIS_ADDED_MASS @ relative, np.zeros((6, 6))
     matrix[:3, 3:] = matrix[3:, :3] = -skew(momentum[:3])
     matrix[3:, 3:] = -skew(momentum[3:])
     return matrix
@@ -65,7 +65,7 @@ class Catamaran:
         """Of position, rotation matrix and nu."""
         place, to_world, nu = state[:3], state[3:12].reshape(3, 3), state[12:]
         yaw = np.arctan2(to_world[1, 0], to_world[0, 0])
-        elevation, slopes, orbital, flow = felt(self.sea, place[0], place[1], yaw, time)
+        elevation, slopes, orbital, flow = wave_kinematics(self.sea, place[0], place[1], yaw, time)
         spin, current = nu[3:], to_world.T @ [*self.current, 0.0]
         drifting = nu - [*current, 0, 0, 0]
         relative = drifting - [*(to_world.T @ orbital), 0, 0, 0]
@@ -91,7 +91,7 @@ class Catamaran:
         load[2:5] -= np.array(p.DAMPING) * [w, roll, pitch]
         for x, y in p.DRAG_POINTS:
             speed = w + roll * y - pitch * x
-            load += np.array([0, 0, 1, y, -x, 0]) * -p.DRAG * speed * abs(speed)
+            load += np.array([0, 0, 1, y, -x, 0]) * -p.POINT_DRAG * speed * abs(speed)
         side, moment = 2 * (-3.899501881 * v + 1.774273356 * r), 2 * (-1.774273356 * v - 0.807294377 * r)
         load += [0, side, 0, -p.HULL_FORCE_HEIGHT * side, 0, moment]
         load[:2] -= 0.1 * np.abs(air[:2]) * air[:2]
@@ -101,7 +101,7 @@ class Catamaran:
         load += [ahead, abeam, 0, -p.RUDDER_HEIGHT * abeam, p.RUDDER_HEIGHT * ahead, -0.34727 * abeam]
         return load
 
-    def sail(self, nu: np.ndarray, times: np.ndarray) -> np.ndarray:
+    def simulate(self, nu: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Positions at these times, from rest attitude in the origin."""
         start = np.concatenate([[0, 0, FLOAT_HEIGHT], np.eye(3).ravel(), nu])
         solution = solve_ivp(self.rate, (0, times[-1]), start, "DOP853", t_eval=times, rtol=1e-11, atol=1e-12)

@@ -11,18 +11,18 @@ from zipfile import ZipFile
 import fmpy
 import pytest
 
-FOREIGN = Path(__file__).parents[1] / "components/fmi/foreign"
+PROBE_SOURCES = Path(__file__).parents[1] / "components/fmi/foreign"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
-def build_foreign(version: int, folder: Path, identifier: str = "probe") -> Path:
+def build_probe_fmu(version: int, folder: Path, identifier: str = "probe") -> Path:
     """The probe as FMU of the given FMI version."""
     compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
     library, target = folder / f"probe{version}.so", folder / f"probe{version}.fmu"
-    source = FOREIGN / f"probe{version}.c"
+    source = PROBE_SOURCES / f"probe{version}.c"
     subprocess.run([compiler, "-shared", "-fPIC", "-O2", f"-I{HEADERS}", source, "-o", library], check=True)
     with ZipFile(target, "w") as archive:
-        archive.write(FOREIGN / f"probe{version}.xml", "modelDescription.xml")
+        archive.write(PROBE_SOURCES / f"probe{version}.xml", "modelDescription.xml")
         platform = fmpy.platform if version == 2 else fmpy.platform_tuple
         archive.write(library, f"binaries/{platform}/{identifier}.so")
     return target
@@ -31,7 +31,7 @@ def build_foreign(version: int, folder: Path, identifier: str = "probe") -> Path
 @pytest.fixture(scope="session")
 def probes(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
     folder = tmp_path_factory.mktemp("probes")
-    return {version: build_foreign(version, folder) for version in (2, 3)}
+    return {version: build_probe_fmu(version, folder) for version in (2, 3)}
 
 
 @pytest.fixture(params=[2, 3], ids=["FMI2", "FMI3"])

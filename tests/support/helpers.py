@@ -9,36 +9,36 @@ from typing import Any
 from cosim.core.component import Component
 from cosim.core.recording import Recording
 from cosim.core.system import Connection, Endpoint, Stage, System
-from cosim.core.time_grid import exact
+from cosim.core.time_grid import exact_fraction
 from cosim.engine.run_loop import Event, Settings, simulate
 
 
-def end(name: str) -> Endpoint:
+def endpoint(name: str) -> Endpoint:
     """ "a.y" as an endpoint; everything before the last dot is the component."""
     component, _, slot = name.rpartition(".")
     return Endpoint(component, slot)
 
 
-def system(components: Mapping[str, Component], wires: str = "", stages: Sequence[Stage] = (), **more: Any) -> System:
+def make_system(components: Mapping[str, Component], wires: str = "", stages: Sequence[Stage] = (), **more: Any) -> System:
     """A system from wires such as "a.y > b.u, b.y >2 a.u" (delay 2); default: all components in one stage."""
     connections = []
     for wire in filter(None, (part.strip() for part in wires.split(","))):
         source, arrow, target = wire.split()
-        connections.append(Connection(end(source), end(target), int(arrow[1:] or 0)))
+        connections.append(Connection(endpoint(source), endpoint(target), int(arrow[1:] or 0)))
     return System(components, connections, tuple(stages) or (tuple(components),), **more)
 
 
-def run(
+def run_system(
     system: System, stop: float | str, step: float | str = "1/100", record: Sequence[str] = (), events: Sequence[Event] = ()
 ) -> Recording:
     """Simulate from 0 and return what was recorded; failures are raised."""
-    columns = {name: end(name) for name in record}
-    outcome = simulate(system, Settings(Fraction(0), exact(stop), exact(step), columns, events=events))
+    columns = {name: endpoint(name) for name in record}
+    outcome = simulate(system, Settings(Fraction(0), exact_fraction(stop), exact_fraction(step), columns, events=events))
     if outcome.failure:
         raise outcome.failure
     return outcome.recording
 
 
-def wire(source: str, target: str, **more: Any) -> dict[str, Any]:
+def connection(source: str, target: str, **more: Any) -> dict[str, Any]:
     """A connection as it stands in a scenario file."""
     return {"from": source, "to": target, **more}

@@ -16,14 +16,14 @@ from typing import Any
 
 from fault_fmu import FaultFmus
 
-from cosim.cli import cli, guarded
+from cosim.cli import cli, run_guarded
 
 KPIS = [{"name": "end", "python": "cosim.kpis:final", "arguments": {"signal": "lag.y"}}]
-SEGV = "DoStep 6 segv"
+SEGV_ORDER = "DoStep 6 segv"
 
 
 @dataclass(frozen=True)
-class Done:
+class CommandResult:
     """Exit code and output of a command."""
 
     code: int
@@ -32,14 +32,14 @@ class Done:
 
 
 @dataclass
-class Lag:
+class LagProject:
     """A folder with a scenario around the FMU, and commands in it; `done` is what came of the last one."""
 
     folder: Path
-    done: Done | None = None
+    last_result: CommandResult | None = None
 
     @classmethod
-    def made(cls, folder: Path, library: Path, **more: Any) -> Lag:
+    def create(cls, folder: Path, library: Path, **more: Any) -> LagProject:
         """`more` replaces keys of the scenario."""
         FaultFmus({2: library}, folder)(2)
         content = {"name": "lag", "stop_time": 0.1, "step_size": 0.01, "components": {"lag": {"fmu": "lag.fmu"}}}
@@ -53,15 +53,15 @@ class Lag:
         file.write_text(json.dumps({"name": name, "scenario": "lag.json", **content}))
         return file
 
-    def call(self, *words: object) -> Done:
+    def run_command(self, *words: object) -> CommandResult:
         """A command in this process: the imports are done."""
         out, err = StringIO(), StringIO()
         with chdir(self.folder), redirect_stdout(out), redirect_stderr(err):
-            code = guarded(lambda: cli.main([*map(str, words)], standalone_mode=False))
-        self.done = Done(code, out.getvalue(), err.getvalue())
-        return self.done
+            code = run_guarded(lambda: cli.main([*map(str, words)], standalone_mode=False))
+        self.last_result = CommandResult(code, out.getvalue(), err.getvalue())
+        return self.last_result
 
-    def start(self, *words: object) -> subprocess.Popen[str]:
+    def start_command(self, *words: object) -> subprocess.Popen[str]:
         """A command that goes on in a process of its own while the test does something to it."""
         command = [sys.executable, "-m", "cosim", *map(str, words)]
         return subprocess.Popen(command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -77,7 +77,7 @@ class Lag:
         return [json.loads(line) for line in lines]
 
 
-Make = Callable[..., Lag]
+MakeLagProject = Callable[..., LagProject]
 
 
 def descendants(process: int) -> list[int]:
@@ -89,7 +89,7 @@ def descendants(process: int) -> list[int]:
     return found
 
 
-def alive(process: int) -> bool:
+def is_alive(process: int) -> bool:
     try:
         os.kill(process, 0)
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"

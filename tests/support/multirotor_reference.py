@@ -25,12 +25,12 @@ class Vehicle:
     mass: float
     inertia: np.ndarray
     rotors: np.ndarray
-    turning: Sequence[int]
+    spin_directions: Sequence[int]
     thrust: float
     torque: float
-    limit: float
+    max_rotor_speed: float
     radius: float
-    blowing: Callable[[float], float]  # height -> share of the inflow that the surface takes away
+    inflow_reduction: Callable[[float], float]  # height -> share of the inflow that the surface takes away
     time_constant: float
     rotor_inertia: float
     rotor_drag: np.ndarray
@@ -41,7 +41,7 @@ class Vehicle:
         return float(np.sqrt(self.mass * GRAVITY / len(self.rotors) / self.thrust))
 
 
-def square(radius: float, side: float) -> Callable[[float], float]:
+def square_ground_effect(radius: float, side: float) -> Callable[[float], float]:
     """Sanchez-Cuevas, Heredia and Ollero 2017, equation 4, for four rotors at the corners of a square."""
 
     def blowing(z: float) -> float:
@@ -51,7 +51,7 @@ def square(radius: float, side: float) -> Callable[[float], float]:
     return blowing
 
 
-def hexagon(radius: float, arm: float) -> Callable[[float], float]:
+def hexagon_ground_effect(radius: float, arm: float) -> Callable[[float], float]:
     """The same for six rotors: two at the distance of an arm, two at sqrt(3) arms and one opposite."""
 
     def blowing(z: float) -> float:
@@ -82,12 +82,12 @@ VEHICLES = {
         inertia=np.array([[16.571710, 0.830806, 0.718277], [0.830806, 16.655602, 1.800197], [0.718277, 1.800197, 29.261652]])
         * 1e-6,
         rotors=np.array([[0.028, -0.028, 0.008], [-0.028, -0.028, 0.008], [-0.028, 0.028, 0.008], [0.028, 0.028, 0.008]]),
-        turning=(1, -1, 1, -1),
+        spin_directions=(1, -1, 1, -1),
         thrust=3.16e-10 / RPM**2,
         torque=7.94e-12 / RPM**2,
-        limit=float(np.sqrt(2.25 * 0.027 * GRAVITY / 4 / 3.16e-10)) * RPM,
+        max_rotor_speed=float(np.sqrt(2.25 * 0.027 * GRAVITY / 4 / 3.16e-10)) * RPM,
         radius=0.0225,
-        blowing=square(0.0225, 0.056),
+        inflow_reduction=square_ground_effect(0.0225, 0.056),
         time_constant=0.072,
         rotor_inertia=5e-8,
         rotor_drag=np.array([10.2506e-7, 10.2506e-7, 7.553e-7]),
@@ -97,12 +97,12 @@ VEHICLES = {
         mass=4.78,
         inertia=_hexagon_inertia(),
         rotors=np.array([0.34 * np.cos(_ANGLES), 0.34 * np.sin(_ANGLES), np.full(6, 0.10)]).T,
-        turning=(-1, 1, -1, 1, -1, 1),
+        spin_directions=(-1, 1, -1, 1, -1, 1),
         thrust=_KF,
         torque=_KF * 0.02 * 0.4064 / (0.062 * 2 * np.pi),
-        limit=float(np.sqrt(2.53 * GRAVITY / _KF)),
+        max_rotor_speed=float(np.sqrt(2.53 * GRAVITY / _KF)),
         radius=0.2032,
-        blowing=hexagon(0.2032, 0.34),
+        inflow_reduction=hexagon_ground_effect(0.2032, 0.34),
         time_constant=0.05,
         rotor_inertia=3.5e-4,
         rotor_drag=np.array([8.06428e-5, 8.06428e-5, 0.0]),
@@ -112,7 +112,7 @@ VEHICLES = {
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldInputs:
     """What acts during a segment of a flight: commands, loads and wind (world frame), height above a surface."""
 
     duration: float
@@ -123,16 +123,18 @@ class Held:
     height: float
 
 
-def start(position: Sequence[float], velocity: Sequence[float], rates: Sequence[float], speed: float, count: int) -> np.ndarray:
+def initial_state(
+    position: Sequence[float], velocity: Sequence[float], rates: Sequence[float], speed: float, count: int
+) -> np.ndarray:
     """A level vehicle with its nose along x: position and velocity (world), rotation and rates (forward-right-down), rotors."""
     return np.concatenate([position, velocity, FLIP.ravel(), FLIP @ rates, np.full(count, speed)])
 
 
 #: number of a segment; velocity (world), upward direction and rates (forward-left-up) at its start -> what acts in it
-Pilot = Callable[[int, np.ndarray, np.ndarray, np.ndarray], Held]
+InputFunction = Callable[[int, np.ndarray, np.ndarray, np.ndarray], HeldInputs]
 
 
-def fly(vehicle: Vehicle, state: np.ndarray, count: int, pilot: Pilot) -> np.ndarray:
+def simulate_flight(vehicle: Vehicle, state: np.ndarray, count: int, pilot: InputFunction) -> np.ndarray:
     """The state after each of so many segments."""
     states = []
     for k in range(count):
@@ -143,12 +145,12 @@ def fly(vehicle: Vehicle, state: np.ndarray, count: int, pilot: Pilot) -> np.nda
     return np.array(states)
 
 
-def _rate(vehicle: Vehicle, state: np.ndarray, held: Held) -> np.ndarray:
+def _rate(vehicle: Vehicle, state: np.ndarray, held: HeldInputs) -> np.ndarray:
     velocity, to_world, rates, speeds = state[3:6], state[6:15].reshape(3, 3), state[15:18], state[18:]
-    speed_rates = (np.clip(held.command, 0, vehicle.limit) - speeds) / vehicle.time_constant
+    speed_rates = (np.clip(held.command, 0, vehicle.max_rotor_speed) - speeds) / vehicle.time_constant
     air = to_world.T @ (held.wind - velocity)  # velocity of the air over the body
-    gain = 1 / (1 - vehicle.blowing(max(held.height, vehicle.radius / 2)))
-    places, turning, spin = vehicle.rotors @ FLIP, np.array(vehicle.turning), _cross(rates)
+    gain = 1 / (1 - vehicle.inflow_reduction(max(held.height, vehicle.radius / 2)))
+    places, turning, spin = vehicle.rotors @ FLIP, np.array(vehicle.spin_directions), _cross(rates)
     loads = speeds[:, None] * vehicle.rotor_drag * (air - places @ spin.T)
     loads[:, 2] -= gain * vehicle.thrust * speeds**2
     force = loads.sum(axis=0) + np.sqrt(air @ air) * vehicle.body_drag * air

@@ -14,7 +14,7 @@ STEP = 0.01
 G, RHO, L, B = 9.81, 1025.0, 2.0, 1.08
 HULL_MASS, HULL_CENTRE = 55.0, np.array([0.2, 0.0, -0.2])
 RADII = np.array([0.4 * B, 0.25 * L, 0.25 * L])
-BEAM, LATERAL, C_W, C_B = 0.25, 0.395, 0.75, 0.4
+BEAM, PONTOON_OFFSET, C_W, C_B = 0.25, 0.395, 0.75, 0.4
 K_AHEAD, K_ASTERN = 0.02216 / 2, 0.01289 / 2
 N_MAX, N_MIN = np.sqrt(0.5 * 24.4 * G / K_AHEAD), -np.sqrt(0.5 * 13.6 * G / K_ASTERN)
 FLOTATION = np.array([-0.2, 0.0, 0.0])
@@ -48,7 +48,7 @@ def skew(v: np.ndarray) -> np.ndarray:
     return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
 
 
-def shift(r: np.ndarray) -> np.ndarray:
+def transformation_matrix(r: np.ndarray) -> np.ndarray:
     """H(r): generalised velocities at a point r from those at the origin."""
     return np.block([[np.eye(3), skew(r).T], [np.zeros((3, 3)), np.eye(3)]])
 
@@ -79,38 +79,38 @@ class Otter:
     def __post_init__(self) -> None:
         self.eta, self.nu, self.shafts = np.zeros(6), np.zeros(6), np.zeros(2)
         m, place = self.payload, np.array(self.payload_place)
-        self.place = place
+        self.payload_position = place
         self.mass = HULL_MASS + m
         self.draught = (volume := self.mass / RHO) / (2 * C_B * BEAM * L)
         self.centre = (HULL_MASS * HULL_CENTRE + m * place) / self.mass
         self.inertia = HULL_MASS * np.diag(RADII**2) - HULL_MASS * np.linalg.matrix_power(skew(HULL_CENTRE - self.centre), 2)
         self.inertia -= m * np.linalg.matrix_power(skew(place - self.centre), 2)
-        self.to_centre = shift(self.centre)
+        self.to_centre = transformation_matrix(self.centre)
         body = np.zeros((6, 6))
         body[:3, :3], body[3:, 3:] = self.mass * np.eye(3), self.inertia
         added = [2.7 * RHO * (HULL_MASS / RHO) ** (5 / 3) / L**2, 1.5 * HULL_MASS, HULL_MASS]
         self.added = np.diag([*added, *(np.array([0.2, 0.8, 1.7]) * np.diag(self.inertia))])
-        self.total = self.to_centre.T @ body @ self.to_centre + self.added
+        self.mass_matrix = self.to_centre.T @ body @ self.to_centre + self.added
         self._set_up_water(volume)
 
     def _set_up_water(self, volume: float) -> None:
         waterplane = C_W * L * BEAM
-        i_t = 2 * (1 / 12) * L * BEAM**3 * (6 * C_W**3 / ((1 + C_W) * (1 + 2 * C_W))) + 2 * waterplane * LATERAL**2
+        i_t = 2 * (1 / 12) * L * BEAM**3 * (6 * C_W**3 / ((1 + C_W) * (1 + 2 * C_W))) + 2 * waterplane * PONTOON_OFFSET**2
         i_l = 0.8 * 2 * (1 / 12) * BEAM * L**3
         buoyancy_height = (5 * self.draught / 2 - 0.5 * volume / (L * BEAM)) / 3
         heights = [buoyancy_height + i / volume - (self.draught - self.centre[2]) for i in (i_t, i_l)]
         stiffness = np.array([2 * RHO * G * waterplane, *(RHO * G * volume * height for height in heights)])
-        to_flotation = shift(FLOTATION)
+        to_flotation = transformation_matrix(FLOTATION)
         self.stiffness = to_flotation.T @ np.diag([0, 0, *stiffness, 0]) @ to_flotation
-        w3, w4, w5 = np.sqrt(stiffness / np.diag(self.total)[2:5])
-        m = np.diag(self.total)
-        self.linear = np.array([24.4 * G / (6 * 0.5144), m[1], 0.6 * w3 * m[2], 0.4 * w4 * m[3], 0.8 * w5 * m[4], m[5]])
+        w3, w4, w5 = np.sqrt(stiffness / np.diag(self.mass_matrix)[2:5])
+        m = np.diag(self.mass_matrix)
+        self.linear_damping = np.array([24.4 * G / (6 * 0.5144), m[1], 0.6 * w3 * m[2], 0.4 * w4 * m[3], 0.8 * w5 * m[4], m[5]])
         self.drag = np.interp(BEAM / (2 * self.draught), *HOERNER.T)
 
     def trim(self, eta: np.ndarray) -> np.ndarray:
         """The attitude and depth to which the payload presses the hull."""
         force = rotation(eta[3:]).T @ np.array([0, 0, self.payload * G])
-        load = np.concatenate([force, np.cross(self.place, force)])
+        load = np.concatenate([force, np.cross(self.payload_position, force)])
         settled = np.zeros(6)
         settled[2:5] = np.linalg.solve(self.stiffness[2:5, 2:5], load[2:5])
         return settled
@@ -129,16 +129,16 @@ class Otter:
         flow[3:, 3:] = -skew(momentum[3:])
         load = self.thrust() + self.damping(relative) - self.stiffness @ level
         load -= (self.to_centre.T @ coriolis @ self.to_centre + flow) @ relative
-        acceleration = np.concatenate([-np.cross(spin, water), np.zeros(3)]) + np.linalg.solve(self.total, load)
+        acceleration = np.concatenate([-np.cross(spin, water), np.zeros(3)]) + np.linalg.solve(self.mass_matrix, load)
         return np.concatenate([rotation(level[3:]) @ nu[:3], euler_rates(level[3:], spin)]), acceleration
 
     def thrust(self) -> np.ndarray:
         n = np.clip(self.shafts, N_MIN, N_MAX)
         port, starboard = np.where(n > 0, K_AHEAD, K_ASTERN) * n * abs(n)
-        return np.array([port + starboard, 0, 0, 0, 0, LATERAL * (port - starboard)])
+        return np.array([port + starboard, 0, 0, 0, 0, PONTOON_OFFSET * (port - starboard)])
 
     def damping(self, relative: np.ndarray) -> np.ndarray:
-        load = -self.linear * relative
+        load = -self.linear_damping * relative
         load[5] *= 1 + 10 * abs(relative[5])
         x = np.linspace(-L / 2, L / 2, 21)
         for axis, turned in ((1, 5), (2, 4)):

@@ -13,7 +13,7 @@ from cosim.core import resources
 
 
 @cache
-def unpacked(name: str) -> str:
+def unpack_fmu(name: str) -> str:
     return extract(str(resources.root() / "fmus" / f"{name}.fmu"))
 
 
@@ -21,7 +21,7 @@ class PlantFmu:
     """An initialized instance, driven by names."""
 
     def __init__(self, name: str, start: Mapping[str, float]):
-        folder = unpacked(name)
+        folder = unpack_fmu(name)
         description = read_model_description(folder)
         self.references = {variable.name: variable.valueReference for variable in description.modelVariables}
         self.slave = FMU2Slave(

@@ -71,7 +71,7 @@ def quadcopter_rate(state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     return np.concatenate([velocity, acceleration, (to_world @ spin).ravel(), angular])
 
 
-def turning_energy(rates: np.ndarray) -> float:
+def rotational_energy(rates: np.ndarray) -> float:
     """Kinetic energy (J) of the quadcopter's rotation, from rates forward-left-up."""
     turning = FLIP @ rates
     return float(turning @ _INERTIA @ turning) / 2

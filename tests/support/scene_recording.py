@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from mission_recording import mission
+from mission_recording import mission_result
 
 VEHICLES = {"uav": {"model": "ar_drone"}, "usv": {"model": "strider"}}
 PLATFORMS = {"start": {"size": [4.0, 4.0, 0.05], "position": [-5.0, 1.0, 0.45]}}
@@ -12,7 +12,7 @@ SCENARIO = {"components": {"plant": {"arguments": {"vehicles": VEHICLES, "platfo
 
 def scene_mission():
     """The mission of `mission_recording` with level vehicles, the vessel at its height, and its scenario."""
-    result = mission()
+    result = mission_result()
     still = np.zeros_like(result.time)
     columns = dict(result.recording.columns)
     for vehicle in ("plant.uav", "plant.usv"):

@@ -41,7 +41,7 @@ MODELS = (
     "Replica of the published simulator",
 )
 
-HEAD = """# Validation
+INTRODUCTION = """# Validation
 
 Every model of the plant beside a reference that is independent of it, with the numbers that the tests measured. Written by
 
@@ -66,7 +66,7 @@ class Statement:
     """What a test says that it measures; `test` is its file (below tests/) and function, `limit` as the document shows it."""
 
     model: str
-    what: str
+    quantity: str
     unit: str
     limit: str
     source: str
@@ -80,7 +80,7 @@ def statement(test: str, model: str, what: str, unit: str, source: str, within: 
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasurementCheck:
     """The fixture `measured`."""
 
     node: Any
@@ -101,13 +101,13 @@ class Measured:
         """Assert |found - expected| <= within, or relative |expected|, in every element; the test may state several cases."""
         test = f"{self.node.path.relative_to(TESTS).as_posix()}::{self.node.originalname}"
         said = statement(test, model, what, unit, source, within, relative)
-        values = worst(found, expected, bool(relative))
+        values = worst_deviation(found, expected, bool(relative))
         where = {"case": case, "line": sys._getframe(1).f_lineno}
         self.node.user_properties.append(("measured", {**asdict(said), **where, **values}))
         assert values["deviation"] <= (relative or within), f"{model}: {what} {case}: {values}, expected within {said.limit}"
 
 
-def worst(found: ArrayLike, expected: ArrayLike, relative: bool) -> dict[str, float]:
+def worst_deviation(found: ArrayLike, expected: ArrayLike, relative: bool) -> dict[str, float]:
     """The pair that disagrees most."""
     pairs = np.broadcast_arrays(np.asarray(found, float), np.asarray(expected, float))
     values, references = (np.ravel(pair) for pair in pairs)
@@ -116,52 +116,52 @@ def worst(found: ArrayLike, expected: ArrayLike, relative: bool) -> dict[str, fl
     return {"found": float(values[k]), "expected": float(references[k]), "deviation": float(deviations[k])}
 
 
-def document(records: Sequence[dict[str, Any]]) -> str:
+def render_document(records: Sequence[dict[str, Any]]) -> str:
     """The page: a table for each model, in the order of files, lines, statements and cases."""
-    lines = [HEAD]
-    sections = {model: list(rows(record for record in records if record["model"] == model)) for model in MODELS}
+    lines = [INTRODUCTION]
+    sections = {model: list(table_rows(record for record in records if record["model"] == model)) for model in MODELS}
     for model, section in sections.items():
         if section:
-            lines += [f"## {model}", "", line(COLUMNS), line(["---"] * len(COLUMNS)), *map(line, section), ""]
+            lines += [f"## {model}", "", table_line(COLUMNS), table_line(["---"] * len(COLUMNS)), *map(table_line, section), ""]
     return "\n".join(lines)
 
 
-def line(cells: Iterable[str]) -> str:
+def table_line(cells: Iterable[str]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def rows(records: Iterable[dict[str, Any]]) -> Iterator[list[str]]:
+def table_rows(records: Iterable[dict[str, Any]]) -> Iterator[list[str]]:
     """A row for each case of each quantity, with the largest deviation."""
-    for _, case in groupby(sorted(records, key=place), place):
-        yield row(max(case, key=lambda record: record["deviation"]))
+    for _, case in groupby(sorted(records, key=sort_key), sort_key):
+        yield table_row(max(case, key=lambda record: record["deviation"]))
 
 
-def place(record: dict[str, Any]) -> tuple[str, int, str]:
+def sort_key(record: dict[str, Any]) -> tuple[str, int, str]:
     """File and line of a statement, and its case, so that 2 comes before 10."""
     case = re.sub(r"\d+", lambda number: number[0].zfill(9), record["case"])
     return record["test"].partition("::")[0], record["line"], case
 
 
-def row(record: dict[str, Any]) -> list[str]:
+def table_row(record: dict[str, Any]) -> list[str]:
     file, _, test = record["test"].partition("::")
     return [
         f"{record['what']} [{record['case']}]" if record["case"] else record["what"],
         record["unit"],
         *(f"{record[name]:.6g}" if record["expected"] else "" for name in ("expected", "found")),
-        shown(record["deviation"]) + (" rel." if record["limit"].endswith("rel.") else ""),
+        format_deviation(record["deviation"]) + (" rel." if record["limit"].endswith("rel.") else ""),
         record["limit"],
         record["source"],
         f"[{test}](../tests/{file})",
     ]
 
 
-def shown(deviation: float) -> str:
+def format_deviation(deviation: float) -> str:
     if deviation >= 1e-12:
         return f"{deviation:.2e}"
     return "< 1e-12" if deviation else "0"
 
 
-class Writer:
+class ValidationReport:
     """Collects what tests measured, in this process or in those of pytest-xdist, and writes the page if all of them passed."""
 
     def __init__(self, target: Path):
@@ -174,7 +174,7 @@ class Writer:
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, exitstatus: int) -> None:
         if exitstatus == 0:
-            self.target.write_text(document(self.records))
+            self.target.write_text(render_document(self.records))
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter, exitstatus: int) -> None:
         said = "written" if exitstatus == 0 else "not written, because tests failed"

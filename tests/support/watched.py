@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 import numpy as np
 
 
-class Reply:
+class HttpReply:
     """Status, headers and body of an answer."""
 
     def __init__(self, response: Any):
@@ -24,7 +24,7 @@ class Reply:
         return json.loads(self.body)
 
 
-class Watched:
+class LiveRun:
     """A run with a page."""
 
     def __init__(self, folder: Path, scenario: object, *options: str):
@@ -37,7 +37,7 @@ class Watched:
         self.host, self.path = parts.netloc, parts.path
         self.version = -1
 
-    def ask(self, method: str, path: str, body: bytes | None = None, **headers: str | None) -> Reply:
+    def request(self, method: str, path: str, body: bytes | None = None, **headers: str | None) -> HttpReply:
         """A request; underscores in names of headers are hyphens, a header that is None is left out."""
         connection = HTTPConnection(self.host, timeout=60)
         connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
@@ -46,16 +46,16 @@ class Watched:
                 connection.putheader(name.replace("_", "-"), value)
         connection.endheaders(body)
         try:
-            return Reply(connection.getresponse())
+            return HttpReply(connection.getresponse())
         finally:
             connection.close()
 
-    def get(self, resource: str = "", **headers: str | None) -> Reply:
-        return self.ask("GET", self.path + resource, **headers)
+    def get(self, resource: str = "", **headers: str | None) -> HttpReply:
+        return self.request("GET", self.path + resource, **headers)
 
-    def post(self, body: bytes, **headers: str | None) -> Reply:
+    def post(self, body: bytes, **headers: str | None) -> HttpReply:
         usual = {"Origin": f"http://{self.host}", "Content_Type": "application/json", "Content_Length": str(len(body))}
-        return self.ask("POST", f"{self.path}command", body, **{**usual, **headers})
+        return self.request("POST", f"{self.path}command", body, **{**usual, **headers})
 
     def command(self, command: str, **more: Any) -> Any:
         return self.post(json.dumps({"command": command, **more}).encode()).json()
@@ -85,14 +85,14 @@ class Watched:
         return self.wait()
 
     def wait(self) -> int:
-        self.said = self.process.communicate(timeout=60)[0]
+        self.output = self.process.communicate(timeout=60)[0]
         return self.process.returncode
 
-    def about(self) -> Any:
+    def run_metadata(self) -> Any:
         return json.loads((self.out / "run.json").read_text())
 
 
-def until(condition: Any, limit: float = 30.0) -> Any:
+def wait_until(condition: Any, limit: float = 30.0) -> Any:
     """The first true value of a condition."""
     end = time.monotonic() + limit
     while not (value := condition()):

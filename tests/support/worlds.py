@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cosim.core.component import Ports, Variable
-from cosim.engine.initialization import take_start_values
+from cosim.engine.initialization import copy_start_values
 from plant_src.world import World
 
 DECK_TOP = 0.2689  # m above the water
@@ -17,7 +17,7 @@ PLATFORM = {"size": [4.0, 4.0, 0.05], "position": [0.0, 0.0, 0.475]}
 PLATFORM_TOP = 0.5
 
 
-class Trial:
+class WorldHarness:
     """A world with its bound arrays: step it and look at it."""
 
     def __init__(
@@ -30,12 +30,12 @@ class Trial:
         self.inputs, self.outputs = _ports(self.world, "input"), _ports(self.world, "output")
         self.world.bind(self.inputs, self.outputs)
         self.world.enter_initialization_mode(0.0, 1e3)
-        take_start_values(self.world, self.inputs)
+        copy_start_values(self.world, self.inputs)
         self.world.exit_initialization_mode()
         self.world.get_outputs()
         self.steps = 0
 
-    def step(self, count: int = 1, step_size: float = 0.01) -> Trial:
+    def step(self, count: int = 1, step_size: float = 0.01) -> WorldHarness:
         for _ in range(count):
             self.world.set_inputs()
             self.world.do_step(self.steps * step_size, step_size)
@@ -64,12 +64,12 @@ def _ports(world: World, causality: str) -> Ports:
 
 
 def _size(variables: list[Variable], dtype: Any) -> int:
-    return sum(len(variable.slots) for variable in variables if variable.dtype == dtype)
+    return sum(len(variable.scalar_names) for variable in variables if variable.dtype == dtype)
 
 
-def quadcopter(position: list[float], **more: Any) -> dict[str, Any]:
+def quadcopter_settings(position: list[float], **more: Any) -> dict[str, Any]:
     return {"model": "ar_drone", "position": position, **more}
 
 
-def vessel(position: list[float], **more: Any) -> dict[str, Any]:
+def vessel_settings(position: list[float], **more: Any) -> dict[str, Any]:
     return {"model": "strider", "position": position, **more}

@@ -7,9 +7,9 @@ from enum import IntEnum
 
 SAMPLE_PERIOD = 0.01  # s, of every controller
 GRAVITY = 9.81  # m/s2
-DEGREES = 180 / math.pi  # deg/rad
-ROTOR_SPEED_MAX = 5000 * 0.10471976  # rad/s, at full throttle: 5000 rpm
-WAYPOINT_CAPACITY = 32
+DEGREES_PER_RADIAN = 180 / math.pi  # deg/rad
+MAX_ROTOR_SPEED = 5000 * 0.10471976  # rad/s, at full throttle: 5000 rpm
+MAX_WAYPOINTS = 32
 
 
 class FlightMode(IntEnum):
@@ -41,6 +41,6 @@ def wrap_angle(angle: float) -> float:
     return angle if abs(angle) <= math.pi else math.atan2(math.sin(angle), math.cos(angle))
 
 
-def length(x: float, y: float) -> float:
+def horizontal_norm(x: float, y: float) -> float:
     """Euclidean norm in the horizontal plane; rounds as the Modelica function does, which math.hypot does not."""
     return math.sqrt(x * x + y * y)

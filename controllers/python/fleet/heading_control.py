@@ -6,10 +6,10 @@ from typing import Any
 
 from . import wrap_angle
 from .pid import Pid
-from .sampled import Sampled
+from .sampled import SampledController
 
 
-class HeadingControl(Sampled):
+class HeadingControl(SampledController):
     """Rudder angle by PD on the heading error, the short way round. Gains for the physical sign of the rudder."""
 
     def __init__(self, **arguments: Any):
@@ -20,7 +20,7 @@ class HeadingControl(Sampled):
         self.parameter("rudder_limit", 0.610865238198015, "rad", "35 degrees")
         self.input("vehicle.attitude.yaw", 0.0, "rad", "Counter-clockwise from east")
         self.output("rudder_angle", 0.0, "rad", "Positive: bow to starboard")
-        self.yaw = self.block("yaw", Pid())
+        self.yaw = self.add_block("yaw", Pid())
 
     def control_heading(self, reference: float) -> None:
         """Set the rudder angle for this tick; `reference` in rad, counter-clockwise from east.

@@ -36,10 +36,10 @@ class Pid:
         u = limit(unlimited, *limits)
         if I * e * (unlimited - u) <= 0:
             self.integral = self.integral + SAMPLE_PERIOD * I * e
-        self.filtered = D * e + _decay(N) * (self.filtered - D * e)
+        self.filtered = D * e + _filter_decay(N) * (self.filtered - D * e)
         return u
 
 
-def _decay(N: float) -> float:
+def _filter_decay(N: float) -> float:
     h = N * SAMPLE_PERIOD
     return 1 - h + h * h / 2 - h**3 / 6

@@ -13,10 +13,10 @@ from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Intege
 
 from . import SAMPLE_PERIOD
 
-TOLERANCE = 1e-6  # part of a period by which a tick may seem to lie off the communication points
+TIME_TOLERANCE = 1e-6  # part of a period by which a tick may seem to lie off the communication points
 
 
-class Quantity(Real):
+class RealWithUnit(Real):
     """A Real variable with a unit."""
 
     def __init__(self, name: str, unit: str, **attributes: Any):
@@ -30,7 +30,7 @@ class Quantity(Real):
         return element
 
 
-class Sampled(Fmi2Slave):
+class SampledController(Fmi2Slave):
     """A controller whose `tick` runs at every multiple of SAMPLE_PERIOD within a step, on the inputs of that step.
 
     Constructors declare variables by dotted names: `self.input("vehicle.position.z", 0.0, "m")` makes the variable and
@@ -47,10 +47,10 @@ class Sampled(Fmi2Slave):
         raise NotImplementedError
 
     def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
-        self.ticks = max(0, math.ceil(start_time / SAMPLE_PERIOD - TOLERANCE))
+        self.ticks = max(0, math.ceil(start_time / SAMPLE_PERIOD - TIME_TOLERANCE))
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        end = current_time + step_size - TOLERANCE * SAMPLE_PERIOD
+        end = current_time + step_size - TIME_TOLERANCE * SAMPLE_PERIOD
         while (time := self.ticks * SAMPLE_PERIOD) < end:
             self.tick(time)
             self.ticks += 1
@@ -62,7 +62,7 @@ class Sampled(Fmi2Slave):
     def calculated_parameter(self, name: str, getter: Callable[[], float], unit: str = "", description: str = "") -> None:
         """A value that follows from parameters; there is no attribute of that name."""
         kind = {"causality": Fmi2Causality.calculatedParameter, "variability": Fmi2Variability.tunable}
-        self.register_variable(Quantity(name, unit, getter=getter, description=description, **kind))
+        self.register_variable(RealWithUnit(name, unit, getter=getter, description=description, **kind))
 
     def input(self, name: str, start: Any, unit: str = "", description: str = "") -> None:
         self._declare(name, start, unit, description, causality=Fmi2Causality.input)
@@ -73,7 +73,7 @@ class Sampled(Fmi2Slave):
     def local(self, name: str, start: Any, unit: str = "", description: str = "") -> None:
         self._declare(name, start, unit, description, causality=Fmi2Causality.local, variability=Fmi2Variability.discrete)
 
-    def block(self, name: str, block: Any) -> Any:
+    def add_block(self, name: str, block: Any) -> Any:
         """Declare the attributes of a shared block, which are its states, as local variables below `name`; returns the block."""
         setattr(self, name, block)
         for state, start in list(vars(block).items()):
@@ -81,16 +81,16 @@ class Sampled(Fmi2Slave):
         return block
 
     def _declare(self, name: str, start: Any, unit: str, description: str, **attributes: Any) -> None:
-        setattr(self._owner(name), name.rpartition(".")[2], start)
+        setattr(self._create_owner(name), name.rpartition(".")[2], start)
         attributes["description"] = description or None
         if not isinstance(start, list):
-            self.register_variable(_variable(name, start, unit, **attributes))
+            self.register_variable(_create_variable(name, start, unit, **attributes))
             return
         for i, element in enumerate(start):
             access = {"getter": partial(start.__getitem__, i), "setter": partial(start.__setitem__, i)}
-            self.register_variable(_variable(f"{name}[{i + 1}]", element, unit, **access, **attributes), nested=False)
+            self.register_variable(_create_variable(f"{name}[{i + 1}]", element, unit, **access, **attributes), nested=False)
 
-    def _owner(self, name: str) -> Any:
+    def _create_owner(self, name: str) -> Any:
         owner: Any = self
         for part in name.split(".")[:-1]:
             if not hasattr(owner, part):
@@ -99,7 +99,7 @@ class Sampled(Fmi2Slave):
         return owner
 
 
-def _variable(name: str, start: Any, unit: str, **attributes: Any) -> Boolean | Integer | Quantity:
+def _create_variable(name: str, start: Any, unit: str, **attributes: Any) -> Boolean | Integer | RealWithUnit:
     if isinstance(start, bool):
         return Boolean(name, **attributes)
-    return Integer(name, **attributes) if isinstance(start, int) else Quantity(name, unit, **attributes)
+    return Integer(name, **attributes) if isinstance(start, int) else RealWithUnit(name, unit, **attributes)

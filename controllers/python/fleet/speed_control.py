@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from .pid import Pid
-from .sampled import Sampled
+from .sampled import SampledController
 
 
-class SpeedControl(Sampled):
+class SpeedControl(SampledController):
     """Thrust proportional to the speed error. Gain of the published simulator."""
 
     def __init__(self, **arguments: Any):
@@ -17,7 +17,7 @@ class SpeedControl(Sampled):
         self.parameter("thrust_limit", 3.0, "N")
         self.input("vehicle.velocity_body.u", 0.0, "m/s", "Forward")
         self.output("thrust", 0.0, "N")
-        self.surge = self.block("surge", Pid())
+        self.surge = self.add_block("surge", Pid())
 
     def control_speed(self, reference: float) -> None:
         """Set the thrust for this tick; `reference` in m/s, forward."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from . import WAYPOINT_CAPACITY, EndPolicy, length
-from .sampled import Sampled
+from . import MAX_WAYPOINTS, EndPolicy, horizontal_norm
+from .sampled import SampledController
 
 
-class Guidance(Sampled):
+class WaypointGuidanceBase(SampledController):
     """Turns the position into heading reference and distance; a waypoint is reached within `acceptance_radius`."""
 
     active_waypoint: int
@@ -20,8 +20,8 @@ class Guidance(Sampled):
         self.parameter("speed_command", 1.0, "m/s", "On the way")
         self.parameter("acceptance_radius", 0.5, "m", "Of the circle around a waypoint that counts as reached")
         self.parameter("waypoint_count", 1, description="Waypoints in use")
-        self.parameter("waypoint_x", [0.0] * WAYPOINT_CAPACITY, "m", "East")
-        self.parameter("waypoint_y", [0.0] * WAYPOINT_CAPACITY, "m", "North")
+        self.parameter("waypoint_x", [0.0] * MAX_WAYPOINTS, "m", "East")
+        self.parameter("waypoint_y", [0.0] * MAX_WAYPOINTS, "m", "North")
         self.parameter("end_policy", 1, description="After the last waypoint: 1 stop, 2 repeat, 3 keep course")
         self.input("vehicle.position.x", 0.0, "m", "East")
         self.input("vehicle.position.y", 0.0, "m", "North")
@@ -30,25 +30,25 @@ class Guidance(Sampled):
         self.output("active_waypoint", 1)
         self.output("finished", False, description="The last waypoint is reached and the list does not repeat")
 
-    def guide(self) -> float:
+    def update_guidance(self) -> float:
         """Set the outputs for this tick; returns the speed reference in m/s, which is 0 after a list that ends with a stop."""
-        if not 1 <= self.waypoint_count <= WAYPOINT_CAPACITY:
-            raise ValueError(f"waypoint_count is not between 1 and {WAYPOINT_CAPACITY}")
+        if not 1 <= self.waypoint_count <= MAX_WAYPOINTS:
+            raise ValueError(f"waypoint_count is not between 1 and {MAX_WAYPOINTS}")
         self.active_waypoint = min(self.active_waypoint, self.waypoint_count)
-        if not self.finished and length(*self._ahead()) <= self.acceptance_radius:
-            self._advance()
-        ahead_x, ahead_y = self._ahead()
-        self.distance = length(ahead_x, ahead_y)
+        if not self.finished and horizontal_norm(*self._vector_to_waypoint()) <= self.acceptance_radius:
+            self._select_next_waypoint()
+        ahead_x, ahead_y = self._vector_to_waypoint()
+        self.distance = horizontal_norm(ahead_x, ahead_y)
         if not self.finished:
             self.heading_reference = math.atan2(ahead_y, ahead_x)
         return 0.0 if self.finished and self.end_policy == EndPolicy.STOP else self.speed_command
 
-    def _ahead(self) -> tuple[float, float]:
+    def _vector_to_waypoint(self) -> tuple[float, float]:
         """From the vessel to the active waypoint."""
         position, active = self.vehicle.position, self.active_waypoint - 1
         return self.waypoint_x[active] - position.x, self.waypoint_y[active] - position.y
 
-    def _advance(self) -> None:
+    def _select_next_waypoint(self) -> None:
         if self.active_waypoint < self.waypoint_count:
             self.active_waypoint += 1
         elif self.end_policy == EndPolicy.REPEAT:

@@ -13,14 +13,14 @@ import click
 
 from ...core.errors import InputError, Problem
 from .. import supervision
-from ..bench_trial import Flight, Trial, flights
-from .regress import SEVERITY, default_folder, found, processors, refuse_same_names
+from ..bench_trial import ControllerTrial, TrialResult, run_trials
+from .regress import EXIT_CODE_SEVERITY, available_processors, check_unique_names, default_folder, find_scenario_files
 
 if TYPE_CHECKING:
-    from ...studies.controller_bench.score import Row
+    from ...studies.controller_bench.score import KpiComparison
 
 #: what the child process that looks at the candidate hands over to its parent
-_PREPARED = "bench.json"
+_PREPARED_FILE = "bench.json"
 
 
 @click.command()
@@ -57,65 +57,67 @@ def command(
     component failed, 2 when the controller does not fit.
     """
     from ...scenario.nested_systems import parse_settings
-    from ...studies.controller_bench.candidate import source
+    from ...studies.controller_bench.candidate import parse_source
 
-    candidate = source(controller)
-    files = list(found(scenarios or [default_folder()]))
-    refuse_same_names(files)
+    candidate = parse_source(controller)
+    files = list(find_scenario_files(scenarios or [default_folder()]))
+    check_unique_names(files)
     own = output_dir / Path(role).stem / candidate.name
-    code = supervision.protected(
-        lambda: _prepare(controller, role, files, own, parse_settings(settings)), "run", lambda outcome: None
+    code = supervision.run_supervised_command(
+        lambda: _write_scenarios(controller, role, files, own, parse_settings(settings)), "run", lambda outcome: None
     )
     if code:
         return code
-    trials, notes = _trials(own, output_dir / "shipped")
+    trials, notes = _read_trials(own, output_dir / "shipped")
     flown = []
-    for flight in flights(trials, jobs or processors()):
+    for flight in run_trials(trials, jobs or available_processors()):
         flown.append(flight)
         if not as_json:
-            _print(flight, candidate.name)
+            _print_trial(flight, candidate.name)
     if as_json:
         _print_json(candidate.name, role, flown, notes)
     else:
-        _summary(flown, notes)
-    return min((flight.outcome.code for flight in flown), key=SEVERITY.index)
+        _print_summary(flown, notes)
+    return min((flight.outcome.code for flight in flown), key=EXIT_CODE_SEVERITY.index)
 
 
-def _prepare(controller: str, role_name: str, files: Sequence[Path], own: Path, settings: Mapping[str, Any]) -> int:
+def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], own: Path, settings: Mapping[str, Any]) -> int:
     """Examine the candidate and write the scenarios with it; in a child process, since its code is run."""
     from ...results.files import write_json
-    from ...studies.controller_bench.candidate import interface, problems, source
+    from ...studies.controller_bench.candidate import interface_problems, parse_source, read_interface
     from ...studies.controller_bench.role import read_role
-    from ...studies.controller_bench.substitution import Transplant
+    from ...studies.controller_bench.substitution import ControllerSubstitution
 
-    role, candidate = read_role(role_name), source(controller)
-    variables = interface(candidate)
-    if misfits := problems(role, variables, settings):
+    role, candidate = read_role(role_name), parse_source(controller)
+    variables = read_interface(candidate)
+    if misfits := interface_problems(role, variables, settings):
         raise InputError([Problem(problem.message, controller) for problem in misfits])
     rmtree(own / "scenarios", ignore_errors=True)
     written, notes = [], []
     for file in files:
-        transplant = Transplant(role, candidate, variables, file, settings)
+        transplant = ControllerSubstitution(role, candidate, variables, file, settings)
         if path := transplant.write((own / "scenarios").absolute()):
             written.append({"file": path, "original": file})
             notes += [f"{file.stem}: {note}" for note in dict.fromkeys(transplant.notes)]
     if not written:
         raise InputError(f'no scenario has a place for the role "{role.name}": {role.description}')
-    write_json({"scenarios": written, "notes": notes}, own / _PREPARED)
+    write_json({"scenarios": written, "notes": notes}, own / _PREPARED_FILE)
     return 0
 
 
-def _trials(own: Path, shipped: Path) -> tuple[list[Trial], list[str]]:
+def _read_trials(own: Path, shipped: Path) -> tuple[list[ControllerTrial], list[str]]:
     """The scenarios that were written, and the notes on what was left out of them."""
-    prepared = json.loads((own / _PREPARED).read_text(encoding="utf-8"))
+    prepared = json.loads((own / _PREPARED_FILE).read_text(encoding="utf-8"))
     trials = [
-        Trial(Path(each["file"]), Path(each["original"]), own / Path(each["file"]).stem, shipped / Path(each["file"]).stem)
+        ControllerTrial(
+            Path(each["file"]), Path(each["original"]), own / Path(each["file"]).stem, shipped / Path(each["file"]).stem
+        )
         for each in prepared["scenarios"]
     ]
     return trials, prepared["notes"]
 
 
-def _print(flight: Flight, candidate: str) -> None:
+def _print_trial(flight: TrialResult, candidate: str) -> None:
     from ..bench_table import print_comparison
 
     word = click.style("passed", fg="green") if flight.outcome.code == 0 else click.style("FAILED", fg="red", bold=True)
@@ -125,7 +127,7 @@ def _print(flight: Flight, candidate: str) -> None:
     print_comparison(flight.rows(), candidate)
 
 
-def _summary(flown: Sequence[Flight], notes: Sequence[str]) -> None:
+def _print_summary(flown: Sequence[TrialResult], notes: Sequence[str]) -> None:
     for note in notes:
         click.echo(f"note: {note}")
     better, worse = (sum(row.against_shipped == word for each in flown for row in each.rows()) for word in ("better", "worse"))
@@ -135,8 +137,8 @@ def _summary(flown: Sequence[Flight], notes: Sequence[str]) -> None:
     )
 
 
-def _print_json(candidate: str, role: str, flown: Sequence[Flight], notes: Sequence[str]) -> None:
-    from ...results.files import plain
+def _print_json(candidate: str, role: str, flown: Sequence[TrialResult], notes: Sequence[str]) -> None:
+    from ...results.files import to_json_types
 
     scenarios = [
         {
@@ -144,14 +146,14 @@ def _print_json(candidate: str, role: str, flown: Sequence[Flight], notes: Seque
             "code": flight.outcome.code,
             "seconds": flight.outcome.seconds,
             "problems": flight.outcome.details,
-            "kpis": [_row(row) for row in flight.rows()],
+            "kpis": [_row_as_json(row) for row in flight.rows()],
         }
         for flight in flown
     ]
     content = {"candidate": candidate, "role": role, "scenarios": scenarios, "notes": notes}
-    click.echo(json.dumps(plain(content), indent=2))
+    click.echo(json.dumps(to_json_types(content), indent=2))
 
 
-def _row(row: Row) -> dict[str, Any]:
+def _row_as_json(row: KpiComparison) -> dict[str, Any]:
     checks = [{**outcome.check, "passed": outcome.passed} for outcome in row.checks]
     return {**asdict(row), "checks": checks}

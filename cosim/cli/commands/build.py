@@ -10,7 +10,7 @@ import click
 from ...core.errors import CheckError, InputError, Problem
 
 if TYPE_CHECKING:
-    from ...export.build import Built
+    from ...export.build import BuildResult
 
 
 @click.command()
@@ -32,7 +32,7 @@ def command(sources: tuple[Path, ...], check: bool, output: Path | None, modelic
     """
     from ...core import resources
     from ...export.build import build
-    from ...export.build_check import check as check_fmus
+    from ...export.build_check import check_fmus as check_fmus
 
     root = resources.root()
     if check:
@@ -45,12 +45,12 @@ def command(sources: tuple[Path, ...], check: bool, output: Path | None, modelic
     elif modelica_compiler != "cosim":
         raise InputError("--modelica-compiler omc needs --output: fmus/ holds what our own compiler makes")
     else:
-        build(list(sources) or None, root, _report)
+        build(list(sources) or None, root, _print_built)
     return 0
 
 
 def _build_one(sources: tuple[Path, ...], output: Path, modelica_compiler: str) -> None:
-    from ...export.build import build_one
+    from ...export.build import build_to
     from ...export.modelica.frontend.openmodelica import export_with_omc
 
     if len(sources) != 1:
@@ -60,15 +60,15 @@ def _build_one(sources: tuple[Path, ...], output: Path, modelica_compiler: str) 
     if modelica_compiler == "omc":
         export_with_omc(sources[0], output)
     else:
-        build_one(sources[0], None, output)
+        build_to(sources[0], None, output)
     click.echo(f"{sources[0]} -> {output}")
 
 
-def _report(built: Built) -> None:
+def _print_built(built: BuildResult) -> None:
     names = ", ".join(path.as_posix()[path.as_posix().rindex("fmus/") :] for path in built.fmus.values())
-    click.echo(f"{_shown(built.source)} -> {names}")
+    click.echo(f"{_relative_to_cwd(built.source)} -> {names}")
 
 
-def _shown(source: Path) -> Path:
+def _relative_to_cwd(source: Path) -> Path:
     """A path as the user would write it, where that is shorter."""
     return source.relative_to(Path.cwd()) if source.is_relative_to(Path.cwd()) else source

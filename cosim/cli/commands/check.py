@@ -11,14 +11,14 @@ from ...core.system import Group, Stage
 from .. import strict_sandbox, supervision
 
 if TYPE_CHECKING:
-    from ...scenario import Assembly
+    from ...scenario import PreparedRun
 
 
-@click.command(cls=strict_sandbox.Command)
+@click.command(cls=strict_sandbox.SandboxCommand)
 @click.argument("scenario")
 @click.option("--set", "settings", multiple=True, metavar="NAME=value", help="As for `cosim run`.")
 @click.option("--connections/--no-connections", default=True, help="List every connection.")
-@supervision.option
+@supervision.supervision_options
 def command(scenario: str, settings: tuple[str, ...], connections: bool, isolation: str, sandbox: str | None) -> None:
     """Load, wire and validate SCENARIO without running it; print components, processes, stages, connections and conversions.
 
@@ -27,20 +27,20 @@ def command(scenario: str, settings: tuple[str, ...], connections: bool, isolati
     """
     from ...api import load
     from ...scenario.nested_systems import parse_settings
-    from ...scenario.warnings import doubts
+    from ...scenario.warnings import find_warnings
 
     apart: Literal["fmu", "none"] = "fmu" if isolation == "fmu" else "none"
     assembly = load(scenario, parse_settings(settings), isolation=apart, sandbox=bool(sandbox))
     try:
         if problems := assembly.figure_problems():
             raise InputError(problems)
-        _components(assembly)
-        _processes(assembly, isolation, sandbox)
-        _stages(assembly)
+        _print_components(assembly)
+        _print_processes(assembly, isolation, sandbox)
+        _print_stages(assembly)
         if connections:
-            _connections(assembly)
-            _unfed(assembly)
-        found = doubts(assembly)
+            _print_connections(assembly)
+            _print_unconnected_inputs(assembly)
+        found = find_warnings(assembly)
         for problem in found:
             click.echo(f"WARNING {problem}", err=True)
         verdict = f"{len(found)} warning{'s' * (len(found) > 1)}." if found else "All is well."
@@ -54,21 +54,25 @@ def command(scenario: str, settings: tuple[str, ...], connections: bool, isolati
         assembly.free()
 
 
-def _components(assembly: Assembly) -> None:
+def _print_components(assembly: PreparedRun) -> None:
     click.echo("components")
     width = max(map(len, assembly.system.components))
     for name, component in assembly.system.components.items():
-        counts = {kind: sum(len(v.slots) for v in component.variables if v.causality == kind) for kind in ("input", "output")}
+        counts = {
+            kind: sum(len(v.scalar_names) for v in component.variables if v.causality == kind) for kind in ("input", "output")
+        }
         period = assembly.system.periods.get(name)
         every = f", every {float(period):g} s" if period else ""
-        click.echo(f"  {name:{width}}  {assembly.origin(name)}, {counts['input']} inputs, {counts['output']} outputs{every}")
+        click.echo(
+            f"  {name:{width}}  {assembly.component_source(name)}, {counts['input']} inputs, {counts['output']} outputs{every}"
+        )
 
 
-def _processes(assembly: Assembly, isolation: str, sandbox: str | None) -> None:
-    from ...components.fmi.isolated.remote import RemoteFmu
+def _print_processes(assembly: PreparedRun, isolation: str, sandbox: str | None) -> None:
+    from ...components.fmi.isolated.remote import IsolatedFmu
 
     components = assembly.system.components
-    apart = {name: component.isolation for name, component in components.items() if isinstance(component, RemoteFmu)}
+    apart = {name: component.isolation for name, component in components.items() if isinstance(component, IsolatedFmu)}
     together = [name for name in components if name not in apart]
     click.echo("\nprocesses" + (", all of them in bubblewrap" if sandbox == "strict" else ""))
     if together:
@@ -77,41 +81,41 @@ def _processes(assembly: Assembly, isolation: str, sandbox: str | None) -> None:
         click.echo(f"  {name}: one of its own{', in a sandbox' if how.sandbox else ''}")
 
 
-def _stages(assembly: Assembly) -> None:
+def _print_stages(assembly: PreparedRun) -> None:
     click.echo("\nstages, in order (components of one line step side by side)")
-    _list_stages(assembly.system.stages, "  ")
+    _print_nested_stages(assembly.system.stages, "  ")
 
 
-def _list_stages(stages: tuple[Stage, ...] | object, indent: str) -> None:
+def _print_nested_stages(stages: tuple[Stage, ...] | object, indent: str) -> None:
     for i, stage in enumerate(stages, 1):  # type: ignore[var-annotated,arg-type]
         names = ", ".join(member.name if isinstance(member, Group) else member for member in stage)
         click.echo(f"{indent}{i}. {names}")
         for member in stage:
             if isinstance(member, Group):
-                _list_stages(member.stages, indent + "   ")
+                _print_nested_stages(member.stages, indent + "   ")
 
 
-def _connections(assembly: Assembly) -> None:
-    from ...engine.transfer_plan import conversion
+def _print_connections(assembly: PreparedRun) -> None:
+    from ...engine.transfer_plan import unit_conversion
 
     system = assembly.system
     click.echo(f"\nconnections ({len(system.connections)})")
     for connection in system.connections:
-        source, target = system.place(connection.source).variable, system.place(connection.target).variable
+        source, target = system.find_element(connection.source).variable, system.find_element(connection.target).variable
         notes = [f"delay {connection.delay}"] if connection.delay else []
-        if conversion(source, target) != (1.0, 0.0) and source.unit and target.unit:
+        if unit_conversion(source, target) != (1.0, 0.0) and source.unit and target.unit:
             notes.append(f"{source.unit.name} to {target.unit.name}")
         if source.type != target.type:
             notes.append(f"{source.type} to {target.type}")
         click.echo(f"  {connection.source} -> {connection.target}" + (f"  ({', '.join(notes)})" if notes else ""))
 
 
-def _unfed(assembly: Assembly) -> None:
+def _print_unconnected_inputs(assembly: PreparedRun) -> None:
     """Inputs that keep their own start values."""
-    from ...scenario.warnings import unfed
+    from ...scenario.warnings import unconnected_inputs
 
     free: dict[str, list[str]] = {}
-    for end in unfed(assembly):
-        free.setdefault(end.component, []).append(end.slot)
+    for end in unconnected_inputs(assembly):
+        free.setdefault(end.component, []).append(end.scalar)
     for name, slots in free.items():
         click.echo(f"\ninputs of {name} that nothing feeds or sets\n  {', '.join(slots)}")

@@ -38,18 +38,18 @@ def command(
     if plot and plot.suffix not in (".png", ".svg"):
         raise click.BadParameter(f'"{plot}" is neither .png nor .svg', param_hint="--plot")
     if _is_scenario(reference):
-        file, tolerances = _of_scenario(reference)
+        file, tolerances = _scenario_reference(reference)
     else:
         file, tolerances = reference, dict.fromkeys(signals or ("*",), Tolerance(absolute, relative, time))
-    found, expected = _read(result), _read(file)
+    found, expected = _read_result(result), _read_result(file)
     comparison = compare(found, expected, tolerances)
     if plot:
-        _draw(found, expected, tolerances, comparison, plot)
+        _draw_tubes(found, expected, tolerances, comparison, plot)
     click.echo(str(comparison), err=not comparison.passed)
     return 0 if comparison.passed else 3
 
 
-def _read(path: Path) -> Result:
+def _read_result(path: Path) -> Result:
     from ...results import Result
 
     return Result.from_csv(path / "result.csv" if path.is_dir() else path)
@@ -60,22 +60,24 @@ def _is_scenario(path: Path) -> bool:
     return path.suffix == ".json" or (path.name == str(path) and not path.suffix and not path.exists())
 
 
-def _of_scenario(scenario: Path) -> tuple[Path, Mapping[str, Tolerance]]:
+def _scenario_reference(scenario: Path) -> tuple[Path, Mapping[str, Tolerance]]:
     """Where the reference of a scenario lies, and its tolerances."""
     from ...core.errors import InputError
     from ...results.comparison import Tolerance
-    from ...scenario.nested_systems import find, load
+    from ...scenario.nested_systems import find_scenario, load_scenario
 
-    path = find(scenario)
-    spec = load(path).spec.reference
+    path = find_scenario(scenario)
+    spec = load_scenario(path).spec.reference
     if spec is None:
         raise InputError(f'{path} names no "reference"')
     return path.parent / spec.file, {name: Tolerance(**vars(part)) for name, part in spec.tolerances.items()}
 
 
-def _draw(result: Result, reference: Result, tolerances: Mapping[str, Tolerance], comparison: Comparison, path: Path) -> None:
-    from ...report.figures import draw, save
-    from ...report.tubes import tubes
+def _draw_tubes(
+    result: Result, reference: Result, tolerances: Mapping[str, Tolerance], comparison: Comparison, path: Path
+) -> None:
+    from ...report.figures import draw_figure, save_figure
+    from ...report.tubes import draw_tubes
 
     arguments = {"reference": reference, "tolerances": tolerances, "comparison": comparison}
-    save(draw(result, "tubes", tubes, arguments), path)
+    save_figure(draw_figure(result, "tubes", draw_tubes, arguments), path)

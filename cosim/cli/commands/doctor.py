@@ -37,15 +37,15 @@ def command(as_json: bool) -> int:
 
     Exit code 0, or 1 when something that is required is broken.
     """
-    findings = [*_host(), *_packages(), *_tools(), *_sandbox()]
+    findings = [*_host_findings(), *_package_findings(), *_tool_findings(), *_sandbox_findings()]
     if as_json:
         click.echo(json.dumps([asdict(finding) for finding in findings], indent=2))
     else:
-        _print(findings)
+        _print_findings(findings)
     return 1 if any(finding.state == "broken" for finding in findings) else 0
 
 
-def _print(findings: Iterable[Finding]) -> None:
+def _print_findings(findings: Iterable[Finding]) -> None:
     section = ""
     for finding in findings:
         if finding.section != section:
@@ -55,35 +55,35 @@ def _print(findings: Iterable[Finding]) -> None:
         click.echo(f"  {finding.name:20} {mark}{finding.found}")
 
 
-def _host() -> Iterator[Finding]:
+def _host_findings() -> Iterator[Finding]:
     from ...core.resources import cache_directory, package_folder
     from ...core.version import __version__
 
     yield Finding("cosim", "cosim", f"{__version__} in {package_folder()}")
     yield Finding("cosim", "Python", f"{platform.python_version()} ({platform.system()} {platform.machine()})")
-    yield Finding("cosim", "processors", f"{_processors()} of {os.cpu_count()} may be used")
-    yield _native()
+    yield Finding("cosim", "processors", f"{available_processors()} of {os.cpu_count()} may be used")
+    yield _executor_finding()
     cache = cache_directory()
     there = next(path for path in (cache, *cache.parents) if path.exists())
     usable = os.access(there, os.W_OK)
     yield Finding("cosim", "cache", f"{cache}{'' if usable else ' cannot be written'}", "ok" if usable else "missing")
 
 
-def _processors() -> int:
+def available_processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _native() -> Finding:
+def _executor_finding() -> Finding:
     try:
-        from ...engine import available
+        from ...engine import native_available
     except ImportError as error:
         return Finding("cosim", "executor", f"the engine cannot be imported: {error}", "broken")
-    if available():
+    if native_available():
         return Finding("cosim", "executor", "native")
     return Finding("cosim", "executor", "Python only: the native one was not built", "missing")
 
 
-def _packages() -> Iterator[Finding]:
+def _package_findings() -> Iterator[Finding]:
     """Requirements as the installed distribution states them, and which extras are complete."""
     from packaging.requirements import Requirement
 
@@ -95,23 +95,23 @@ def _packages() -> Iterator[Finding]:
     requirements = [Requirement(text) for text in own.requires or ()]
     for requirement in requirements:
         if requirement.marker is None or requirement.marker.evaluate({"extra": ""}):
-            found, fits = _installed(requirement)
+            found, fits = _installed_version(requirement)
             yield Finding("required packages", requirement.name, found, "ok" if fits else "broken")
     for extra in own.metadata.get_all("Provides-Extra") or ():
-        yield _extra(extra, requirements)
+        yield _extra_finding(extra, requirements)
 
 
-def _extra(extra: str, requirements: Iterable[Requirement]) -> Finding:
+def _extra_finding(extra: str, requirements: Iterable[Requirement]) -> Finding:
     """Other extras that this one names are listed on their own."""
     only = [r for r in requirements if r.marker and r.marker.evaluate({"extra": extra}) and not r.marker.evaluate({"extra": ""})]
     named = [r for r in only if r.name != DISTRIBUTION]
-    lacking = [f"{r.name}: {_installed(r)[0]}" for r in named if not _installed(r)[1]]
+    lacking = [f"{r.name}: {_installed_version(r)[0]}" for r in named if not _installed_version(r)[1]]
     if lacking:
         return Finding("extras", extra, f"{'; '.join(lacking)} (pip install '{DISTRIBUTION}[{extra}]')", "missing")
-    return Finding("extras", extra, ", ".join(f"{r.name} {_installed(r)[0]}" for r in named))
+    return Finding("extras", extra, ", ".join(f"{r.name} {_installed_version(r)[0]}" for r in named))
 
 
-def _installed(requirement: Requirement) -> tuple[str, bool]:
+def _installed_version(requirement: Requirement) -> tuple[str, bool]:
     """The version that is installed, and whether it is one that is asked for."""
     try:
         version = metadata.version(requirement.name)
@@ -122,7 +122,7 @@ def _installed(requirement: Requirement) -> tuple[str, bool]:
     return f"{version}, needed is {requirement.specifier}", False
 
 
-def _tools() -> Iterator[Finding]:
+def _tool_findings() -> Iterator[Finding]:
     from ...core.errors import InputError
     from ...export.fmu.compiler import compiler_version, find_compiler
 
@@ -130,10 +130,10 @@ def _tools() -> Iterator[Finding]:
         yield Finding("tools", "C compiler", compiler_version(tuple(find_compiler())))
     except (InputError, OSError) as error:
         yield Finding("tools", "C compiler", str(error), "missing")
-    yield _program("OpenModelica", "omc", "--version")
+    yield _program_finding("OpenModelica", "omc", "--version")
 
 
-def _program(name: str, program: str, option: str) -> Finding:
+def _program_finding(name: str, program: str, option: str) -> Finding:
     """A program that says its version."""
     path = shutil.which(program)
     if path is None:
@@ -145,12 +145,12 @@ def _program(name: str, program: str, option: str) -> Finding:
     return Finding("tools", name, said.stdout.partition("\n")[0].strip())
 
 
-def _sandbox() -> Iterator[Finding]:
-    from ...process.sandbox import active, available, landlock
+def _sandbox_findings() -> Iterator[Finding]:
+    from ...process.sandbox import find_available_sandboxes, landlock, probe_restrictions
 
-    offered = available()
+    offered = find_available_sandboxes()
     if offered.landlock:
-        kinds = ["files", *(["TCP"] if offered.landlock >= landlock.NETWORK_VERSION else [])]
+        kinds = ["files", *(["TCP"] if offered.landlock >= landlock.NETWORK_ABI else [])]
         yield Finding("sandbox", "Landlock", f"version {offered.landlock}: can confine {', '.join(kinds)}; not UDP")
     else:
         yield Finding("sandbox", "Landlock", "not in this kernel (Linux 5.13 or newer)", "missing")
@@ -158,8 +158,10 @@ def _sandbox() -> Iterator[Finding]:
         yield Finding("sandbox", "bubblewrap", f"{offered.bubblewrap} works: --sandbox strict can be used")
     else:
         yield Finding("sandbox", "bubblewrap", "no program bwrap that works here, so no --sandbox strict", "missing")
-    yield from (Finding("this process", name.replace("_", " "), _words(value)) for name, value in asdict(active()).items())
+    yield from (
+        Finding("this process", name.replace("_", " "), _yes_or_no(value)) for name, value in asdict(probe_restrictions()).items()
+    )
 
 
-def _words(value: Any) -> str:
+def _yes_or_no(value: Any) -> str:
     return {True: "yes", False: "no", None: "unlimited"}[value] if value is None or isinstance(value, bool) else str(value)

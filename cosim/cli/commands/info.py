@@ -21,7 +21,7 @@ def command(fmu: Path, with_locals: bool) -> None:
     experiment = about.default_experiment
     abilities = {
         "state can be saved and restored": about.has_state,
-        "one instance per process": about.only_once_per_process,
+        "one instance per process": about.once_per_process,
         "needs an external tool": about.needs_execution_tool,
     }
     rows = {
@@ -40,10 +40,10 @@ def command(fmu: Path, with_locals: bool) -> None:
             click.echo(f"{name:13} {value}")
     groups = ["input", "output", "structuralParameter", "parameter", "calculatedParameter", *(["local"] if with_locals else [])]
     for causality in groups:
-        _list(causality, [v for v in about.variables if v.causality == causality])
+        _print_variables(causality, [v for v in about.variables if v.causality == causality])
 
 
-def _list(causality: str, variables: list[Variable]) -> None:
+def _print_variables(causality: str, variables: list[Variable]) -> None:
     if not variables:
         return
     click.echo(f"\n{causality}s ({len(variables)})")
@@ -51,11 +51,11 @@ def _list(causality: str, variables: list[Variable]) -> None:
     for variable in variables:
         dimensions = f"[{','.join(map(str, variable.shape))}]" if variable.shape else ""
         unit = variable.unit.name if variable.unit else "-"
-        start = "" if variable.start is None else f" = {_shortened(variable.start)}"
+        start = "" if variable.start is None else f" = {_shorten(variable.start)}"
         start += "".join(f", {number}: {name}" for name, number in variable.items).replace(", ", "; ", 1)
         click.echo(f"  {variable.name:{width}} {variable.type + dimensions:12} {unit:8} {variable.description}{start}".rstrip())
 
 
-def _shortened(start: object) -> str:
+def _shorten(start: object) -> str:
     text = str(start)
     return text if len(text) <= 40 else text[:37] + "..."

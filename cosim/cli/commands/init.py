@@ -19,7 +19,7 @@ from ...studies.regression import Regression
 
 _TEMPLATES = Path(__file__).parents[1] / "templates"
 #: file of a new project -> what it is made from
-_FILES = {
+_PROJECT_FILES = {
     "README.md": _TEMPLATES / "project/README.md",
     "requirements.txt": _TEMPLATES / "project/requirements.txt",
     "pytest.ini": _TEMPLATES / "project/pytest.ini",
@@ -41,11 +41,11 @@ def command(directory: Path, force: bool) -> int:
 
     The reference is made by flying the scenario.
     """
-    present = [directory / name for name in (*_FILES, _PLANT) if (directory / name).exists()]
+    present = [directory / name for name in (*_PROJECT_FILES, _PLANT) if (directory / name).exists()]
     if present and not force:
         raise InputError([Problem("exists; --force overwrites it", str(path)) for path in present])
-    _write(directory)
-    outcome = Regression(directory / "scenarios/course.json", directory / "runs/course", update=True).outcome()
+    _write_project(directory)
+    outcome = Regression(directory / "scenarios/course.json", directory / "runs/course", update=True).run()
     if outcome.code:
         click.echo("\n".join([f"course: {outcome.summary}", *outcome.details]), err=True)
         return outcome.code
@@ -55,9 +55,9 @@ def command(directory: Path, force: bool) -> int:
     return 0
 
 
-def _write(directory: Path) -> None:
-    marks = {"README.md": ("NAME", directory.resolve().name), "requirements.txt": ("COSIM", requirement(origin()))}
-    for file, template in _FILES.items():
+def _write_project(directory: Path) -> None:
+    marks = {"README.md": ("NAME", directory.resolve().name), "requirements.txt": ("COSIM", pip_requirement(pip_origin()))}
+    for file, template in _PROJECT_FILES.items():
         path = directory / file
         text = template.read_text(encoding="utf-8")
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -69,13 +69,13 @@ def _write(directory: Path) -> None:
     click.echo(plant)
 
 
-def origin() -> Mapping[str, Any] | None:
+def pip_origin() -> Mapping[str, Any] | None:
     """Where pip got this cosim from, as its direct_url.json says (PEP 610); None when from an index, or not by pip."""
     found = (made.read_text("direct_url.json") for made in distributions(name="fmi-cosim"))  # a clone has a record of its own
     return next((json.loads(text) for text in found if text), None)
 
 
-def requirement(source: Mapping[str, Any] | None) -> str:
+def pip_requirement(source: Mapping[str, Any] | None) -> str:
     """The line by which pip gets the same cosim again."""
     if source is None:
         return f"fmi-cosim=={__version__}"

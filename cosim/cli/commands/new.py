@@ -19,8 +19,8 @@ from ...core.errors import InputError, Problem, did_you_mean
 TEMPLATES = Path(__file__).parents[1] / "templates"
 #: what the templates are called: they are valid programs, in which a new controller's name replaces this one
 _SNAKE, _CAMEL = "speed_keeper", "SpeedKeeper"
-_TYPES = ("Real", "Integer", "Boolean", "String")
-_PICTURES, _PLANT = "pictures.py", "fmus/strider.fmu"
+_MODELICA_TYPES = ("Real", "Integer", "Boolean", "String")
+_FIGURES_FILE, _PLANT = "pictures.py", "fmus/strider.fmu"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,22 +58,22 @@ def controller(name: str, language: str, directory: Path, force: bool) -> None:
     if language not in LANGUAGES:
         raise InputError(f'there is no language "{language}"{did_you_mean(language, LANGUAGES)}')
     chosen = LANGUAGES[language]
-    template = _template(chosen)
-    names = _names(name, template.values())
+    template = _read_template(chosen)
+    names = _template_names(name, template.values())
     folder = directory / names[_SNAKE]
-    files = {folder / _replaced(file, names): _replaced(text, names) for file, text in template.items()}
-    files[folder / f"{names[_SNAKE]}.json"] = _scenario(chosen, names)
-    files[folder / _PICTURES] = (TEMPLATES / "vessel" / _PICTURES).read_text()
-    _write(files, folder / _PLANT, force)
-    _say_what_is_next(chosen, folder, names)
+    files = {folder / _substitute_names(file, names): _substitute_names(text, names) for file, text in template.items()}
+    files[folder / f"{names[_SNAKE]}.json"] = _scenario_text(chosen, names)
+    files[folder / _FIGURES_FILE] = (TEMPLATES / "vessel" / _FIGURES_FILE).read_text()
+    _write_files(files, folder / _PLANT, force)
+    _print_next_steps(chosen, folder, names)
 
 
-def _template(language: Language) -> dict[str, str]:
+def _read_template(language: Language) -> dict[str, str]:
     """The files of a template: name -> text."""
     return {path.name: path.read_text() for path in sorted(language.folder.iterdir()) if path.is_file()}
 
 
-def _names(name: str, texts: Iterable[str]) -> dict[str, str]:
+def _template_names(name: str, texts: Iterable[str]) -> dict[str, str]:
     """The template's names -> the controller's, as a file and as a class. Refuses names that some language cannot take."""
     from ...export.sources import snake_case
 
@@ -81,23 +81,23 @@ def _names(name: str, texts: Iterable[str]) -> dict[str, str]:
         raise InputError(f'"{name}" is no name of a controller: expected a letter, then letters, digits and underscores')
     snake = snake_case(name)
     camel = "".join(word[:1].upper() + word[1:] for word in snake.split("_"))
-    taken = {*_TYPES, *(word for text in texts for word in re.findall(r"\w+", text))} - {_CAMEL}
-    modules = {*sys.stdlib_module_names, "pythonfmu", Path(_PICTURES).stem}
+    taken = {*_MODELICA_TYPES, *(word for text in texts for word in re.findall(r"\w+", text))} - {_CAMEL}
+    modules = {*sys.stdlib_module_names, "pythonfmu", Path(_FIGURES_FILE).stem}
     if camel in taken or snake in modules or keyword.iskeyword(snake) or keyword.iskeyword(camel):
         raise InputError(f'"{name}" means something else already; choose another name')
     return {_SNAKE: snake, _CAMEL: camel}
 
 
-def _replaced(text: str, names: Mapping[str, str]) -> str:
+def _substitute_names(text: str, names: Mapping[str, str]) -> str:
     return re.sub("|".join(names), lambda match: names[match[0]], text)
 
 
-def _scenario(language: Language, names: Mapping[str, str]) -> str:
-    marks = {"SOURCE": language.key, "FILE": _replaced(language.component, names)}
-    return _replaced((TEMPLATES / "scenario.json").read_text(), {**names, **marks})
+def _scenario_text(language: Language, names: Mapping[str, str]) -> str:
+    marks = {"SOURCE": language.key, "FILE": _substitute_names(language.component, names)}
+    return _substitute_names((TEMPLATES / "scenario.json").read_text(), {**names, **marks})
 
 
-def _write(files: Mapping[Path, str], plant: Path, force: bool) -> None:
+def _write_files(files: Mapping[Path, str], plant: Path, force: bool) -> None:
     present = [path for path in (*files, plant) if path.exists()]
     if present and not force:
         raise InputError([Problem("exists; --force overwrites it", str(path)) for path in present])
@@ -110,10 +110,10 @@ def _write(files: Mapping[Path, str], plant: Path, force: bool) -> None:
     click.echo(plant)
 
 
-def _say_what_is_next(language: Language, folder: Path, names: Mapping[str, str]) -> None:
+def _print_next_steps(language: Language, folder: Path, names: Mapping[str, str]) -> None:
     name = names[_SNAKE]
     run = shlex.join(["cosim", "run", str(folder / f"{name}.json")])
-    source, fmu = folder / _replaced(language.source, names), folder / f"{name}.fmu"
+    source, fmu = folder / _substitute_names(language.source, names), folder / f"{name}.fmu"
     build = shlex.join(["cosim", "build", str(source), "--output", str(fmu)])
     click.echo(
         f"\nBuild and run it:\n  {build}\n  {run}" if language.key == "fmu" else f"\nRun it:\n  {run}\nAs an FMU:\n  {build}"

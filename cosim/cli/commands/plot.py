@@ -27,24 +27,26 @@ def command(
     each has a folder of its own in the output directory; the figure of --timings stands beside these folders.
     """
     from ...report.figures import draw_figures
-    from ...report.runs import figures_of, read_run
-    from ...report.timings import timings as draw_timings
+    from ...report.runs import load_figures, read_run
+    from ...report.timings import draw_timings as draw_timings
     from ...report.video import write_video
 
     suffixes = [f".{name}" for name in formats]
     runs = {directory: read_run(directory) for directory in results}
     for directory, result in runs.items():
         target = directory if output_dir is None else output_dir / directory.name if len(runs) > 1 else output_dir
-        _report(draw_figures(result, figures_of(result), target, suffixes, numbers=True))
+        _print_paths(draw_figures(result, load_figures(result), target, suffixes, write_data=True))
         if video:
             with progress_bar(f"{camera}.mp4") as progress:
                 file = write_video(result, target / f"{camera}.mp4", camera, progress=progress)
-            _report([file])
+            _print_paths([file])
     if timings:
         figure = ("timings", draw_timings, {"others": list(runs.values())[1:]})
-        _report(draw_figures(next(iter(runs.values())), [figure], output_dir or results[0].parent, suffixes, numbers=True))
+        _print_paths(
+            draw_figures(next(iter(runs.values())), [figure], output_dir or results[0].parent, suffixes, write_data=True)
+        )
 
 
-def _report(files: list[Path]) -> None:
+def _print_paths(files: list[Path]) -> None:
     for path in files:
         click.echo(path)

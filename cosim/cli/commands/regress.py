@@ -12,15 +12,15 @@ import click
 
 from ...core import resources
 from ...core.errors import InputError
-from ...studies.regression import EXPECTATIONS, Outcome, Regression, holds
+from ...studies.regression import EXPECTATION_KEYS, Regression, RegressionOutcome, has_keys
 
 if TYPE_CHECKING:
-    from ...report.junit import Case
+    from ...report.junit import JUnitCase
 
 T = TypeVar("T")
 
 #: of several exit codes the first one counts
-SEVERITY = (130, 70, 2, 1, 3, 0)
+EXIT_CODE_SEVERITY = (130, 70, 2, 1, 3, 0)
 
 
 @click.command()
@@ -37,23 +37,23 @@ def command(scenarios: tuple[Path, ...], update: bool, junit: Path | None, outpu
     few rows as describe them, and beside them what made them; a run that fails its checks becomes no reference. Ends with 3 when
     a check or comparison was not met, 1 when a component failed, 2 when a scenario was refused.
     """
-    expected = ("reference",) if update else EXPECTATIONS
-    files = [file for file in found(scenarios or [default_folder()]) if holds(file, expected)]
+    expected = ("reference",) if update else EXPECTATION_KEYS
+    files = [file for file in find_scenario_files(scenarios or [default_folder()]) if has_keys(file, expected)]
     if not files:
         raise InputError('there is no scenario with a "reference" (or, without --update, "checks")')
-    refuse_same_names(files)
+    check_unique_names(files)
     work = [Regression(file, output_dir / file.stem, update) for file in files]
     outcomes = []
-    for outcome in in_parallel([each.outcome for each in work], jobs or processors()):
-        _print(outcome)
+    for outcome in run_in_parallel([each.run for each in work], jobs or available_processors()):
+        _print_outcome(outcome)
         outcomes.append(outcome)
     if junit:
         from ...report.junit import write_junit
 
-        write_junit("cosim regress", [_case(outcome) for outcome in outcomes], junit)
+        write_junit("cosim regress", [_junit_case(outcome) for outcome in outcomes], junit)
     failed = sum(outcome.code != 0 for outcome in outcomes)
     click.echo(f"{len(outcomes)} scenarios, {failed} failed" if failed else f"{len(outcomes)} scenarios, all well")
-    return min((outcome.code for outcome in outcomes), key=SEVERITY.index)
+    return min((outcome.code for outcome in outcomes), key=EXIT_CODE_SEVERITY.index)
 
 
 def default_folder() -> Path:
@@ -62,20 +62,20 @@ def default_folder() -> Path:
     return own if own.is_dir() else resources.root() / own
 
 
-def found(paths: Iterable[Path]) -> Iterator[Path]:
+def find_scenario_files(paths: Iterable[Path]) -> Iterator[Path]:
     """The scenario files that are meant by files, names of shipped scenarios and folders. Raises InputError."""
-    from ...scenario.nested_systems import find
+    from ...scenario.nested_systems import find_scenario
 
     for path in paths:
         if not path.is_dir():
-            yield find(path)
+            yield find_scenario(path)
         elif files := sorted(path.glob("*.json")):
             yield from files
         else:
             raise InputError(f'the folder "{path}" holds no scenario (*.json)')
 
 
-def refuse_same_names(files: Iterable[Path]) -> None:
+def check_unique_names(files: Iterable[Path]) -> None:
     """Each has a folder of its own for results. Raises InputError."""
     counts = Counter(file.stem for file in files)
     if several := [name for name, count in counts.items() if count > 1]:
@@ -84,12 +84,12 @@ def refuse_same_names(files: Iterable[Path]) -> None:
         )
 
 
-def processors() -> int:
+def available_processors() -> int:
     """How many this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def in_parallel(work: Sequence[Callable[[], T]], jobs: int) -> Iterator[T]:
+def run_in_parallel(work: Sequence[Callable[[], T]], jobs: int) -> Iterator[T]:
     """What all functions return, in order; each is called on a thread that mostly waits for a child process.
 
     When the caller is interrupted, those that wait for their turn are not called any more.
@@ -103,15 +103,15 @@ def in_parallel(work: Sequence[Callable[[], T]], jobs: int) -> Iterator[T]:
         pool.shutdown(cancel_futures=True)
 
 
-def _print(outcome: Outcome) -> None:
+def _print_outcome(outcome: RegressionOutcome) -> None:
     word = click.style("passed", fg="green") if outcome.code == 0 else click.style("FAILED", fg="red", bold=True)
     click.echo(f"{word}  {outcome.name:<28} {outcome.summary:<24} {outcome.seconds:5.1f} s")
     for line in outcome.details:
         click.echo(f"        {line}")
 
 
-def _case(outcome: Outcome) -> Case:
-    from ...report.junit import Case
+def _junit_case(outcome: RegressionOutcome) -> JUnitCase:
+    from ...report.junit import JUnitCase
 
     kind = {0: "passed", 3: "failure"}.get(outcome.code, "error")
-    return Case(outcome.name, kind, outcome.seconds, outcome.details)
+    return JUnitCase(outcome.name, kind, outcome.seconds, outcome.details)

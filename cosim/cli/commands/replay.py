@@ -19,12 +19,12 @@ def command(result: Path, other: Path | None, output_file: Path | None, shall_op
     """
     from ...report.replay import write_replay
     from ...report.runs import read_run
-    from ...report.scene import scene_of
+    from ...report.scene import build_scene
 
     target = output_file or result / "replay.html"
     runs = [read_run(directory) for directory in (result, *([other] if other else []))]
     write_replay(runs, target)
-    if not scene_of(runs[0].metadata)["bodies"]:
+    if not build_scene(runs[0].metadata)["bodies"]:
         text = 'nothing says what this run looks like (key "scene" of the scenario): the page shows signals, and nothing in 3-D'
         click.echo(f"{result}: {text}", err=True)
     click.echo(target)

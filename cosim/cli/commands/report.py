@@ -16,15 +16,17 @@ def command(result: Path, output_file: Path | None, shall_open: bool) -> None:
 
     The page is one file and needs no network.
     """
-    from ...report.figures import draw, svg
+    from ...report.figures import draw_figure, figure_to_svg
     from ...report.html import write_report
-    from ...report.runs import figures_of, read_run
+    from ...report.runs import load_figures, read_run
     from ...results.checks import evaluate_checks
 
     run, target = read_run(result), output_file or result / "report.html"
     checks = run.metadata.get("scenario", {}).get("checks", [])
     outcomes = evaluate_checks(run.kpis, [check for check in checks if check["kpi"] in run.kpis])
-    pictures = {name: svg(draw(run, name, function, arguments)) for name, function, arguments in figures_of(run)}
+    pictures = {
+        name: figure_to_svg(draw_figure(run, name, function, arguments)) for name, function, arguments in load_figures(run)
+    }
     write_report(run, outcomes, pictures, target)
     click.echo(target)
     if shall_open:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...core.errors import CosimError, InputError
-from ...process.journal import STEPS
-from .. import live, report, strict_sandbox, supervision
+from ...process.journal import STEP_COUNT
+from .. import live, report_error, strict_sandbox, supervision
 from ..progress import progress_bar
 
 if TYPE_CHECKING:
@@ -21,20 +21,20 @@ if TYPE_CHECKING:
 
     from ...api import Execution
     from ...engine.run_loop import Observer
-    from ...process.supervisor import Outcome
+    from ...process.supervisor import SupervisedOutcome
     from ...results import Result
     from ...results.checks import CheckOutcome
-    from ...scenario import Assembly
+    from ...scenario import PreparedRun
 
-_LATENESS = {"max": "max_lateness", "mean": "mean_lateness", "99 %": "lateness_99_percent"}
+_LATENESS_LABELS = {"max": "max_lateness", "mean": "mean_lateness", "99 %": "lateness_99_percent"}
 
 #: folder of a run that is going on, inside its output directory
-UNFINISHED = ".unfinished"
+UNFINISHED_FOLDER = ".unfinished"
 
-RESULTS = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run.json", "report.html", "replay.html")
+RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run.json", "report.html", "replay.html")
 
 
-@click.command(cls=strict_sandbox.Command)
+@click.command(cls=strict_sandbox.SandboxCommand)
 @click.argument("scenario")
 @click.option("--output-dir", type=click.Path(path_type=Path), help="Where results go; default: runs/NAME.")
 @click.option("--stop-time", help="Stop time in s instead of the scenario's.")
@@ -58,8 +58,8 @@ RESULTS = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run.json
 @click.option("--parquet", is_flag=True, help="Write result.parquet too (extra `parquet`).")
 @click.option("--mcap", is_flag=True, help="Write result.mcap too, for Foxglove and ROS 2 (extra `mcap`).")
 @click.option("--no-report", is_flag=True, help="Write no figures and no report.html.")
-@live.option
-@supervision.option
+@live.view_options
+@supervision.supervision_options
 def command(isolation: str, sandbox: str | None, view: bool, view_port: int, **options: Any) -> int:
     """Run SCENARIO, a JSON file or the name of a shipped scenario.
 
@@ -67,25 +67,27 @@ def command(isolation: str, sandbox: str | None, view: bool, view_port: int, **o
     1: a component failed, the results until then are kept; 2: the scenario was refused; 3: a check was not met.
     """
     if view:
-        live.require(isolation, sandbox, options["late"])
-    if strict_sandbox.wanted(sandbox):
-        return strict_sandbox.again(*_needed(**options))
+        live.check_view_options(isolation, sandbox, options["late"])
+    if strict_sandbox.must_rerun(sandbox):
+        return strict_sandbox.rerun_in_bubblewrap(*_sandbox_paths(**options))
     apart: dict[str, Any] = {"isolation": "fmu" if isolation == "fmu" else "none", "sandbox": bool(sandbox)}
     if view:
-        return live.viewed(lambda link: _run(**options, **apart, link=link), isolation, _salvage, view_port)
-    return supervision.protected(lambda: _run(**options, **apart), isolation, _salvage)
+        return live.run_with_view(
+            lambda link: _run_scenario(**options, **apart, link=link), isolation, _save_after_crash, view_port
+        )
+    return supervision.run_supervised_command(lambda: _run_scenario(**options, **apart), isolation, _save_after_crash)
 
 
-def _needed(scenario: str, output_dir: Path | None, settings: Sequence[str], **_: Any) -> tuple[list[Path], Path | None]:
+def _sandbox_paths(scenario: str, output_dir: Path | None, settings: Sequence[str], **_: Any) -> tuple[list[Path], Path | None]:
     """Files that the command reads, and the folder it writes to (None when it will refuse the scenario)."""
-    from ...scenario import load
+    from ...scenario import load_scenario
     from ...scenario.nested_systems import parse_settings
 
-    loaded = load(scenario, parse_settings(settings))
+    loaded = load_scenario(scenario, parse_settings(settings))
     return loaded.files(), None if loaded.problems else (output_dir or Path("runs") / loaded.spec.name).absolute()
 
 
-def _run(
+def _run_scenario(
     scenario: str,
     output_dir: Path | None,
     stop_time: str | None,
@@ -97,89 +99,93 @@ def _run(
     link: Connection | None = None,
     **conditions: Any,
 ) -> int:
-    from ...api import executed, load
-    from ...process.run_files.folder import unfinished
+    from ...api import executing, load
+    from ...process.run_files.folder import keeping_run_files
     from ...results.mcap_files import require_mcap
     from ...results.parquet_files import require_parquet
     from ...scenario.nested_systems import parse_settings
     from ...scenario.warnings import missing_connections
     from .. import messages
 
-    warnings = messages.show()
+    warnings = messages.print_log()
     if parquet:
         require_parquet()
     if mcap:
         require_mcap()
     began = time.perf_counter()
     assembly = load(scenario, parse_settings(settings), stop_time=stop_time, step_size=step_size, **conditions)
-    supervision.configure(assembly.spec.deadlines)
-    messages.warn(missing_connections(assembly))
+    supervision.set_deadlines(assembly.spec.deadlines)
+    messages.log_problems(missing_connections(assembly))
     directory = (output_dir or Path("runs") / assembly.spec.name).absolute()
     shown = output_dir or Path("runs") / assembly.spec.name
-    _say_whose_results_go(directory, shown, assembly.document.file.resolve())
+    _warn_overwriting(directory, shown, assembly.document.file.resolve())
     try:
         if not no_report and (problems := assembly.figure_problems()):
             raise InputError(problems)
-        _prepare(directory, [spec.name for spec in assembly.spec.figures])
-        control = live.control(assembly, link) if link else None
+        _prepare_folder(directory, [spec.name for spec in assembly.spec.figures])
+        control = live.create_control(assembly, link) if link else None
     except CosimError:
         assembly.free()  # from here on `executed` frees the components
         raise
     with (
-        unfinished(directory / UNFINISHED, directory / "result.csv"),
-        _progress(assembly) as observers,
-        executed(live.controlled(assembly, control), observers) as execution,
+        keeping_run_files(directory / UNFINISHED_FOLDER, directory / "result.csv"),
+        _progress_observers(assembly) as observers,
+        executing(live.with_control(assembly, control), observers) as execution,
     ):
         execution.result.metadata["warnings"] = warnings
         if control:
-            execution.result.metadata["live_events"] = control.end()
-        code = _finish(execution, assembly, directory, shown, no_report, began)
+            execution.result.metadata["live_events"] = control.finish()
+        code = _write_outcome(execution, assembly, directory, shown, no_report, began)
         if parquet:
             execution.result.to_parquet(directory / "result.parquet")
         if mcap:
-            from ...report.scene import scene_of
+            from ...report.scene import build_scene
 
-            execution.result.to_mcap(directory / "result.mcap", scene_of(execution.result.metadata))
-        return supervision.leaving(code)
+            execution.result.to_mcap(directory / "result.mcap", build_scene(execution.result.metadata))
+        return supervision.results_written(code)
 
 
-def _finish(execution: Execution, assembly: Assembly, directory: Path, shown: Path, no_report: bool, began: float) -> int:
+def _write_outcome(
+    execution: Execution, assembly: PreparedRun, directory: Path, shown: Path, no_report: bool, began: float
+) -> int:
     """Write, print and draw what came of the run; returns the exit code."""
-    from ...api import checks
-    from ...process.run_files.folder import saved
+    from ...api import evaluate_scenario_checks
+    from ...process.run_files.folder import remove_run_files
     from ...report.tables import print_kpis
     from ...results.kpi import kpi_units
     from ...results.result import write_run
 
     result = execution.result
     if execution.failure:
-        _keep(result, directory, shown)
-        saved()
-        return report(execution.failure)
+        _write_partial_result(result, directory, shown)
+        remove_run_files()
+        return report_error(execution.failure)
     write_run(result, directory)
-    saved()
-    outcomes = checks(assembly, result)
+    remove_run_files()
+    outcomes = evaluate_scenario_checks(assembly, result)
     print_kpis(result.kpis, outcomes, kpi_units(assembly.kpis(), result.kpis, result.units))
-    files = [] if no_report else _draw(result, assembly, outcomes, directory)
-    _summary(result, shown, files, began)
+    files = [] if no_report else _write_figures_and_report(result, assembly, outcomes, directory)
+    _print_summary(result, shown, files, began)
     return 0 if all(outcome.passed for outcome in outcomes) else 3
 
 
-def _draw(result: Result, assembly: Assembly, outcomes: Sequence[CheckOutcome], directory: Path) -> list[str]:
+def _write_figures_and_report(
+    result: Result, assembly: PreparedRun, outcomes: Sequence[CheckOutcome], directory: Path
+) -> list[str]:
     """Draw the figures and write the report; returns the names of the files."""
-    from ...report.figures import draw, save, svg
+    from ...report.figures import draw_figure, figure_to_svg, save_figure
     from ...report.html import write_report
 
     pictures = {}
     for name, function, arguments in assembly.figures():
-        figure = draw(result, name, function, arguments)
-        save(figure, directory / f"{name}.png")
-        pictures[name] = svg(figure)
+        figure = draw_figure(result, name, function, arguments)
+        save_figure(figure, directory / f"{name}.png")
+        pictures[name] = figure_to_svg(figure)
     write_report(result, outcomes, pictures, directory / "report.html")
     return [*(f"{name}.png" for name in pictures), "report.html"]
 
 
-def _salvage(outcome: Outcome) -> None:
+def _save_after_crash(outcome: SupervisedOutcome) -> None:
     """Write what a child has left that came to a bad end."""
     from ...process.run_files.folder import read_metadata
     from ...results import Result
@@ -187,19 +193,21 @@ def _salvage(outcome: Outcome) -> None:
     folder = outcome.journal.folder
     if folder is not None:
         failure = "interrupted" if outcome.interrupted else str(outcome.failure)
-        metadata = {**read_metadata(folder), "macro_steps": outcome.journal[STEPS], "failure": failure}
-        _keep(Result(supervision.recovered(outcome), metadata=metadata), folder.parent, folder.parent)
+        metadata = {**read_metadata(folder), "macro_steps": outcome.journal[STEP_COUNT], "failure": failure}
+        _write_partial_result(
+            Result(supervision.recover_outcome_recording(outcome), metadata=metadata), folder.parent, folder.parent
+        )
 
 
-def _prepare(directory: Path, figures: Sequence[str]) -> None:
+def _prepare_folder(directory: Path, figures: Sequence[str]) -> None:
     """Make sure that results can be written before anything runs, and remove those of an earlier run."""
-    from ...results.files import prepare, remove
+    from ...results.files import check_writable, remove_files
 
-    prepare(directory)
-    remove(directory, *RESULTS, *(f"{name}{suffix}" for name in figures for suffix in (".png", ".svg", ".csv")))
+    check_writable(directory)
+    remove_files(directory, *RESULT_FILES, *(f"{name}{suffix}" for name in figures for suffix in (".png", ".svg", ".csv")))
 
 
-def _say_whose_results_go(directory: Path, shown: Path, file: Path) -> None:
+def _warn_overwriting(directory: Path, shown: Path, file: Path) -> None:
     """A copied scenario whose name was not changed takes the folder of the first one."""
     try:
         former = json.loads((directory / "run.json").read_text(encoding="utf-8"))["scenario_file"]
@@ -210,7 +218,7 @@ def _say_whose_results_go(directory: Path, shown: Path, file: Path) -> None:
         click.echo(text, err=True)
 
 
-def _keep(partial: Result, directory: Path, shown: Path) -> None:
+def _write_partial_result(partial: Result, directory: Path, shown: Path) -> None:
     """Write what was recorded before a failure."""
     from ...results.result import write_run
 
@@ -219,25 +227,25 @@ def _keep(partial: Result, directory: Path, shown: Path) -> None:
         click.echo(f"{len(partial.time)} rows until t = {partial.time[-1]:g} s kept in {shown}", err=True)
 
 
-def _summary(result: Result, directory: Path, drawn: list[str], began: float) -> None:
+def _print_summary(result: Result, directory: Path, drawn: list[str], began: float) -> None:
     loop, simulated = result.timing["loop_seconds"], float(result.time[-1] - result.time[0])
     files = ", ".join(["result.csv", "kpis.json", "run.json", *drawn])
     click.echo(f"\n{simulated:g} s simulated in {loop:.2f} s: {simulated / loop:.0f} times real time")
     click.echo(f"{files} in {directory} ({time.perf_counter() - began:.1f} s in all)")
     if pace := result.metadata["real_time"]:
-        click.echo(_pace(pace))
+        click.echo(_format_pacing(pace))
     if events := result.metadata.get("live_events"):
         click.echo(f"values were set {len(events)} times while it ran: run.json has them as events that repeat this run")
     if by := result.metadata["terminated_by"]:
         click.echo(f"{by['component']} asked to end the simulation at t = {by['time']:g} s")
 
 
-def _pace(pace: Mapping[str, Any]) -> str:
-    lateness = ", ".join(f"{label} {1e3 * pace[key]:.3g} ms" for label, key in _LATENESS.items())
+def _format_pacing(pace: Mapping[str, Any]) -> str:
+    lateness = ", ".join(f"{label} {1e3 * pace[key]:.3g} ms" for label, key in _LATENESS_LABELS.items())
     return f"paced to {pace['factor']:g} times real time: {pace['late_steps']} of {pace['steps']} steps late; lateness {lateness}"
 
 
 @contextmanager
-def _progress(assembly: Assembly) -> Iterator[list[Observer]]:
+def _progress_observers(assembly: PreparedRun) -> Iterator[list[Observer]]:
     with progress_bar(assembly.spec.name) as observer:
         yield [observer] if observer else []

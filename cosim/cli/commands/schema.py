@@ -22,9 +22,9 @@ def command(kind: str | None) -> None:
 
 def _schema(kind: str | None) -> dict[str, Any]:
     if kind in ("sweep", "tune"):
-        from ...studies.schema import SweepSpec, TuneSpec, json_schema
+        from ...studies.schema import SweepSpec, TuneSpec, study_json_schema
 
-        return json_schema(SweepSpec if kind == "sweep" else TuneSpec)
+        return study_json_schema(SweepSpec if kind == "sweep" else TuneSpec)
     from ... import scenario
 
     return scenario.json_schema(kind == "nested")

@@ -12,13 +12,13 @@ from ...core.errors import CosimError, InputError
 from .. import study_options
 
 if TYPE_CHECKING:
-    from ...studies.execution.run_store import Ledger
-    from ...studies.summary.files import Summary
-    from ...studies.summary.statistics import Group
+    from ...studies.execution.run_store import RunStore
+    from ...studies.summary.files import SweepSummary
+    from ...studies.summary.statistics import RunGroup
     from ...studies.sweep import Sweep
 
 #: so many groups and causes are printed; the files hold all of them
-_SHOWN = 20
+_MAX_PRINTED = 20
 
 
 @click.command()
@@ -26,7 +26,7 @@ _SHOWN = 20
 @click.option("--output-dir", type=click.Path(path_type=Path), help="Where results go; default: runs/NAME.")
 @click.option("--parquet", is_flag=True, help="Write table.parquet too (extra `parquet`).")
 @click.option("--replays", is_flag=True, help="Write the 3-D replay of one run of every cell of the maps, too.")
-@study_options.options
+@study_options.study_options
 def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, **where: Any) -> int:
     """Run SWEEP, a JSON file or the name of a shipped sweep.
 
@@ -40,62 +40,64 @@ def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, *
 
     if parquet:
         require_parquet()
-    read = Sweep.of(sweep)
-    folder = output_dir or Path("runs") / read.read.spec.name
-    with study_options.ledger(folder, where.pop("retry_failed")) as ledger:
-        return _run(read, ledger, folder, parquet, replays, **where)
+    read = Sweep.from_file(sweep)
+    folder = output_dir or Path("runs") / read.study_file.spec.name
+    with study_options.open_run_store(folder, where.pop("retry_failed")) as ledger:
+        return _run_sweep(read, ledger, folder, parquet, replays, **where)
 
 
-def _run(
-    sweep: Sweep, ledger: Ledger, folder: Path, parquet: bool, replays: bool, workers: int | None, scheduler: str | None
+def _run_sweep(
+    sweep: Sweep, ledger: RunStore, folder: Path, parquet: bool, replays: bool, workers: int | None, scheduler: str | None
 ) -> int:
-    from ...process.supervisor import polite_ends
-    from ...studies.summary.files import write
+    from ...process.supervisor import interrupt_on_termination
+    from ...studies.summary.files import write_sweep_files
 
     began, interrupted = time.monotonic(), False
     done = sum(key in ledger for key in sweep.keys)
     if done < len(sweep):
         try:
             with (
-                polite_ends(),
-                study_options.progress(len(sweep)) as progress,
-                study_options.engine(sweep.study, workers, scheduler) as engine,
+                interrupt_on_termination(),
+                study_options.show_progress(len(sweep)) as progress,
+                study_options.create_runner(sweep.study, workers, scheduler) as engine,
             ):
-                progress.begin(done)
+                progress.start(done)
                 sweep.run(ledger, engine, progress)
         except KeyboardInterrupt:
             interrupted = True
         except CosimError as error:
             if error.exit_code != InputError.exit_code:
-                write(sweep, ledger, folder, parquet)
+                write_sweep_files(sweep, ledger, folder, parquet)
             raise
     if not interrupted:
         sweep.check_names(ledger)
-    summary = write(sweep, ledger, folder, parquet)
-    _draw(sweep, ledger, summary, folder, replays and not interrupted, workers)
-    _print(sweep, summary)
-    made = f"{summary.finished - done} made now in {study_options.duration(time.monotonic() - began)}"
+    summary = write_sweep_files(sweep, ledger, folder, parquet)
+    _write_maps_and_page(sweep, ledger, summary, folder, replays and not interrupted, workers)
+    _print_summary(sweep, summary)
+    made = f"{summary.finished - done} made now in {study_options.format_duration(time.monotonic() - began)}"
     click.echo(f"{summary.finished} of {len(sweep)} runs, {made}, {summary.failed} failed; table.csv and others in {folder}")
     if interrupted:
         raise KeyboardInterrupt
     return 1 if summary.failed else 0
 
 
-def _draw(sweep: Sweep, ledger: Ledger, summary: Summary, folder: Path, replays: bool, workers: int | None) -> None:
+def _write_maps_and_page(
+    sweep: Sweep, ledger: RunStore, summary: SweepSummary, folder: Path, replays: bool, workers: int | None
+) -> None:
     """Maps, replays of their cells, and the page."""
-    from ...studies.summary.page import write_page
+    from ...studies.summary.page import write_sweep_page
     from ...studies.summary.replays import write_replays
     from ...studies.summary.success_map import success_maps
 
     maps = success_maps(sweep, sweep.rows(ledger))
     if replays:
-        runs = [cell.shown.number for each in maps for cell in each.cells.values() if cell.shown]
-        for run, cause in write_replays(sweep, runs, folder, workers or study_options.processors()).items():
+        runs = [cell.representative_run.number for each in maps for cell in each.cells.values() if cell.representative_run]
+        for run, cause in write_replays(sweep, runs, folder, workers or study_options.available_processors()).items():
             click.echo(f"no replay of run {run}: {cause}", err=True)
-    write_page(sweep, summary, maps, folder)
+    write_sweep_page(sweep, summary, maps, folder)
 
 
-def _print(sweep: Sweep, summary: Summary) -> None:
+def _print_summary(sweep: Sweep, summary: SweepSummary) -> None:
     if not summary.groups:
         return
     numbers = summary.groups[0].statistics()
@@ -104,17 +106,17 @@ def _print(sweep: Sweep, summary: Summary) -> None:
         study_options.print_table(["KPI", "mean", "std", "min", "median", "max"], kpis)
     if sweep.criteria or summary.failed:
         study_options.print_table(
-            ["runs", "n", "success", "95 % interval"], [_success(group) for group in summary.groups[:_SHOWN]]
+            ["runs", "n", "success", "95 % interval"], [_success_row(group) for group in summary.groups[:_MAX_PRINTED]]
         )
         if summary.groups[0].distinct < summary.groups[0].runs:
             click.echo(
                 f"{summary.groups[0].distinct} of {summary.groups[0].runs} runs are distinct; intervals are those of so many"
             )
-    for cause, count, first in summary.causes[:_SHOWN]:
+    for cause, count, first in summary.failure_causes[:_MAX_PRINTED]:
         click.echo(f"{count} failed, the first is run {first}: {cause}", err=True)
 
 
-def _success(group: Group) -> list[str]:
+def _success_row(group: RunGroup) -> list[str]:
     label = ", ".join(f"{name} = {value}" for name, value in group.labels.items()) or "all"
     low, high = group.interval
-    return [label, str(group.runs), f"{100 * group.rate:.1f} %", f"{100 * low:.1f} ... {100 * high:.1f} %"]
+    return [label, str(group.runs), f"{100 * group.success_rate:.1f} %", f"{100 * low:.1f} ... {100 * high:.1f} %"]

@@ -12,14 +12,14 @@ from ...core.errors import CosimError, InputError
 from .. import study_options
 
 if TYPE_CHECKING:
-    from ...studies.execution.run_store import Ledger
+    from ...studies.execution.run_store import RunStore
     from ...studies.tune import Trial, Tuning
 
 
 @click.command()
 @click.argument("tuning", metavar="TUNE")
 @click.option("--output-dir", type=click.Path(path_type=Path), help="Where results go; default: runs/NAME.")
-@study_options.options
+@study_options.study_options
 def command(tuning: str, output_dir: Path | None, **where: Any) -> int:
     """Search as TUNE says, a JSON file or the name of a shipped one.
 
@@ -29,54 +29,54 @@ def command(tuning: str, output_dir: Path | None, **where: Any) -> int:
     """
     from ...studies.tune import Tuning
 
-    read = Tuning.of(tuning)
+    read = Tuning.from_file(tuning)
     folder = output_dir or Path("runs") / read.spec.name
-    with study_options.ledger(folder, where.pop("retry_failed")) as ledger:
-        return _run(read, ledger, folder, **where)
+    with study_options.open_run_store(folder, where.pop("retry_failed")) as ledger:
+        return _run_tuning(read, ledger, folder, **where)
 
 
-def _run(tuning: Tuning, ledger: Ledger, folder: Path, workers: int | None, scheduler: str | None) -> int:
-    from ...process.supervisor import polite_ends
-    from ...studies.summary.tuning_files import write
+def _run_tuning(tuning: Tuning, ledger: RunStore, folder: Path, workers: int | None, scheduler: str | None) -> int:
+    from ...process.supervisor import interrupt_on_termination
+    from ...studies.summary.tuning_files import write_tuning_files
 
     try:
         with (
-            polite_ends(),
-            study_options.progress(_most(tuning)) as progress,
-            study_options.engine(tuning.study, workers, scheduler) as engine,
+            interrupt_on_termination(),
+            study_options.show_progress(_max_runs(tuning)) as progress,
+            study_options.create_runner(tuning.study, workers, scheduler) as engine,
         ):
             tuning.run(ledger, engine, progress)
     except (CosimError, KeyboardInterrupt) as error:
         if tuning.trials and not isinstance(error, InputError):
-            write(tuning, folder)
+            write_tuning_files(tuning, folder)
         raise
-    best = write(tuning, folder)
-    _print(tuning, best, folder)
+    best = write_tuning_files(tuning, folder)
+    _print_best(tuning, best, folder)
     return 0 if best.feasible else 1 if best.failure else 3
 
 
-def _most(tuning: Tuning) -> int:
+def _max_runs(tuning: Tuning) -> int:
     """Runs at most."""
     method = tuning.spec.method
     whole = method.population * (method.generations + 1) if method.kind == "differential_evolution" else method.evaluations
     return whole * len(tuning.spec.cases)
 
 
-def _print(tuning: Tuning, best: Trial, folder: Path) -> None:
-    from ...studies.summary.files import run_command
+def _print_best(tuning: Tuning, best: Trial, folder: Path) -> None:
+    from ...studies.summary.files import format_run_command
 
     first = tuning.trials[0]
     rows = [[name, f"{first.parameters[name]:.6g}", f"{value:.6g}"] for name, value in best.parameters.items()]
     rows.append([tuning.objective.text, f"{first.value:.6g}", f"{best.value:.6g}"])
     study_options.print_table(["", "start", "best"], rows)
     if not best.feasible:
-        click.echo(_shortcoming(tuning, best), err=True)
+        click.echo(_failure_text(tuning, best), err=True)
     settings = {**tuning.spec.settings, **tuning.spec.cases[0], **tuning.settings(best.parameters)}
     click.echo(f"{len(tuning.trials)} points tried; trials.csv and best.json in {folder}")
-    click.echo(run_command(tuning.read.scenario, settings))
+    click.echo(format_run_command(tuning.study_file.scenario, settings))
 
 
-def _shortcoming(tuning: Tuning, best: Trial) -> str:
+def _failure_text(tuning: Tuning, best: Trial) -> str:
     """What is wrong with every point, the best one included."""
     if best.failure:
         return f"a run failed at every point, the first time: {best.failure}"

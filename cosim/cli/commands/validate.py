@@ -22,26 +22,28 @@ def command(fmus: tuple[Path, ...], as_json: bool) -> int:
     Errors are what `cosim run` refuses; warnings break the FMI standard without harm to a run. Whether an FMU computes what
     it should is not examined. Ends with 2 when there are findings.
     """
-    findings = {path: _findings(path) for path in fmus}
+    findings = {path: _validate_fmu(path) for path in fmus}
     if as_json:
-        click.echo(json.dumps([_as_json(path, finding) for path, found in findings.items() for finding in found], indent=1))
+        click.echo(
+            json.dumps([_finding_as_json(path, finding) for path, found in findings.items() for finding in found], indent=1)
+        )
     else:
-        _print(findings)
+        _print_findings(findings)
     return 2 if any(findings.values()) else 0
 
 
-def _findings(path: Path) -> Sequence[Finding]:
+def _validate_fmu(path: Path) -> Sequence[Finding]:
     from ...components.fmi.preflight.archive import FILE
-    from ...components.fmi.preflight.validation import validate
+    from ...components.fmi.preflight.validation import validate_fmu
     from ...core.errors import InputError
 
     try:
-        return validate(path)
+        return validate_fmu(path)
     except InputError as error:
         return [FILE(problem.message) for problem in error.problems]
 
 
-def _print(findings: Mapping[Path, Sequence[Finding]]) -> None:
+def _print_findings(findings: Mapping[Path, Sequence[Finding]]) -> None:
     for path, found in findings.items():
         if not found:
             click.echo(f"{path}: no findings")
@@ -49,7 +51,7 @@ def _print(findings: Mapping[Path, Sequence[Finding]]) -> None:
             click.echo(f"{path}: {finding.rule.severity}: {finding}")
 
 
-def _as_json(path: Path, finding: Finding) -> dict[str, Any]:
+def _finding_as_json(path: Path, finding: Finding) -> dict[str, Any]:
     return {
         "file": str(path),
         "severity": finding.rule.severity,

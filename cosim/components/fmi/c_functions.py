@@ -12,23 +12,23 @@ from functools import cache
 from typing import Any
 
 #: arguments made beforehand, which ctypes passes on as they are: half the price of a call goes into converting others
-POINTER = ctypes.c_void_p.from_param
-SIZE, DOUBLE = cache(ctypes.c_size_t.from_param), cache(ctypes.c_double.from_param)
+as_pointer = ctypes.c_void_p.from_param
+as_size, as_double = cache(ctypes.c_size_t.from_param), cache(ctypes.c_double.from_param)
 
 
-class Function(CFuncPtr):
+class GilHoldingFunction(CFuncPtr):
     """Called while the interpreter lock is held."""
 
     _flags_ = FUNCFLAG_CDECL | FUNCFLAG_PYTHONAPI
 
 
-class LongFunction(CFuncPtr):
+class GilReleasingFunction(CFuncPtr):
     """Called without the interpreter lock: it may take long, and other threads may log meanwhile."""
 
     _flags_ = FUNCFLAG_CDECL
 
 
-class Functions(dict[str, CFuncPtr]):
+class FunctionTable(dict[str, CFuncPtr]):
     """The functions of one loaded library by their names, each made once for all instances."""
 
     def __init__(self, library: ctypes.CDLL):
@@ -36,11 +36,11 @@ class Functions(dict[str, CFuncPtr]):
         self._library = library
 
     def __missing__(self, name: str) -> CFuncPtr:
-        kind = LongFunction if name.endswith("DoStep") else Function
+        kind = GilReleasingFunction if name.endswith("DoStep") else GilHoldingFunction
         self[name] = kind((name, self._library))
         return self[name]
 
 
-def address(function: Any) -> int:
+def function_address(function: Any) -> int:
     """Where a C function lies."""
     return ctypes.cast(function, ctypes.c_void_p).value or 0

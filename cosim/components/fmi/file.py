@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import InputError
-from ...process.journal import waiting
-from ...process.temporary_folders import FMU, LockedFolder
-from .description import Description, describe
-from .preflight import LIMITS, Examination, Limits, examine, extract, open_file, refuse
+from ...process.journal import suspending_deadline
+from ...process.temporary_folders import FMU_PREFIX, LockedFolder
+from .description import FmuDescription, build_description
+from .preflight import DEFAULT_LIMITS, Examination, PreflightLimits, examine, extract, open_regular_file, raise_errors
 
 
 @dataclass(frozen=True)
-class _LentFolder:
+class _BorrowedFolder:
     """An extracted FMU that somebody else removes."""
 
     name: str
@@ -32,39 +32,39 @@ class FmuFile:
     Nothing of the FMU is extracted before it was examined and found to be good; `limits` bound what that may cost.
     """
 
-    def __init__(self, path: Path, limits: Limits = LIMITS):
+    def __init__(self, path: Path, limits: PreflightLimits = DEFAULT_LIMITS):
         self.path, self.limits = path, limits
-        self._folder: LockedFolder | _LentFolder | None = None
-        self._users = 0
+        self._folder: LockedFolder | _BorrowedFolder | None = None
+        self._reference_count = 0
         #: FMPy's object with the loaded library, which all instances share
         self.library: Any = None
         #: an instance reported a fatal error: nothing of this FMU may be called any more
-        self.corrupt = False
+        self.has_fatal_error = False
 
     @cached_property
     def examination(self) -> Examination:
         return examine(self.path, self.limits)
 
     @cached_property
-    def description(self) -> Description:
-        return describe(self.path, self.examination)
+    def description(self) -> FmuDescription:
+        return build_description(self.path, self.examination)
 
     @cached_property
     def sha256(self) -> str:
-        with open_file(self.path) as file:
+        with open_regular_file(self.path) as file:
             return file_digest(file, "sha256").hexdigest()
 
-    def check_platform(self) -> None:
+    def check_binary(self) -> None:
         """Raises InputError when the FMU has no binary for this machine, or one that cannot be loaded."""
-        refuse(self.path, [*self.examination.findings, *self.examination.binary])
+        raise_errors(self.path, [*self.examination.findings, *self.examination.binary_findings])
 
     def acquire(self) -> Path:
         """The folder with the extracted FMU, until it is released. Raises InputError when it cannot be extracted."""
         if self._folder is None:
-            self.check_platform()
-            folder = LockedFolder(FMU)
+            self.check_binary()
+            folder = LockedFolder(FMU_PREFIX)
             try:
-                with waiting():  # a large archive takes its time, which is no fault of the component
+                with suspending_deadline():  # a large archive takes its time, which is no fault of the component
                     extract(self.path, self.examination, Path(folder.name), self.limits)
             except OSError as error:
                 folder.cleanup()
@@ -73,21 +73,26 @@ class FmuFile:
                 folder.cleanup()
                 raise
             self._folder = folder
-        self._users += 1
+        self._reference_count += 1
         return Path(self._folder.name)
 
-    def lent(self) -> FmuFile:
+    def share(self) -> FmuFile:
         """The same extracted FMU for another process, which loads the library itself."""
         assert self._folder is not None
         other = copy(self)
-        other._folder, other._users, other.library, other.corrupt = _LentFolder(self._folder.name), 0, None, False
+        other._folder, other._reference_count, other.library, other.has_fatal_error = (
+            _BorrowedFolder(self._folder.name),
+            0,
+            None,
+            False,
+        )
         return other
 
     def release(self) -> None:
-        self._users -= 1
-        if self._users == 0 and self.library is not None and not self.corrupt:
+        self._reference_count -= 1
+        if self._reference_count == 0 and self.library is not None and not self.has_fatal_error:
             self.library.freeLibrary()
             self.library = None
-        if self._users == 0 and self._folder is not None:
+        if self._reference_count == 0 and self._folder is not None:
             self._folder.cleanup()
             self._folder = None

@@ -17,15 +17,15 @@ from typing import Any, NoReturn
 import numpy as np
 
 from ...core import component_log
-from ...core.component import GOOD, Access, Call, Component, Ports, StepResult, Variable
+from ...core.component import SUCCESS_STATUSES, Component, NativeGetSet, Ports, PreparedCall, StepResult, Variable
 from ...core.errors import ComponentError, InputError
 from ...process import float_mode
-from ...process.containment import contained
-from ...process.journal import calling
-from .c_functions import DOUBLE, POINTER, SIZE, Functions, address
+from ...process.containment import restoring_process_state
+from ...process.journal import calling_component
+from .c_functions import FunctionTable, as_double, as_pointer, as_size, function_address
 from .file import FmuFile
 
-STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
+STATUS_NAMES = ("OK", "warning", "discard", "error", "fatal", "pending")
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 
 
@@ -40,83 +40,85 @@ class FmuInstance(Component):
     accessors: Mapping[str, str]
 
     def __init__(self, file: FmuFile, instance_name: str, logging_on: bool):
-        self.name, self._file, self.code = instance_name, file, file
+        self.name, self._file, self.shared_code = instance_name, file, file
         self.description = file.description
         self.variables = self.description.variables
         self.has_state = self.description.has_state
-        self._by_name = {variable.name: variable for variable in self.variables}
-        self._message = ""
+        self._variables_by_name = {variable.name: variable for variable in self.variables}
+        self._last_message = ""
         self._clock = ctypes.c_double()
         #: instantiated, and neither freed nor corrupt
-        self._alive, self._holds_folder = False, False
+        self._is_instantiated, self._holds_folder = False, False
         #: the deadline of calls that are not steps
-        self._kind = "initialization"
+        self._deadline_name = "initialization"
         self._logging_on = logging_on
         self._fmu: Any = None
-        file.check_platform()
+        file.check_binary()
 
     # -- what differs between the FMI versions -------------------------------------------------------------------------
 
-    def _slave(self, **arguments: Any) -> Any:
+    def _create_fmpy_slave(self, **arguments: Any) -> Any:
         raise NotImplementedError
 
     def _instantiate(self) -> None:
         raise NotImplementedError
 
-    def _texts(self, reference: int, count: int) -> Sequence[bytes | None]:
+    def _get_strings(self, reference: int, count: int) -> Sequence[bytes | None]:
         """The values of a string variable; None for null pointers."""
         raise NotImplementedError
 
-    def _binaries(self, reference: int, count: int) -> list[bytes]:
+    def _get_binaries(self, reference: int, count: int) -> list[bytes]:
         """The values of a binary variable, which only FMI 3.0 knows."""
         raise NotImplementedError
 
     #: the C function that makes an instance
-    _instantiation: str
+    _instantiate_function: str
 
-    def _step_calls(self, step_size: Any, seconds: float) -> list[Call]:
+    def _prepare_do_step(self, step_size: Any, seconds: float) -> list[PreparedCall]:
         """doStep from the time in `self._clock`."""
         raise NotImplementedError
 
     # -- life cycle ----------------------------------------------------------------------------------------------------
 
-    def _start(self) -> None:
+    def _load_and_instantiate(self) -> None:
         """Load the library and instantiate the FMU. Raises InputError or ComponentError."""
         folder = self._file.acquire()
         self._holds_folder = True
-        with contained(self.name), calling(self.name, "loading the binary", "load"):
-            self._fmu = self._load(folder)
-        with contained(self.name), calling(self.name, self._instantiation, "load"):
+        with restoring_process_state(self.name), calling_component(self.name, "loading the binary", "load"):
+            self._fmu = self._fmpy_instance(folder)
+        with restoring_process_state(self.name), calling_component(self.name, self._instantiate_function, "load"):
             self._instantiate()
-        self._alive = True
+        self._is_instantiated = True
         self._handle: int = self._fmu.component
         self._do_step = self._fmu.functions[f"{self.prefix}DoStep"]
-        self._instance = POINTER(self._handle)
+        self._instance = as_pointer(self._handle)
         self._clock, self._step_size = ctypes.c_double(), ctypes.c_double()
-        self._steps = self._step_calls(self._step_size, 0.0)
+        self._do_step_calls = self._prepare_do_step(self._step_size, 0.0)
 
-    def _load(self, folder: Path) -> Any:
+    def _fmpy_instance(self, folder: Path) -> Any:
         """FMPy's object for this instance: a copy of one that is made once for all instances, which takes milliseconds."""
         if self._file.library is None:
-            self._file.library = self._open(folder)
-            self._file.library.functions = Functions(self._file.library.dll)
+            self._file.library = self._load_library(folder)
+            self._file.library.functions = FunctionTable(self._file.library.dll)
         fmu = copy(self._file.library)
         fmu.instanceName = self.name
         return fmu
 
-    def _open(self, folder: Path) -> Any:
+    def _load_library(self, folder: Path) -> Any:
         description = self.description
         try:
-            fmu = self._slave(guid=description.token, modelIdentifier=description.identifier, unzipDirectory=str(folder))
+            fmu = self._create_fmpy_slave(
+                guid=description.instantiation_token, modelIdentifier=description.model_identifier, unzipDirectory=str(folder)
+            )
         except Exception as error:
             reason = str(error).replace(f"{folder}/", "")
             raise InputError(f'the binary of "{self._file.path}" cannot be loaded: {reason}') from None
         for function in fmu._functions.values():
             if function.restype is ctypes.c_int:
-                function.errcheck = _not_negative
+                function.errcheck = _reject_negative_status
         return fmu
 
-    def call(self, function: str, *arguments: Any, no_answer: int | None = None) -> Any:
+    def call_function(self, function: str, *arguments: Any, unavailable_status: int | None = None) -> Any:
         """Call one of FMPy's methods, or a C function by its whole name.
 
         A bad status becomes a ComponentError with the FMU's own last message, but for the status that means `no_answer`: None.
@@ -124,82 +126,82 @@ class FmuInstance(Component):
         from fmpy.fmi1 import FMICallException
 
         name = function if function.startswith(self.prefix) else self.prefix + function[0].upper() + function[1:]
-        with calling(self.name, name, self._kind, self._clock.value):
+        with calling_component(self.name, name, self._deadline_name, self._clock.value):
             try:
                 result = getattr(self._fmu, function)(*arguments)
             except FMICallException as error:
-                if error.status == no_answer:
+                if error.status == unavailable_status:
                     return None
-                self.fail(error.function, error.status)
-        self._look_at_float_mode(name)
+                self.raise_failure(error.function, error.status)
+        self._check_float_mode(name)
         return result
 
-    def _look_at_float_mode(self, function: str) -> None:
-        if float_mode.changed() or float_mode.traps():
-            raise ComponentError(self.name, function, float_mode.REASON, self._clock.value)
+    def _check_float_mode(self, function: str) -> None:
+        if float_mode.is_changed() or float_mode.enabled_traps():
+            raise ComponentError(self.name, function, float_mode.CHANGE_REASON, self._clock.value)
 
-    def fail(self, function: str, status: int, more: str = "") -> NoReturn:
+    def raise_failure(self, function: str, status: int, details: str = "") -> NoReturn:
         """Raise the error for a status; `more` is said at its end.
 
         After fatal nothing of any instance of this FMU may be called (FMI 3.0 section 2.2.3).
         """
-        self._file.corrupt = self._file.corrupt or status == FATAL
-        label = STATUS[status] if 0 <= status < len(STATUS) else "not defined by FMI"
-        reason = f"status {status} ({label})" + (f": {self._message}" if self._message else "") + more
+        self._file.has_fatal_error = self._file.has_fatal_error or status == FATAL
+        label = STATUS_NAMES[status] if 0 <= status < len(STATUS_NAMES) else "not defined by FMI"
+        reason = f"status {status} ({label})" + (f": {self._last_message}" if self._last_message else "") + details
         raise ComponentError(self.name, function, reason, None if isnan(self._clock.value) else self._clock.value)
 
-    def log(self, status: int, text: bytes | None) -> None:
+    def log_message(self, status: int, text: bytes | None) -> None:
         """A message from the FMU: kept as the reason of a later failure, and passed on to the user."""
-        self._message = (text or b"").decode("utf-8", "replace").strip()
+        self._last_message = (text or b"").decode("utf-8", "replace").strip()
         level = (
             component_log.INFO if status == OK else component_log.WARNING if status in (WARNING, DISCARD) else component_log.ERROR
         )
-        component_log.message(self.name, level, self._message)
+        component_log.log_message(self.name, level, self._last_message)
 
     @property
-    def corrupt(self) -> bool:
+    def has_fatal_error(self) -> bool:
         """A fatal error was reported by an instance of this FMU."""
-        return self._file.corrupt
+        return self._file.has_fatal_error
 
     def exit_initialization_mode(self) -> None:
-        self.call("exitInitializationMode")
-        self._kind = "step"
+        self.call_function("exitInitializationMode")
+        self._deadline_name = "step"
 
     def terminate(self) -> None:
-        self._kind, self._clock = "end", ctypes.c_double(nan)  # the simulation is over: its time says nothing any more
-        if not self._file.corrupt:
-            self.call("terminate")
+        self._deadline_name, self._clock = "end", ctypes.c_double(nan)  # the simulation is over: its time says nothing any more
+        if not self._file.has_fatal_error:
+            self.call_function("terminate")
 
     def free(self) -> None:
-        if self._alive and not self._file.corrupt:
-            with calling(self.name, f"{self.prefix}FreeInstance", "end"):
+        if self._is_instantiated and not self._file.has_fatal_error:
+            with calling_component(self.name, f"{self.prefix}FreeInstance", "end"):
                 getattr(self._fmu, f"{self.prefix}FreeInstance")(self._handle)
-        self._alive = False
+        self._is_instantiated = False
         if self._holds_folder:
             self._holds_folder = False
-            with calling(self.name, "unloading the binary", "end"):
+            with calling_component(self.name, "unloading the binary", "end"):
                 self._file.release()
 
     # -- access off the hot path ---------------------------------------------------------------------------------------
 
     def set(self, name: str, value: Any) -> None:
-        variable = self._by_name[name]
+        variable = self._variables_by_name[name]
         values = list(np.ravel(value)) if variable.shape else [value]
-        self.call(f"set{self.accessors[variable.type]}", [self.description.references[name]], values)
+        self.call_function(f"set{self.accessors[variable.type]}", [self.description.value_references[name]], values)
 
     def get(self, name: str) -> Any:
-        variable = self._by_name[name]
-        reference, count = self.description.references[name], len(variable.slots)
+        variable = self._variables_by_name[name]
+        reference, count = self.description.value_references[name], len(variable.scalar_names)
         values: Sequence[Any]
         if variable.type == "String":
-            values = [self._text(name, text) for text in self._texts(reference, count)]
+            values = [self._decode_string(name, text) for text in self._get_strings(reference, count)]
         elif variable.type == "Binary":
-            values = self._binaries(reference, count)
+            values = self._get_binaries(reference, count)
         else:
-            values = self.call(f"get{self.accessors[variable.type]}", [reference], *((count,) if variable.shape else ()))
+            values = self.call_function(f"get{self.accessors[variable.type]}", [reference], *((count,) if variable.shape else ()))
         return values if variable.shape else values[0]
 
-    def _text(self, name: str, text: bytes | None) -> str:
+    def _decode_string(self, name: str, text: bytes | None) -> str:
         if text is None:
             reason = f'the value of "{name}" is a null pointer, expected a text'
             raise ComponentError(self.name, f"{self.prefix}GetString", reason, self._clock.value)
@@ -208,24 +210,24 @@ class FmuInstance(Component):
     # -- the hot path --------------------------------------------------------------------------------------------------
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
-        self._start()
-        self._sets, self._gets = self._calls("Set", inputs), self._calls("Get", outputs)
+        self._load_and_instantiate()
+        self._set_calls, self._get_calls = self._prepare_accessors("Set", inputs), self._prepare_accessors("Get", outputs)
 
-    def _calls(self, verb: str, ports: Ports) -> list[Call]:
+    def _prepare_accessors(self, verb: str, ports: Ports) -> list[PreparedCall]:
         """One call for each run of variables with the same accessor; strings and binaries go one by one."""
-        calls: list[Call] = []
+        calls: list[PreparedCall] = []
         move = self._set_object if verb == "Set" else self._get_object
         for dtype, array in ports.arrays.items():
             place = 0
             own = [variable for variable in ports.variables if variable.dtype == dtype]
             for accessor, run in groupby(own, lambda variable: self.accessors[variable.type]):
                 variables = list(run)
-                size = sum(len(variable.slots) for variable in variables)
+                size = sum(len(variable.scalar_names) for variable in variables)
                 if dtype.hasobject:
                     name = f"{self.prefix}{verb}{accessor}"
-                    calls += [Call(move, (v.name, array, place + i), name) for i, v in enumerate(variables)]
+                    calls += [PreparedCall(move, (v.name, array, place + i), name) for i, v in enumerate(variables)]
                 else:
-                    calls.append(self._access(f"{self.prefix}{verb}{accessor}", variables, array[place : place + size]))
+                    calls.append(self._prepare_accessor(f"{self.prefix}{verb}{accessor}", variables, array[place : place + size]))
                 place += size
         return calls
 
@@ -237,44 +239,44 @@ class FmuInstance(Component):
         array[index] = self.get(name)
         return OK
 
-    def _access(self, function: str, variables: Sequence[Variable], values: np.ndarray) -> Call:
-        references = (ctypes.c_uint32 * len(variables))(*(self.description.references[v.name] for v in variables))
+    def _prepare_accessor(self, function: str, variables: Sequence[Variable], values: np.ndarray) -> PreparedCall:
+        references = (ctypes.c_uint32 * len(variables))(*(self.description.value_references[v.name] for v in variables))
         bound = self._fmu.functions[function]
         pointers = (self._handle, ctypes.addressof(references), values.ctypes.data)
-        arguments: tuple[Any, ...] = (self._instance, POINTER(pointers[1]), SIZE(len(variables)), POINTER(pointers[2]))
+        arguments: tuple[Any, ...] = (self._instance, as_pointer(pointers[1]), as_size(len(variables)), as_pointer(pointers[2]))
         if self.major > 2:
-            arguments += (SIZE(len(values)),)
-        native = Access(self.major, address(bound), *pointers[:2], len(variables), pointers[2], len(values))
-        return Call(bound, arguments, function, native, (references, values))
+            arguments += (as_size(len(values)),)
+        native = NativeGetSet(self.major, function_address(bound), *pointers[:2], len(variables), pointers[2], len(values))
+        return PreparedCall(bound, arguments, function, native, (references, values))
 
-    def turn(self, clock: ctypes.c_double, step_size: float) -> Sequence[Call]:
+    def prepare_step_calls(self, clock: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
         self._clock = clock
-        return [*self._sets, *self._step_calls(DOUBLE(step_size), step_size), *self._gets]
+        return [*self._set_calls, *self._prepare_do_step(as_double(step_size), step_size), *self._get_calls]
 
     def set_inputs(self) -> None:
-        self._make(self._sets)
+        self._execute_calls(self._set_calls)
 
     def do_step(self, time: float, step_size: float) -> StepResult | None:
         self._clock.value, self._step_size.value = time, step_size
-        return self._make(self._steps)
+        return self._execute_calls(self._do_step_calls)
 
     def get_outputs(self) -> None:
-        self._make(self._gets)
+        self._execute_calls(self._get_calls)
 
-    def _make(self, calls: Sequence[Call]) -> StepResult | None:
+    def _execute_calls(self, calls: Sequence[PreparedCall]) -> StepResult | None:
         for call in calls:
-            with calling(self.name, call.name, self._kind, self._clock.value):
+            with calling_component(self.name, call.name, self._deadline_name, self._clock.value):
                 status = call.function(*call.arguments)
-            if status not in GOOD:
-                return self.failed(call.name, status)
-            self._look_at_float_mode(call.name)
+            if status not in SUCCESS_STATUSES:
+                return self.interpret_status(call.name, status)
+            self._check_float_mode(call.name)
         return None
 
-    def failed(self, name: str, status: int) -> StepResult:
-        self.fail(name, status)
+    def interpret_status(self, name: str, status: int) -> StepResult:
+        self.raise_failure(name, status)
 
 
-def _not_negative(status: int, function: Any, _: Any) -> int:
+def _reject_negative_status(status: int, function: Any, _: Any) -> int:
     """FMPy alone would take negative numbers for good statuses."""
     from fmpy.fmi1 import FMICallException
 

@@ -74,75 +74,75 @@ class Callee:
 
     function: ca.Function
     body: str
-    needs: Sequence[ca.Function] = ()
+    required_functions: Sequence[ca.Function] = ()
     attributes: str = ""
 
     def __call__(self, *arguments: ca.SX) -> ca.SX:
         """The result, by a call that stays one in C."""
-        return called(self.function, *arguments)[0]
+        return call_in_c(self.function, *arguments)[0]
 
 
-def called(function: ca.Function, *arguments: ca.SX) -> list[ca.SX]:
+def call_in_c(function: ca.Function, *arguments: ca.SX) -> list[ca.SX]:
     """The results of a function that is called in C instead of becoming part of the caller."""
     return function.call(list(arguments), False, True)
 
 
-class Places(NamedTuple):
+class ElementAccess(NamedTuple):
     """Where element j of argument i and of result i lie in C."""
 
     argument: Callable[[int, int], str]
     result: Callable[[int, int], str]
 
 
-_POINTERS = Places(lambda i, j: f"in[{i}][{j}]", lambda i, j: f"out[{i}][{j}]")
+_POINTER_ACCESS = ElementAccess(lambda i, j: f"in[{i}][{j}]", lambda i, j: f"out[{i}][{j}]")
 
 
-def callees(functions: Iterable[ca.Function], known: Sequence[Callee] = ()) -> dict[str, str]:
+def callee_definitions(functions: Iterable[ca.Function], known: Sequence[Callee] = ()) -> dict[str, str]:
     """Name -> definition of the functions that these call, each after those that it calls itself."""
     given = {callee.function.name(): callee for callee in known}
     found: dict[str, str] = {}
     for function in functions:
         for inner in function.find_functions(0):
             callee = given.get(inner.name())
-            found |= callees([inner] if callee is None else [], known)
-            for needed in callee.needs if callee else ():
-                found |= callees([needed], known) | {needed.name(): definition("static", needed)}
-            found[inner.name()] = _definition(callee) if callee else definition("static", inner)
+            found |= callee_definitions([inner] if callee is None else [], known)
+            for needed in callee.required_functions if callee else ():
+                found |= callee_definitions([needed], known) | {needed.name(): function_definition("static", needed)}
+            found[inner.name()] = _callee_definition(callee) if callee else function_definition("static", inner)
     return found
 
 
-def _definition(callee: Callee) -> str:
+def _callee_definition(callee: Callee) -> str:
     return f"{callee.attributes}static {_SIGNATURE.format(callee.function.name())}\n{callee.body}"
 
 
-def definition(linkage: str, function: ca.Function) -> str:
+def function_definition(linkage: str, function: ca.Function) -> str:
     """The function in C, after a word about its linkage. Raises ValueError as `c_function` does."""
-    return f"{linkage} {_SIGNATURE.format(function.name())}\n{c_function(function)}"
+    return f"{linkage} {_SIGNATURE.format(function.name())}\n{function_body(function)}"
 
 
-def c_function(function: ca.Function) -> str:
+def function_body(function: ca.Function) -> str:
     """The body of the function: reads `in[i][j]` and writes `out[i][j]`, element j of argument and result i.
 
     What it calls by `called` is called (`callees` has the bodies).
     Raises ValueError for an operation that has no counterpart in C.
     """
-    return "{\n" + "".join(f"    {statement};\n" for statement in Statements(dense(function))) + "}\n"
+    return "{\n" + "".join(f"    {statement};\n" for statement in StatementGenerator(densify(function))) + "}\n"
 
 
-def dense(function: ca.Function) -> ca.Function:
+def densify(function: ca.Function) -> ca.Function:
     """The function without structural zeros and common subexpressions."""
     arguments = [ca.SX.sym(f"a{i}", function.size_in(i)) for i in range(function.n_in())]
     results = ca.cse([ca.densify(result) for result in function.call(arguments)])
     return ca.Function(function.name(), arguments, results)
 
 
-class Statements:
+class StatementGenerator:
     """The statements of a function, each an assignment or a call.
 
     `_values` maps places in CasADi's work vector to the C expression that holds their present value.
     """
 
-    def __init__(self, function: ca.Function, places: Places = _POINTERS):
+    def __init__(self, function: ca.Function, places: ElementAccess = _POINTER_ACCESS):
         self._function, self._places = function, places
         self._values: dict[int, str] = {}
         self._constants: dict[str, float] = {}
@@ -156,17 +156,17 @@ class Statements:
             if operation == ca.OP_CALL:
                 yield from self._call(k)
             elif operation == ca.OP_INPUT:
-                self._read(k)
+                self._load_argument(k)
             elif operation == ca.OP_CONST:
-                self._take(k)
+                self._load_constant(k)
             else:
                 yield self._assign(k, operation)
 
-    def _read(self, k: int) -> None:
+    def _load_argument(self, k: int) -> None:
         argument, element = self._function.instruction_input(k)
         self._values[self._function.instruction_output(k)[0]] = self._places.argument(argument, element)
 
-    def _take(self, k: int) -> None:
+    def _load_constant(self, k: int) -> None:
         value = self._function.instruction_constant(k)
         self._values[self._function.instruction_output(k)[0]] = text = _literal(value)
         self._constants[text] = value
@@ -177,9 +177,9 @@ class Statements:
         if operation == ca.OP_OUTPUT:
             return f"{self._places.result(*targets)} = {values[0]}"
         self._values[targets[0]] = f"v{k}"
-        return f"const double v{k} = {self._result(operation, values)}"
+        return f"const double v{k} = {self._expression(operation, values)}"
 
-    def _result(self, operation: int, operands: list[str]) -> str:
+    def _expression(self, operation: int, operands: list[str]) -> str:
         """The expression of an operation; dividing by a constant takes four times as long as multiplying by its inverse."""
         divisor = self._constants.get(operands[-1]) if operation == ca.OP_DIV else None
         if divisor and math.isfinite(1 / divisor):

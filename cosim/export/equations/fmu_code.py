@@ -9,7 +9,7 @@ import casadi as ca
 
 from ...core.component import Variable
 from ..fmu.block import Block, BlockVariable
-from .c_code import callees, definition
+from .c_code import callee_definitions, function_definition
 from .model import ContinuousModel
 
 
@@ -18,20 +18,20 @@ def as_block(model: ContinuousModel, exported: Sequence[ca.Function] = ()) -> Bl
     return Block(
         model.identifier,
         model.description,
-        [_block_variable(variable, member) for variable, member in _members(model)],
+        [_block_variable(variable, member) for variable, member in _struct_members(model)],
         model.step_size,
-        {"model.h": _header(model), "model.c": _source(model, exported)},
+        {"model.h": _header_text(model), "model.c": _source_text(model, exported)},
         model.resources,
     )
 
 
-def _members(model: ContinuousModel) -> Iterator[tuple[Variable, str]]:
+def _struct_members(model: ContinuousModel) -> Iterator[tuple[Variable, str]]:
     """Every variable with the member of `Model` where its first element lies."""
     filled: dict[str, int] = {}
     for variable in model.variables:
         array = "flag" if variable.type == "Boolean" else variable.causality
         first = filled.get(array, 0)
-        filled[array] = first + len(variable.slots)
+        filled[array] = first + len(variable.scalar_names)
         yield variable, f"{array}[{first}]"
 
 
@@ -51,12 +51,12 @@ def _block_variable(variable: Variable, member: str) -> BlockVariable:
     )
 
 
-def _header(model: ContinuousModel) -> str:
-    flags = model.flags()
+def _header_text(model: ContinuousModel) -> str:
+    flags = model.boolean_outputs()
     sizes = {
-        "parameter": len(model.slots("parameter")),
-        "constant": model.constant_symbols().numel() if model.constants else 0,
-        "input": len(model.slots("input")),
+        "parameter": len(model.elements("parameter")),
+        "constant": model.derived_parameter_symbols().numel() if model.derived_parameters else 0,
+        "input": len(model.elements("input")),
         "state": len(model.states),
         "output": len(flags) - sum(flags),
     }
@@ -67,67 +67,67 @@ def _header(model: ContinuousModel) -> str:
     return f"/* {model.description} */\n#include <stdbool.h>\n\ntypedef struct {{\n{lines}\n}} Model;\n"
 
 
-def _source(model: ContinuousModel, exported: Sequence[ca.Function]) -> str:
+def _source_text(model: ContinuousModel, exported: Sequence[ca.Function]) -> str:
     """The text of model.c."""
-    own = _functions(model)
-    functions = [*callees([*own, *exported], model.callees).values()]
-    functions += [definition("static", function) for function in own]
-    functions += [definition("MODEL_EXPORT", function) for function in exported]
-    return "\n".join([_INCLUDES, *functions, _interface(model)])
+    own = _casadi_functions(model)
+    functions = [*callee_definitions([*own, *exported], model.callees).values()]
+    functions += [function_definition("static", function) for function in own]
+    functions += [function_definition("MODEL_EXPORT", function) for function in exported]
+    return "\n".join([_INCLUDES, *functions, _block_interface(model)])
 
 
-def _functions(model: ContinuousModel) -> list[ca.Function]:
-    parameters, constants = ca.SX.sym("parameters", len(model.slots("parameter"))), model.constant_symbols()
-    inputs = ca.SX.sym("inputs", len(model.slots("input")))
+def _casadi_functions(model: ContinuousModel) -> list[ca.Function]:
+    parameters, constants = ca.SX.sym("parameters", len(model.elements("parameter"))), model.derived_parameter_symbols()
+    inputs = ca.SX.sym("inputs", len(model.elements("input")))
     state = ca.SX.sym("state", len(model.states))
     step = ca.SX.sym("step")
     outputs = ca.vertsplit(model.outputs(state, inputs, constants))
-    flags = model.flags()
+    flags = model.boolean_outputs()
     numbers = ca.vertcat(*(y for y, flag in zip(outputs, flags, strict=True) if not flag))
     truths = ca.vertcat(*(y for y, flag in zip(outputs, flags, strict=True) if flag))
     observe = ca.Function("observe", [state, inputs, constants], [numbers, truths])
     if not model.states:
         return [observe]
-    prepare = [ca.Function("prepare", [parameters], [model.constants(parameters)])] if model.constants else []
+    prepare = [ca.Function("prepare", [parameters], [model.derived_parameters(parameters)])] if model.derived_parameters else []
     return [
         *prepare,
         ca.Function("initial_state", [constants], [model.initial_state(constants)]),
-        ca.Function("sub_step", [state, inputs, constants, step], [model.advance(state, inputs, constants, step)]),
+        ca.Function("sub_step", [state, inputs, constants, step], [model.integrate(state, inputs, constants, step)]),
         observe,
     ]
 
 
-def _interface(model: ContinuousModel) -> str:
+def _block_interface(model: ContinuousModel) -> str:
     """The functions of the block's interface; they call `observe` and, with states, `initial_state` and `sub_step`."""
     messages = ",\n".join(f'    "the state {name} is not finite"' for name in model.states)
-    member = {kind: f"m->{kind}" if model.slots(kind) else "NULL" for kind in ("parameter", "input")}
-    flags = sum(model.flags())
-    numbers = "m->output" if flags < len(model.flags()) else "NULL"
+    member = {kind: f"m->{kind}" if model.elements(kind) else "NULL" for kind in ("parameter", "input")}
+    flags = sum(model.boolean_outputs())
+    numbers = "m->output" if flags < len(model.boolean_outputs()) else "NULL"
     return (_WITH_STATES if model.states else _WITHOUT_STATES) % {
         "messages": messages,
         "states": len(model.states),
         "state": "m->state" if model.states else "NULL",
-        "constant": "m->constant" if model.constants else member["parameter"],
-        "prepare": _PREPARE if model.constants else "",
+        "constant": "m->constant" if model.derived_parameters else member["parameter"],
+        "prepare": _PREPARE if model.derived_parameters else "",
         "input": member["input"],
         "output": numbers,
         "flag_slots": max(flags, 1),
         "take_flags": f"    for (int i = 0; i < {flags}; ++i) m->flag[i] = flags[i] != 0;\n" if flags else "",
-        "starts": _starts(model),
+        "starts": _start_assignments(model),
         "max_sub_step": repr(model.max_sub_step),
     }
 
 
-def _starts(model: ContinuousModel) -> str:
+def _start_assignments(model: ContinuousModel) -> str:
     """Assignments of the start values that differ from zero; the rest of the structure is cleared before."""
     lines = []
     for kind in ("parameter", "input"):
-        values = [start for v in model.variables if v.causality == kind for start in _start(v)]
+        values = [start for v in model.variables if v.causality == kind for start in _start_values(v)]
         lines += [f"    m->{kind}[{k}] = {value!r};\n" for k, value in enumerate(values) if value != 0]
     return "".join(lines)
 
 
-def _start(variable: Variable) -> Sequence[float]:
+def _start_values(variable: Variable) -> Sequence[float]:
     count = math.prod(variable.shape)
     if variable.start is None:
         return [0.0] * count
@@ -141,7 +141,7 @@ _INCLUDES = """#include <math.h>
 #include "model.h"
 """
 
-_PUBLISH = """static void publish(Model *m)
+_PUBLISH_TEMPLATE = """static void publish(Model *m)
 {
     double flags[%(flag_slots)d];
     const double *in[] = {%(state)s, %(input)s, %(constant)s};
@@ -228,5 +228,5 @@ const char *model_step(Model *m, double time, double step_size)
 }
 """
 
-_WITH_STATES = _FAILURES + _PUBLISH + _FAILURE + _START + _ADVANCE
-_WITHOUT_STATES = _PUBLISH + _START + _EVALUATE
+_WITH_STATES = _FAILURES + _PUBLISH_TEMPLATE + _FAILURE + _START + _ADVANCE
+_WITHOUT_STATES = _PUBLISH_TEMPLATE + _START + _EVALUATE

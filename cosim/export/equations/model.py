@@ -37,7 +37,7 @@ class ContinuousModel:
     #: parameters -> state at the start
     initial_state: Callable[[ca.SX], ca.SX]
     #: state, inputs, parameters -> time derivative of the state
-    rate: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
+    derivatives: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
     #: state, inputs, parameters -> outputs
     outputs: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
     project: Callable[[ca.SX], ca.SX] = lambda state: state
@@ -45,28 +45,28 @@ class ContinuousModel:
     max_sub_step: float = 0.005
     resources: Mapping[str, Path] = field(default_factory=dict)
     #: parameters -> what the other callables are given in their place, computed once when the model is initialized
-    constants: Callable[[ca.SX], ca.SX] | None = None
+    derived_parameters: Callable[[ca.SX], ca.SX] | None = None
     #: how functions that the expressions call are written in C, where it is not their own text
     callees: Sequence[Callee] = ()
 
-    def constant_symbols(self) -> ca.SX:
+    def derived_parameter_symbols(self) -> ca.SX:
         """Symbols for what the callables are given as parameters."""
-        parameters = ca.SX.sym("parameters", len(self.slots("parameter")))
-        return ca.SX.sym("constants", self.constants(parameters).numel()) if self.constants else parameters
+        parameters = ca.SX.sym("parameters", len(self.elements("parameter")))
+        return ca.SX.sym("constants", self.derived_parameters(parameters).numel()) if self.derived_parameters else parameters
 
-    def advance(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1) -> ca.SX:
+    def integrate(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1) -> ca.SX:
         """The state after `step` (s) with held inputs, in `sub_steps` equal Runge-Kutta steps."""
         for _ in range(sub_steps):
-            state = self.project(runge_kutta_4(lambda x: self.rate(x, inputs, parameters), state, step / sub_steps))
+            state = self.project(runge_kutta_4(lambda x: self.derivatives(x, inputs, parameters), state, step / sub_steps))
         return state
 
-    def slots(self, causality: str) -> list[Variable]:
+    def elements(self, causality: str) -> list[Variable]:
         """Variables of a causality, repeated for each of their elements."""
-        return [variable for variable in self.variables if variable.causality == causality for _ in variable.slots]
+        return [variable for variable in self.variables if variable.causality == causality for _ in variable.scalar_names]
 
-    def flags(self) -> list[bool]:
+    def boolean_outputs(self) -> list[bool]:
         """For each output slot whether it is Boolean."""
-        return [variable.type == "Boolean" for variable in self.slots("output")]
+        return [variable.type == "Boolean" for variable in self.elements("output")]
 
 
 def static_model(

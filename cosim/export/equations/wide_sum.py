@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from .c_code import Callee, Places, Statements, dense
+from .c_code import Callee, ElementAccess, StatementGenerator, densify
 
 
 def sum_over_rows(name: str, term: ca.Function, rows: int) -> Callee:
@@ -18,15 +18,15 @@ def sum_over_rows(name: str, term: ca.Function, rows: int) -> Callee:
     count = ca.SX.sym("count")
     terms = [ca.if_else(count > k, term(common, table[k, :].T), 0) for k in range(rows)]
     total = ca.Function(name, [common, count, table], [sum(terms)])
-    places = Places(lambda i, j: f"row[{rows * j} + k]" if i else f"common[{j}]", lambda i, j: f"value[{j}][k]")
-    statements = "".join(f"            {statement};\n" for statement in Statements(dense(term), places))
+    places = ElementAccess(lambda i, j: f"row[{rows * j} + k]" if i else f"common[{j}]", lambda i, j: f"value[{j}][k]")
+    statements = "".join(f"            {statement};\n" for statement in StatementGenerator(densify(term), places))
     sizes = {"size": term.size1_out(0), "rows": rows, "common": term.size1_in(0)}
-    return Callee(total, _SUM % {**sizes, "statements": statements}, attributes=_WIDE)
+    return Callee(total, _SUM_TEMPLATE % {**sizes, "statements": statements}, attributes=_TARGET_CLONES)
 
 
 #: compiled for each width of registers; the processor it runs on chooses. The bits are the same: every row has the same
 #: operations in the same order, whatever is computed beside it. Not for 512 bits: many processors run slower after these
-_WIDE = """#ifndef WIDE
+_TARGET_CLONES = """#ifndef WIDE
 #if defined __x86_64__ && defined __GLIBC__ && !defined __clang__
 #define WIDE __attribute__((target_clones("avx2", "default")))
 #else
@@ -35,7 +35,7 @@ _WIDE = """#ifndef WIDE
 #endif
 WIDE """
 
-_SUM = """{
+_SUM_TEMPLATE = """{
     const double count = in[1][0];
     double common[%(common)d], sums[%(size)d][8] = {{0}};
     for (int i = 0; i < %(common)d; ++i) common[i] = in[0][i];

@@ -19,36 +19,36 @@ CAUSALITIES = ("parameter", "calculatedParameter", "input", "output", "local")
 _DEFAULT_START = {"Float64": 0.0, "Int32": 0, "Boolean": False, "Enumeration": 1}
 
 
-class Row(NamedTuple):
+class TableRow(NamedTuple):
     """One row of the table of variables; its value reference is its position. `element` counts within the array `member`."""
 
     variable: BlockVariable
     element: int = 0
 
 
-def rows(block: Block, fmi_version: int) -> list[Row]:
+def variable_table(block: Block, fmi_version: int) -> list[TableRow]:
     """The variables as an FMI version sees them: FMI 2.0 has a scalar for each element of an array."""
     if fmi_version == 3:
-        return [Row(variable) for variable in block.variables]
-    return [row for variable in block.variables for row in _elements(variable)]
+        return [TableRow(variable) for variable in block.variables]
+    return [row for variable in block.variables for row in _scalar_rows(variable)]
 
 
-def _elements(variable: BlockVariable) -> Iterator[Row]:
-    names = Variable(variable.name, shape=variable.shape).slots
-    for element, (name, start) in enumerate(zip(names, starts(variable), strict=True)):
-        yield Row(replace(variable, name=name, shape=(), start=start), element)
+def _scalar_rows(variable: BlockVariable) -> Iterator[TableRow]:
+    names = Variable(variable.name, shape=variable.shape).scalar_names
+    for element, (name, start) in enumerate(zip(names, start_values(variable), strict=True)):
+        yield TableRow(replace(variable, name=name, shape=(), start=start), element)
 
 
-def starts(variable: BlockVariable) -> tuple[Any, ...]:
+def start_values(variable: BlockVariable) -> tuple[Any, ...]:
     """The start values of all elements; zero, false or the first literal where the block gives none."""
     if variable.start is None:
         return (_DEFAULT_START[variable.type],) * math.prod(variable.shape)
     return variable.start if isinstance(variable.start, tuple) else (variable.start,)
 
 
-def c_table(block: Block, fmi_version: int) -> str:
+def c_variable_table(block: Block, fmi_version: int) -> str:
     """The C table of variables that the shell reads (`variables.h`), without the FMU's token."""
-    entries = [_c_row(row, fmi_version) for row in rows(block, fmi_version)]
+    entries = [_c_row(row, fmi_version) for row in variable_table(block, fmi_version)]
     if fmi_version == 3:
         entries.insert(0, '{"time", FLOAT64, READ_ONLY, offsetof(State, time), 1, 0}')
     lines = "".join(f"    {entry},\n" for entry in entries)
@@ -56,7 +56,7 @@ def c_table(block: Block, fmi_version: int) -> str:
     return f"{comment}\nstatic const Variable VARIABLES[] = {{\n{lines}}};\n"
 
 
-def _c_row(row: Row, fmi_version: int) -> str:
+def _c_row(row: TableRow, fmi_version: int) -> str:
     variable = row.variable
     # FMI 2.0 reads and writes enumerations as integers
     kind = "Int32" if fmi_version == 2 and variable.type == "Enumeration" else variable.type
@@ -64,10 +64,10 @@ def _c_row(row: Row, fmi_version: int) -> str:
     if row.element:
         offset += f" + {row.element} * sizeof({C_TYPES[variable.type]})"
     name = json.dumps(variable.name, ensure_ascii=False)
-    return f"{{{name}, {kind.upper()}, {_role(variable)}, {offset}, {math.prod(variable.shape)}, {len(variable.enumeration)}}}"
+    return f"{{{name}, {kind.upper()}, {_c_role(variable)}, {offset}, {math.prod(variable.shape)}, {len(variable.enumeration)}}}"
 
 
-def _role(variable: BlockVariable) -> str:
+def _c_role(variable: BlockVariable) -> str:
     if variable.causality == "parameter":
         return "TUNABLE_PARAMETER" if variable.variability == "tunable" else "FIXED_PARAMETER"
     return "INPUT" if variable.causality == "input" else "READ_ONLY"
@@ -81,12 +81,12 @@ def check_block(block: Block) -> None:
     counts = Counter(["time", *(variable.name for variable in block.variables)])
     problems += [f'variable name "{name}" is used {count} times' for name, count in counts.items() if count > 1]
     for variable in block.variables:
-        problems += [f'variable "{variable.name}": {problem}' for problem in _problems(variable)]
+        problems += [f'variable "{variable.name}": {problem}' for problem in _variable_problems(variable)]
     if problems:
         raise InputError([Problem(problem, block.identifier) for problem in problems])
 
 
-def _problems(variable: BlockVariable) -> Iterator[str]:
+def _variable_problems(variable: BlockVariable) -> Iterator[str]:
     if variable.type not in C_TYPES:
         yield f'unknown type "{variable.type}"{did_you_mean(variable.type, C_TYPES)}'
         return
@@ -96,10 +96,10 @@ def _problems(variable: BlockVariable) -> Iterator[str]:
         yield f"type {variable.type} cannot be continuous"
     if variable.type == "Enumeration" and not variable.enumeration:
         yield "the enumeration has no literals"
-    found, expected = len(starts(variable)), math.prod(variable.shape)
+    found, expected = len(start_values(variable)), math.prod(variable.shape)
     if found != expected:
         yield f"found {found} start values, expected {expected}"
     try:
-        units.parse(variable.unit or "1")
+        units.parse_unit(variable.unit or "1")
     except ValueError as error:
         yield str(error)

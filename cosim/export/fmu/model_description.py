@@ -8,25 +8,25 @@ from xml.etree import ElementTree
 
 from ...core import units
 from .block import Block, BlockVariable
-from .interface import Row, rows, starts
+from .interface import TableRow, start_values, variable_table
 
 Element = ElementTree.Element
-ERRORS = {"name": "logStatusError", "description": "why a call failed"}
+ERROR_LOG_CATEGORY = {"name": "logStatusError", "description": "why a call failed"}
 _FMI2_TYPES = {"Float64": "Real", "Int32": "Integer"}
 
 
-def model_description(block: Block, fmi_version: int, token: str, c_files: Sequence[str]) -> bytes:
+def model_description_xml(block: Block, fmi_version: int, token: str, c_files: Sequence[str]) -> bytes:
     """The XML text that describes the FMU of a block; `c_files` are the sources that have to be compiled."""
-    return to_bytes((_fmi2 if fmi_version == 2 else _fmi3)(block, token, c_files))
+    return to_bytes((_fmi2_description if fmi_version == 2 else _fmi3_description)(block, token, c_files))
 
 
-def build_description(block: Block, c_files: Sequence[str]) -> bytes:
+def build_description_xml(block: Block, c_files: Sequence[str]) -> bytes:
     """How the sources of an FMI 3.0 FMU are built (FMI 3.0 section 2.5.2)."""
     root = Element("fmiBuildDescription", fmiVersion="3.0")
-    configuration = _add(root, "BuildConfiguration", modelIdentifier=block.identifier)
-    file_set = _add(configuration, "SourceFileSet", language="C11")
+    configuration = _add_element(root, "BuildConfiguration", modelIdentifier=block.identifier)
+    file_set = _add_element(configuration, "SourceFileSet", language="C11")
     for name in c_files:
-        _add(file_set, "SourceFile", name=name)
+        _add_element(file_set, "SourceFile", name=name)
     return to_bytes(root)
 
 
@@ -40,9 +40,9 @@ def to_bytes(root: Element) -> bytes:
 # -- FMI 2.0 ---------------------------------------------------------------------------------------------------------------
 
 
-def _fmi2(block: Block, token: str, c_files: Sequence[str]) -> Element:
-    root = _root(block, "2.0", guid=token)
-    interface = _add(
+def _fmi2_description(block: Block, token: str, c_files: Sequence[str]) -> Element:
+    root = _root_element(block, "2.0", guid=token)
+    interface = _add_element(
         root,
         "CoSimulation",
         modelIdentifier=block.identifier,
@@ -51,34 +51,34 @@ def _fmi2(block: Block, token: str, c_files: Sequence[str]) -> Element:
         canGetAndSetFMUstate=True,
         canSerializeFMUstate=True,
     )
-    files = _add(interface, "SourceFiles")
+    files = _add_element(interface, "SourceFiles")
     for name in c_files:
-        _add(files, "File", name=name)
-    table = rows(block, 2)
-    _common_parts(root, block, 2)
-    variables = _add(root, "ModelVariables")
+        _add_element(files, "File", name=name)
+    table = variable_table(block, 2)
+    _add_common_elements(root, block, 2)
+    variables = _add_element(root, "ModelVariables")
     for reference, row in enumerate(table):
-        _fmi2_variable(variables, reference, row.variable, _declared_types(block))
-    structure = _add(root, "ModelStructure")
-    for name, unknowns in (("Outputs", _outputs(table)), ("InitialUnknowns", _initial_unknowns(table))):
+        _add_fmi2_variable(variables, reference, row.variable, _declared_types(block))
+    structure = _add_element(root, "ModelStructure")
+    for name, unknowns in (("Outputs", _output_indices(table)), ("InitialUnknowns", _initial_unknown_indices(table))):
         if unknowns:
-            group = _add(structure, name)
+            group = _add_element(structure, name)
             for reference in unknowns:
-                _add(group, "Unknown", index=reference + 1)
+                _add_element(group, "Unknown", index=reference + 1)
     return root
 
 
-def _fmi2_variable(parent: Element, reference: int, variable: BlockVariable, declared: dict[Any, str]) -> None:
-    scalar = _add(parent, "ScalarVariable", **_identity(reference, variable))
-    _add(scalar, _FMI2_TYPES.get(variable.type, variable.type), **_typed(variable, declared))
+def _add_fmi2_variable(parent: Element, reference: int, variable: BlockVariable, declared: dict[Any, str]) -> None:
+    scalar = _add_element(parent, "ScalarVariable", **_common_attributes(reference, variable))
+    _add_element(scalar, _FMI2_TYPES.get(variable.type, variable.type), **_type_attributes(variable, declared))
 
 
 # -- FMI 3.0 ---------------------------------------------------------------------------------------------------------------
 
 
-def _fmi3(block: Block, token: str, c_files: Sequence[str]) -> Element:
-    root = _root(block, "3.0", instantiationToken=token)
-    _add(
+def _fmi3_description(block: Block, token: str, c_files: Sequence[str]) -> Element:
+    root = _root_element(block, "3.0", instantiationToken=token)
+    _add_element(
         root,
         "CoSimulation",
         modelIdentifier=block.identifier,
@@ -86,28 +86,28 @@ def _fmi3(block: Block, token: str, c_files: Sequence[str]) -> Element:
         canGetAndSetFMUState=True,
         canSerializeFMUState=True,
     )
-    table = rows(block, 3)
-    _common_parts(root, block, 3)
-    variables = _add(root, "ModelVariables")
+    table = variable_table(block, 3)
+    _add_common_elements(root, block, 3)
+    variables = _add_element(root, "ModelVariables")
     time = {"name": "time", "valueReference": 0, "causality": "independent", "variability": "continuous", "unit": "s"}
-    _add(variables, "Float64", **time)
+    _add_element(variables, "Float64", **time)
     for reference, row in enumerate(table, start=1):
-        attributes = _identity(reference, row.variable) | _typed(row.variable, _declared_types(block))
-        element = _add(variables, row.variable.type, **attributes)
+        attributes = _common_attributes(reference, row.variable) | _type_attributes(row.variable, _declared_types(block))
+        element = _add_element(variables, row.variable.type, **attributes)
         for size in row.variable.shape:
-            _add(element, "Dimension", start=size)
-    structure = _add(root, "ModelStructure")
-    for name, unknowns in (("Output", _outputs(table)), ("InitialUnknown", _initial_unknowns(table))):
+            _add_element(element, "Dimension", start=size)
+    structure = _add_element(root, "ModelStructure")
+    for name, unknowns in (("Output", _output_indices(table)), ("InitialUnknown", _initial_unknown_indices(table))):
         for reference in unknowns:
-            _add(structure, name, valueReference=reference + 1)
+            _add_element(structure, name, valueReference=reference + 1)
     return root
 
 
 # -- what both have in common ----------------------------------------------------------------------------------------------
 
 
-def _root(block: Block, fmi_version: str, **token: str) -> Element:
-    return _with(
+def _root_element(block: Block, fmi_version: str, **token: str) -> Element:
+    return _set_attributes(
         Element("fmiModelDescription"),
         fmiVersion=fmi_version,
         modelName=block.identifier,
@@ -118,23 +118,23 @@ def _root(block: Block, fmi_version: str, **token: str) -> Element:
     )
 
 
-def _common_parts(root: Element, block: Block, fmi_version: int) -> None:
+def _add_common_elements(root: Element, block: Block, fmi_version: int) -> None:
     names = {variable.unit for variable in block.variables if variable.type == "Float64" and variable.unit}
     add_units(root, names | {"s"} if fmi_version == 3 else names)
     _add_enumerations(root, block, fmi_version)
-    _add(_add(root, "LogCategories"), "Category", **ERRORS)
-    _add(root, "DefaultExperiment", stepSize=block.step_size)
+    _add_element(_add_element(root, "LogCategories"), "Category", **ERROR_LOG_CATEGORY)
+    _add_element(root, "DefaultExperiment", stepSize=block.step_size)
 
 
 def add_units(root: Element, names: Iterable[str]) -> None:
     if not names:
         return
-    definitions = _add(root, "UnitDefinitions")
+    definitions = _add_element(root, "UnitDefinitions")
     for name in sorted(names):
-        unit = units.parse(name)
-        exponents = {base: exponent for base, exponent in zip(units.BASE, unit.exponents, strict=True) if exponent}
+        unit = units.parse_unit(name)
+        exponents = {base: exponent for base, exponent in zip(units.BASE_UNITS, unit.exponents, strict=True) if exponent}
         scale = {"factor": unit.factor if unit.factor != 1 else None, "offset": unit.offset or None}
-        _add(_add(definitions, "Unit", name=name), "BaseUnit", **exponents, **scale)
+        _add_element(_add_element(definitions, "Unit", name=name), "BaseUnit", **exponents, **scale)
 
 
 def _declared_types(block: Block) -> dict[Any, str]:
@@ -150,17 +150,17 @@ def _add_enumerations(root: Element, block: Block, fmi_version: int) -> None:
     declared = _declared_types(block)
     if not declared:
         return
-    definitions = _add(root, "TypeDefinitions")
+    definitions = _add_element(root, "TypeDefinitions")
     for literals, name in declared.items():
         if fmi_version == 2:
-            enumeration = _add(_add(definitions, "SimpleType", name=name), "Enumeration")
+            enumeration = _add_element(_add_element(definitions, "SimpleType", name=name), "Enumeration")
         else:
-            enumeration = _add(definitions, "EnumerationType", name=name)
+            enumeration = _add_element(definitions, "EnumerationType", name=name)
         for value, (literal, description) in enumerate(literals, start=1):
-            _add(enumeration, "Item", name=literal, value=value, description=description or None)
+            _add_element(enumeration, "Item", name=literal, value=value, description=description or None)
 
 
-def _identity(reference: int, variable: BlockVariable) -> dict[str, Any]:
+def _common_attributes(reference: int, variable: BlockVariable) -> dict[str, Any]:
     return {
         "name": variable.name,
         "valueReference": reference,
@@ -177,7 +177,7 @@ def _initial(variable: BlockVariable) -> str | None:
     return "exact" if variable.causality == "parameter" or variable.variability == "constant" else "calculated"
 
 
-def _typed(variable: BlockVariable, declared: dict[Any, str]) -> dict[str, Any]:
+def _type_attributes(variable: BlockVariable, declared: dict[Any, str]) -> dict[str, Any]:
     number = float if variable.type == "Float64" else int
     literals = len(variable.enumeration)
     minimum, maximum = (1, literals) if literals else (variable.minimum, variable.maximum)
@@ -187,7 +187,7 @@ def _typed(variable: BlockVariable, declared: dict[Any, str]) -> dict[str, Any]:
         "unit": variable.unit or None if variable.type == "Float64" else None,
         "min": None if minimum is None else number(minimum),
         "max": None if maximum is None else number(maximum),
-        "start": " ".join(_text(_cast(variable, value)) for value in starts(variable)) if known_before else None,
+        "start": " ".join(_format_value(_cast(variable, value)) for value in start_values(variable)) if known_before else None,
     }
 
 
@@ -195,11 +195,11 @@ def _cast(variable: BlockVariable, value: Any) -> Any:
     return {"Float64": float, "Boolean": bool}.get(variable.type, int)(value)
 
 
-def _outputs(table: Sequence[Row]) -> list[int]:
+def _output_indices(table: Sequence[TableRow]) -> list[int]:
     return [reference for reference, row in enumerate(table) if row.variable.causality == "output"]
 
 
-def _initial_unknowns(table: Sequence[Row]) -> list[int]:
+def _initial_unknown_indices(table: Sequence[TableRow]) -> list[int]:
     return [
         reference
         for reference, (variable, _) in enumerate(table)
@@ -207,18 +207,18 @@ def _initial_unknowns(table: Sequence[Row]) -> list[int]:
     ]
 
 
-def _add(parent: Element, tag: str, **attributes: Any) -> Element:
-    return _with(ElementTree.SubElement(parent, tag), **attributes)
+def _add_element(parent: Element, tag: str, **attributes: Any) -> Element:
+    return _set_attributes(ElementTree.SubElement(parent, tag), **attributes)
 
 
-def _with(element: Element, **attributes: Any) -> Element:
+def _set_attributes(element: Element, **attributes: Any) -> Element:
     for name, value in attributes.items():
         if value is not None:
-            element.set(name, _text(value))
+            element.set(name, _format_value(value))
     return element
 
 
-def _text(value: Any) -> str:
+def _format_value(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return repr(value) if isinstance(value, float) else str(value)

@@ -11,10 +11,10 @@ from ...core.errors import InputError
 from .archive import content_token, write_archive
 from .block import Block
 from .compiler import compile_library
-from .interface import c_table, check_block
-from .model_description import build_description, model_description
+from .interface import c_variable_table, check_block
+from .model_description import build_description_xml, model_description_xml
 
-SHELL = Path(__file__).parents[1] / "shell"
+SHELL_FOLDER = Path(__file__).parents[1] / "shell"
 _SHELL_FILES = {2: ("fmi2.c", "common.h", "export.h"), 3: ("fmi3.c", "common.h", "export.h")}
 _FMI_HEADERS = {
     2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
@@ -31,31 +31,31 @@ def write_fmu(block: Block, fmi_version: int, target: Path) -> Path:
     if fmi_version not in _SHELL_FILES:
         raise InputError(f"found FMI version {fmi_version}, expected 2 or 3")
     check_block(block)
-    files = _with_token(block, fmi_version)
+    files = _description_and_sources(block, fmi_version)
     files |= {f"resources/{name}": path.read_bytes() for name, path in block.resources.items()}
     sources = {name.removeprefix("sources/"): text for name, text in files.items() if name.startswith("sources/")}
     files |= compile_binary(block.identifier, fmi_version, sources, _c_files(sources))
     return write_archive(files, target)
 
 
-def _with_token(block: Block, fmi_version: int) -> dict[str, bytes]:
+def _description_and_sources(block: Block, fmi_version: int) -> dict[str, bytes]:
     """Description and sources; the token that ties them together is a hash of both."""
-    sources = _sources(block, fmi_version)
+    sources = _collect_sources(block, fmi_version)
     c_files = _c_files(sources)
-    token = content_token([model_description(block, fmi_version, "", c_files), *(sources[name] for name in sorted(sources))])
+    token = content_token([model_description_xml(block, fmi_version, "", c_files), *(sources[name] for name in sorted(sources))])
     sources["variables.h"] += f'\n#define TOKEN "{token}"\n'.encode()
     if fmi_version == 3:
-        sources["buildDescription.xml"] = build_description(block, c_files)
-    description = model_description(block, fmi_version, token, c_files)
+        sources["buildDescription.xml"] = build_description_xml(block, c_files)
+    description = model_description_xml(block, fmi_version, token, c_files)
     return {"modelDescription.xml": description} | {f"sources/{name}": text for name, text in sources.items()}
 
 
-def _sources(block: Block, fmi_version: int) -> dict[str, bytes]:
+def _collect_sources(block: Block, fmi_version: int) -> dict[str, bytes]:
     """All that is needed to compile the FMU anywhere, FMI's own headers included."""
     sources = {name: text.encode() for name, text in block.files.items()}
-    sources |= {name: (SHELL / name).read_bytes() for name in _SHELL_FILES[fmi_version]}
+    sources |= {name: (SHELL_FOLDER / name).read_bytes() for name in _SHELL_FILES[fmi_version]}
     sources |= fmi_headers(fmi_version)
-    sources["variables.h"] = c_table(block, fmi_version).encode()
+    sources["variables.h"] = c_variable_table(block, fmi_version).encode()
     return sources
 
 

@@ -8,10 +8,10 @@ from zipfile import ZipFile
 
 from ...core.errors import InputError, Problem
 
-DESCRIPTION = "modelDescription.xml"
+DESCRIPTION_FILE = "modelDescription.xml"
 
 
-def validate(description: bytes, source: Path) -> None:
+def validate_description(description: bytes, source: Path) -> None:
     """Raises InputError with everything that is wrong in a modelDescription.xml; `source` is the file to blame.
 
     FMPy reads XML with all its dangers, so it gets only what was found to be without them.
@@ -19,17 +19,17 @@ def validate(description: bytes, source: Path) -> None:
     from fmpy import read_model_description
     from fmpy.model_description import ValidationError
 
-    from ...components.fmi.preflight import LIMITS
-    from ...components.fmi.preflight.findings import Flaw, refuse
-    from ...components.fmi.preflight.xml import parse
+    from ...components.fmi.preflight import DEFAULT_LIMITS
+    from ...components.fmi.preflight.findings import FatalFinding, raise_errors
+    from ...components.fmi.preflight.xml import parse_xml
 
     try:
-        parse(description, DESCRIPTION, LIMITS)
-    except Flaw as flaw:
-        refuse(source, [flaw.finding])
+        parse_xml(description, DESCRIPTION_FILE, DEFAULT_LIMITS)
+    except FatalFinding as flaw:
+        raise_errors(source, [flaw.finding])
     archive = BytesIO()
     with ZipFile(archive, "w") as file:
-        file.writestr(DESCRIPTION, description)
+        file.writestr(DESCRIPTION_FILE, description)
     try:
         read_model_description(archive, validate_variable_names=True, validate_model_structure=True)
     except ValidationError as error:

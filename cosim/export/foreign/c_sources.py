@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 from ...core.errors import InputError, Problem, did_you_mean
 from ..fmu.archive import write_archive
 from ..fmu.package import compile_binary, fmi_headers
-from ..fmu.validation import DESCRIPTION, validate
+from ..fmu.validation import DESCRIPTION_FILE, validate_description
 
 
 def write_c_fmu(description: Path, target: Path) -> list[Path]:
@@ -17,16 +17,16 @@ def write_c_fmu(description: Path, target: Path) -> list[Path]:
     Its `<SourceFiles>` name the files beside it that are compiled, against FMI's headers; all .c and .h files beside it go
     into the FMU's `sources/`. Returns the files that went in. Raises InputError when the description or the C code is faulty.
     """
-    identifier, compiled = _interface(description)
+    identifier, compiled = _read_co_simulation_element(description)
     own = sorted(path for path in description.parent.iterdir() if path.suffix in (".c", ".h"))
     _check_files(description, compiled, {path.name for path in own})
     sources = fmi_headers(2) | {path.name: path.read_bytes() for path in own}
-    files = {DESCRIPTION: description.read_bytes()} | {f"sources/{name}": text for name, text in sources.items()}
+    files = {DESCRIPTION_FILE: description.read_bytes()} | {f"sources/{name}": text for name, text in sources.items()}
     write_archive(files | compile_binary(identifier, 2, sources, compiled), target)
     return [description, *own]
 
 
-def _interface(description: Path) -> tuple[str, list[str]]:
+def _read_co_simulation_element(description: Path) -> tuple[str, list[str]]:
     """The model identifier and the names of the files to compile."""
     try:
         text = description.read_bytes()
@@ -36,7 +36,7 @@ def _interface(description: Path) -> tuple[str, list[str]]:
     found = root.get("fmiVersion", "none")
     if found != "2.0":
         raise InputError(Problem(f'found fmiVersion "{found}", expected "2.0"', str(description)))
-    validate(text, description)
+    validate_description(text, description)
     interface = root.find("CoSimulation")
     if interface is None:
         raise InputError(Problem("has no <CoSimulation>", str(description)))

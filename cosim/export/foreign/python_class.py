@@ -22,11 +22,11 @@ from zipfile import ZipFile
 from ...core.errors import InputError, Problem
 from ..fmu.archive import content_token, write_archive
 from ..fmu.model_description import Element, add_units, to_bytes
-from ..fmu.validation import DESCRIPTION, validate
+from ..fmu.validation import DESCRIPTION_FILE, validate_description
 from .relative_imports import with_relative_imports
 
 #: makes a module the package of the files beside it
-_PACKAGE = "__path__, __package__ = [__import__('os').path.dirname(__file__)], __name__  # inserted by cosim"
+_PACKAGE_STATEMENT = "__path__, __package__ = [__import__('os').path.dirname(__file__)], __name__  # inserted by cosim"
 
 
 def write_python_fmu(source: Path, target: Path) -> Path:
@@ -38,26 +38,26 @@ def write_python_fmu(source: Path, target: Path) -> Path:
     `unit` writes it itself (`to_xml`); the definitions of units are added. Raises InputError when the class cannot be exported
     or its variables make no valid description.
     """
-    files = _build(source)
-    root = ElementTree.fromstring(files[DESCRIPTION])  # noqa: S314 - just written by PythonFMU
-    _complete(root)
-    root.set("guid", content_token([to_bytes(root), *(files[name] for name in sorted(files) if name != DESCRIPTION)]))
-    files[DESCRIPTION] = to_bytes(root)
-    validate(files[DESCRIPTION], source)
+    files = _build_with_pythonfmu(source)
+    root = ElementTree.fromstring(files[DESCRIPTION_FILE])  # noqa: S314 - just written by PythonFMU
+    _complete_description(root)
+    root.set("guid", content_token([to_bytes(root), *(files[name] for name in sorted(files) if name != DESCRIPTION_FILE)]))
+    files[DESCRIPTION_FILE] = to_bytes(root)
+    validate_description(files[DESCRIPTION_FILE], source)
     return write_archive(files, target)
 
 
-def source_files(source: Path) -> list[Path]:
+def files_of_python_fmu(source: Path) -> list[Path]:
     """The files that go into the FMU."""
     data = source.resolve().with_suffix(".json")
     return [*with_relative_imports(source), *([data] if data.is_file() else [])]
 
 
-def _build(source: Path) -> dict[str, bytes]:
+def _build_with_pythonfmu(source: Path) -> dict[str, bytes]:
     """The members of the FMU as PythonFMU's builder makes it."""
-    modules = _modules(source)
+    modules = _read_modules(source)
     with TemporaryDirectory(prefix="cosim-build-") as folder, TemporaryDirectory(prefix="cosim-build-") as target:
-        loader, files = _stage(modules, source.stem, Path(folder))
+        loader, files = _stage_files(modules, source.stem, Path(folder))
         command = [sys.executable, "-m", "pythonfmu", "build", "-f", loader, "-d", target, "--handle-state", *files]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
         built = list(Path(target).glob("*.fmu"))
@@ -68,11 +68,11 @@ def _build(source: Path) -> dict[str, bytes]:
             return {name: archive.read(name) for name in archive.namelist()}
 
 
-def _modules(source: Path) -> dict[Path, bytes]:
+def _read_modules(source: Path) -> dict[Path, bytes]:
     """The files of a source, by their paths from its folder."""
     folder = source.resolve().parent
     try:
-        files = sorted(file.resolve() for file in source_files(source))
+        files = sorted(file.resolve() for file in files_of_python_fmu(source))
     except SyntaxError as error:
         raise InputError(Problem(f"cannot be exported: {error}", str(source))) from None
     outside = [file for file in files if not file.is_relative_to(folder)]
@@ -82,7 +82,7 @@ def _modules(source: Path) -> dict[Path, bytes]:
     return {file.relative_to(folder): file.read_bytes() for file in files}
 
 
-def _stage(modules: Mapping[Path, bytes], name: str, folder: Path) -> tuple[str, list[str]]:
+def _stage_files(modules: Mapping[Path, bytes], name: str, folder: Path) -> tuple[str, list[str]]:
     """Write the modules, and the source once more as their package; returns the name of that and what else goes into the FMU."""
     package = f"{name}_{sha256(repr(sorted(modules.items())).encode()).hexdigest()[:12]}"
     for path, content in modules.items():
@@ -97,10 +97,10 @@ def _as_package(text: str) -> str:
     future = [node for node in ast.parse(text).body if isinstance(node, ast.ImportFrom) and node.module == "__future__"]
     line = future[-1].end_lineno or 0 if future else 0
     lines = text.splitlines()
-    return "\n".join([*lines[:line], _PACKAGE, *lines[line:], ""])
+    return "\n".join([*lines[:line], _PACKAGE_STATEMENT, *lines[line:], ""])
 
 
-def _complete(root: Element) -> None:
+def _complete_description(root: Element) -> None:
     """What FMI 2.0 demands and PythonFMU leaves out; the date goes, because it would make every build different."""
     root.attrib.pop("generationDateAndTime", None)
     root.set("guid", "")

@@ -22,6 +22,6 @@ ticks and at the ends of steps only; assertions are checked there. States begin 
 equation `x = ...`.
 """
 
-from .assemble import interpreter, load
+from .assemble import load_block, load_interpreter
 
-__all__ = ["interpreter", "load"]
+__all__ = ["load_interpreter", "load_block"]

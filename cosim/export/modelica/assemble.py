@@ -11,51 +11,51 @@ import numpy as np
 
 from ...core.component import Causality, Variability
 from ..fmu.block import Block, BlockVariable
-from .c_code.emit import emit
-from .c_code.header import members
-from .causality.continuous_states import with_states
+from .c_code.emit import generate_c
+from .c_code.header import struct_members
+from .causality.continuous_states import introduce_derivatives
 from .causality.interpreter import Interpreter
 from .causality.matching import is_input
 from .frontend.constants import inline_constants
-from .frontend.folded_branches import check_folding
-from .frontend.reader import Reader
-from .frontend.rumoca import Sources, flatten
-from .model.flat_model import Model, Variable, refuse
+from .frontend.folded_branches import check_folded_branches
+from .frontend.reader import ModelReader
+from .frontend.rumoca import ModelicaSources, flatten_model
+from .model.flat_model import Model, Variable, raise_model_error
 
 _FMI_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
-_DEFAULT_STEP = 0.01
+_DEFAULT_STEP_SIZE = 0.01
 
-Role = tuple[Causality, Variability]
+FmiRole = tuple[Causality, Variability]
 
 
-def load(path: Path, model: str | None = None) -> Block:
+def load_block(path: Path, model: str | None = None) -> Block:
     """The Modelica model `model` (default: named as the file) of a file as C code with described variables.
 
     The file may use the packages in folders beside it. Raises InputError, with file and line, for everything that is wrong or
     not supported; nothing is ever left out.
     """
-    defaults, sources = _open(path, model)
-    folder = _root(sources.files)
+    defaults, sources = _flatten(path, model)
+    folder = _source_root(sources.files)
     names = {str(file.relative_to(folder)): file for file in sources.files}
     return Block(
         identifier=re.sub(r"\W", "_", defaults.model.name.rpartition(".")[2]),
         description=defaults.model.description,
-        variables=_variables(defaults),
-        step_size=min((float(defaults.evaluate(clock.period)) for clock in defaults.plan.clocks), default=_DEFAULT_STEP),
-        files=emit(defaults, sorted(names)),
+        variables=_block_variables(defaults),
+        step_size=min((float(defaults.evaluate(clock.period)) for clock in defaults.schedule.clocks), default=_DEFAULT_STEP_SIZE),
+        files=generate_c(defaults, sorted(names)),
         resources=names,
     )
 
 
-def interpreter(path: Path, model: str | None = None) -> Interpreter:
+def load_interpreter(path: Path, model: str | None = None) -> Interpreter:
     """The same model in plain Python, with default parameters."""
-    return _open(path, model)[0]
+    return _flatten(path, model)[0]
 
 
-def _open(path: Path, model: str | None) -> tuple[Interpreter, Sources]:
-    json, sources = flatten(Path(path), model)
-    check_folding(json, sources)
-    flat = with_states(inline_constants(Reader(json, sources).model(model or Path(path).stem)))
+def _flatten(path: Path, model: str | None) -> tuple[Interpreter, ModelicaSources]:
+    json, sources = flatten_model(Path(path), model)
+    check_folded_branches(json, sources)
+    flat = introduce_derivatives(inline_constants(ModelReader(json, sources).read_model(model or Path(path).stem)))
     _check_types(flat)
     return Interpreter(flat), sources
 
@@ -63,30 +63,30 @@ def _open(path: Path, model: str | None) -> tuple[Interpreter, Sources]:
 def _check_types(model: Model) -> None:
     for variable in model.variables.values():
         if variable.type not in _FMI_TYPES:
-            refuse(f"{variable.name}: variables of type {variable.type} are not supported", variable.where)
+            raise_model_error(f"{variable.name}: variables of type {variable.type} are not supported", variable.where)
         if 0 in variable.shape:
-            refuse(f"{variable.name}: arrays without elements are not supported", variable.where)
+            raise_model_error(f"{variable.name}: arrays without elements are not supported", variable.where)
 
 
-def _root(files: Sequence[Path]) -> Path:
+def _source_root(files: Sequence[Path]) -> Path:
     """The folder that holds the model's file, or the outermost package."""
     return min((file.parent.parent if file.name == "package.mo" else file.parent for file in files), key=lambda f: len(f.parts))
 
 
-def _variables(defaults: Interpreter) -> list[BlockVariable]:
-    names = members(defaults.model)
-    shown = ((v, _role(v, defaults)) for v in defaults.model.variables.values())
-    return [_described(v, names[v.name], role, defaults) for v, role in shown if role]
+def _block_variables(defaults: Interpreter) -> list[BlockVariable]:
+    names = struct_members(defaults.model)
+    shown = ((v, _fmi_role(v, defaults)) for v in defaults.model.variables.values())
+    return [_block_variable(v, names[v.name], role, defaults) for v, role in shown if role]
 
 
-def _role(variable: Variable, defaults: Interpreter) -> Role | None:
+def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
     """Causality and variability of a variable that the FMU shows; inner ones and what has another owner stay hidden."""
-    roles = defaults.roles
+    roles = defaults.parameter_roles
     if variable.name in roles.settable:
-        return "parameter", "fixed" if variable.name in roles.timing else "tunable"
+        return "parameter", "fixed" if variable.name in roles.clock_parameters else "tunable"
     if variable.variability == "parameter":
         return None if variable.protected or variable.bound_by_modifier else ("calculatedParameter", "tunable")
-    continuous = variable.type == "Real" and bool(defaults.model.states or not defaults.plan.clocks)
+    continuous = variable.type == "Real" and bool(defaults.model.states or not defaults.schedule.clocks)
     if is_input(variable):
         return "input", "continuous" if variable.type == "Real" else "discrete"
     if variable.causality == "output" and variable.top_level:
@@ -94,14 +94,14 @@ def _role(variable: Variable, defaults: Interpreter) -> Role | None:
     return None
 
 
-def _described(variable: Variable, member: str, role: Role, defaults: Interpreter) -> BlockVariable:
+def _block_variable(variable: Variable, member: str, role: FmiRole, defaults: Interpreter) -> BlockVariable:
     return BlockVariable(
         name=variable.name,
         member=member,
         type=_FMI_TYPES[variable.type],
         causality=role[0],
         variability=role[1],
-        start=_plain(defaults.get(variable.name)),
+        start=_to_python(defaults.get(variable.name)),
         unit=variable.unit,
         shape=variable.shape,
         description=variable.description,
@@ -116,9 +116,9 @@ def _literals(variable: Variable, model: Model) -> tuple[str, ...]:
     name = variable.enumeration
     found = {literals for owner, literals in model.enumerations.items() if name and f".{owner}".endswith(f".{name}")}
     if len(found) > 1:
-        refuse(f'{variable.name}: several enumerations are named "{name}"; give them different names', variable.where)
+        raise_model_error(f'{variable.name}: several enumerations are named "{name}"; give them different names', variable.where)
     return next(iter(found), ())
 
 
-def _plain(value: Any) -> Any:
+def _to_python(value: Any) -> Any:
     return tuple(value.ravel().tolist()) if isinstance(value, np.ndarray) else value

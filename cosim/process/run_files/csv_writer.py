@@ -15,153 +15,157 @@ from pathlib import Path
 from shutil import copyfileobj
 from typing import IO
 
-from ..journal import ROWS, Journal
-from .folder import ROWS_FILE, Header, TextReader, read_header
+from ..journal import ROW_COUNT, Journal
+from .folder import ROWS_FILE, RowsHeader, TextReader, read_header
 
 #: short runs are left alone for this long, long ones get new lines this often, and no longer than this at a time (s)
-FIRST, EVERY, AT_MOST = 0.2, 0.3, 0.2
+FIRST_UPDATE_DELAY, UPDATE_INTERVAL, MAX_UPDATE_TIME = 0.2, 0.3, 0.2
 
-_ROWS_AT_A_TIME = 500
+_ROWS_PER_CHUNK = 500
 
 
 @dataclass
-class _Copy:
+class _CsvCopy:
     """A file, and how much of it is sound (bytes)."""
 
     path: Path
     size: int = 0
 
 
-class LiveCsv:
+class LiveCsvWriter:
     """Appends to the journal's CSV file what was recorded since the last update; without NumPy, which is slow to import."""
 
     def __init__(self, journal: Journal):
         self._journal = journal
-        self._next = 0.0
-        self._lines: Lines | None = None
+        self._next_update = 0.0
+        self._lines: CsvLineReader | None = None
 
     def update(self) -> None:
         """Append what is new, if it is time; a file that cannot be written is the business of the run itself."""
         now = time.monotonic()
-        if not self._journal.phase.in_loop or now < self._next:
+        if not self._journal.phase.in_loop or now < self._next_update:
             return
         try:
-            if self._lines is None and not self._begin(now):
+            if self._lines is None and not self._open_copies(now):
                 return
-            self._append(now + AT_MOST)
+            self._append_rows(now + MAX_UPDATE_TIME)
         except OSError:
-            self._next = float("inf")
+            self._next_update = float("inf")
 
-    def _begin(self, now: float) -> bool:
-        if self._next == 0.0:
-            self._next = now + FIRST
+    def _open_copies(self, now: float) -> bool:
+        if self._next_update == 0.0:
+            self._next_update = now + FIRST_UPDATE_DELAY
             return False
-        folder, target = self._journal.folder, self._journal.csv
+        folder, target = self._journal.folder, self._journal.csv_path
         header = read_header(folder)
         if folder is None or target is None or header is None:
             return False
         self._target, self._rows_file = target, folder / ROWS_FILE
-        self._lines = Lines(header, TextReader(folder, header))
-        self._shown, self._hidden = (_Copy(folder / f"live-{name}.csv") for name in "ab")
-        self._shown.path.write_bytes(self._lines.first())
-        self._shown.size = len(self._lines.first())
-        self._hidden.path.touch()
+        self._lines = CsvLineReader(header, TextReader(folder, header))
+        self._front, self._back = (_CsvCopy(folder / f"live-{name}.csv") for name in "ab")
+        self._front.path.write_bytes(self._lines.header_line())
+        self._front.size = len(self._lines.header_line())
+        self._back.path.touch()
         return True
 
-    def _append(self, until: float) -> None:
+    def _append_rows(self, until: float) -> None:
         """Bring the hidden copy up to date, as far as time allows, and show it."""
         assert self._lines is not None
-        written, rows = self._lines.written, self._journal[ROWS]
+        written, rows = self._lines.row_count, self._journal[ROW_COUNT]
         try:
-            with self._hidden.path.open("r+b") as target:
-                self._catch_up(target)
+            with self._back.path.open("r+b") as target:
+                self._synchronize_back(target)
                 with self._rows_file.open("rb") as source:
-                    while self._lines.written < rows and time.monotonic() < until:
-                        target.write(self._lines.next(source, rows))
-                self._hidden.size = target.tell()
-            shown = self._show()
+                    while self._lines.row_count < rows and time.monotonic() < until:
+                        target.write(self._lines.read_lines(source, rows))
+                self._back.size = target.tell()
+            shown = self._publish_back()
         except BaseException:
-            self._lines.written = written
+            self._lines.row_count = written
             raise
         if shown:
-            self._shown, self._hidden = self._hidden, self._shown
-        self._next = time.monotonic() + (EVERY if self._lines.written == rows else 0)
+            self._front, self._back = self._back, self._front
+        self._next_update = time.monotonic() + (UPDATE_INTERVAL if self._lines.row_count == rows else 0)
 
-    def _catch_up(self, target: IO[bytes]) -> None:
+    def _synchronize_back(self, target: IO[bytes]) -> None:
         """What the shown copy has and the hidden one lacks; an append that was interrupted is undone."""
-        size = min(self._hidden.size, self._shown.size)
+        size = min(self._back.size, self._front.size)
         target.truncate(size)
         target.seek(size)
-        with self._shown.path.open("rb") as shown:
+        with self._front.path.open("rb") as shown:
             shown.seek(size)
             copyfileobj(shown, target)
 
-    def _show(self) -> bool:
+    def _publish_back(self) -> bool:
         """Put the hidden copy in its place, unless the run has left the stepping loop: then the final file is on its way."""
-        link = self._hidden.path.with_suffix(".link")
+        link = self._back.path.with_suffix(".link")
         link.unlink(missing_ok=True)
-        os.link(self._hidden.path, link)
-        with self._journal.showing() as allowed:
+        os.link(self._back.path, link)
+        with self._journal.updating_csv() as allowed:
             if allowed:
                 link.replace(self._target)
         return allowed
 
 
-class Lines:
+class CsvLineReader:
     """The rows of a run as lines of CSV, in the format of `results.csv_files`."""
 
-    def __init__(self, header: Header, texts: TextReader):
+    def __init__(self, header: RowsHeader, texts: TextReader):
         self._header, self._texts = header, texts
         places = sorted({column.offset for column in header.columns})
         order = [places.index(column.offset) for column in header.columns]
-        self._ordered = itemgetter(*order) if len(order) > 1 else lambda values: tuple(values[i] for i in order)
-        self._unpack = struct.Struct(_format(header)).iter_unpack
+        self._order_columns = itemgetter(*order) if len(order) > 1 else lambda values: tuple(values[i] for i in order)
+        self._unpack = struct.Struct(_row_format(header)).iter_unpack
         #: rows that were given out
-        self.written = 0
+        self.row_count = 0
 
-    def first(self) -> bytes:
+    def header_line(self) -> bytes:
         """The line of names."""
-        return ",".join(map(_quoted, ("time", *self._header.names))).encode() + b"\n"
+        return ",".join(map(_quote_csv, ("time", *self._header.names))).encode() + b"\n"
 
-    def next(self, source: IO[bytes], rows: int) -> bytes:
+    def read_lines(self, source: IO[bytes], rows: int) -> bytes:
         """Lines of some of the rows that follow, of `rows` that there are in the file."""
         from pydantic_core import to_json
 
-        header, first = self._header, self.written
-        count = min(rows - first, _ROWS_AT_A_TIME)
+        header, first = self._header, self.row_count
+        count = min(rows - first, _ROWS_PER_CHUNK)
         source.seek(first * header.row_size)
         data = source.read(count * header.row_size)
         if len(data) < count * header.row_size:
             raise OSError("rows are missing: foreign code has made their file shorter")
         values = self._unpack(data) if header.row_size else [()] * count
-        table = [(header.seconds(n * header.every), *self._ordered(row)) for n, row in enumerate(values, start=first)]
+        table = [
+            (header.time_at(n * header.steps_per_row), *self._order_columns(row)) for n, row in enumerate(values, start=first)
+        ]
         lines = to_json(table, inf_nan_mode="constants")[2:-2].replace(b"],[", b"\n") + b"\n"
-        self.written += len(table)
-        return self._with_texts(lines, first) if header.texts else lines
+        self.row_count += len(table)
+        return self._insert_texts(lines, first) if header.texts else lines
 
-    def _with_texts(self, lines: bytes, first: int) -> bytes:
+    def _insert_texts(self, lines: bytes, first: int) -> bytes:
         """The lines of numbers, the first of them with this number, with texts between them."""
         whole = []
         for row, line in enumerate(lines.decode().splitlines(), start=first):
             time, *numbers = line.split(",")
-            whole.append(",".join([time, *self._header.complete(numbers, map(_quoted, self._texts.row(row)))]) + "\n")
+            whole.append(
+                ",".join([time, *self._header.merge_columns(numbers, map(_quote_csv, self._texts.read_row(row)))]) + "\n"
+            )
         return "".join(whole).encode()
 
 
-def _quoted(text: str) -> str:
+def _quote_csv(text: str) -> str:
     return '"' + str(text).replace('"', '""') + '"'
 
 
-def _format(header: Header) -> str:
+def _row_format(header: RowsHeader) -> str:
     """The row as a format of the struct module, columns by position."""
     parts, position = ["="], 0
-    for offset, kind in sorted({(column.offset, struct_kind(column.dtype)) for column in header.columns}):
+    for offset, kind in sorted({(column.offset, struct_format_character(column.dtype)) for column in header.columns}):
         parts += [f"{offset - position}x", kind]
         position = offset + struct.calcsize(f"={kind}")
     return "".join([*parts, f"{header.row_size - position}x"])
 
 
-def struct_kind(dtype: str) -> str:
+def struct_format_character(dtype: str) -> str:
     """The struct module's character for a numpy dtype such as "<f8"; Booleans are 0 and 1.
 
     >>> struct_kind("<f8"), struct_kind("|b1"), struct_kind("<u4")

@@ -17,14 +17,14 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..journal import current
+from ..journal import current_journal
 
 if TYPE_CHECKING:
     import numpy as np
 
     from ...core.recording import Recording
 
-T = TypeVar("T")
+Value = TypeVar("Value")
 
 ROWS_FILE, TEXTS_FILE, HEADER_FILE, METADATA_FILE = "rows", "texts", "header.json", "metadata.json"
 
@@ -41,7 +41,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Header:
+class RowsHeader:
     """What the rows of an unfinished run mean.
 
     Row k holds the values of communication point n = k * `every`, at (`origin` + n * `stride`) / `denominator` s. `calls` names
@@ -52,7 +52,7 @@ class Header:
     origin: int
     stride: int
     denominator: int
-    every: int
+    steps_per_row: int
     row_size: int
     columns: Sequence[Column]
     calls: Sequence[tuple[str, str]]
@@ -61,9 +61,9 @@ class Header:
     @property
     def names(self) -> list[str]:
         """All columns in the order in which they were asked for."""
-        return self.complete([column.name for column in self.columns], [name for _, name in self.texts])
+        return self.merge_columns([column.name for column in self.columns], [name for _, name in self.texts])
 
-    def complete(self, numbers: Iterable[T], texts: Iterable[T]) -> list[T]:
+    def merge_columns(self, numbers: Iterable[Value], texts: Iterable[Value]) -> list[Value]:
         """What belongs to the columns of numbers and to those of texts, in the order of all columns."""
         whole = list(numbers)
         for (place, _), text in zip(self.texts, texts, strict=True):
@@ -84,20 +84,20 @@ class Header:
             }
         )
 
-    def seconds(self, n: int) -> float:
+    def time_at(self, n: int) -> float:
         """Time of communication point n."""
         return (self.origin + n * self.stride) / self.denominator
 
     def times(self, rows: int) -> np.ndarray:
         """Times of the first rows (s), shape (rows,)."""
-        from ...core.time_grid import Grid
+        from ...core.time_grid import TimeGrid
 
         start, step = Fraction(self.origin, self.denominator), Fraction(self.stride, self.denominator)
-        grid = Grid(start, step, rows * self.every, self.denominator, self.origin, self.stride)
-        return grid.times(range(0, rows * self.every, self.every))
+        grid = TimeGrid(start, step, rows * self.steps_per_row, self.denominator, self.origin, self.stride)
+        return grid.times(range(0, rows * self.steps_per_row, self.steps_per_row))
 
 
-def read_header(folder: Path | None) -> Header | None:
+def read_header(folder: Path | None) -> RowsHeader | None:
     """The header of a run; None when it did not come that far."""
     if folder is None:
         return None
@@ -107,46 +107,46 @@ def read_header(folder: Path | None) -> Header | None:
         return None
     columns = [Column(**column) for column in data.pop("columns")]
     pairs = {key: [tuple(pair) for pair in data[key]] for key in ("calls", "texts")}
-    return Header(**data | {"columns": columns} | pairs)
+    return RowsHeader(**data | {"columns": columns} | pairs)
 
 
 class TextReader:
     """Follows the texts of an unfinished run row by row, as far as they are written."""
 
-    def __init__(self, folder: Path, header: Header):
+    def __init__(self, folder: Path, header: RowsHeader):
         self._file = (folder / TEXTS_FILE).open("rb") if header.texts else io.BytesIO()
         self._names = [name for _, name in header.texts]
         self._rewind()
 
     def _rewind(self) -> None:
         self._file.seek(0)
-        self._row, self._change = -1, (-1, dict[str, Any]())
+        self._row, self._pending_change = -1, (-1, dict[str, Any]())
         self._texts: dict[str, Any] = dict.fromkeys(self._names, "")
 
-    def row(self, number: int) -> list[Any]:
+    def read_row(self, number: int) -> list[Any]:
         """The texts in a row; rows are best asked for one after the other."""
         if number < self._row:
             self._rewind()
         self._row = number
-        while self._change[0] <= number:
-            self._texts |= self._change[1]
+        while self._pending_change[0] <= number:
+            self._texts |= self._pending_change[1]
             line = self._file.readline()
             if not line.endswith(b"\n"):
                 self._file.seek(-len(line), os.SEEK_CUR)
-                self._change = (-1, {})
+                self._pending_change = (-1, {})
                 break
-            first, texts = json.loads(line, object_hook=_restored)
-            self._change = (first, texts)
+            first, texts = json.loads(line, object_hook=_decode_bytes)
+            self._pending_change = (first, texts)
         return list(self._texts.values())
 
 
-def _restored(value: dict[str, Any]) -> Any:
+def _decode_bytes(value: dict[str, Any]) -> Any:
     return bytes.fromhex(value["bytes"]) if value.keys() == {"bytes"} else value
 
 
 def write_metadata(metadata: dict[str, Any]) -> None:
     """Keep what describes the run, if a supervisor wants to see it."""
-    journal = current()
+    journal = current_journal()
     if journal and journal.folder:
         (journal.folder / METADATA_FILE).write_text(json.dumps(metadata, default=str), encoding="utf-8")
 
@@ -160,27 +160,27 @@ def read_metadata(folder: Path) -> dict[str, Any]:
 
 
 @contextmanager
-def unfinished(folder: Path, csv: Path | None = None) -> Iterator[None]:
+def keeping_run_files(folder: Path, csv: Path | None = None) -> Iterator[None]:
     """While the block lasts, the run of this process keeps its files in `folder`, if a supervisor wants to see them."""
-    journal = current()
+    journal = current_journal()
     if journal is None:
         yield
         return
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    journal.put_files(folder, csv)
+    journal.set_run_files(folder, csv)
     yield
-    saved()
+    remove_run_files()
 
 
-def saved() -> None:
+def remove_run_files() -> None:
     """The rows of this process's run are where the user wants them: its folder is not needed any more."""
-    journal = current()
+    journal = current_journal()
     if journal and journal.folder:
         shutil.rmtree(journal.folder, ignore_errors=True)
 
 
-def recover(folder: Path | None, rows: int) -> Recording:
+def recover_recording(folder: Path | None, rows: int) -> Recording:
     """The first `rows` rows of an unfinished run as a recording; fewer if foreign code has made their file shorter."""
     import numpy as np
 
@@ -190,20 +190,20 @@ def recover(folder: Path | None, rows: int) -> Recording:
     header = read_header(folder)
     if folder is None or header is None:
         return Recording.empty()
-    columns, rows = header.columns, _there(folder, header, rows)
+    columns, rows = header.columns, _count_readable_rows(folder, header, rows)
     data = read_rows(folder / ROWS_FILE, header.dtype, rows)
     numbers = [data[column.name].astype(bool) if column.boolean else data[column.name] for column in columns]
     reader = TextReader(folder, header)
     texts = np.empty((rows, len(header.texts)), object)
     for row in range(rows if header.texts else 0):
-        texts[row] = reader.row(row)
-    units = header.complete([column.unit for column in columns], [""] * len(header.texts))
-    values = header.complete(numbers, texts.T)
+        texts[row] = reader.read_row(row)
+    units = header.merge_columns([column.unit for column in columns], [""] * len(header.texts))
+    values = header.merge_columns(numbers, texts.T)
     signals = dict(zip(header.names, values, strict=True))
     return Recording(header.times(rows), signals, dict(zip(header.names, units, strict=True)))
 
 
-def _there(folder: Path, header: Header, rows: int) -> int:
+def _count_readable_rows(folder: Path, header: RowsHeader, rows: int) -> int:
     """How many of so many rows can be read."""
     try:
         return min(rows, (folder / ROWS_FILE).stat().st_size // header.row_size) if header.row_size else rows

@@ -13,13 +13,13 @@ from weakref import finalize
 import numpy as np
 
 #: a chunk of a file is at most this large (bytes); so many values are computed at a time
-CHUNK, PIECE = 1 << 24, 1 << 18
+CHUNK_BYTES, BATCH_VALUES = 1 << 24, 1 << 18
 
 #: more than this (bytes) is not kept in memory
-LARGE = 1 << 26
+MAX_MEMORY_BYTES = 1 << 26
 
 
-class Rows:
+class RowStore:
     """Rows of one structured dtype, in memory; `expected` rows are all that will come."""
 
     def __init__(self, dtype: np.dtype[Any], expected: int):
@@ -28,17 +28,17 @@ class Rows:
         self.chunk_rows = max(1, expected)
         self._chunk = np.zeros(0, dtype)
 
-    def extend(self) -> np.ndarray:
+    def add_chunk(self) -> np.ndarray:
         """A new chunk at the end, to be filled."""
         self._chunk = np.zeros(self.chunk_rows, self.dtype)
         return self._chunk
 
-    def first(self, count: int) -> np.ndarray:
+    def read_first(self, count: int) -> np.ndarray:
         """The first `count` rows."""
         return self._chunk[:count]
 
 
-class FileRows(Rows):
+class FileRowStore(RowStore):
     """Rows in a file, one after the other: what was recorded is in it even when the process is killed.
 
     Only the chunk that is being filled occupies memory. The disk's space is claimed chunk by chunk, so that a full disk is an
@@ -46,41 +46,41 @@ class FileRows(Rows):
     """
 
     def __init__(self, dtype: np.dtype[Any], expected: int, file: IO[bytes]):
-        super().__init__(dtype, min(expected, CHUNK // max(1, dtype.itemsize)))
+        super().__init__(dtype, min(expected, CHUNK_BYTES // max(1, dtype.itemsize)))
         self._file, self._rows = file, 0
         finalize(self, file.close)
 
-    def extend(self) -> np.ndarray:
+    def add_chunk(self) -> np.ndarray:
         if not self.dtype.itemsize:
             return np.zeros(self.chunk_rows, self.dtype)
         begin = self._rows * self.dtype.itemsize
         self._rows += self.chunk_rows
         end = self._rows * self.dtype.itemsize
-        _claim(self._file.fileno(), begin, end)
+        _allocate_disk_space(self._file.fileno(), begin, end)
         page = begin - begin % mmap.ALLOCATIONGRANULARITY
         mapped = mmap.mmap(self._file.fileno(), end - page, offset=page)
         return np.frombuffer(mapped, self.dtype, self.chunk_rows, begin - page)
 
-    def first(self, count: int) -> np.ndarray:
+    def read_first(self, count: int) -> np.ndarray:
         return read_rows(self._file, self.dtype, count)
 
 
-def rows_for(dtype: np.dtype[Any], expected: int, path: Path | None) -> Rows:
+def open_row_store(dtype: np.dtype[Any], expected: int, path: Path | None) -> RowStore:
     """Rows in the file at `path`; without one in memory, or in a temporary file that nobody sees when they are many."""
-    if path is None and expected * dtype.itemsize <= LARGE:
-        return Rows(dtype, expected)
-    return FileRows(dtype, expected, path.open("w+b") if path else TemporaryFile())  # type: ignore[arg-type]
+    if path is None and expected * dtype.itemsize <= MAX_MEMORY_BYTES:
+        return RowStore(dtype, expected)
+    return FileRowStore(dtype, expected, path.open("w+b") if path else TemporaryFile())  # type: ignore[arg-type]
 
 
-def filled(count: int, fill: Callable[[range], np.ndarray], dtype: np.dtype[Any]) -> np.ndarray:
+def compute_in_chunks(count: int, fill: Callable[[range], np.ndarray], dtype: np.dtype[Any]) -> np.ndarray:
     """The values 0 ... count - 1 that `fill` makes piece by piece; many of them lie in a temporary file."""
-    store = rows_for(dtype, count, None)
+    store = open_row_store(dtype, count, None)
     for begin in range(0, count, store.chunk_rows):
-        chunk = store.extend()[: count - begin]
-        for first in range(0, len(chunk), PIECE):
-            piece = fill(range(begin + first, begin + min(len(chunk), first + PIECE)))
+        chunk = store.add_chunk()[: count - begin]
+        for first in range(0, len(chunk), BATCH_VALUES):
+            piece = fill(range(begin + first, begin + min(len(chunk), first + BATCH_VALUES)))
             chunk[first : first + len(piece)] = piece
-    return store.first(count)
+    return store.read_first(count)
 
 
 def read_rows(file: Path | IO[bytes], dtype: np.dtype[Any], count: int) -> np.ndarray:
@@ -88,7 +88,7 @@ def read_rows(file: Path | IO[bytes], dtype: np.dtype[Any], count: int) -> np.nd
     return np.memmap(file, dtype, "r", shape=(count,)) if count and dtype.itemsize else np.zeros(count, dtype)
 
 
-def _claim(file: int, begin: int, end: int) -> None:
+def _allocate_disk_space(file: int, begin: int, end: int) -> None:
     """Make the file `end` bytes long with disk space behind every byte."""
     if hasattr(os, "posix_fallocate") and end > begin:
         os.posix_fallocate(file, begin, end - begin)

@@ -21,27 +21,27 @@ from typing import Literal
 
 from ...core.errors import InputError
 from . import landlock, process
-from .bubblewrap import bubblewrap, command
+from .bubblewrap import bubblewrap_command, find_bubblewrap
 from .folders import interpreter_folders
-from .report import Active, Available, active, available
+from .report import ActiveRestrictions, AvailableSandboxes, find_available_sandboxes, probe_restrictions
 
 __all__ = [
-    "Active",
-    "Available",
-    "Settings",
-    "active",
-    "available",
-    "bubblewrap",
-    "command",
-    "enter",
+    "ActiveRestrictions",
+    "AvailableSandboxes",
+    "SandboxSettings",
+    "probe_restrictions",
+    "find_available_sandboxes",
+    "find_bubblewrap",
+    "bubblewrap_command",
+    "enter_sandbox",
     "interpreter_folders",
 ]
 
-GIB = 1 << 30
+GIBIBYTE = 1 << 30
 
 
 @dataclass(frozen=True)
-class Settings:
+class SandboxSettings:
     """Limits of a worker process.
 
     `memory`: bytes of address space beyond what is mapped already; `file_size`: bytes of one written file; `cpu_seconds`:
@@ -50,9 +50,9 @@ class Settings:
     `parent`: process id without which the worker must not go on.
     """
 
-    memory: int = 2 * GIB
+    memory: int = 2 * GIBIBYTE
     open_files: int = 256
-    file_size: int = GIB
+    file_size: int = GIBIBYTE
     cpu_seconds: int | None = None
     readable: tuple[Path, ...] = ()
     writable: tuple[Path, ...] = ()
@@ -61,31 +61,31 @@ class Settings:
     parent: int | None = None
 
 
-def enter(settings: Settings) -> None:
+def enter_sandbox(settings: SandboxSettings) -> None:
     """Put this process under the settings; nothing of it can be undone.
 
     To be called where the process has one thread only. Raises InputError, before anything is changed, when confinement is
     required and this kernel has none, or none for the network, or when a listed folder does not exist.
     """
-    confined = settings.confine == "required" or (settings.confine == "available" and landlock.version() > 0)
-    if confined and (reason := _lacking(settings)):
+    confined = settings.confine == "required" or (settings.confine == "available" and landlock.abi_version() > 0)
+    if confined and (reason := _unmet_requirement(settings)):
         raise InputError(f"the sandbox cannot be entered: {reason}")
     process.detach(settings.parent)
-    process.limit(settings.memory, settings.open_files, settings.file_size, settings.cpu_seconds)
+    process.set_limits(settings.memory, settings.open_files, settings.file_size, settings.cpu_seconds)
     if confined:
         landlock.confine(settings.readable, settings.writable, network=settings.network)
 
 
-def _lacking(settings: Settings) -> str:
+def _unmet_requirement(settings: SandboxSettings) -> str:
     """Why the settings cannot be met; empty when they can."""
     missing = [str(path) for path in (*settings.readable, *settings.writable) if not path.exists()]
     if missing:
         return f"{', '.join(missing)} does not exist"
-    found = landlock.version()
+    found = landlock.abi_version()
     if not found:
         return "Landlock is needed (Linux 5.13 or newer, enabled); this kernel has none"
-    if settings.confine == "required" and not settings.network and found < landlock.NETWORK_VERSION:
-        return f"to close the network needs Landlock {landlock.NETWORK_VERSION} (Linux 6.7); this kernel has {found}"
-    if process.threads() > 1:
+    if settings.confine == "required" and not settings.network and found < landlock.NETWORK_ABI:
+        return f"to close the network needs Landlock {landlock.NETWORK_ABI} (Linux 6.7); this kernel has {found}"
+    if process.thread_count() > 1:
         return "the process has more than one thread, and the others would stay free"
     return ""

@@ -9,16 +9,16 @@ from pathlib import Path
 
 from ...core.errors import InputError
 
-_CLOSED = ("--unshare-all", "--die-with-parent", "--new-session", "--as-pid-1")
-_OWN = ("--proc", "/proc", "--dev", "/dev", "--tmpfs", "/tmp")  # noqa: S108
+_ISOLATION_OPTIONS = ("--unshare-all", "--die-with-parent", "--new-session", "--as-pid-1")
+_MOUNT_OPTIONS = ("--proc", "/proc", "--dev", "/dev", "--tmpfs", "/tmp")  # noqa: S108
 
 
-def bubblewrap() -> str:
+def find_bubblewrap() -> str:
     """Path of the program `bwrap`; empty where it is not installed or may not do its work."""
     program = shutil.which("bwrap")
     if program is None:
         return ""
-    trial = [program, *_CLOSED, "--ro-bind", "/", "/", "true"]
+    trial = [program, *_ISOLATION_OPTIONS, "--ro-bind", "/", "/", "true"]
     try:
         subprocess.run(trial, capture_output=True, check=True, timeout=5)  # noqa: S603
     except (OSError, subprocess.SubprocessError):
@@ -26,7 +26,7 @@ def bubblewrap() -> str:
     return program
 
 
-def command(
+def bubblewrap_command(
     arguments: Sequence[str], readable: Iterable[Path], writable: Iterable[Path] = (), *, status: int | None = None
 ) -> list[str]:
     """The command that runs `arguments` in this folder seeing nothing but the listed ones, under their own paths.
@@ -36,12 +36,12 @@ def command(
     with "child-pid", and "exit-code" at the end of a command that was started. Raises InputError where bubblewrap is missing
     or not permitted.
     """
-    program = bubblewrap()
+    program = find_bubblewrap()
     if not program:
         raise InputError(
             "the strict sandbox needs bubblewrap (program bwrap, package bubblewrap) and user namespaces; found none that works"
         )
-    words = [program, *_CLOSED, *_OWN]
+    words = [program, *_ISOLATION_OPTIONS, *_MOUNT_OPTIONS]
     bound = {**dict.fromkeys(readable, "--ro-bind"), **dict.fromkeys(writable, "--bind")}
     for path in sorted(bound):
         words += [bound[path], str(path), str(path)]

@@ -8,7 +8,7 @@ from pathlib import Path
 from ...core.resources import package_folder
 
 #: shared libraries and what the loader and C library look up
-_SYSTEM = (
+_SYSTEM_PATHS = (
     "/usr/lib",
     "/usr/lib64",
     "/usr/local/lib",
@@ -27,5 +27,5 @@ def interpreter_folders() -> tuple[Path, ...]:
     """
     own = package_folder()
     searched = [path for path in map(Path, sys.path) if path.absolute() != Path.cwd()]
-    places = [*map(Path, (*_SYSTEM, sys.prefix, sys.base_prefix)), *searched, own]
+    places = [*map(Path, (*_SYSTEM_PATHS, sys.prefix, sys.base_prefix)), *searched, own]
     return tuple(dict.fromkeys(path.absolute() for path in places if path.exists()))

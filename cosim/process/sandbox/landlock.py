@@ -13,18 +13,18 @@ from collections.abc import Iterable
 from pathlib import Path
 
 CREATE_RULESET, ADD_RULE, RESTRICT_SELF = 444, 445, 446
-CREATE_VERSION, RULE_PATH_BENEATH = 1, 1
+CREATE_RULESET_VERSION, RULE_PATH_BENEATH = 1, 1
 #: first version with rules for TCP; for signals and abstract sockets
-NETWORK_VERSION, SCOPE_VERSION = 4, 6
+NETWORK_ABI, SCOPE_ABI = 4, 6
 
 EXECUTE, WRITE_FILE, READ_FILE, READ_DIR = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 TRUNCATE, IOCTL_DEV = 1 << 14, 1 << 15
 #: rights that a single file can have
-OF_FILES = EXECUTE | WRITE_FILE | READ_FILE | TRUNCATE | IOCTL_DEV
+FILE_ACCESS_RIGHTS = EXECUTE | WRITE_FILE | READ_FILE | TRUNCATE | IOCTL_DEV
 #: version -> number of rights over files that it knows
-FILE_RIGHTS = {1: 13, 2: 14, 3: 15, 4: 15, 5: 16}
-TCP = 1 << 0 | 1 << 1
-OUTSIDE_SIGNALS_AND_SOCKETS = 1 << 0 | 1 << 1
+FILE_RIGHT_COUNTS = {1: 13, 2: 14, 3: 15, 4: 15, 5: 16}
+TCP_RIGHTS = 1 << 0 | 1 << 1
+SCOPED_SIGNALS_AND_SOCKETS = 1 << 0 | 1 << 1
 
 _LIBC = ctypes.CDLL(None, use_errno=True)
 
@@ -38,11 +38,11 @@ class _PathBeneath(ctypes.Structure):
     _fields_ = [("allowed", ctypes.c_uint64), ("parent", ctypes.c_int32)]
 
 
-def version() -> int:
+def abi_version() -> int:
     """The Landlock version of this kernel; 0 where there is none."""
     if sys.platform != "linux":
         return 0
-    found: int = _LIBC.syscall(CREATE_RULESET, None, ctypes.c_size_t(0), ctypes.c_uint32(CREATE_VERSION))
+    found: int = _LIBC.syscall(CREATE_RULESET, None, ctypes.c_size_t(0), ctypes.c_uint32(CREATE_RULESET_VERSION))
     return max(found, 0)
 
 
@@ -52,36 +52,36 @@ def confine(readable: Iterable[Path], writable: Iterable[Path], *, network: bool
     Without `network` TCP is closed (version 4), and signals and abstract sockets do not leave the confinement (version 6).
     Open files stay open. The process must have given up new privileges, or be privileged. Raises OSError when the kernel refuses.
     """
-    found = version()
-    rights = (1 << FILE_RIGHTS[min(found, max(FILE_RIGHTS))]) - 1
-    tcp = TCP if found >= NETWORK_VERSION and not network else 0
-    scoped = OUTSIDE_SIGNALS_AND_SOCKETS if found >= SCOPE_VERSION else 0
+    found = abi_version()
+    rights = (1 << FILE_RIGHT_COUNTS[min(found, max(FILE_RIGHT_COUNTS))]) - 1
+    tcp = TCP_RIGHTS if found >= NETWORK_ABI and not network else 0
+    scoped = SCOPED_SIGNALS_AND_SOCKETS if found >= SCOPE_ABI else 0
     attributes = _Ruleset(rights, tcp, scoped)
-    size = 8 if found < NETWORK_VERSION else 16 if found < SCOPE_VERSION else 24
-    ruleset = _call(CREATE_RULESET, ctypes.byref(attributes), ctypes.c_size_t(size), ctypes.c_uint32(0))
+    size = 8 if found < NETWORK_ABI else 16 if found < SCOPE_ABI else 24
+    ruleset = _system_call(CREATE_RULESET, ctypes.byref(attributes), ctypes.c_size_t(size), ctypes.c_uint32(0))
     try:
         for path in readable:
-            _allow(ruleset, path, rights & (EXECUTE | READ_FILE | READ_DIR))
+            _add_path_rule(ruleset, path, rights & (EXECUTE | READ_FILE | READ_DIR))
         for path in writable:
-            _allow(ruleset, path, rights & ~EXECUTE)
-        _allow(ruleset, Path(os.devnull), rights & (READ_FILE | WRITE_FILE))
-        _call(RESTRICT_SELF, ctypes.c_int(ruleset), ctypes.c_uint32(0))
+            _add_path_rule(ruleset, path, rights & ~EXECUTE)
+        _add_path_rule(ruleset, Path(os.devnull), rights & (READ_FILE | WRITE_FILE))
+        _system_call(RESTRICT_SELF, ctypes.c_int(ruleset), ctypes.c_uint32(0))
     finally:
         os.close(ruleset)
 
 
-def _allow(ruleset: int, path: Path, rights: int) -> None:
+def _add_path_rule(ruleset: int, path: Path, rights: int) -> None:
     place = os.open(path, os.O_PATH | os.O_CLOEXEC)
     try:
         if not stat.S_ISDIR(os.fstat(place).st_mode):
-            rights &= OF_FILES
+            rights &= FILE_ACCESS_RIGHTS
         rule = _PathBeneath(rights, place)
-        _call(ADD_RULE, ctypes.c_int(ruleset), ctypes.c_int(RULE_PATH_BENEATH), ctypes.byref(rule), ctypes.c_uint32(0))
+        _system_call(ADD_RULE, ctypes.c_int(ruleset), ctypes.c_int(RULE_PATH_BENEATH), ctypes.byref(rule), ctypes.c_uint32(0))
     finally:
         os.close(place)
 
 
-def _call(number: int, *arguments: object) -> int:
+def _system_call(number: int, *arguments: object) -> int:
     returned: int = _LIBC.syscall(number, *arguments)
     if returned < 0:
         error = ctypes.get_errno()

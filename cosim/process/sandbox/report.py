@@ -9,14 +9,14 @@ import socket
 from dataclasses import dataclass
 
 from . import landlock, process
-from .bubblewrap import bubblewrap
+from .bubblewrap import find_bubblewrap
 
 #: the discard port: nobody listens, so that a connection which is permitted is refused at once
-_NOWHERE = ("127.0.0.1", 9)
+_DISCARD_ADDRESS = ("127.0.0.1", 9)
 
 
 @dataclass(frozen=True)
-class Available:
+class AvailableSandboxes:
     """What sandboxes can be built from here: Landlock version (0: none) and path of a working bubblewrap (empty: none)."""
 
     landlock: int
@@ -24,7 +24,7 @@ class Available:
 
 
 @dataclass(frozen=True)
-class Active:
+class ActiveRestrictions:
     """What holds for this process. Limits are None where there is none; memory and file size in bytes, time in s.
 
     `files_confined`: by Landlock; bubblewrap shows other files instead.
@@ -40,25 +40,25 @@ class Active:
     cpu_seconds: int | None
 
 
-def available() -> Available:
-    return Available(landlock.version(), bubblewrap())
+def find_available_sandboxes() -> AvailableSandboxes:
+    return AvailableSandboxes(landlock.abi_version(), find_bubblewrap())
 
 
-def active() -> Active:
+def probe_restrictions() -> ActiveRestrictions:
     """Look and try: lists the root folder and knocks at a port of this machine."""
-    return Active(
-        files_confined=_root_closed(),
-        tcp_closed=_tcp_closed(),
+    return ActiveRestrictions(
+        files_confined=_is_root_unreadable(),
+        tcp_closed=_is_tcp_denied(),
         own_session=os.getsid(0) == os.getpid(),
         no_new_privileges=process.no_new_privileges(),
-        memory=_limit(resource.RLIMIT_AS),
-        open_files=_limit(resource.RLIMIT_NOFILE),
-        file_size=_limit(resource.RLIMIT_FSIZE),
-        cpu_seconds=_limit(resource.RLIMIT_CPU),
+        memory=_soft_limit(resource.RLIMIT_AS),
+        open_files=_soft_limit(resource.RLIMIT_NOFILE),
+        file_size=_soft_limit(resource.RLIMIT_FSIZE),
+        cpu_seconds=_soft_limit(resource.RLIMIT_CPU),
     )
 
 
-def _root_closed() -> bool:
+def _is_root_unreadable() -> bool:
     """Anyone may list the root folder unless Landlock forbids it."""
     try:
         os.close(os.open("/", os.O_RDONLY | os.O_DIRECTORY))
@@ -67,12 +67,12 @@ def _root_closed() -> bool:
     return False
 
 
-def _tcp_closed() -> bool:
+def _is_tcp_denied() -> bool:
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as knocking:
         knocking.settimeout(0.5)
-        return knocking.connect_ex(_NOWHERE) in (errno.EACCES, errno.EPERM, errno.ENETUNREACH)
+        return knocking.connect_ex(_DISCARD_ADDRESS) in (errno.EACCES, errno.EPERM, errno.ENETUNREACH)
 
 
-def _limit(kind: int) -> int | None:
+def _soft_limit(kind: int) -> int | None:
     soft, _ = resource.getrlimit(kind)
     return None if soft == resource.RLIM_INFINITY else soft

@@ -17,29 +17,29 @@ from typing import Any
 from ...core.component import Variable
 from ...core.errors import ComponentError, InputError, did_you_mean
 from ...core.system import System
-from ...core.time_grid import Grid
+from ...core.time_grid import TimeGrid
 from ...engine.pacer import Pacer
-from ...engine.run_loop import adjustable
-from ...process.journal import calling, current, waiting
+from ...engine.run_loop import settable_variables
+from ...process.journal import calling_component, current_journal, suspending_deadline
 from ...process.run_files.folder import read_metadata, write_metadata
-from ...scenario.name_resolution import assign
+from ...scenario.name_resolution import check_assignment
 
 #: smallest and largest factor of speed that a command may ask for
-SLOWEST, FASTEST = 0.01, 1000.0
+MIN_SPEED_FACTOR, MAX_SPEED_FACTOR = 0.01, 1000.0
 
 
-class Control:
+class LiveControl:
     """A `cosim.engine.run_loop.Control` that obeys what comes through `link`; `speed` is where it begins.
 
     `about` is told to the other side before anything moves, with "adjustable": what can be set, and its values.
     """
 
-    def __init__(self, link: Connection, system: System, grid: Grid, speed: float | None, about: Mapping[str, Any]):
-        self._link, self._grid, self._about = link, grid, about
+    def __init__(self, connection: Connection, system: System, grid: TimeGrid, speed: float | None, run_info: Mapping[str, Any]):
+        self._connection, self._grid, self._run_info = connection, grid, run_info
         self._components = system.components
-        self._adjustable = {f"{name}.{variable.name}": (name, variable) for name, variable in adjustable(system)}
-        self._inbox = select.poll()
-        self._inbox.register(link.fileno(), select.POLLIN)
+        self._adjustable = {f"{name}.{variable.name}": (name, variable) for name, variable in settable_variables(system)}
+        self._poller = select.poll()
+        self._poller.register(connection.fileno(), select.POLLIN)
         self._speed, self._paused, self._steps = speed, False, 0
         self._pacer: Pacer | None = None
         self._commands: Mapping[str, Callable[[int, Mapping[str, Any]], None]] = {
@@ -54,32 +54,32 @@ class Control:
     def __call__(self, n: int) -> None:
         """Before the step that starts at communication point n: keep pace, and obey what has come."""
         if n == 0:
-            self._introduce()
+            self._handshake()
         if self._pacer and not self._paused:
-            with waiting():
+            with suspending_deadline():
                 self._pacer.wait(n)
-        while self._inbox.poll(0):
-            self._obey(n)
+        while self._poller.poll(0):
+            self._handle_command(n)
         while self._paused and not self._steps:
-            with waiting():
-                self._inbox.poll()
-            self._obey(n)
+            with suspending_deadline():
+                self._poller.poll()
+            self._handle_command(n)
         self._steps = max(0, self._steps - 1)
 
-    def end(self) -> list[dict[str, Any]]:
+    def finish(self) -> list[dict[str, Any]]:
         """The run is over, nobody listens any more; returns what was set, as a scenario writes its events."""
         self._send({"ended": True})
         return self._events
 
-    def _introduce(self) -> None:
+    def _handshake(self) -> None:
         """Wait until the other side follows the rows: those of a short run would be gone before."""
-        values = [self._described(full_name, *place) for full_name, place in self._adjustable.items()]
-        with waiting():
-            self._send({"about": {**self._about, "adjustable": values}, **self._state(0)})
-            self._link.recv_bytes()
-        self._pace(0)
+        values = [self._describe_variable(full_name, *place) for full_name, place in self._adjustable.items()]
+        with suspending_deadline():
+            self._send({"about": {**self._run_info, "adjustable": values}, **self._state(0)})
+            self._connection.recv_bytes()
+        self._restart_pacer(0)
 
-    def _described(self, full_name: str, name: str, variable: Variable) -> dict[str, Any]:
+    def _describe_variable(self, full_name: str, name: str, variable: Variable) -> dict[str, Any]:
         return {
             "name": full_name,
             "type": variable.type,
@@ -91,16 +91,16 @@ class Control:
         }
 
     def _send(self, message: Mapping[str, Any]) -> None:
-        self._link.send_bytes(json.dumps(message, default=str).encode())
+        self._connection.send_bytes(json.dumps(message, default=str).encode())
 
     def _state(self, n: int) -> dict[str, Any]:
-        return {"time": self._grid.seconds(n), "paused": self._paused, "speed": self._speed}
+        return {"time": self._grid.time_at(n), "paused": self._paused, "speed": self._speed}
 
-    def _obey(self, n: int) -> None:
-        message = json.loads(self._link.recv_bytes())
+    def _handle_command(self, n: int) -> None:
+        message = json.loads(self._connection.recv_bytes())
         answer: dict[str, Any] = {"id": message.get("id")}
         try:
-            self._command(message)(n, message)
+            self._find_command(message)(n, message)
         except InputError as error:
             answer["error"] = str(error)
         except ComponentError as error:
@@ -108,7 +108,7 @@ class Control:
             raise
         self._send({**answer, **self._state(n)})
 
-    def _command(self, message: Mapping[str, Any]) -> Callable[[int, Mapping[str, Any]], None]:
+    def _find_command(self, message: Mapping[str, Any]) -> Callable[[int, Mapping[str, Any]], None]:
         name = str(message.get("command"))
         if name not in self._commands:
             raise InputError(f'unknown command "{name}"{did_you_mean(name, self._commands)}')
@@ -119,7 +119,7 @@ class Control:
 
     def _resume(self, n: int, message: Mapping[str, Any]) -> None:
         self._paused = False
-        self._pace(n)
+        self._restart_pacer(n)
 
     def _step(self, n: int, message: Mapping[str, Any]) -> None:
         self._paused = True
@@ -128,12 +128,14 @@ class Control:
     def _set_speed(self, n: int, message: Mapping[str, Any]) -> None:
         factor = message.get("factor")
         is_number = isinstance(factor, int | float) and not isinstance(factor, bool)
-        if factor is not None and not (is_number and SLOWEST <= factor <= FASTEST):
-            raise InputError(f"the speed must lie in {SLOWEST:g} ... {FASTEST:g}, or be null, found {json.dumps(factor)}")
+        if factor is not None and not (is_number and MIN_SPEED_FACTOR <= factor <= MAX_SPEED_FACTOR):
+            raise InputError(
+                f"the speed must lie in {MIN_SPEED_FACTOR:g} ... {MAX_SPEED_FACTOR:g}, or be null, found {json.dumps(factor)}"
+            )
         self._speed = factor
-        self._pace(n)
+        self._restart_pacer(n)
 
-    def _pace(self, n: int) -> None:
+    def _restart_pacer(self, n: int) -> None:
         """From now on the clock counts from communication point n."""
         self._pacer = Pacer(self._grid, self._speed, "warn") if self._speed else None
         if self._pacer:
@@ -146,21 +148,21 @@ class Control:
             raise InputError(f'"{full_name}" is no tunable parameter and no unconnected input{near}')
         name, variable = self._adjustable[full_name]
         try:
-            for own, checked in assign(name, {variable.name: variable}, variable.name, value).items():
-                with calling(name, "set", "step", self._grid.seconds(n)):
+            for own, checked in check_assignment(name, {variable.name: variable}, variable.name, value).items():
+                with calling_component(name, "set", "step", self._grid.time_at(n)):
                     self._components[name].set(own, checked)
         except (ValueError, TypeError, OverflowError) as error:
             raise InputError(str(error)) from error
-        self._note(n, full_name, value)
+        self._record_event(n, full_name, value)
 
-    def _note(self, n: int, name: str, value: Any) -> None:
+    def _record_event(self, n: int, name: str, value: Any) -> None:
         """Kept beside the rows too, so that it is known of a run that comes to a bad end."""
-        self._events.append({"time": self._written(n), "set": {name: value}})
-        journal = current()
+        self._events.append({"time": self._event_time(n), "set": {name: value}})
+        journal = current_journal()
         if journal and journal.folder:
             write_metadata({**read_metadata(journal.folder), "live_events": self._events})
 
-    def _written(self, n: int) -> float | str:
+    def _event_time(self, n: int) -> float | str:
         """Time of communication point n as a scenario has to write it to mean exactly that."""
-        seconds, exact = self._grid.seconds(n), self._grid.start + n * self._grid.step
+        seconds, exact = self._grid.time_at(n), self._grid.start + n * self._grid.step
         return seconds if Fraction(repr(seconds)) == exact else str(exact)

@@ -8,23 +8,23 @@ from pathlib import Path
 
 import numpy as np
 
-from ...process.run_files.folder import ROWS_FILE, Header
+from ...process.run_files.folder import ROWS_FILE, RowsHeader
 
 #: values of all signals together that a page can hold while they come; longer runs are thinned
-MOST_VALUES = 4_000_000
+MAX_VALUES = 4_000_000
 
 
-class Feed:
+class RowFeed:
     """The numeric signals of a run of `expected` rows, whose files lie in `folder`; every `stride`-th row is given out."""
 
-    def __init__(self, folder: Path, header: Header, expected: int):
+    def __init__(self, folder: Path, header: RowsHeader, expected_rows: int):
         self._header, self._dtype = header, header.dtype
         self._path = folder / ROWS_FILE
         self._file = self._path.open("rb")  # it may be removed while somebody still reads
         self.columns = ["time", *(column.name for column in header.columns)]
-        self.stride = max(1, -(-expected * len(self.columns) // MOST_VALUES))
+        self.stride = max(1, -(-expected_rows * len(self.columns) // MAX_VALUES))
         #: so many rows will be given out at most
-        self.capacity = (expected - 1) // self.stride + 1
+        self.capacity = (expected_rows - 1) // self.stride + 1
 
     @cached_property
     def units(self) -> Mapping[str, str]:
@@ -39,7 +39,7 @@ class Feed:
         """Rows from `first` on, column by column: float32 of shape (columns, count)."""
         numbers = range(first * self.stride, (first + count) * self.stride, self.stride)
         table = np.empty((len(self.columns), count), "<f4")
-        table[0] = [self._header.seconds(row * self._header.every) for row in numbers]
+        table[0] = [self._header.time_at(row * self._header.steps_per_row) for row in numbers]
         if count and self._dtype.itemsize:
             rows = self._rows(numbers)
             for place, name in enumerate(self.columns[1:], start=1):

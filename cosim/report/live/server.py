@@ -9,19 +9,19 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from ..pages import POLICY, embedded, render
-from .session import Session
+from ..pages import CONTENT_SECURITY_POLICY, embed_json, render_page
+from .session import LiveSession
 
-ADDRESS = "127.0.0.1"
+HOST = "127.0.0.1"
 
 #: a command is no longer than this (bytes)
-LONGEST_COMMAND = 1 << 16
+MAX_COMMAND_LENGTH = 1 << 16
 
 #: the page may ask this server, and nobody else anything
-LIVE_POLICY = f"{POLICY}; connect-src 'self'"
+LIVE_CONTENT_SECURITY_POLICY = f"{CONTENT_SECURITY_POLICY}; connect-src 'self'"
 
 _HEADERS = {
-    "Content-Security-Policy": f"{LIVE_POLICY}; base-uri 'none'; frame-ancestors 'none'",
+    "Content-Security-Policy": f"{LIVE_CONTENT_SECURITY_POLICY}; base-uri 'none'; frame-ancestors 'none'",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
@@ -30,106 +30,108 @@ _HEADERS = {
 }
 
 
-class Refused(Exception):
+class RequestRefused(Exception):
     """A request that is not answered, with the status that says why."""
 
 
-class Server(ThreadingHTTPServer):
+class LiveServer(ThreadingHTTPServer):
     """Listens from the beginning, serves `session` once it is there; paths begin with the token. `port` 0 is any free one."""
 
     daemon_threads = True
-    session: Session
+    session: LiveSession
 
     def __init__(self, port: int, token: str):
         self.token = token
-        super().__init__((ADDRESS, port), _Handler)
-        self.hosts = {f"{name}:{self.server_port}" for name in (ADDRESS, "localhost")}
+        super().__init__((HOST, port), _Handler)
+        self.allowed_hosts = {f"{name}:{self.server_port}" for name in (HOST, "localhost")}
 
     @property
     def url(self) -> str:
-        return f"http://{ADDRESS}:{self.server_port}/{self.token}/"
+        return f"http://{HOST}:{self.server_port}/{self.token}/"
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A browser that goes away is no error; nothing else is told about a request either."""
 
 
 class _Handler(BaseHTTPRequestHandler):
-    server: Server
+    server: LiveServer
     protocol_version = "HTTP/1.1"
     server_version, sys_version = "cosim", ""
     timeout = 60
 
     def do_GET(self) -> None:
-        self._answer({"": self._page, "rows": self._rows})
+        self._respond({"": self._send_page, "rows": self._send_rows})
 
     def do_POST(self) -> None:
-        self._answer({"command": self._command})
+        self._respond({"command": self._run_command})
 
     def log_message(self, format: str, *args: Any) -> None:
         """The terminal belongs to the run."""
 
-    def _answer(self, resources: dict[str, Any]) -> None:
+    def _respond(self, resources: dict[str, Any]) -> None:
         try:
-            resource = self._checked()
+            resource = self._authorized_resource()
             if resource not in resources:
-                raise Refused(HTTPStatus.NOT_FOUND)
+                raise RequestRefused(HTTPStatus.NOT_FOUND)
             resources[resource]()
-        except Refused as refused:
+        except RequestRefused as refused:
             self.close_connection = True
             self._send(refused.args[0], "text/plain", refused.args[0].phrase.encode())
 
-    def _checked(self) -> str:
+    def _authorized_resource(self) -> str:
         """The resource that is asked for: by who sits here and knows the token; commands come from the page itself."""
         hosts, origins = (self.headers.get_all(name, []) for name in ("Host", "Origin"))
-        if len(hosts) != 1 or hosts[0] not in self.server.hosts:
-            raise Refused(HTTPStatus.FORBIDDEN)
+        if len(hosts) != 1 or hosts[0] not in self.server.allowed_hosts:
+            raise RequestRefused(HTTPStatus.FORBIDDEN)
         token, _, resource = urlsplit(self.path).path.removeprefix("/").partition("/")
         if not compare_digest(token.encode(), self.server.token.encode()):
-            raise Refused(HTTPStatus.FORBIDDEN)
+            raise RequestRefused(HTTPStatus.FORBIDDEN)
         expected = [f"http://{hosts[0]}"]
         if origins != expected and (origins or self.command == "POST"):
-            raise Refused(HTTPStatus.FORBIDDEN)
+            raise RequestRefused(HTTPStatus.FORBIDDEN)
         return resource
 
-    def _page(self) -> None:
-        about = self.server.session.about()
+    def _send_page(self) -> None:
+        about = self.server.session.page_data()
         if about is None:
-            raise Refused(HTTPStatus.GONE)
-        data = embedded({"scene": about.pop("scene"), "live": about})
-        text = render("replay.html", title=about["name"], description=about["description"], data=data, policy=LIVE_POLICY)
+            raise RequestRefused(HTTPStatus.GONE)
+        data = embed_json({"scene": about.pop("scene"), "live": about})
+        text = render_page(
+            "replay.html", title=about["name"], description=about["description"], data=data, policy=LIVE_CONTENT_SECURITY_POLICY
+        )
         self._send(HTTPStatus.OK, "text/html; charset=utf-8", text.encode())
 
-    def _rows(self) -> None:
+    def _send_rows(self) -> None:
         """One line of JSON, then float32 (see `feed`)."""
         try:
             query = parse_qs(urlsplit(self.path).query)
             first, version = (int(query[name][0]) for name in ("first", "version"))
         except (KeyError, ValueError):
-            raise Refused(HTTPStatus.BAD_REQUEST) from None
+            raise RequestRefused(HTTPStatus.BAD_REQUEST) from None
         if first < 0:
-            raise Refused(HTTPStatus.BAD_REQUEST)
-        state, rows = self.server.session.news(first, version)
+            raise RequestRefused(HTTPStatus.BAD_REQUEST)
+        state, rows = self.server.session.wait_for_rows(first, version)
         self._send(HTTPStatus.OK, "application/octet-stream", json.dumps(state).encode() + b"\n" + rows)
 
-    def _command(self) -> None:
-        answer = self.server.session.command(self._message())
+    def _run_command(self) -> None:
+        answer = self.server.session.send_command(self._read_message())
         status = HTTPStatus.BAD_REQUEST if "error" in answer else HTTPStatus.OK
         self._send(status, "application/json", json.dumps(answer).encode())
 
-    def _message(self) -> dict[str, Any]:
+    def _read_message(self) -> dict[str, Any]:
         if self.headers.get_content_type() != "application/json":
-            raise Refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE)
+            raise RequestRefused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE)
         length = self.headers.get("Content-Length", "")
         if not (length.isascii() and length.isdigit()) or len(length) > 9:
-            raise Refused(HTTPStatus.LENGTH_REQUIRED)
-        if int(length) > LONGEST_COMMAND:
-            raise Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+            raise RequestRefused(HTTPStatus.LENGTH_REQUIRED)
+        if int(length) > MAX_COMMAND_LENGTH:
+            raise RequestRefused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
         try:
             message = json.loads(self.rfile.read(int(length)))
         except (ValueError, RecursionError):
             message = None
         if not isinstance(message, dict):
-            raise Refused(HTTPStatus.BAD_REQUEST)
+            raise RequestRefused(HTTPStatus.BAD_REQUEST)
         return message
 
     def _send(self, status: HTTPStatus, kind: str, body: bytes) -> None:

@@ -10,34 +10,34 @@ from queue import Empty, Queue
 from threading import Condition, Lock, Thread
 from typing import Any
 
-from ...process.journal import ROWS, Journal
+from ...process.journal import ROW_COUNT, Journal
 from ...process.run_files.folder import read_header
-from .feed import Feed
+from .feed import RowFeed
 
 #: rows are looked for this often, and a request waits for news this long (s)
-LOOK, PATIENCE = 0.03, 10.0
+POLL_INTERVAL, LONG_POLL_TIMEOUT = 0.03, 10.0
 
 #: a command may wait this long for the end of the present step (s)
-LONGEST_STEP = 60.0
+COMMAND_TIMEOUT = 60.0
 
 #: rows given out at a time
-MOST_ROWS = 2000
+MAX_ROWS = 2000
 
 
-class Session:
+class LiveSession:
     """A run in the process at the other end of `link`. Safe to use from several threads."""
 
-    def __init__(self, link: Connection, journal: Journal):
-        self._link, self._journal = link, journal
-        self._answers: Queue[dict[str, Any]] = Queue()
-        self._one_at_a_time, self._changed = Lock(), Condition()
+    def __init__(self, connection: Connection, journal: Journal):
+        self._connection, self._journal = connection, journal
+        self._replies: Queue[dict[str, Any]] = Queue()
+        self._command_lock, self._changed = Lock(), Condition()
         self._commands = 0
         self._values: dict[str, Any] = {}
-        self._about: dict[str, Any] = {}
+        self._run_info: dict[str, Any] = {}
         self._state: dict[str, Any] = {"version": 0, "paused": False, "speed": None, "time": 0.0, "ended": False}
-        self.feed: Feed | None = None
+        self.feed: RowFeed | None = None
         #: until when somebody looks (s, monotonic), and whether everything was shown until the end
-        self.looked, self.complete = 0.0, False
+        self.last_viewed, self.fully_viewed = 0.0, False
         self._listener = Thread(target=self._listen, daemon=True)
 
     def start(self) -> None:
@@ -46,88 +46,88 @@ class Session:
     def _listen(self) -> None:
         try:
             while True:
-                self._hear(json.loads(self._link.recv_bytes()))
+                self._handle_message(json.loads(self._connection.recv_bytes()))
         except (EOFError, OSError, ValueError):
-            self._link.close()
-            self.end()
+            self._connection.close()
+            self.mark_ended()
 
-    def _hear(self, message: dict[str, Any]) -> None:
+    def _handle_message(self, message: dict[str, Any]) -> None:
         folder = self._journal.folder
         if "about" in message and folder and (header := read_header(folder)):
-            self.feed = Feed(folder, header, message["about"]["rows"])
-            self._link.send_bytes(b"{}")  # the first that the run hears; commands come after
+            self.feed = RowFeed(folder, header, message["about"]["rows"])
+            self._connection.send_bytes(b"{}")  # the first that the run hears; commands come after
         changes: dict[str, Any] = {key: message[key] for key in ("paused", "speed", "time", "ended") if key in message}
         with self._changed:
-            self._about = message.get("about", self._about)
+            self._run_info = message.get("about", self._run_info)
             self._state = {**self._state, **changes, "version": self._state["version"] + 1}
             self._changed.notify_all()
         if "id" in message:
-            self._answers.put(message)
+            self._replies.put(message)
 
-    def end(self) -> None:
+    def mark_ended(self) -> None:
         """Nothing more will come."""
         with self._changed:
             if not self._state["ended"]:
                 self._state = {**self._state, "ended": True, "version": self._state["version"] + 1}
             self._changed.notify_all()
-        self._answers.put({"id": None})
+        self._replies.put({"id": None})
 
-    def about(self) -> dict[str, Any] | None:
+    def page_data(self) -> dict[str, Any] | None:
         """What a page has to know before the first row, as soon as the run has come that far; None when it has ended before."""
-        self._wait_for_the_beginning()
+        self._wait_until_started()
         if self.feed is None:
             return None
-        adjustable = [{**each, "value": self._values.get(each["name"], each["value"])} for each in self._about["adjustable"]]
+        adjustable = [{**each, "value": self._values.get(each["name"], each["value"])} for each in self._run_info["adjustable"]]
         layout = {"columns": self.feed.columns, "units": self.feed.units, "capacity": self.feed.capacity}
-        return {**self._about, **layout, "adjustable": adjustable}
+        return {**self._run_info, **layout, "adjustable": adjustable}
 
-    def _wait_for_the_beginning(self) -> None:
+    def _wait_until_started(self) -> None:
         with self._changed:
-            self._changed.wait_for(lambda: self._about or self._state["ended"])
+            self._changed.wait_for(lambda: self._run_info or self._state["ended"])
 
-    def news(self, first: int, version: int) -> tuple[dict[str, Any], bytes]:
+    def wait_for_rows(self, first: int, version: int) -> tuple[dict[str, Any], bytes]:
         """The state of the run and the rows from `first` on, when there are any or the state is not that of `version`; else
         after a while."""
-        self.looked = until = time.monotonic() + PATIENCE
+        self.last_viewed = until = time.monotonic() + LONG_POLL_TIMEOUT
         while True:
             state, available = self._state, self._available()
             if available > first or state["version"] != version or time.monotonic() > until:
                 break
             with self._changed:
-                self._changed.wait(LOOK)
-        count = max(0, min(available - first, MOST_ROWS))
+                self._changed.wait(POLL_INTERVAL)
+        count = max(0, min(available - first, MAX_ROWS))
         rows = self.feed.read(first, count) if self.feed else b""
-        self.looked = time.monotonic()
-        self.complete = state["ended"] and first + count >= available
-        return {**state, "first": first, "count": count, "complete": self.complete}, rows
+        self.last_viewed = time.monotonic()
+        self.fully_viewed = state["ended"] and first + count >= available
+        return {**state, "first": first, "count": count, "complete": self.fully_viewed}, rows
 
     def _available(self) -> int:
-        return self.feed.available(self._journal[ROWS]) if self.feed else 0
+        return self.feed.available(self._journal[ROW_COUNT]) if self.feed else 0
 
-    def command(self, message: Mapping[str, Any]) -> dict[str, Any]:
+    def send_command(self, message: Mapping[str, Any]) -> dict[str, Any]:
         """What the run answers to a command (see `control`)."""
-        self._wait_for_the_beginning()
-        with self._one_at_a_time:
+        self._wait_until_started()
+        with self._command_lock:
             self._commands += 1
             try:
                 if not self._state["ended"]:
-                    self._link.send_bytes(json.dumps({**message, "id": self._commands}).encode())
+                    self._connection.send_bytes(json.dumps({**message, "id": self._commands}).encode())
             except OSError:
-                self.end()
-            answer = self._answer(self._commands)
+                self.mark_ended()
+            answer = self._wait_for_reply(self._commands)
         if message.get("command") == "set" and "error" not in answer:
             self._values[message["name"]] = message["value"]
         return answer
 
-    def _answer(self, number: int) -> dict[str, Any]:
-        until = time.monotonic() + LONGEST_STEP
+    def _wait_for_reply(self, number: int) -> dict[str, Any]:
+        until = time.monotonic() + COMMAND_TIMEOUT
         while time.monotonic() < until:
             try:
-                answer = self._answers.get(timeout=0.2)
+                answer = self._replies.get(timeout=0.2)
             except Empty:
                 if self._state["ended"]:
                     return {"error": "the run has ended"}
                 continue
             if answer.pop("id") == number:
                 return answer
-        return {"error": f"no answer within {LONGEST_STEP:g} s"}
+        return {"error": f"no answer within {COMMAND_TIMEOUT:g} s"}

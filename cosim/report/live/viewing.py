@@ -17,14 +17,14 @@ import click
 
 from ...core.errors import InputError
 from ...process.journal import Journal
-from .server import ADDRESS, Server
-from .session import Session
+from .server import HOST, LiveServer
+from .session import LiveSession
 
 #: at the end a page that is open has so long to fetch the last rows (s)
-LAST_LOOK = 2.0
+FINAL_FETCH_TIMEOUT = 2.0
 
 
-class Viewing:
+class LiveView:
     """Listens on a port of this machine (0: any free one) before the run's process is born, so that its address is known.
 
     Raises InputError when the port cannot be had.
@@ -32,41 +32,41 @@ class Viewing:
 
     def __init__(self, port: int):
         try:
-            self._server = Server(port, token_urlsafe(24))
+            self._server = LiveServer(port, token_urlsafe(24))
         except OSError as error:
-            raise InputError(f"--view cannot listen on {ADDRESS}:{port}: {error.strerror}") from None
-        self._here, self._there = Pipe()
+            raise InputError(f"--view cannot listen on {HOST}:{port}: {error.strerror}") from None
+        self._parent_end, self._child_end = Pipe()
 
     @property
     def url(self) -> str:
         return self._server.url
 
-    def link(self) -> Connection:
+    def open_in_child(self) -> Connection:
         """In the run's process: its end of the pipe. It keeps nothing else of this."""
         self._server.socket.close()
-        self._here.close()
-        return self._there
+        self._parent_end.close()
+        return self._child_end
 
     @contextmanager
-    def serving(self, journal: Journal) -> Iterator[None]:
+    def serve(self, journal: Journal) -> Iterator[None]:
         """In the supervising process: serve the page until the run has ended and who looks at it has seen the end."""
-        self._there.close()
-        session = self._server.session = Session(self._here, journal)
+        self._child_end.close()
+        session = self._server.session = LiveSession(self._parent_end, journal)
         session.start()
         thread = Thread(target=self._server.serve_forever, args=(0.05,), daemon=True)
         thread.start()
         try:
             yield
         finally:
-            session.end()
-            _wait_for_the_last_look(session)
+            session.mark_ended()
+            _wait_for_final_fetch(session)
             self._server.shutdown()
             self._server.server_close()
 
 
-def _wait_for_the_last_look(session: Session) -> None:
-    until = time.monotonic() + LAST_LOOK
-    while time.monotonic() - session.looked < LAST_LOOK and not session.complete and time.monotonic() < until:
+def _wait_for_final_fetch(session: LiveSession) -> None:
+    until = time.monotonic() + FINAL_FETCH_TIMEOUT
+    while time.monotonic() - session.last_viewed < FINAL_FETCH_TIMEOUT and not session.fully_viewed and time.monotonic() < until:
         time.sleep(0.02)
 
 

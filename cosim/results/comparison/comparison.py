@@ -13,10 +13,10 @@ import numpy as np
 
 from ...core.errors import InputError, did_you_mean
 from .. import Result
-from .tube import EvenWindows, Points, Tolerance, Tube, Windows, even_spacing, slack
+from .tube import ComparisonPoints, TimeWindows, Tolerance, Tube, UniformTimeWindows, time_tolerance, uniform_spacing
 
 #: a share of all points that is quicker to look at on its own
-FEW = 0.1
+DENSE_FRACTION = 0.1
 
 
 class Verdict(NamedTuple):
@@ -79,9 +79,9 @@ def compare(result: Result, reference: Result, tolerances: Mapping[str, Toleranc
     fail where they are not equal. A pattern that matches nothing fails as well, so a comparison of nothing does not pass.
     Raises InputError for tolerances that are negative, NaN or infinite.
     """
-    if problems := list(_problems(tolerances)):
+    if problems := list(_find_tolerance_problems(tolerances)):
         raise InputError(problems)
-    chosen = matched(tolerances, list(reference))
+    chosen = match_tolerances(tolerances, list(reference))
     idle = [pattern for pattern in tolerances if not reference.signals(pattern)]
     general = [
         Verdict(f'"{pattern}"', f"matches no signal of the reference{did_you_mean(pattern, reference)}") for pattern in idle
@@ -89,17 +89,17 @@ def compare(result: Result, reference: Result, tolerances: Mapping[str, Toleranc
     if not len(reference.time) or not len(result.time):
         return Comparison((*general, Verdict("the reference" if not len(reference.time) else "the result", "has no rows")))
     comparer = Comparer(result, reference)
-    return Comparison((*general, *(comparer.verdict(name, tolerance) for name, tolerance in chosen.items())))
+    return Comparison((*general, *(comparer.compare_signal(name, tolerance) for name, tolerance in chosen.items())))
 
 
-def _problems(tolerances: Mapping[str, Tolerance]) -> Iterator[str]:
+def _find_tolerance_problems(tolerances: Mapping[str, Tolerance]) -> Iterator[str]:
     for pattern, tolerance in tolerances.items():
         for name, value in tolerance._asdict().items():
             if not 0 <= value < math.inf:
                 yield f'tolerance of "{pattern}": "{name}" is {value}, expected a finite number of at least 0'
 
 
-def matched(tolerances: Mapping[str, Tolerance], names: list[str]) -> dict[str, Tolerance]:
+def match_tolerances(tolerances: Mapping[str, Tolerance], names: list[str]) -> dict[str, Tolerance]:
     """The tolerance of each of `names` that matches a pattern, in their order."""
     patterns = [
         (re.compile(".*".join(map(re.escape, pattern.split("*")))), tolerance) for pattern, tolerance in tolerances.items()
@@ -115,117 +115,119 @@ class Comparer:
         self._result, self._reference = result, reference
 
     @cached_property
-    def points(self) -> Points:
-        return Points(self._result.time, self._reference.time)
+    def points(self) -> ComparisonPoints:
+        return ComparisonPoints(self._result.time, self._reference.time)
 
     def tube(self, name: str, tolerance: Tolerance, rows: slice | np.ndarray = slice(None)) -> Tube:
         """The tube around a signal of the reference at `points`, or at some of them."""
         time = self.points.time[rows]
-        reference = _numbers(self._reference, name)
+        reference = _to_floats(self._reference, name)
         if self._spacing and isinstance(rows, slice):
-            lower, upper = EvenWindows(self._spacing, tolerance.time).extremes(reference)
+            lower, upper = UniformTimeWindows(self._spacing, tolerance.time).extremes(reference)
         else:
-            lower, upper = Windows(self._reference.time, time, tolerance.time).extremes(reference)
+            lower, upper = TimeWindows(self._reference.time, time, tolerance.time).extremes(reference)
         half_width = tolerance.half_width(reference)
         return Tube(time, lower - half_width, upper + half_width)
 
     @cached_property
     def _spacing(self) -> float:
         """The distance between points (s) where they are the rows of the reference, all at even distances, else 0."""
-        return even_spacing(self.points.time) if np.array_equal(self.points.time, self._reference.time) else 0.0
+        return uniform_spacing(self.points.time) if np.array_equal(self.points.time, self._reference.time) else 0.0
 
-    def outside(self, name: str, tolerance: Tolerance) -> np.ndarray:
+    def is_outside(self, name: str, tolerance: Tolerance) -> np.ndarray:
         """Whether the result is outside the tube around a signal, at each of `points`."""
-        tube, values = self.tube(name, tolerance), self.points.values(_numbers(self._result, name))
+        tube, values = self.tube(name, tolerance), self.points.interpolate_result(_to_floats(self._result, name))
         return (values < tube.lower) | (values > tube.upper)
 
-    def verdict(self, name: str, tolerance: Tolerance) -> Verdict:
-        if problem := next(self._obstacles(name), None):
+    def compare_signal(self, name: str, tolerance: Tolerance) -> Verdict:
+        if problem := next(self._find_comparison_problems(name), None):
             return problem
         if self._result[name].dtype == object:
-            return self._texts(name)
-        return self._inside(name, tolerance)
+            return self._compare_texts(name)
+        return self._compare_numbers(name, tolerance)
 
-    def _obstacles(self, name: str) -> Iterator[Verdict]:
+    def _find_comparison_problems(self, name: str) -> Iterator[Verdict]:
         """Why a signal cannot be compared."""
         if name not in self._result:
             yield Verdict(name, f"is missing{did_you_mean(name, self._result)}")
             return
-        if text := self._coverage:
+        if text := self._coverage_problem:
             yield Verdict(name, text)
         runs = {"result": self._result, "reference": self._reference}
         texts = [who for who, run in runs.items() if run[name].dtype == object]
         if len(texts) == 1:
             yield Verdict(name, f"holds text in the {texts[0]}, and numbers in the other")
         if not texts:
-            yield from self._not_finite(name, "result", self.points.time, self.points.values(_numbers(self._result, name)))
-            yield from self._not_finite(name, "reference", self._reference.time, _numbers(self._reference, name))
+            yield from self._find_non_finite(
+                name, "result", self.points.time, self.points.interpolate_result(_to_floats(self._result, name))
+            )
+            yield from self._find_non_finite(name, "reference", self._reference.time, _to_floats(self._reference, name))
 
     @cached_property
-    def _coverage(self) -> str:
+    def _coverage_problem(self) -> str:
         """How the result is too short, "" when it is not."""
         own, other = self._result.time, self._reference.time
-        margin = slack(other)
+        margin = time_tolerance(other)
         if own[0] - margin <= other[0] and other[-1] <= own[-1] + margin:
             return ""
         return f"covers {own[0]:g} s to {own[-1]:g} s only, the reference {other[0]:g} s to {other[-1]:g} s"
 
     @staticmethod
-    def _not_finite(name: str, who: str, time: np.ndarray, values: np.ndarray) -> Iterator[Verdict]:
+    def _find_non_finite(name: str, who: str, time: np.ndarray, values: np.ndarray) -> Iterator[Verdict]:
         rows = np.flatnonzero(~np.isfinite(values))
         if rows.size:
             row = rows[0]
             yield Verdict(name, f"is {values[row]} at t = {time[row]:g} s in the {who}", float(time[row]))
 
-    def _texts(self, name: str) -> Verdict:
+    def _compare_texts(self, name: str) -> Verdict:
         """Texts hold until the next row; at the rows of both they have to be equal."""
         own, other = self._result.time, self._reference.time
-        covered = own[(own >= other[0] - slack(other)) & (own <= other[-1] + slack(other))]
+        covered = own[(own >= other[0] - time_tolerance(other)) & (own <= other[-1] + time_tolerance(other))]
         time = np.union1d(covered, other)
-        found, expected = (_held(run, name, time) for run in (self._result, self._reference))
+        found, expected = (_sample_and_hold(run, name, time) for run in (self._result, self._reference))
         different = np.flatnonzero(found != expected)
         if not different.size:
             return Verdict(name, excess=-math.inf)
         row = different[0]
         return Verdict(name, f'is "{found[row]}" at t = {time[row]:g} s, expected "{expected[row]}"', float(time[row]))
 
-    def _inside(self, name: str, tolerance: Tolerance) -> Verdict:
+    def _compare_numbers(self, name: str, tolerance: Tolerance) -> Verdict:
         """Most points are close to the reference at their own time: the others alone are held against the tube."""
-        values, reference = self.points.values(_numbers(self._result, name)), _numbers(self._reference, name)
+        values, reference = self.points.interpolate_result(_to_floats(self._result, name)), _to_floats(self._reference, name)
         half_width = tolerance.half_width(reference)
-        off = np.abs(values - self.points.nearby(reference))
+        off = np.abs(values - self.points.interpolate_reference(reference))
         doubtful = np.flatnonzero(off > half_width)
-        rows = doubtful if doubtful.size < FEW * off.size else slice(None)
+        rows = doubtful if doubtful.size < DENSE_FRACTION * off.size else slice(None)
         tube = self.tube(name, tolerance, rows)
         distance = np.maximum(tube.lower - values[rows], values[rows] - tube.upper)
         if distance.max(initial=0) > 0:
-            return self._outside(name, tube, values[rows], distance, half_width)
-        return Verdict(name, time=math.inf, excess=_relative(min(float(off.max()) - half_width, 0.0), half_width))
+            return self._tube_violation(name, tube, values[rows], distance, half_width)
+        return Verdict(name, time=math.inf, excess=_relative_excess(min(float(off.max()) - half_width, 0.0), half_width))
 
-    def _outside(self, name: str, tube: Tube, values: np.ndarray, distance: np.ndarray, half_width: float) -> Verdict:
+    def _tube_violation(self, name: str, tube: Tube, values: np.ndarray, distance: np.ndarray, half_width: float) -> Verdict:
         outside = np.flatnonzero(distance > 0)
-        row, worst, unit = outside[0], int(distance.argmax()), self._unit(name)
+        row, worst, unit = outside[0], int(distance.argmax()), self._unit_suffix(name)
         side, bound = ("above", tube.upper) if values[row] > tube.upper[row] else ("below", tube.lower)
         text = (
             f"leaves its tube at t = {tube.time[row]:g} s: {values[row]:.6g}{unit} is {distance[row]:.3g}{unit} {side} "
             f"{bound[row]:.6g}{unit}; at most {distance[worst]:.3g}{unit} outside, at t = {tube.time[worst]:g} s; "
             f"{outside.size} of {self.points.time.size} points outside"
         )
-        return Verdict(name, text, float(tube.time[row]), _relative(distance[worst], half_width))
+        return Verdict(name, text, float(tube.time[row]), _relative_excess(distance[worst], half_width))
 
-    def _unit(self, name: str) -> str:
+    def _unit_suffix(self, name: str) -> str:
         unit = self._result.units.get(name) or self._reference.units.get(name)
         return f" {unit}" if unit and unit != "1" else ""
 
 
-def _numbers(run: Result, name: str) -> np.ndarray:
+def _to_floats(run: Result, name: str) -> np.ndarray:
     return run[name].astype(np.float64, copy=False)
 
 
-def _held(run: Result, name: str, time: np.ndarray) -> np.ndarray:
+def _sample_and_hold(run: Result, name: str, time: np.ndarray) -> np.ndarray:
     """Texts at these times."""
-    return run[name][np.searchsorted(run.time, time + slack(time), "right") - 1]
+    return run[name][np.searchsorted(run.time, time + time_tolerance(time), "right") - 1]
 
 
-def _relative(distance: float, half_width: float) -> float:
+def _relative_excess(distance: float, half_width: float) -> float:
     return float(distance) / half_width if half_width > 0 else math.inf if distance > 0 else 0.0

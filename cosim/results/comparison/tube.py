@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 #: times that differ by less than this, relative to the largest of them, are the same: sums of decimal fractions are not exact
-SAME_TIME = 1e-14
+RELATIVE_TIME_TOLERANCE = 1e-14
 
 #: by this share of the distance between rows they may be off, and still be evenly spaced
-_WHOLE = 1e-9
+_SPACING_TOLERANCE = 1e-9
 
 
 class Tolerance(NamedTuple):
@@ -47,23 +47,23 @@ class Tube(NamedTuple):
     upper: np.ndarray
 
 
-class Windows:
+class TimeWindows:
     """The pieces [t - reach, t + reach] of a reference around each of `times`, reach in s; beyond its ends there is nothing."""
 
     def __init__(self, reference_time: np.ndarray, times: np.ndarray, reach: float):
-        reach += slack(reference_time)
+        reach += time_tolerance(reference_time)
         begins, ends = times - reach, times + reach
         first = np.searchsorted(reference_time, begins, "left")
         last = np.searchsorted(reference_time, ends, "right") - 1
-        self._edges = [_Places(reference_time, moments) for moments in (begins, ends)]
-        self._levels = list(_levels(first, last))
+        self._edges = [_Interpolation(reference_time, moments) for moments in (begins, ends)]
+        self._levels = list(_doubling_levels(first, last))
 
     def extremes(self, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Smallest and largest value of the reference in each window, each of shape (times,)."""
         begins, ends = (places.values(reference) for places in self._edges)
-        return tuple(self._chosen(choose, choose(begins, ends), reference) for choose in (np.minimum, np.maximum))  # type: ignore
+        return tuple(self._extend_extremes(choose, choose(begins, ends), reference) for choose in (np.minimum, np.maximum))  # type: ignore
 
-    def _chosen(self, choose: np.ufunc, found: np.ndarray, row: np.ndarray) -> np.ndarray:
+    def _extend_extremes(self, choose: np.ufunc, found: np.ndarray, row: np.ndarray) -> np.ndarray:
         """Over all rows inside: after k rounds `row[i]` is the extreme of the 2**k rows from i on; two of those make a window."""
         for k, (windows, left, right) in enumerate(self._levels):
             if k:
@@ -73,7 +73,7 @@ class Windows:
         return found
 
 
-def _levels(first: np.ndarray, last: np.ndarray) -> Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def _doubling_levels(first: np.ndarray, last: np.ndarray) -> Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """For each k: the windows of 2**k ... 2**(k+1) - 1 rows, and where their first and their last 2**k rows begin."""
     exponents = np.frexp(np.maximum(last - first + 1, 0))[1] - 1
     for k in range(int(exponents.max(initial=-1)) + 1):
@@ -81,7 +81,7 @@ def _levels(first: np.ndarray, last: np.ndarray) -> Iterable[tuple[np.ndarray, n
         yield windows, first[windows], last[windows] - 2**k + 1
 
 
-class _Places:
+class _Interpolation:
     """Moments between the rows of a reference, held to its span."""
 
     def __init__(self, time: np.ndarray, moments: np.ndarray):
@@ -96,29 +96,29 @@ class _Places:
         return left + self._share * (right - left)
 
 
-class EvenWindows:
+class UniformTimeWindows:
     """As `Windows`, around every row of a reference whose rows are `spacing` (s) apart: about nine times faster."""
 
     def __init__(self, spacing: float, reach: float):
         rows = reach / spacing
-        self._count = round(rows) if abs(rows - round(rows)) < _WHOLE else int(rows)
+        self._count = round(rows) if abs(rows - round(rows)) < _SPACING_TOLERANCE else int(rows)
         self._share = max(rows - self._count, 0.0)
 
     def extremes(self, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Smallest and largest value of the reference in each window, each of shape (rows,)."""
         count, rows = self._count, len(reference)
         padded = np.pad(reference, count + 1, mode="edge")
-        begins = self._between(padded[1:], padded, rows)
-        ends = self._between(padded[2 * count + 1 :], padded[2 * count + 2 :], rows)
-        lower, upper = (_sliding(choose, padded[1:-1], 2 * count + 1) for choose in (np.minimum, np.maximum))
+        begins = self._interpolate_edges(padded[1:], padded, rows)
+        ends = self._interpolate_edges(padded[2 * count + 1 :], padded[2 * count + 2 :], rows)
+        lower, upper = (_sliding_extreme(choose, padded[1:-1], 2 * count + 1) for choose in (np.minimum, np.maximum))
         return np.minimum(lower, np.minimum(begins, ends)), np.maximum(upper, np.maximum(begins, ends))
 
-    def _between(self, last: np.ndarray, beyond: np.ndarray, rows: int) -> np.ndarray:
+    def _interpolate_edges(self, last: np.ndarray, beyond: np.ndarray, rows: int) -> np.ndarray:
         """The edges of all windows, between the last row inside and the one beyond it."""
         return last[:rows] + self._share * (beyond[:rows] - last[:rows])
 
 
-def _sliding(choose: np.ufunc, row: np.ndarray, width: int) -> np.ndarray:
+def _sliding_extreme(choose: np.ufunc, row: np.ndarray, width: int) -> np.ndarray:
     """The extreme of each `width` neighbours, by doubling."""
     length, rows = 1, len(row) - width + 1
     while 2 * length <= width:
@@ -127,47 +127,47 @@ def _sliding(choose: np.ufunc, row: np.ndarray, width: int) -> np.ndarray:
     return choose(row[:rows], row[width - length :][:rows])
 
 
-def even_spacing(time: np.ndarray) -> float:
+def uniform_spacing(time: np.ndarray) -> float:
     """The distance between rows (s) where it is the same everywhere, else 0."""
     if len(time) < 2:
         return 0.0
     spacing = float(time[-1] - time[0]) / (len(time) - 1)
     even = time[0] + spacing * np.arange(len(time))
-    return spacing if spacing > 0 and np.abs(even - time).max() < _WHOLE * spacing else 0.0
+    return spacing if spacing > 0 and np.abs(even - time).max() < _SPACING_TOLERANCE * spacing else 0.0
 
 
-def slack(time: np.ndarray) -> float:
+def time_tolerance(time: np.ndarray) -> float:
     """By how much two times of `time` may differ and yet be the same, in s."""
-    return SAME_TIME * float(np.abs(time[[0, -1]]).max())
+    return RELATIVE_TIME_TOLERANCE * float(np.abs(time[[0, -1]]).max())
 
 
-class Points:
+class ComparisonPoints:
     """Where a result is held against a reference: at its own rows within the span of the reference, and, interpolated linearly,
     at the reference's times between them, so that a coarse result misses nothing.
     """
 
     def __init__(self, result_time: np.ndarray, reference_time: np.ndarray):
-        margin = slack(reference_time)
+        margin = time_tolerance(reference_time)
         self._result_time = result_time
         self._rows = slice(
             int(np.searchsorted(result_time, reference_time[0] - margin, "left")),
             int(np.searchsorted(result_time, reference_time[-1] + margin, "right")),
         )
-        self._between = np.setdiff1d(reference_time, result_time)
-        times = np.concatenate([result_time[self._rows], self._between])
-        self._order = np.argsort(times, kind="stable") if self._between.size else slice(None)
+        self._reference_times = np.setdiff1d(reference_time, result_time)
+        times = np.concatenate([result_time[self._rows], self._reference_times])
+        self._order = np.argsort(times, kind="stable") if self._reference_times.size else slice(None)
         self.time = times[self._order]
         self._reference_time = reference_time
 
-    def nearby(self, reference: np.ndarray) -> np.ndarray:
+    def interpolate_reference(self, reference: np.ndarray) -> np.ndarray:
         """A signal of the reference at all points, interpolated linearly, shape (points,)."""
         if np.array_equal(self.time, self._reference_time):
             return reference
         return np.interp(self.time, self._reference_time, reference)
 
-    def values(self, result: np.ndarray) -> np.ndarray:
+    def interpolate_result(self, result: np.ndarray) -> np.ndarray:
         """A signal of the result at all points, shape (points,)."""
         own = result[self._rows]
-        if not self._between.size:
+        if not self._reference_times.size:
             return own
-        return np.concatenate([own, np.interp(self._between, self._result_time, result)])[self._order]
+        return np.concatenate([own, np.interp(self._reference_times, self._result_time, result)])[self._order]

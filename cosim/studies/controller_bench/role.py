@@ -26,7 +26,7 @@ from pydantic import TypeAdapter, ValidationError
 from ...components.fmi import FmuFile
 from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
-from ...core.units import Unit, parse
+from ...core.units import Unit, parse_unit
 from ...scenario.json_document import Document, read_document
 from ...scenario.schema import Spec
 
@@ -65,36 +65,36 @@ class Role:
 
 def read_role(role: str) -> Role:
     """A shipped role by its name, or one of the user's own by the path of its JSON file. Raises InputError."""
-    file = _find(role)
+    file = _find_role(role)
     document = read_document(file)
-    spec = _validated(document)
+    spec = _validate_role(document)
     folder = file.parent.resolve()
-    inputs = [item for name, source in spec.inputs.items() for item in _inputs(name, source, folder)]
+    inputs = [item for name, source in spec.inputs.items() for item in _input_units(name, source, folder)]
     return Role(
         file.stem,
         spec.description,
         dict(inputs),
-        {name: _unit(unit) for name, unit in spec.outputs.items()},
-        {name: _unit(unit) for name, unit in spec.parameters.items()},
+        {name: _parse_unit(unit) for name, unit in spec.outputs.items()},
+        {name: _parse_unit(unit) for name, unit in spec.parameters.items()},
         frozenset((folder / path).resolve() for path in spec.controllers),
         {(folder / path).resolve(): (folder / system).resolve() for path, system in spec.stand_ins.items()},
     )
 
 
-def roles() -> list[str]:
+def role_names() -> list[str]:
     """Names of the shipped roles."""
     return sorted(path.stem for path in (resources.root() / "scenarios/roles").glob("*.json"))
 
 
-def _find(role: str) -> Path:
+def _find_role(role: str) -> Path:
     if role.endswith(".json"):
         return Path(role)
-    if role not in roles():
-        raise InputError(f'there is no role "{role}"{did_you_mean(role, roles()) or "; valid: " + ", ".join(roles())}')
+    if role not in role_names():
+        raise InputError(f'there is no role "{role}"{did_you_mean(role, role_names()) or "; valid: " + ", ".join(role_names())}')
     return resources.root() / "scenarios/roles" / f"{role}.json"
 
 
-def _validated(document: Document) -> RoleSpec:
+def _validate_role(document: Document) -> RoleSpec:
     problems = list(document.problems)
     try:
         spec = TypeAdapter(RoleSpec).validate_python(document.value)
@@ -105,21 +105,21 @@ def _validated(document: Document) -> RoleSpec:
     return spec
 
 
-def _inputs(name: str, source: str | OutputsSpec, folder: Path) -> list[tuple[str, Unit | None]]:
+def _input_units(name: str, source: str | OutputsSpec, folder: Path) -> list[tuple[str, Unit | None]]:
     if isinstance(source, str):
-        return [(name, _unit(source))]
+        return [(name, _parse_unit(source))]
     outputs = (v for v in FmuFile(folder / source.outputs_of).description.variables if v.causality == "output")
     head = f"{source.below}." if source.below else ""
     return [
         (f"{name}.{slot.removeprefix(head)}", variable.unit)
         for variable in outputs
-        for slot in variable.slots
+        for slot in variable.scalar_names
         if slot.startswith(head)
     ]
 
 
-def _unit(text: str) -> Unit | None:
+def _parse_unit(text: str) -> Unit | None:
     try:
-        return parse(text) if text else None
+        return parse_unit(text) if text else None
     except ValueError as error:
         raise InputError(str(error)) from None

@@ -14,11 +14,11 @@ from ...core.version import __version__
 from ...results.checks import CheckOutcome, Number, evaluate_checks
 
 #: numbers that differ by less than this share are equal
-SAME = 0.01
+EQUALITY_TOLERANCE = 0.01
 
 
 @dataclass(frozen=True)
-class Scores:
+class RunKpis:
     """What a run left behind, as far as it counts here."""
 
     kpis: Mapping[str, Number]
@@ -26,7 +26,7 @@ class Scores:
     senses: Mapping[str, str]
 
     @classmethod
-    def read(cls, directory: Path) -> Scores | None:
+    def read(cls, directory: Path) -> RunKpis | None:
         """Those of the folder that `cosim run` wrote, None where there is no run that came to its end."""
         try:
             kpis, about = (json.loads((directory / name).read_text(encoding="utf-8")) for name in ("kpis.json", "run.json"))
@@ -47,7 +47,7 @@ def is_current(directory: Path, scenario: Path) -> bool:
         return False
 
 
-def verdict(value: Number | None, other: Number | None, sense: str | None) -> str:
+def compare_values(value: Number | None, other: Number | None, sense: str | None) -> str:
     """ "better" or "worse" than `other`, "" where they are the same, where one is missing or nothing says what is better.
 
     `sense` is "lower" or "higher", what is better. A number is better than NaN, which did not happen.
@@ -56,12 +56,12 @@ def verdict(value: Number | None, other: Number | None, sense: str | None) -> st
         return ""
     if math.isnan(value) or math.isnan(other):
         return "worse" if math.isnan(value) else "better"
-    if abs(value - other) <= SAME * max(abs(value), abs(other)):
+    if abs(value - other) <= EQUALITY_TOLERANCE * max(abs(value), abs(other)):
         return ""
     return "better" if (value < other) == (sense == "lower") else "worse"
 
 
-def senses(declared: Mapping[str, str], checks: list[Mapping[str, Any]]) -> dict[str, str]:
+def merge_senses(declared: Mapping[str, str], checks: list[Mapping[str, Any]]) -> dict[str, str]:
     """What is better for each KPI: as its function declares, else as its check has it ("max": the lower the better)."""
     of_checks = {
         check["kpi"]: "lower" if "max" in check else "higher"
@@ -72,7 +72,7 @@ def senses(declared: Mapping[str, str], checks: list[Mapping[str, Any]]) -> dict
 
 
 @dataclass(frozen=True)
-class Row:
+class KpiComparison:
     """One KPI in one scenario: numbers of the candidate, the shipped controller and the candidate's last run (None: no such)."""
 
     name: str
@@ -85,15 +85,17 @@ class Row:
     checks: tuple[CheckOutcome, ...]
 
 
-def rows(candidate: Scores, shipped: Scores | None, last: Scores | None, checks: list[Mapping[str, Any]]) -> list[Row]:
+def compare_kpis(
+    candidate: RunKpis, shipped: RunKpis | None, last: RunKpis | None, checks: list[Mapping[str, Any]]
+) -> list[KpiComparison]:
     """The KPIs of the candidate in their order."""
-    better = senses(candidate.senses, checks)
+    better = merge_senses(candidate.senses, checks)
     outcomes = evaluate_checks(candidate.kpis, checks)
 
-    def row(name: str, value: Number) -> Row:
+    def row(name: str, value: Number) -> KpiComparison:
         of_shipped, of_last = (scores.kpis.get(name) if scores else None for scores in (shipped, last))
-        against_shipped, against_last = (verdict(value, other, better.get(name)) for other in (of_shipped, of_last))
+        against_shipped, against_last = (compare_values(value, other, better.get(name)) for other in (of_shipped, of_last))
         own = tuple(outcome for outcome in outcomes if outcome.check["kpi"] == name)
-        return Row(name, candidate.units.get(name, ""), value, of_shipped, of_last, against_shipped, against_last, own)
+        return KpiComparison(name, candidate.units.get(name, ""), value, of_shipped, of_last, against_shipped, against_last, own)
 
     return [row(name, value) for name, value in candidate.kpis.items()]

@@ -15,12 +15,12 @@ from ...components.python_class import package_files, package_root
 from ...core import paths, resources
 from ...core.errors import InputError, Problem
 from ...core.version import __version__
-from ...scenario import load
+from ...scenario import load_scenario
 from ...scenario.nested_systems import Node
 from ...scenario.schema import ComponentSpec
 
 
-def identity() -> str:
+def cosim_fingerprint() -> str:
     """Version of cosim and a hash of its sources and of the FMUs it ships: what must be the same for results to be the same."""
     package = resources.package_folder()
     own = sorted(path for path in package.rglob("*.py") if "_bundle" not in path.parts)
@@ -42,9 +42,9 @@ class Bundle:
     @cached_property
     def digest(self) -> str:
         """What the files are, wherever they lie, and the cosim that runs them."""
-        return sha256(json.dumps([identity(), str(self.scenario), sorted(self.files.items())]).encode()).hexdigest()
+        return sha256(json.dumps([cosim_fingerprint(), str(self.scenario), sorted(self.files.items())]).encode()).hexdigest()
 
-    def contents(self, hashes: Iterable[str]) -> dict[str, bytes]:
+    def read_contents(self, hashes: Iterable[str]) -> dict[str, bytes]:
         """Contents by their hash. Raises InputError when a file has changed since."""
         wanted = set(hashes)
         found = {sha: (self.root / path).read_bytes() for path, sha in self.files.items() if sha in wanted}
@@ -54,15 +54,15 @@ class Bundle:
         return found
 
 
-def bundle(scenario: Path, variants: Iterable[Mapping[str, Any]] = ({},)) -> Bundle:
+def collect_bundle(scenario: Path, variants: Iterable[Mapping[str, Any]] = ({},)) -> Bundle:
     """The files of a scenario, also of those that it names with one of the `variants` of its settings."""
-    used = {path for settings in variants for path in _files(scenario, settings)}
+    used = {path for settings in variants for path in _scenario_files(scenario, settings)}
     root = Path(os.path.commonpath([path.parent for path in used]))
     files = {path.relative_to(root).as_posix(): sha256(path.read_bytes()).hexdigest() for path in sorted(used)}
     return Bundle(root, PurePosixPath(scenario.resolve().relative_to(root).as_posix()), files)
 
 
-def fmus(files: Iterable[str]) -> tuple[str, ...]:
+def fmu_paths(files: Iterable[str]) -> tuple[str, ...]:
     """Those of some files that are FMUs."""
     return tuple(sorted(path for path in files if path.endswith(".fmu")))
 
@@ -71,65 +71,65 @@ def absolute_paths(scenario: Path, settings: Mapping[str, Any]) -> list[Problem]
     """Paths that mean nothing on another machine."""
     return [
         Problem(f'absolute path "{path}" cannot be shipped to a cluster, expected one relative to this file', where)
-        for node in load(scenario, _pointers(settings)).root.walk()
-        for path, where in _named(node)
+        for node in load_scenario(scenario, _pointer_settings(settings)).root.walk()
+        for path, where in _named_files(node)
         if Path(path).is_absolute() and paths.is_file(Path(path))
     ]
 
 
-def _files(scenario: Path, settings: Mapping[str, Any]) -> Iterator[Path]:
-    root = load(scenario, _pointers(settings)).root
+def _scenario_files(scenario: Path, settings: Mapping[str, Any]) -> Iterator[Path]:
+    root = load_scenario(scenario, _pointer_settings(settings)).root
     for node in root.walk():
         yield node.document.file.resolve()
-        yield from _there(node.folder, (name for name, _ in _named(node)))
+        yield from _existing_files(node.folder, (name for name, _ in _named_files(node)))
     variables = [value for name, value in settings.items() if not name.startswith("/")]
-    yield from _there(root.folder, _texts(variables))
+    yield from _existing_files(root.folder, _strings(variables))
 
 
-def _there(folder: Path, names: Iterable[str]) -> Iterator[Path]:
+def _existing_files(folder: Path, names: Iterable[str]) -> Iterator[Path]:
     """Those of some names that are files, Python ones with their packages."""
-    for path in (paths.real(folder / name) for name in names):
+    for path in (paths.resolve_path(folder / name) for name in names):
         if paths.is_file(path):
-            yield from _package(path) if path.suffix == ".py" else [path]
+            yield from _package_files(path) if path.suffix == ".py" else [path]
 
 
-def _pointers(settings: Mapping[str, Any]) -> dict[str, Any]:
+def _pointer_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Those that change the scenario's JSON."""
     return {name: value for name, value in settings.items() if name.startswith("/")}
 
 
-def _named(node: Node) -> Iterator[tuple[str, str]]:
+def _named_files(node: Node) -> Iterator[tuple[str, str]]:
     """(path, where it stands) of all files that a system names, and of texts in arguments and parameters that may be files."""
     for name, component in node.spec.components.items():
         where = node.where("components", name)
-        yield from ((path, where) for path in _sources(component))
+        yield from ((path, where) for path in _component_paths(component))
     for i, profile in enumerate(getattr(node.spec, "inputs", ())):
         yield profile.file, node.where("inputs", i)
     for i, kpi in enumerate(getattr(node.spec, "kpis", ())):
         where = node.where("kpis", i)
-        yield from ((path, where) for path in (kpi.python.rpartition(":")[0], *_texts(kpi.arguments)))
+        yield from ((path, where) for path in (kpi.python.rpartition(":")[0], *_strings(kpi.arguments)))
 
 
-def _sources(component: ComponentSpec) -> Iterator[str]:
+def _component_paths(component: ComponentSpec) -> Iterator[str]:
     for path in (component.fmu, component.system):
         if path is not None:
             yield path
     for reference in (component.python, component.modelica):
         if reference is not None:
             yield reference.rpartition(":")[0]
-    yield from _texts(component.arguments)
-    yield from _texts(component.parameters)
+    yield from _strings(component.arguments)
+    yield from _strings(component.parameters)
 
 
-def _texts(value: Any) -> Iterator[str]:
+def _strings(value: Any) -> Iterator[str]:
     if isinstance(value, dict | list):
         for item in value.values() if isinstance(value, dict) else value:
-            yield from _texts(item)
+            yield from _strings(item)
     elif isinstance(value, str) and value and "\0" not in value:
         yield value
 
 
-def _package(path: Path) -> Iterator[Path]:
+def _package_files(path: Path) -> Iterator[Path]:
     """A Python file and, when it is in a package, everything in the outermost one, data too."""
     if package_files(path) == [path]:
         yield path

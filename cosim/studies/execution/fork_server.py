@@ -23,16 +23,16 @@ from typing import Any
 from ...components.fmi import FmuFile
 from ...components.python_class import load_object
 from ...core.errors import CosimError
-from ...process.sandbox.process import detach, threads
-from ...process.temporary_folders import run_folder
-from ...scenario import load
+from ...process.sandbox.process import detach, thread_count
+from ...process.temporary_folders import temporary_run_folder
+from ...scenario import load_scenario
 from ...scenario.functions import function_problem, load_function
 from ...scenario.nested_systems import Scenario
-from .job import Job, Order
-from .run import Prepared, Replay, supervised_check, supervised_run
+from .job import Job, StudyContext
+from .run import FmuFiles, ReplayRequest, supervised_check, supervised_run
 
 #: what a run imports on its way
-_MODULES = (
+_PRELOADED_MODULES = (
     "fmpy.fmi1",
     "fmpy.fmi2",
     "fmpy.fmi3",
@@ -42,23 +42,23 @@ _MODULES = (
 )
 
 
-def serve(control: socket.socket) -> None:
+def serve_forks(control: socket.socket) -> None:
     """Fork lanes until whoever started this process is gone."""
     if not (message := control.recv(1 << 16)):
         return
     request = json.loads(message)
-    order = Order(Path(request["scenario"]), Path(request["root"]), request["deadline"], tuple(request["fmus"]))
-    with run_folder() as folder:
+    order = StudyContext(Path(request["scenario"]), Path(request["root"]), request["deadline"], tuple(request["fmus"]))
+    with temporary_run_folder() as folder:
         tempfile.tempdir = os.environ["TMPDIR"] = folder
-        for module in _MODULES:
+        for module in _PRELOADED_MODULES:
             import_module(module)
-        prepared = {} if request["cold"] else dict(_warm(order))
+        prepared = {} if request["cold"] else dict(_preload(order))
         gc.freeze()
-        control.sendall(b"warm" if request["cold"] or threads() == 1 else b"cold")
+        control.sendall(b"warm" if request["cold"] or thread_count() == 1 else b"cold")
         lanes: list[int] = []
         try:
             while descriptors := socket.recv_fds(control, 16, 1)[1]:
-                lanes.append(_fork(control, descriptors[0], order, prepared))
+                lanes.append(_fork_worker(control, descriptors[0], order, prepared))
                 os.close(descriptors[0])
         finally:
             for lane in lanes:
@@ -67,19 +67,19 @@ def serve(control: socket.socket) -> None:
                     os.waitpid(lane, 0)
 
 
-def _warm(order: Order) -> Iterator[tuple[Path, FmuFile]]:
+def _preload(order: StudyContext) -> Iterator[tuple[Path, FmuFile]]:
     """Import what the scenario uses as it stands in its file, unpack all FMUs; what is wrong with them, the runs will say."""
     with suppress(CosimError):
-        _import(load(order.scenario))
+        _preload_components(load_scenario(order.scenario))
     for path in order.fmus:
         with suppress(CosimError):
             file = FmuFile(order.root / path)
-            if not file.description.only_once_per_process:
+            if not file.description.once_per_process:
                 file.acquire()
                 yield (order.root / path).resolve(), file
 
 
-def _import(scenario: Scenario) -> None:
+def _preload_components(scenario: Scenario) -> None:
     for node, name in scenario.root.leaves():
         reference = node.spec.components[name].python
         if reference and (warm := getattr(load_object(reference, node.folder), "warm", None)):
@@ -90,7 +90,7 @@ def _import(scenario: Scenario) -> None:
         load_function(kpi.python, scenario.root.folder)
 
 
-def _fork(control: socket.socket, descriptor: int, order: Order, prepared: Prepared) -> int:
+def _fork_worker(control: socket.socket, descriptor: int, order: StudyContext, prepared: FmuFiles) -> int:
     template = os.getpid()
     child = os.fork()
     if child:
@@ -98,29 +98,29 @@ def _fork(control: socket.socket, descriptor: int, order: Order, prepared: Prepa
     try:
         control.close()
         detach(template)
-        _quiet()
-        _answer_all(socket.socket(fileno=descriptor), order, prepared)
+        _redirect_output()
+        _serve_requests(socket.socket(fileno=descriptor), order, prepared)
     finally:
         os._exit(0)
 
 
-def _quiet() -> None:
+def _redirect_output() -> None:
     """What is printed here goes to a file without a name."""
     with tempfile.TemporaryFile("ab") as file:
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
 
 
-def _answer_all(client: socket.socket, order: Order, prepared: Prepared) -> None:
+def _serve_requests(client: socket.socket, order: StudyContext, prepared: FmuFiles) -> None:
     with client.makefile("rb") as requests:
         for line in requests:
-            client.sendall((_answer(json.loads(line), order, prepared) + "\n").encode())
+            client.sendall((_handle_request(json.loads(line), order, prepared) + "\n").encode())
 
 
-def _answer(request: dict[str, Any], order: Order, prepared: Prepared) -> str:
+def _handle_request(request: dict[str, Any], order: StudyContext, prepared: FmuFiles) -> str:
     job = Job(request["key"], request["settings"])
     if not request["check"]:
-        replay = Replay(**request["replay"]) if "replay" in request else None
+        replay = ReplayRequest(**request["replay"]) if "replay" in request else None
         return supervised_run(order, job, prepared, replay).to_json()
     try:
         found = supervised_check(order, job, prepared)
@@ -131,4 +131,4 @@ def _answer(request: dict[str, Any], order: Order, prepared: Prepared) -> str:
 
 if __name__ == "__main__":
     with suppress(ConnectionError):  # it was interrupted while this process warmed up
-        serve(socket.socket(fileno=int(sys.argv[1])))
+        serve_forks(socket.socket(fileno=int(sys.argv[1])))

@@ -40,7 +40,7 @@ class Record:
 
 
 @dataclass(frozen=True)
-class Order:
+class StudyContext:
     """What all runs have in common: the scenario's file, the folder its messages are relative to, and a run's deadline (s).
 
     `fmus` are the paths below that folder of all FMUs that some run uses.
@@ -52,12 +52,12 @@ class Order:
     fmus: tuple[str, ...] = ()
 
 
-class Engine(Protocol):
+class Runner(Protocol):
     """Runs jobs, several at a time, and answers in whatever order they end."""
 
-    def results(self, jobs: Iterable[Job]) -> Iterator[Record]: ...
+    def run_jobs(self, jobs: Iterable[Job]) -> Iterator[Record]: ...
 
 
-def key(digest: str, settings: Mapping[str, Any]) -> str:
+def run_key(digest: str, settings: Mapping[str, Any]) -> str:
     """The key of the run that scenario files of this digest make with these settings."""
     return sha256(json.dumps([digest, settings], sort_keys=True).encode()).hexdigest()[:32]

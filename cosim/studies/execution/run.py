@@ -15,47 +15,47 @@ from typing import IO, Any, NamedTuple
 
 from ...components.fmi import FmuFile
 from ...core.errors import ComponentError, CosimError, InputError, Problem
-from ...engine.run_loop import simulation
-from ...process.journal import CODE, Deadlines, Phase, current
-from ...process.run_files.folder import unfinished
-from ...process.supervisor import Outcome, supervised
+from ...engine.run_loop import simulating
+from ...process.journal import EXIT_CODE, Deadlines, Phase, current_journal
+from ...process.run_files.folder import keeping_run_files
+from ...process.supervisor import SupervisedOutcome, run_supervised
 from ...results import Result
 from ...results.kpi import evaluate_kpis
-from ...scenario import Assembly, assemble
-from .job import Job, Order, Record
+from ...scenario import PreparedRun, prepare
+from .job import Job, Record, StudyContext
 
 #: so much of what components printed is kept of a run that failed (bytes)
-_OUTPUT = 2000
+_MAX_OUTPUT = 2000
 
-Prepared = Mapping[Path, FmuFile]
+FmuFiles = Mapping[Path, FmuFile]
 
 
-class Replay(NamedTuple):
+class ReplayRequest(NamedTuple):
     """The page that is to be made of a run."""
 
     title: str
     page: str
 
 
-def supervised_run(order: Order, job: Job, prepared: Prepared, replay: Replay | None = None) -> Record:
+def supervised_run(order: StudyContext, job: Job, fmu_files: FmuFiles, replay: ReplayRequest | None = None) -> Record:
     """Run a job in a child process; what it prints goes to this process's standard error, which is a file.
 
     Whatever the run does, a record comes of it. With `replay` its 3-D replay is written.
     """
-    work = _run if replay is None else partial(_replayed, replay)
+    work = _run_job if replay is None else partial(_run_with_replay, replay)
     began = time.monotonic()
     os.ftruncate(2, 0)
     with tempfile.TemporaryFile("w+") as reply:
-        outcome = supervised(lambda: _reporting(reply, lambda: work(order, job, prepared, reply)))
-        record = _record(order, job, outcome, reply)
+        outcome = run_supervised(lambda: _run_reporting_failure(reply, lambda: work(order, job, fmu_files, reply)))
+        record = _make_record(order, job, outcome, reply)
     record = replace(record, seconds=round(time.monotonic() - began, 4))
     return replace(record, output=_last_output()) if record.failure else record
 
 
-def supervised_check(order: Order, job: Job, prepared: Prepared) -> list[Problem]:
+def supervised_check(order: StudyContext, job: Job, fmu_files: FmuFiles) -> list[Problem]:
     """What keeps a job from being run, without running it. Raises ComponentError when that ends the process."""
     with tempfile.TemporaryFile("w+") as reply:
-        outcome = supervised(lambda: _reporting(reply, lambda: _check(order, job, prepared, reply)))
+        outcome = run_supervised(lambda: _run_reporting_failure(reply, lambda: _check_job(order, job, fmu_files, reply)))
         if outcome.failure:
             raise outcome.failure
         reply.seek(0)
@@ -65,104 +65,104 @@ def supervised_check(order: Order, job: Job, prepared: Prepared) -> list[Problem
 # -- in the child ------------------------------------------------------------------------------------------------------------
 
 
-def _reporting(reply: IO[str], work: Callable[[], None]) -> int:
+def _run_reporting_failure(reply: IO[str], work: Callable[[], None]) -> int:
     """Do the work; what it raises becomes the reply."""
     try:
         work()
         return 0
     except CosimError as error:
-        _answer(reply, {"failure": str(error)})
+        _write_reply(reply, {"failure": str(error)})
         return error.exit_code
     except Exception as error:
-        _answer(reply, {"failure": f"internal error: {type(error).__name__}: {error}"})
+        _write_reply(reply, {"failure": f"internal error: {type(error).__name__}: {error}"})
         return 70
 
 
-def _answer(reply: IO[str], value: Any) -> None:
+def _write_reply(reply: IO[str], value: Any) -> None:
     reply.seek(0)
     reply.truncate()
     json.dump(value, reply)
     reply.flush()
 
 
-def _run(order: Order, job: Job, prepared: Prepared, reply: IO[str]) -> None:
+def _run_job(order: StudyContext, job: Job, prepared: FmuFiles, reply: IO[str]) -> None:
     _set_deadline(order)
-    assembly = _assembled(order, job, prepared)
-    with unfinished(Path(tempfile.gettempdir()) / "run"), simulation(assembly.system, assembly.settings) as outcome:
+    assembly = _prepare_job(order, job, prepared)
+    with keeping_run_files(Path(tempfile.gettempdir()) / "run"), simulating(assembly.system, assembly.settings) as outcome:
         if outcome.failure:
             raise outcome.failure
         kpis = evaluate_kpis(Result(outcome.recording), assembly.kpis())
-        _answer(reply, {"kpis": kpis})
-        _leave()
+        _write_reply(reply, {"kpis": kpis})
+        _results_written()
 
 
-def _replayed(replay: Replay, order: Order, job: Job, prepared: Prepared, reply: IO[str]) -> None:
-    from ...api import executed
+def _run_with_replay(replay: ReplayRequest, order: StudyContext, job: Job, prepared: FmuFiles, reply: IO[str]) -> None:
+    from ...api import executing
     from ...report.replay import write_replay
 
     _set_deadline(order)
-    with unfinished(Path(tempfile.gettempdir()) / "run"), executed(_assembled(order, job, prepared)) as execution:
+    with keeping_run_files(Path(tempfile.gettempdir()) / "run"), executing(_prepare_job(order, job, prepared)) as execution:
         result = execution.result
         write_replay([replace(result, metadata={**result.metadata, "name": replay.title})], Path(replay.page))
         if execution.failure:
             raise execution.failure
-        _answer(reply, {"kpis": result.kpis})
-        _leave()
+        _write_reply(reply, {"kpis": result.kpis})
+        _results_written()
 
 
-def _set_deadline(order: Order) -> None:
+def _set_deadline(order: StudyContext) -> None:
     if order.deadline:
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
         signal.setitimer(signal.ITIMER_REAL, order.deadline)
 
 
-def _assembled(order: Order, job: Job, prepared: Prepared) -> Assembly:
-    assembly = assemble(order.scenario, job.settings, prepared={path: file.lent() for path, file in prepared.items()})
-    if journal := current():
+def _prepare_job(order: StudyContext, job: Job, prepared: FmuFiles) -> PreparedRun:
+    assembly = prepare(order.scenario, job.settings, loaded_fmus={path: file.share() for path, file in prepared.items()})
+    if journal := current_journal():
         journal.deadlines = Deadlines(**assembly.spec.deadlines.model_dump())
     return assembly
 
 
-def _leave() -> None:
+def _results_written() -> None:
     """All results are written: what components do from now on cannot change them."""
     signal.setitimer(signal.ITIMER_REAL, 0)
-    if journal := current():
-        journal[CODE] = 0
-        journal.enter(Phase.LEAVING)
+    if journal := current_journal():
+        journal[EXIT_CODE] = 0
+        journal.enter_phase(Phase.RESULTS_WRITTEN)
 
 
-def _check(order: Order, job: Job, prepared: Prepared, reply: IO[str]) -> None:
+def _check_job(order: StudyContext, job: Job, prepared: FmuFiles, reply: IO[str]) -> None:
     problems: list[Problem] = []
     try:
-        _assembled(order, job, prepared).free()
+        _prepare_job(order, job, prepared).free()
     except InputError as error:
         problems = list(error.problems)
-    _answer(reply, [(problem.message, _relative(order, problem.where)) for problem in problems])
+    _write_reply(reply, [(problem.message, _without_root(order, problem.where)) for problem in problems])
 
 
 # -- in the supervisor -------------------------------------------------------------------------------------------------------
 
 
-def _record(order: Order, job: Job, outcome: Outcome, reply: IO[str]) -> Record:
+def _make_record(order: StudyContext, job: Job, outcome: SupervisedOutcome, reply: IO[str]) -> Record:
     if outcome.failure:
-        return Record(job.key, failure=_relative(order, _cause(order, outcome.failure)))
+        return Record(job.key, failure=_without_root(order, _failure_cause(order, outcome.failure)))
     reply.seek(0)
     answer = json.load(reply)
-    return Record(job.key, answer.get("kpis", {}), _relative(order, answer.get("failure", "")))
+    return Record(job.key, answer.get("kpis", {}), _without_root(order, answer.get("failure", "")))
 
 
-def _cause(order: Order, failure: ComponentError) -> str:
+def _failure_cause(order: StudyContext, failure: ComponentError) -> str:
     """How the child ended; that it was late does not depend on where it was then."""
     if order.deadline and f"signal {signal.SIGALRM:d} " in failure.reason:
         return f"the run did not end within {order.deadline:g} s"
     return str(failure)
 
 
-def _relative(order: Order, text: str) -> str:
+def _without_root(order: StudyContext, text: str) -> str:
     """The same text on every machine."""
     return text.replace(f"{order.root}/", "")
 
 
 def _last_output() -> str:
     size = os.fstat(2).st_size
-    return os.pread(2, _OUTPUT, max(0, size - _OUTPUT)).decode("utf-8", "replace")
+    return os.pread(2, _MAX_OUTPUT, max(0, size - _MAX_OUTPUT)).decode("utf-8", "replace")

@@ -13,38 +13,38 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import ComponentError, CosimError, Problem
-from .job import Job, Order, Record
+from .job import Job, Record, StudyContext
 
 #: a run is begun so often when the process that watches over it is killed
-ATTEMPTS = 3
+MAX_ATTEMPTS = 3
 #: imports may take so long, and the end of all runs (s)
-_WARM_UP, _PATIENCE = 120.0, 5.0
+_STARTUP_TIMEOUT, _SHUTDOWN_TIMEOUT = 120.0, 5.0
 #: so many FMUs are unpacked in advance
-_MOST_WARM = 100
+_MAX_PRELOADED_FMUS = 100
 #: one thread per process: many processes share the machine, and a process with threads cannot be forked
-_ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+_SINGLE_THREAD_ENVIRONMENT = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 #: a forked process touches all its memory for the first time: with large pages (glibc, Linux) that costs half as much
-_LARGE_PAGES = {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
+_LARGE_PAGES_ENVIRONMENT = {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
 
 
-class Lost(CosimError):
+class WorkerLost(CosimError):
     """The process at the other end is gone."""
 
 
-class _Lane:
+class Worker:
     """A process that answers one job after the other."""
 
     def __init__(self, connection: socket.socket):
         self._connection, self._answers = connection, connection.makefile("rb")
 
-    def ask(self, request: dict[str, Any]) -> bytes:
+    def request(self, request: dict[str, Any]) -> bytes:
         try:
             self._connection.sendall(json.dumps(request).encode() + b"\n")
             answer = self._answers.readline()
         except OSError:
             answer = b""
         if not answer.endswith(b"\n"):
-            raise Lost("a lane ended")
+            raise WorkerLost("a lane ended")
         return answer
 
     def close(self) -> None:
@@ -53,16 +53,16 @@ class _Lane:
         self._connection.close()
 
 
-class _Template:
+class _ForkServer:
     """The warm process. One that cannot be warmed up, or has threads then, is started again without."""
 
-    def __init__(self, order: Order):
-        if not self._start(order, cold=False):
+    def __init__(self, order: StudyContext):
+        if not self._start(order, preload=False):
             self.close()
-            if not self._start(order, cold=True):
+            if not self._start(order, preload=True):
                 raise ComponentError("cosim", "the template process", f"it ended with exit code {self._process.wait()}")
 
-    def _start(self, order: Order, cold: bool) -> bool:
+    def _start(self, order: StudyContext, preload: bool) -> bool:
         self._control, other = socket.socketpair()
         with other:
             command = [sys.executable, "-m", "cosim.studies.execution.fork_server", str(other.fileno())]
@@ -71,71 +71,71 @@ class _Template:
                 pass_fds=[other.fileno()],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
-                env={**_LARGE_PAGES, **os.environ, **_ONE_THREAD},
+                env={**_LARGE_PAGES_ENVIRONMENT, **os.environ, **_SINGLE_THREAD_ENVIRONMENT},
                 start_new_session=True,
             )
-        place = {"scenario": str(order.scenario.resolve()), "root": str(order.root), "fmus": order.fmus[:_MOST_WARM]}
-        request = {**place, "deadline": order.deadline, "cold": cold}
-        self._control.settimeout(_WARM_UP)
+        place = {"scenario": str(order.scenario.resolve()), "root": str(order.root), "fmus": order.fmus[:_MAX_PRELOADED_FMUS]}
+        request = {**place, "deadline": order.deadline, "cold": preload}
+        self._control.settimeout(_STARTUP_TIMEOUT)
         with suppress(OSError):
             self._control.sendall(json.dumps(request).encode())
             return self._control.recv(16) == b"warm"
         return False
 
-    def lane(self) -> _Lane:
+    def fork_worker(self) -> Worker:
         """A new lane. Raises OSError when the template is gone."""
         own, other = socket.socketpair()
         with other:
             socket.send_fds(self._control, [b"lane"], [other.fileno()])
-        return _Lane(own)
+        return Worker(own)
 
     @property
-    def process(self) -> int:
+    def pid(self) -> int:
         return self._process.pid
 
     def close(self) -> None:
         """It ends itself, and its lanes, when nobody can ask any more."""
         self._control.close()
         try:
-            self._process.wait(_PATIENCE)
+            self._process.wait(_SHUTDOWN_TIMEOUT)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
 
 
-class Shop:
+class WorkerPool:
     """Runs jobs; several threads may ask at a time, each gets a lane of its own. Killed templates and lanes are replaced."""
 
-    def __init__(self, order: Order):
-        self._order, self._lock, self._idle = order, threading.Lock(), list[_Lane]()
-        self._busy: set[_Lane] = set()
-        self._template: _Template | None = None
+    def __init__(self, order: StudyContext):
+        self._context, self._lock, self._idle = order, threading.Lock(), list[Worker]()
+        self._busy: set[Worker] = set()
+        self._fork_server: _ForkServer | None = None
         self._closed = False
 
     def run(self, job: Job) -> Record:
         """The record of a run. Raises Lost when the shop is closed meanwhile."""
         try:
-            return Record.from_json(self._ask(job, check=False))
-        except Lost as error:
+            return Record.from_json(self._request(job, check=False))
+        except WorkerLost as error:
             if self._closed:
                 raise
             return Record(job.key, failure=str(error))
 
     def check(self, job: Job) -> list[Problem]:
         """What keeps a job from being run."""
-        return [Problem(message, where) for message, where in json.loads(self._ask(job, check=True))]
+        return [Problem(message, where) for message, where in json.loads(self._request(job, check=True))]
 
     def replay(self, job: Job, title: str, page: Path) -> Record:
         """Run a job once more and write its 3-D replay; of a run that fails, what was recorded until then."""
-        return Record.from_json(self._ask(job, check=False, replay={"title": title, "page": str(page.resolve())}))
+        return Record.from_json(self._request(job, check=False, replay={"title": title, "page": str(page.resolve())}))
 
-    def _ask(self, job: Job, check: bool, **more: Any) -> bytes:
+    def _request(self, job: Job, check: bool, **more: Any) -> bytes:
         request = {"key": job.key, "settings": job.settings, "check": check, **more}
-        for _ in range(ATTEMPTS):
-            lane = self._borrow()
+        for _ in range(MAX_ATTEMPTS):
+            lane = self._acquire_worker()
             try:
-                answer = lane.ask(request)
-            except Lost:
+                answer = lane.request(request)
+            except WorkerLost:
                 self._busy.discard(lane)
                 lane.close()
                 continue
@@ -143,23 +143,23 @@ class Shop:
                 self._busy.discard(lane)
                 self._idle.append(lane)
             return answer
-        raise Lost(f"the process that watches over the run was killed {ATTEMPTS} times")
+        raise WorkerLost(f"the process that watches over the run was killed {MAX_ATTEMPTS} times")
 
-    def _borrow(self) -> _Lane:
+    def _acquire_worker(self) -> Worker:
         with self._lock:
             if self._closed:
-                raise Lost("the sweep was ended")
-            lane = self._idle.pop() if self._idle else self._new_lane()
+                raise WorkerLost("the sweep was ended")
+            lane = self._idle.pop() if self._idle else self._start_worker()
             self._busy.add(lane)
             return lane
 
-    def _new_lane(self) -> _Lane:
-        if self._template:
+    def _start_worker(self) -> Worker:
+        if self._fork_server:
             with suppress(OSError):
-                return self._template.lane()
-            self._template.close()
-        self._template = _Template(self._order)
-        return self._template.lane()
+                return self._fork_server.fork_worker()
+            self._fork_server.close()
+        self._fork_server = _ForkServer(self._context)
+        return self._fork_server.fork_worker()
 
     def close(self) -> None:
         """End all runs."""
@@ -167,5 +167,5 @@ class Shop:
         with self._lock:
             for lane in (*self._idle, *self._busy):
                 lane.close()
-            if self._template:
-                self._template.close()
+            if self._fork_server:
+                self._fork_server.close()

@@ -10,77 +10,77 @@ from os.path import normpath
 from pathlib import Path
 from typing import Any
 
-from ...results.files import remove, write_json
-from ..execution.bundle import identity
-from ..execution.run_store import Ledger
-from ..schema import AGGREGATES, SUCCESS
-from ..sweep import Row, Sweep, kpi_names
-from .statistics import Group, causes, groupings, groups
-from .table import write_csv, write_parquet, write_rows
+from ...results.files import remove_files, write_json
+from ..execution.bundle import cosim_fingerprint
+from ..execution.run_store import RunStore
+from ..schema import AGGREGATE_COLUMNS, SUCCESS_COLUMNS
+from ..sweep import Sweep, SweepRow, kpi_names
+from .statistics import RunGroup, failure_causes, group_rows, groupings
+from .table import write_csv, write_csv_rows, write_parquet
 
 
 @dataclass(frozen=True)
-class Summary:
+class SweepSummary:
     """What a sweep comes to: groups of runs (the first holds all of them), and causes of failures."""
 
     finished: int
-    groups: list[Group]
-    causes: list[tuple[str, int, int]]
+    groups: list[RunGroup]
+    failure_causes: list[tuple[str, int, int]]
 
     @property
     def failed(self) -> int:
         return self.groups[0].failed if self.groups else 0
 
 
-def write(sweep: Sweep, ledger: Ledger, folder: Path, parquet: bool) -> Summary:
+def write_sweep_files(sweep: Sweep, ledger: RunStore, folder: Path, parquet: bool) -> SweepSummary:
     """Write table.csv, aggregates.csv, success.csv, failures.csv and sweep.json to a folder; no older table stays."""
     factors, kpis = sweep.design.columns, kpi_names(sweep.rows(ledger))
 
-    def rows() -> Iterator[Row]:
+    def rows() -> Iterator[SweepRow]:
         return sweep.rows(ledger)
 
     write_csv(rows, factors, kpis, folder / "table.csv")
     if parquet:
         write_parquet(rows, factors, kpis, folder / "table.parquet")
     else:
-        remove(folder, "table.parquet")
+        remove_files(folder, "table.parquet")
     found, statistics = [], []
-    for names in groupings(sweep.design, sweep.read.spec.by):
-        for group in groups(rows, names):
-            statistics += [_statistic(group, factors, kpi, numbers) for kpi, numbers in group.statistics()]
+    for names in groupings(sweep.design, sweep.study_file.spec.by):
+        for group in group_rows(rows, names):
+            statistics += [_statistics_row(group, factors, kpi, numbers) for kpi, numbers in group.statistics()]
             group.kpis = group.kpis if not names else {}
             found.append(group)
-    write_rows([*factors, *AGGREGATES], statistics, folder / "aggregates.csv")
-    write_rows([*factors, *SUCCESS], (_success(group, factors) for group in found), folder / "success.csv")
-    write_rows(["run", *factors, "failure", "output", "command"], _failures(sweep, rows()), folder / "failures.csv")
-    summary = Summary(found[0].runs if found else 0, found, causes(rows()))
-    write_json(_description(sweep, summary), folder / "sweep.json")
+    write_csv_rows([*factors, *AGGREGATE_COLUMNS], statistics, folder / "aggregates.csv")
+    write_csv_rows([*factors, *SUCCESS_COLUMNS], (_success_row(group, factors) for group in found), folder / "success.csv")
+    write_csv_rows(["run", *factors, "failure", "output", "command"], _failure_rows(sweep, rows()), folder / "failures.csv")
+    summary = SweepSummary(found[0].runs if found else 0, found, failure_causes(rows()))
+    write_json(_sweep_metadata(sweep, summary), folder / "sweep.json")
     return summary
 
 
-def _statistic(group: Group, factors: list[str], kpi: str, numbers: dict[str, float]) -> list[Any]:
+def _statistics_row(group: RunGroup, factors: list[str], kpi: str, numbers: dict[str, float]) -> list[Any]:
     return [*(group.labels.get(name) for name in factors), kpi, *numbers.values()]
 
 
-def _success(group: Group, factors: list[str]) -> list[Any]:
+def _success_row(group: RunGroup, factors: list[str]) -> list[Any]:
     labels = (group.labels.get(name) for name in factors)
-    return [*labels, group.runs, group.distinct, group.failed, group.passed, group.rate, *group.interval]
+    return [*labels, group.runs, group.distinct, group.failed, group.passed, group.success_rate, *group.interval]
 
 
-def _failures(sweep: Sweep, rows: Iterator[Row]) -> Iterator[list[Any]]:
+def _failure_rows(sweep: Sweep, rows: Iterator[SweepRow]) -> Iterator[list[Any]]:
     for row in rows:
         if row.record.failure:
-            command = run_command(sweep.read.scenario, sweep.study.job(row.point.settings).settings)
+            command = format_run_command(sweep.study_file.scenario, sweep.study.job(row.point.settings).settings)
             yield [row.run, *row.point.labels.values(), row.record.failure, row.record.output, command]
 
 
-def run_command(scenario: Path, settings: Any) -> str:
+def format_run_command(scenario: Path, settings: Any) -> str:
     """The command that makes this run alone."""
-    words = [word for name, value in settings.items() for word in ("--set", f"{name}={_text(value)}")]
+    words = [word for name, value in settings.items() for word in ("--set", f"{name}={_setting_text(value)}")]
     return shlex.join(["cosim", "run", normpath(scenario), *words])
 
 
-def _text(value: Any) -> str:
+def _setting_text(value: Any) -> str:
     """As `--set` takes it: JSON, or a text that is none."""
     try:
         json.loads(value)
@@ -89,13 +89,13 @@ def _text(value: Any) -> str:
     return json.dumps(value)
 
 
-def _description(sweep: Sweep, summary: Summary) -> dict[str, Any]:
-    spec = sweep.read.spec
+def _sweep_metadata(sweep: Sweep, summary: SweepSummary) -> dict[str, Any]:
+    spec = sweep.study_file.spec
     return {
         "name": spec.name,
-        "sweep": sweep.read.document.value,
-        "scenario_file": str(sweep.read.scenario.resolve()),
-        "cosim": identity(),
+        "sweep": sweep.study_file.document.value,
+        "scenario_file": str(sweep.study_file.scenario.resolve()),
+        "cosim": cosim_fingerprint(),
         "sha256": dict(sweep.study.bundle.files),
         "success": sweep.criteria,
         "runs": len(sweep),

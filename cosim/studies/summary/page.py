@@ -8,24 +8,24 @@ from pathlib import Path
 from typing import Any
 
 from ...core.version import __version__
-from ...report.figures import save, svg
-from ...report.pages import markup, render
+from ...report.figures import figure_to_svg, save_figure
+from ...report.pages import render_page, safe_markup
 from ...results.checks import evaluate_checks
-from ...results.files import remove, replacing
+from ...results.files import remove_files, writing_atomically
 from ..design import Design
 from ..sweep import Sweep
-from .files import Summary, run_command
-from .replays import page_of, settings_of
-from .success_map import MAP, Cell, SuccessMap
+from .files import SweepSummary, format_run_command
+from .replays import replay_path, replay_settings
+from .success_map import MAP_NAME, MapCell, SuccessMap
 from .success_map_figure import draw_map
 
-PAGE = "sweep.html"
-_FILE = re.compile(rf"{MAP}(_\d+)?\.(png|svg)")
+PAGE_FILE = "sweep.html"
+_MAP_FILE = re.compile(rf"{MAP_NAME}(_\d+)?\.(png|svg)")
 #: so many different labels of a factor are listed
-_LISTED = 12
+_MAX_LISTED_LEVELS = 12
 
 
-def write_page(sweep: Sweep, summary: Summary, maps: Sequence[SuccessMap], folder: Path) -> None:
+def write_sweep_page(sweep: Sweep, summary: SweepSummary, maps: Sequence[SuccessMap], folder: Path) -> None:
     """Write every map as NAME.png and NAME.svg, and sweep.html: maps, success by levels, KPIs, causes of failures, the design.
 
     A click on a cell of a map leads to the replay of one of its runs where there is one, else to the command that shows it. Maps
@@ -33,75 +33,82 @@ def write_page(sweep: Sweep, summary: Summary, maps: Sequence[SuccessMap], folde
     """
     overall = summary.groups[0] if summary.groups else None
     drawn = {f"{each.name}{suffix}" for each in maps for suffix in (".png", ".svg")}
-    remove(folder, *(path.name for path in folder.glob(f"{MAP}*") if _FILE.fullmatch(path.name) and path.name not in drawn))
-    cells = list(_cells(sweep, maps, folder))
-    text = render(
+    remove_files(
+        folder, *(path.name for path in folder.glob(f"{MAP_NAME}*") if _MAP_FILE.fullmatch(path.name) and path.name not in drawn)
+    )
+    cells = list(_shown_cells(sweep, maps, folder))
+    text = render_page(
         "sweep.html",
-        spec=sweep.read.spec,
+        spec=sweep.study_file.spec,
         total=len(sweep),
         summary=summary,
         overall=overall,
-        design=list(_design(sweep)),
-        criteria=[_limits(check) for check in sweep.criteria],
-        maps=[_drawn(sweep, each, folder) for each in maps],
-        commands=[cell for cell in cells if cell["link"].startswith(PAGE)],
-        replays=[cell for cell in cells if not cell["link"].startswith(PAGE)],
+        design=list(_design_rows(sweep)),
+        criteria=[_criterion(check) for check in sweep.criteria],
+        maps=[_write_map(sweep, each, folder) for each in maps],
+        commands=[cell for cell in cells if cell["link"].startswith(PAGE_FILE)],
+        replays=[cell for cell in cells if not cell["link"].startswith(PAGE_FILE)],
         kpis=list(overall.statistics()) if overall else [],
         version=__version__,
-        file=sweep.read.document.file,
+        file=sweep.study_file.document.file,
     )
-    with replacing(folder / PAGE) as temporary:
+    with writing_atomically(folder / PAGE_FILE) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def _limits(check: Mapping[str, Any]) -> tuple[str, str]:
+def _criterion(check: Mapping[str, Any]) -> tuple[str, str]:
     """A criterion as (KPI, limits)."""
     (outcome,) = evaluate_checks({check["kpi"]: 0.0}, [check])
     return check["kpi"], outcome.limits
 
 
-def _design(sweep: Sweep) -> Iterator[tuple[str, str]]:
+def _design_rows(sweep: Sweep) -> Iterator[tuple[str, str]]:
     for i, factor in enumerate(sweep.design.factors):
-        yield factor.name, _levels(sweep.design, i)
+        yield factor.name, _level_summary(sweep.design, i)
     if seeds := sweep.design.seeds:
         yield "seed", f"{seeds[0].label} ... {seeds[-1].label}"
-    design = sweep.read.spec.design
+    design = sweep.study_file.spec.design
     yield "design", design.kind.replace("_", " ") + (f", seed {design.seed}" if design.runs else "")
 
 
-def _levels(design: Design, number: int) -> str:
+def _level_summary(design: Design, number: int) -> str:
     """All levels of a factor, of many the lowest and the highest."""
     factor = design.factors[number]
-    if factor.listed or (design.samples is None and len(factor.grid) <= _LISTED):
-        return ", ".join(str(level.label) for level in factor.grid)
-    if design.samples is None:
-        ends = factor.grid[0], factor.grid[-1]
+    if factor.listed_levels or (design.unit_samples is None and len(factor.grid_levels) <= _MAX_LISTED_LEVELS):
+        return ", ".join(str(level.label) for level in factor.grid_levels)
+    if design.unit_samples is None:
+        ends = factor.grid_levels[0], factor.grid_levels[-1]
     else:
-        places = design.samples[:, number]
-        ends = factor.at(float(places.min())), factor.at(float(places.max()))
+        places = design.unit_samples[:, number]
+        ends = factor.level_at(float(places.min())), factor.level_at(float(places.max()))
     return " ... ".join(f"{level.label:.4g}" for level in ends)
 
 
-def _drawn(sweep: Sweep, map_: SuccessMap, folder: Path) -> dict[str, Any]:
+def _write_map(sweep: Sweep, map_: SuccessMap, folder: Path) -> dict[str, Any]:
     """A map in its files; as SVG whose cells are links, and the width (in) that it was drawn for."""
-    figure = draw_map(map_, lambda cell: _link(sweep, cell, folder))
-    save(figure, folder / f"{map_.name}.png")
-    text = svg(figure).replace(' target="_blank"', "")
-    with replacing(folder / f"{map_.name}.svg") as temporary:
+    figure = draw_map(map_, lambda cell: _cell_link(sweep, cell, folder))
+    save_figure(figure, folder / f"{map_.name}.png")
+    text = figure_to_svg(figure).replace(' target="_blank"', "")
+    with writing_atomically(folder / f"{map_.name}.svg") as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
-    return {"svg": markup(text[text.index("<svg") :]), "width": figure.get_figwidth()}
+    return {"svg": safe_markup(text[text.index("<svg") :]), "width": figure.get_figwidth()}
 
 
-def _link(sweep: Sweep, cell: Cell, folder: Path) -> str:
-    if cell.shown is None:
+def _cell_link(sweep: Sweep, cell: MapCell, folder: Path) -> str:
+    if cell.representative_run is None:
         return ""
-    page = page_of(sweep, cell.shown.number)
-    return page if (folder / page).exists() else f"{PAGE}#run-{cell.shown.number}"
+    page = replay_path(sweep, cell.representative_run.number)
+    return page if (folder / page).exists() else f"{PAGE_FILE}#run-{cell.representative_run.number}"
 
 
-def _cells(sweep: Sweep, maps: Iterable[SuccessMap], folder: Path) -> Iterator[dict[str, Any]]:
+def _shown_cells(sweep: Sweep, maps: Iterable[SuccessMap], folder: Path) -> Iterator[dict[str, Any]]:
     """The run that each cell shows, once."""
-    shown = {cell.shown.number: cell for map_ in maps for cell in map_.cells.values() if cell.shown is not None}
+    shown = {
+        cell.representative_run.number: cell
+        for map_ in maps
+        for cell in map_.cells.values()
+        if cell.representative_run is not None
+    }
     for number, cell in sorted(shown.items()):
-        command = run_command(sweep.read.scenario, settings_of(sweep, number))
-        yield {"run": number, "cell": cell, "link": _link(sweep, cell, folder), "command": command}
+        command = format_run_command(sweep.study_file.scenario, replay_settings(sweep, number))
+        yield {"run": number, "cell": cell, "link": _cell_link(sweep, cell, folder), "command": command}

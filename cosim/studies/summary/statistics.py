@@ -14,32 +14,32 @@ import numpy as np
 
 from ..design import Design
 from ..schema import QUANTILES
-from ..sweep import Row
-from .table import Rows
+from ..sweep import SweepRow
+from .table import RowSource
 
 #: quantile of the normal distribution for intervals of 95 %
-_Z = 1.959963984540054
+_Z_95 = 1.959963984540054
 
 
-class Interval(NamedTuple):
+class ConfidenceInterval(NamedTuple):
     """Of a share: both ends."""
 
     low: float
     high: float
 
 
-def wilson(successes: float, count: int) -> Interval:
+def wilson_interval(successes: float, count: int) -> ConfidenceInterval:
     """Wilson's score interval (95 %) of a share (E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), 209-212)."""
     if count == 0:
-        return Interval(0.0, 1.0)
-    share, z2 = successes / count, _Z * _Z
+        return ConfidenceInterval(0.0, 1.0)
+    share, z2 = successes / count, _Z_95 * _Z_95
     center = (share + z2 / (2 * count)) / (1 + z2 / count)
-    half = _Z / (1 + z2 / count) * math.sqrt(share * (1 - share) / count + z2 / (4 * count * count))
-    return Interval(0.0 if successes == 0 else center - half, 1.0 if successes == count else center + half)
+    half = _Z_95 / (1 + z2 / count) * math.sqrt(share * (1 - share) / count + z2 / (4 * count * count))
+    return ConfidenceInterval(0.0 if successes == 0 else center - half, 1.0 if successes == count else center + half)
 
 
 @dataclass
-class Group:
+class RunGroup:
     """Runs that share the labels of some factors, and the finite values of their KPIs.
 
     `distinct` counts a run that several points have once: it says nothing new the second time.
@@ -51,13 +51,13 @@ class Group:
     failed: int = 0
     passed: int = 0
     kpis: dict[str, array[float]] = field(default_factory=dict)
-    _shared: set[str] = field(default_factory=set)
+    _shared_keys: set[str] = field(default_factory=set)
 
-    def add(self, row: Row) -> None:
+    def add(self, row: SweepRow) -> None:
         self.runs += 1
-        self.distinct += row.record.key not in self._shared
+        self.distinct += row.record.key not in self._shared_keys
         if row.shared:
-            self._shared.add(row.record.key)
+            self._shared_keys.add(row.record.key)
         self.failed += bool(row.record.failure)
         self.passed += row.passed
         for name, value in row.record.kpis.items():
@@ -66,14 +66,14 @@ class Group:
                 values.append(value)
 
     @property
-    def rate(self) -> float:
+    def success_rate(self) -> float:
         """Share of successes in all runs; a run that failed is none."""
         return self.passed / self.runs
 
     @property
-    def interval(self) -> Interval:
+    def interval(self) -> ConfidenceInterval:
         """Of the rate, as many runs as are distinct having been made."""
-        return wilson(self.passed * self.distinct / self.runs, self.distinct)
+        return wilson_interval(self.passed * self.distinct / self.runs, self.distinct)
 
     def statistics(self) -> Iterator[tuple[str, dict[str, float]]]:
         """(KPI, statistics) of each KPI: number of finite values, their mean, standard deviation (n - 1) and quantiles."""
@@ -86,20 +86,24 @@ class Group:
 
 def groupings(design: Design, by: Iterable[Sequence[str]]) -> list[tuple[str, ...]]:
     """All runs together, every factor with levels alone, and what else was asked for."""
-    single = [(factor.name,) for factor in design.factors if factor.grid and (factor.listed or design.samples is None)]
+    single = [
+        (factor.name,)
+        for factor in design.factors
+        if factor.grid_levels and (factor.listed_levels or design.unit_samples is None)
+    ]
     return list(dict.fromkeys([(), *single, *map(tuple, by)]))
 
 
-def groups(rows: Rows, names: Sequence[str]) -> list[Group]:
+def group_rows(rows: RowSource, names: Sequence[str]) -> list[RunGroup]:
     """Runs grouped by the labels of these factors, in the order in which they appear."""
-    found: dict[str, Group] = {}
+    found: dict[str, RunGroup] = {}
     for row in rows():
         labels = {name: row.point.labels[name] for name in names}
-        found.setdefault(json.dumps(labels), Group(labels)).add(row)
+        found.setdefault(json.dumps(labels), RunGroup(labels)).add(row)
     return list(found.values())
 
 
-def causes(rows: Iterable[Row]) -> list[tuple[str, int, int]]:
+def failure_causes(rows: Iterable[SweepRow]) -> list[tuple[str, int, int]]:
     """(cause, number of runs, first run) of failures, the most frequent first."""
     counts: Counter[str] = Counter()
     first: dict[str, int] = {}

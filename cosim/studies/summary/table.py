@@ -9,21 +9,21 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from ...results.files import replacing
-from ..sweep import Row
+from ...results.files import writing_atomically
+from ..sweep import SweepRow
 
 #: reads all rows anew: they are never all in memory
-Rows = Callable[[], Iterable[Row]]
+RowSource = Callable[[], Iterable[SweepRow]]
 
-_ROWS_AT_A_TIME = 10_000
+_BATCH_SIZE = 10_000
 
 
-def header(factors: Sequence[str], kpis: Sequence[str]) -> list[str]:
+def table_header(factors: Sequence[str], kpis: Sequence[str]) -> list[str]:
     """Names of the columns."""
     return ["run", *factors, "status", "passed", *kpis, "failure"]
 
 
-def values(row: Row, factors: Sequence[str], kpis: Sequence[str]) -> list[Any]:
+def row_values(row: SweepRow, factors: Sequence[str], kpis: Sequence[str]) -> list[Any]:
     """The row's values by column; None where a run has none."""
     record = row.record
     return [
@@ -36,45 +36,45 @@ def values(row: Row, factors: Sequence[str], kpis: Sequence[str]) -> list[Any]:
     ]
 
 
-def write_csv(rows: Rows, factors: Sequence[str], kpis: Sequence[str], path: Path) -> None:
+def write_csv(rows: RowSource, factors: Sequence[str], kpis: Sequence[str], path: Path) -> None:
     """Booleans as 0 and 1, numbers that round-trip, nan and inf as such, nothing where a run has no value."""
-    write_rows(header(factors, kpis), (values(row, factors, kpis) for row in rows()), path)
+    write_csv_rows(table_header(factors, kpis), (row_values(row, factors, kpis) for row in rows()), path)
 
 
-def write_rows(names: Sequence[str], lines: Iterable[Sequence[Any]], path: Path) -> None:
+def write_csv_rows(names: Sequence[str], lines: Iterable[Sequence[Any]], path: Path) -> None:
     """A CSV file, whole or not at all. Raises InputError or OutputError."""
-    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+    with writing_atomically(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(names)
-        writer.writerows([cell(value) for value in line] for line in lines)
+        writer.writerows([csv_value(value) for value in line] for line in lines)
 
 
-def cell(value: Any) -> Any:
+def csv_value(value: Any) -> Any:
     """A value as it stands in a CSV file."""
     if isinstance(value, bool):
         return int(value)
     return json.dumps(value) if isinstance(value, list | dict) else value
 
 
-def write_parquet(rows: Rows, factors: Sequence[str], kpis: Sequence[str], path: Path) -> None:
+def write_parquet(rows: RowSource, factors: Sequence[str], kpis: Sequence[str], path: Path) -> None:
     """The same table as Parquet (extra `parquet`): KPIs as doubles, factors too where all their labels are numbers."""
     import pyarrow as pa
     from pyarrow.parquet import ParquetWriter
 
     texts = {name for row in rows() for name, label in row.point.labels.items() if not isinstance(label, int | float)}
     kinds = {"run": pa.int64(), "status": pa.string(), "passed": pa.bool_(), "failure": pa.string()}
-    names = header(factors, kpis)
+    names = table_header(factors, kpis)
     schema = pa.schema([(name, kinds.get(name) or (pa.string() if name in texts else pa.float64())) for name in names])
-    with replacing(path) as temporary, ParquetWriter(temporary, schema) as writer:
-        lines = (values(row, factors, kpis) for row in rows())
-        while batch := list(islice(lines, _ROWS_AT_A_TIME)):
-            writer.write_batch(pa.record_batch(list(_columns(batch, schema)), schema=schema))
+    with writing_atomically(path) as temporary, ParquetWriter(temporary, schema) as writer:
+        lines = (row_values(row, factors, kpis) for row in rows())
+        while batch := list(islice(lines, _BATCH_SIZE)):
+            writer.write_batch(pa.record_batch(list(_arrow_columns(batch, schema)), schema=schema))
 
 
-def _columns(batch: list[list[Any]], schema: Any) -> Iterator[Any]:
+def _arrow_columns(batch: list[list[Any]], schema: Any) -> Iterator[Any]:
     import pyarrow as pa
 
     for field, column in zip(schema, zip(*batch, strict=True), strict=True):
         text, number = field.type == pa.string(), field.type == pa.float64()
-        plain = [str(cell(v)) if text else float(v) if number and v is not None else v for v in column]
+        plain = [str(csv_value(v)) if text else float(v) if number and v is not None else v for v in column]
         yield pa.array(plain, field.type)

@@ -5,27 +5,27 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...results.files import write_json
-from ..execution.bundle import identity
-from ..schema import TRIALS
+from ..execution.bundle import cosim_fingerprint
+from ..schema import TRIAL_COLUMNS
 from ..tune import Trial, Tuning
-from .table import write_rows
+from .table import write_csv_rows
 
 
-def write(tuning: Tuning, folder: Path) -> Trial:
+def write_tuning_files(tuning: Tuning, folder: Path) -> Trial:
     """Write trials.csv and best.json; returns the best trial. Something must have been tried."""
     names = [spec.name for spec in tuning.spec.parameters]
     lines = ([*trial.parameters.values(), trial.value, trial.violation, trial.failure] for trial in tuning.trials)
-    write_rows([*names, *TRIALS], lines, folder / "trials.csv")
+    write_csv_rows([*names, *TRIAL_COLUMNS], lines, folder / "trials.csv")
     best = min(tuning.trials, key=lambda trial: trial.rank)
     description = {
         "name": tuning.spec.name,
-        "tuning": tuning.read.document.value,
+        "tuning": tuning.study_file.document.value,
         "parameters": best.parameters,
         "settings": tuning.settings(best.parameters),
         "value": best.value,
         "violation": best.violation,
         "trials": len(tuning.trials),
-        "cosim": identity(),
+        "cosim": cosim_fingerprint(),
         "sha256": dict(tuning.study.bundle.files),
     }
     write_json(description, folder / "best.json")

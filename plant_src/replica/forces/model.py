@@ -7,18 +7,18 @@ from collections.abc import Callable, Sequence
 import casadi as ca
 
 from cosim.core.component import Variable
-from cosim.core.units import parse
+from cosim.core.units import parse_unit
 from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import static_model
 from cosim.export.fmu.block import Block
 
-from ...vehicles.common.interface import scalar, vector
+from ...vehicles.common.interface import scalar_variable, vector_variables
 
 #: inputs: the vessel's motion as the bus has it, the paper's equation 11
-VESSEL = (
-    *vector("vehicle.velocity", "xy", "m/s", "centre of mass, world frame", "input"),
-    scalar("vehicle.angular_velocity.z", "rad/s", "counter-clockwise"),
-    scalar("vehicle.attitude.yaw", "rad", "counter-clockwise from the world's x axis"),
+VESSEL_INPUTS = (
+    *vector_variables("vehicle.velocity", "xy", "m/s", "centre of mass, world frame", "input"),
+    scalar_variable("vehicle.angular_velocity.z", "rad/s", "counter-clockwise"),
+    scalar_variable("vehicle.attitude.yaw", "rad", "counter-clockwise from the world's x axis"),
 )
 
 
@@ -28,16 +28,16 @@ def planar_velocity(motion: ca.SX) -> ca.SX:
     return ca.vertcat(ca.cos(yaw) * x + ca.sin(yaw) * y, ca.cos(yaw) * y - ca.sin(yaw) * x, rate)
 
 
-def parameter(name: str, start: float, unit: str, description: str) -> Variable:
+def tunable_parameter(name: str, start: float, unit: str, description: str) -> Variable:
     """A number that can be changed between steps."""
-    return Variable(name, "Float64", "parameter", "tunable", start, parse(unit), description=description)
+    return Variable(name, "Float64", "parameter", "tunable", start, parse_unit(unit), description=description)
 
 
-def load(what: str) -> tuple[Variable, ...]:
+def load_outputs(what: str) -> tuple[Variable, ...]:
     """Outputs X, Y (N) and N (N m) of a load on the vessel."""
     return (
-        *vector("load", "xy", "N", f"{what}, vessel body frame, at the centre of mass"),
-        *vector("load", "n", "N.m", f"{what}, moment about z"),
+        *vector_variables("load", "xy", "N", f"{what}, vessel body frame, at the centre of mass"),
+        *vector_variables("load", "n", "N.m", f"{what}, moment about z"),
     )
 
 

@@ -10,4 +10,4 @@ from .parameters import AIRFRAME
 
 def block() -> Block:
     """The quadcopter in free flight."""
-    return multirotor_equations.block(AIRFRAME, "AR.Drone 2.0 quadcopter in free flight")
+    return multirotor_equations.multirotor_block(AIRFRAME, "AR.Drone 2.0 quadcopter in free flight")

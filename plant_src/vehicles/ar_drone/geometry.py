@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..common.shapes import Box, quaternion
+from ..common.shapes import Box, quaternion_from_matrix
 from .parameters import AIRFRAME, CENTRE_OF_MASS
 
 #: bottom of the motor cylinders, on which the vehicle stands, and top of the hull, from the origin of the model's frame (m)
@@ -26,7 +26,7 @@ def boxes(to_body: np.ndarray) -> tuple[Box, ...]:
     half = math.sqrt(0.5)
     diagonal = np.array([[half, half, 0.0], [-half, half, 0.0], [0.0, 0.0, 1.0]])
     half_extents = (EDGE / 2, EDGE / 2, (TOP_HEIGHT - FEET_HEIGHT) / 2)
-    return (Box(half_extents, tuple(centre.tolist()), quaternion(to_body.T @ diagonal)),)
+    return (Box(half_extents, tuple(centre.tolist()), quaternion_from_matrix(to_body.T @ diagonal)),)
 
 
 BODY = AIRFRAME.body(boxes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 #: a state whose norm (m, m/s, rad, rad/s) is not below this is an explosion
-LARGEST_STATE = 1e5
+MAX_STATE_NORM = 1e5
 
 #: the vehicle may come near something; an input or the state is not finite, or the state an explosion; zero: neither
-ADRIFT, UNSOUND = 1.0, 2.0
+LEAVES_SAFE_BOX, INVALID_STATE = 1.0, 2.0

@@ -32,34 +32,34 @@ import casadi as ca
 from cosim.export.equations.model import ContinuousModel
 
 from . import kinematics
-from .alarms import ADRIFT, LARGEST_STATE, UNSOUND
-from .interface import SURROUNDINGS
+from .alarms import INVALID_STATE, LEAVES_SAFE_BOX, MAX_STATE_NORM
+from .interface import ENVIRONMENT_INPUTS
 
 #: at most 5 ms long, since the world makes steps of at most 10 ms
 SUB_STEPS = 2
 
 #: how many numbers a force and a torque are
-LINEAR_ANGULAR = 6
+TWIST_SIZE = 6
 
 #: below this contact impulse (N s) a step was free; rounding leaves less than 1e-14
-FREE_IMPULSE = 1e-12
+IMPULSE_TOLERANCE = 1e-12
 
 
-class Rigid(NamedTuple):
+class RigidBody(NamedTuple):
     """Mass (kg), inertia about the centre of mass (3, 3; kg m2, body frame) and its inverse."""
 
     mass: ca.SX
     inertia: ca.SX
-    inverse: ca.SX
+    inverse_inertia: ca.SX
 
-    def in_world(self, orientation: ca.SX) -> ca.SX:
+    def inertia_in_world(self, orientation: ca.SX) -> ca.SX:
         """The inertia in the axes of the world."""
-        to_world = kinematics.matrix(orientation)
+        to_world = kinematics.rotation_matrix(orientation)
         return to_world @ self.inertia @ to_world.T
 
 
 @dataclass(frozen=True)
-class FreeBody:
+class FreeContactMaps:
     """A free rigid body with the state (position, orientation, world velocity, body rates), and more that contact leaves alone.
 
     `rigid` gives its mass and inertia of the constants, `observe` the published variables of a state. A pose in Bullet's terms is
@@ -68,47 +68,47 @@ class FreeBody:
     """
 
     model: ContinuousModel
-    rigid: Callable[[ca.SX], Rigid]
+    rigid: Callable[[ca.SX], RigidBody]
     observe: Callable[[ca.SX], ca.SX]
 
     def functions(self) -> list[ca.Function]:
         """The functions to export."""
-        return [self._spawn(), self._before(), self._after()]
+        return [self._initialize_function(), self._predict_function(), self._correct_function()]
 
-    def _spawn(self) -> ca.Function:
-        parameters, constants = constants_of(self.model)
-        (axes,) = symbols(axes=4)
+    def _initialize_function(self) -> ca.Function:
+        parameters, constants = parameters_and_constants(self.model)
+        (axes,) = create_symbols(axes=4)
         state = self.model.initial_state(constants)
-        motion = ca.vertcat(state[7:10], kinematics.matrix(state[3:7]) @ state[10:13])
-        return ca.Function("shadow_spawn", [parameters, axes], [constants, state, motion, motion, _pose(state, axes)])
+        motion = ca.vertcat(state[7:10], kinematics.rotation_matrix(state[3:7]) @ state[10:13])
+        return ca.Function("shadow_spawn", [parameters, axes], [constants, state, motion, motion, _bullet_pose(state, axes)])
 
-    def _before(self) -> ca.Function:
-        arguments = symbols_before(self.model)
-        state, end, step = arguments[0], foreseen(self.model, *arguments[:5]), arguments[4]
-        (axes,) = symbols(axes=4)
+    def _predict_function(self) -> ca.Function:
+        arguments = predict_symbols(self.model)
+        state, end, step = arguments[0], predicted_state(self.model, *arguments[:5]), arguments[4]
+        (axes,) = create_symbols(axes=4)
         linear = (end[0:3] - state[0:3]) / step
-        angular = kinematics.rotation_vector(kinematics.product(end[3:7], kinematics.conjugate(state[3:7]))) / step
+        angular = kinematics.rotation_vector(kinematics.quaternion_product(end[3:7], kinematics.conjugate(state[3:7]))) / step
         # Bullet adds the gyroscopic torque of its body by itself: this one cancels it
-        torque = ca.cross(angular, self.rigid(arguments[3]).in_world(state[3:7]) @ angular)
+        torque = ca.cross(angular, self.rigid(arguments[3]).inertia_in_world(state[3:7]) @ angular)
         twist, path = ca.vertcat(linear, angular), ca.vertcat(state[0:3], end[0:3])
-        results = [state, end, twist, twist, torque, _pose(state, axes), path, alarm(end, path, arguments)]
+        results = [state, end, twist, twist, torque, _bullet_pose(state, axes), path, alarm_code(end, path, arguments)]
         return ca.Function("shadow_before", [*arguments, axes], results)
 
-    def _after(self) -> ca.Function:
-        start, predicted, twist, motion, constants, step = arguments = symbols_after(self.model)
+    def _correct_function(self) -> ca.Function:
+        start, predicted, twist, motion, constants, step = arguments = correct_symbols(self.model)
         linear, angular = ca.vertsplit(motion - twist, 3)
-        rigid, to_body = self.rigid(constants), kinematics.matrix(predicted[3:7]).T
-        turned = rigid.inverse @ (to_body @ (rigid.in_world(start[3:7]) @ angular))
+        rigid, to_body = self.rigid(constants), kinematics.rotation_matrix(predicted[3:7]).T
+        turned = rigid.inverse_inertia @ (to_body @ (rigid.inertia_in_world(start[3:7]) @ angular))
         velocity, others = predicted[7:13] + ca.vertcat(linear, turned), predicted[13:]
-        impulse = contact(rigid.mass * ca.norm_2(linear))
-        orientation = kinematics.product(kinematics.turned_by(motion[3:6] * step), start[3:7])
-        pose = ca.vertcat(start[0:3] + motion[0:3] * step, kinematics.normalised(orientation))
-        seen = ca.vertcat(pose, motion[0:3], kinematics.matrix(orientation).T @ motion[3:6], others)
-        return _outcome(arguments, impulse, predicted, ca.vertcat(pose, velocity, others), self.observe, seen)
+        impulse = contact_impulse(rigid.mass * ca.norm_2(linear))
+        orientation = kinematics.quaternion_product(kinematics.quaternion_from_rotation_vector(motion[3:6] * step), start[3:7])
+        pose = ca.vertcat(start[0:3] + motion[0:3] * step, kinematics.normalised_quaternion(orientation))
+        seen = ca.vertcat(pose, motion[0:3], kinematics.rotation_matrix(orientation).T @ motion[3:6], others)
+        return _correct_function(arguments, impulse, predicted, ca.vertcat(pose, velocity, others), self.observe, seen)
 
 
 @dataclass(frozen=True)
-class PlanarBody:
+class PlanarContactMaps:
     """A vessel in the horizontal plane with the state (x, y, yaw, surge, sway, yaw rate).
 
     `mass` (kg) and `moment` (kg m2, about z) are those of the hull, whose centre of mass lies on the yaw axis at `height` (m).
@@ -120,75 +120,79 @@ class PlanarBody:
 
     model: ContinuousModel
     mass: float
-    moment: float
+    yaw_inertia: float
     height: float
     observe: Callable[[ca.SX], ca.SX]
 
     def functions(self) -> list[ca.Function]:
         """The functions to export."""
-        return [self._spawn(), self._before(), self._after()]
+        return [self._initialize_function(), self._predict_function(), self._correct_function()]
 
-    def _spawn(self) -> ca.Function:
-        parameters, constants = constants_of(self.model)
+    def _initialize_function(self) -> ca.Function:
+        parameters, constants = parameters_and_constants(self.model)
         state = self.model.initial_state(constants)
-        motion = _level(_turn(state[2]) @ state[3:5], ca.SX(0), state[5])
+        motion = _planar_twist(_planar_rotation(state[2]) @ state[3:5], ca.SX(0), state[5])
         return ca.Function("shadow_spawn", [parameters], [constants, state, motion, motion, self._pose(state)])
 
-    def _before(self) -> ca.Function:
-        arguments = symbols_before(self.model)
-        state, end, step = arguments[0], foreseen(self.model, *arguments[:5]), arguments[4]
-        (pressed,) = symbols(pressed=3)
+    def _predict_function(self) -> ca.Function:
+        arguments = predict_symbols(self.model)
+        state, end, step = arguments[0], predicted_state(self.model, *arguments[:5]), arguments[4]
+        (pressed,) = create_symbols(pressed=3)
         rates = (end[0:3] - state[0:3]) / step
-        twist = _level(rates[0:2], _weaker(pressed[0], pressed[1]) / self.mass, rates[2])
+        twist = _planar_twist(rates[0:2], _minmod(pressed[0], pressed[1]) / self.mass, rates[2])
         path = ca.vertcat(self.observe(state)[0:3], self.observe(end)[0:3])
         previous = ca.vertcat(pressed[0], pressed[2])
-        results = [state, end, twist, twist, self._pose(state), previous, path, alarm(end, path, arguments)]
+        results = [state, end, twist, twist, self._pose(state), previous, path, alarm_code(end, path, arguments)]
         return ca.Function("shadow_before", [*arguments, pressed], results)
 
-    def _after(self) -> ca.Function:
-        start, predicted, twist, motion, _, step = arguments = symbols_after(self.model)
-        (previous,) = symbols(previous=2)
+    def _correct_function(self) -> ca.Function:
+        start, predicted, twist, motion, _, step = arguments = correct_symbols(self.model)
+        (previous,) = create_symbols(previous=2)
         change = motion - twist
-        velocity = predicted[3:6] + ca.vertcat(_turn(predicted[2]).T @ change[0:2], change[5])
-        impulse = contact(ca.norm_2(ca.vertcat(self.mass * change[0:3], self.moment * change[5])))
+        velocity = predicted[3:6] + ca.vertcat(_planar_rotation(predicted[2]).T @ change[0:2], change[5])
+        impulse = contact_impulse(ca.norm_2(ca.vertcat(self.mass * change[0:3], self.yaw_inertia * change[5])))
         pose = start[0:3] + step * ca.vertcat(motion[0:2], motion[5])
-        seen = ca.vertcat(pose, _turn(pose[2]).T @ motion[0:2], motion[5])
+        seen = ca.vertcat(pose, _planar_rotation(pose[2]).T @ motion[0:2], motion[5])
         pressed = ca.vertcat(-self.mass * change[2], previous[0], previous[1] + motion[2] * step)
-        return _outcome([*arguments, previous], impulse, predicted, ca.vertcat(pose, velocity), self.observe, seen, pressed)
+        return _correct_function(
+            [*arguments, previous], impulse, predicted, ca.vertcat(pose, velocity), self.observe, seen, pressed
+        )
 
     def _pose(self, state: ca.SX) -> ca.SX:
-        q = kinematics.about_z(state[2])
+        q = kinematics.quaternion_about_z(state[2])
         return ca.vertcat(state[0:2], self.height, q[1:4], q[0])
 
 
-def constants_of(model: ContinuousModel) -> tuple[ca.SX, ca.SX]:
+def parameters_and_constants(model: ContinuousModel) -> tuple[ca.SX, ca.SX]:
     """Symbols of the parameters, and the constants that follow from them."""
-    (parameters,) = symbols(parameters=len(model.slots("parameter")))
-    return parameters, model.constants(parameters) if model.constants else parameters
+    (parameters,) = create_symbols(parameters=len(model.elements("parameter")))
+    return parameters, model.derived_parameters(parameters) if model.derived_parameters else parameters
 
 
-def symbols_before(model: ContinuousModel) -> list[ca.SX]:
+def predict_symbols(model: ContinuousModel) -> list[ca.SX]:
     """State, inputs, surroundings, constants, step, and middle and half edges (world frame, m) of the box in which the vehicle
     comes near nothing."""
-    surroundings = sum(variable.name in SURROUNDINGS for variable in model.slots("input"))
-    inputs = len(model.slots("input")) - surroundings
-    state, given, around = symbols(state=len(model.states), inputs=inputs, surroundings=surroundings)
-    return [state, given, around, model.constant_symbols(), *symbols(step=1, anchor=3, leash=3)]
+    surroundings = sum(variable.name in ENVIRONMENT_INPUTS for variable in model.elements("input"))
+    inputs = len(model.elements("input")) - surroundings
+    state, given, around = create_symbols(state=len(model.states), inputs=inputs, surroundings=surroundings)
+    return [state, given, around, model.derived_parameter_symbols(), *create_symbols(step=1, anchor=3, leash=3)]
 
 
-def symbols_after(model: ContinuousModel) -> list[ca.SX]:
+def correct_symbols(model: ContinuousModel) -> list[ca.SX]:
     """State at the start and foreseen at the end of a step, foreseen and real mean motion, constants and step."""
     count = len(model.states)
-    states = symbols(start=count, predicted=count, twist=LINEAR_ANGULAR, motion=LINEAR_ANGULAR)
-    return [*states, model.constant_symbols(), *symbols(step=1)]
+    states = create_symbols(start=count, predicted=count, twist=TWIST_SIZE, motion=TWIST_SIZE)
+    return [*states, model.derived_parameter_symbols(), *create_symbols(step=1)]
 
 
-def foreseen(model: ContinuousModel, state: ca.SX, inputs: ca.SX, surroundings: ca.SX, constants: ca.SX, step: ca.SX) -> ca.SX:
+def predicted_state(
+    model: ContinuousModel, state: ca.SX, inputs: ca.SX, surroundings: ca.SX, constants: ca.SX, step: ca.SX
+) -> ca.SX:
     """The state after a free step."""
-    return model.advance(state, ca.vertcat(inputs, surroundings), constants, step, SUB_STEPS)
+    return model.integrate(state, ca.vertcat(inputs, surroundings), constants, step, SUB_STEPS)
 
 
-def _outcome(
+def _correct_function(
     arguments: list[ca.SX],
     impulse: ca.SX,
     free: ca.SX,
@@ -202,43 +206,43 @@ def _outcome(
     return ca.Function("shadow_after", arguments, [state, impulse, observe(published), *more])
 
 
-def symbols(**sizes: int) -> list[ca.SX]:
+def create_symbols(**sizes: int) -> list[ca.SX]:
     return [ca.SX.sym(name, size) for name, size in sizes.items()]
 
 
-def alarm(end: ca.SX, path: ca.SX, arguments: list[ca.SX]) -> ca.SX:
+def alarm_code(end: ca.SX, path: ca.SX, arguments: list[ca.SX]) -> ca.SX:
     """Zero when all is well, ADRIFT when the path leaves the box, UNSOUND when inputs or the state at the end are unusable.
 
     `arguments` are those of `shadow_before`.
     """
     _, inputs, surroundings, _, _, anchor, leash = arguments
     given = ca.fabs(ca.vertcat(inputs, surroundings))
-    sound = ca.logic_and(ca.sum1(given) < ca.inf, ca.norm_2(end) < LARGEST_STATE)
+    sound = ca.logic_and(ca.sum1(given) < ca.inf, ca.norm_2(end) < MAX_STATE_NORM)
     excess = ca.fabs(path - ca.vertcat(anchor, anchor)) - ca.vertcat(leash, leash)
-    return ca.if_else(sound, ca.if_else(ca.mmax(excess) > 0, ADRIFT, 0), UNSOUND)
+    return ca.if_else(sound, ca.if_else(ca.mmax(excess) > 0, LEAVES_SAFE_BOX, 0), INVALID_STATE)
 
 
-def contact(impulse: ca.SX) -> ca.SX:
+def contact_impulse(impulse: ca.SX) -> ca.SX:
     """The impulse (N s), zero where there is only rounding; not a number stays so."""
-    return ca.if_else(impulse <= FREE_IMPULSE, 0, impulse)
+    return ca.if_else(impulse <= IMPULSE_TOLERANCE, 0, impulse)
 
 
-def _pose(state: ca.SX, axes: ca.SX) -> ca.SX:
+def _bullet_pose(state: ca.SX, axes: ca.SX) -> ca.SX:
     """The pose of a free body in Bullet's terms."""
-    turned = kinematics.product(state[3:7], ca.vertcat(axes[3], axes[0:3]))
+    turned = kinematics.quaternion_product(state[3:7], ca.vertcat(axes[3], axes[0:3]))
     return ca.vertcat(state[0:3], turned[1:4], turned[0])
 
 
-def _level(horizontal: ca.SX, vertical: ca.SX, yaw_rate: ca.SX) -> ca.SX:
+def _planar_twist(horizontal: ca.SX, vertical: ca.SX, yaw_rate: ca.SX) -> ca.SX:
     """The motion of a body that neither rolls nor pitches: velocity and angular velocity."""
     return ca.vertcat(horizontal, vertical, 0, 0, yaw_rate)
 
 
-def _weaker(a: ca.SX, b: ca.SX) -> ca.SX:
+def _minmod(a: ca.SX, b: ca.SX) -> ca.SX:
     """The number that is nearer to zero; zero if they have different signs."""
     return ca.if_else(a * b > 0, ca.if_else(ca.fabs(a) < ca.fabs(b), a, b), 0)
 
 
-def _turn(yaw: ca.SX) -> ca.SX:
+def _planar_rotation(yaw: ca.SX) -> ca.SX:
     """Rotation matrix (2, 2) of the plane."""
     return ca.vertcat(ca.horzcat(ca.cos(yaw), -ca.sin(yaw)), ca.horzcat(ca.sin(yaw), ca.cos(yaw)))

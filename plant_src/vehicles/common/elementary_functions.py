@@ -15,30 +15,30 @@ _ARCTANGENT = tuple((-1) ** k / (2 * k + 1) for k in range(20))
 _EXPONENTIAL = tuple(1 / math.factorial(k) for k in range(7))
 
 #: a whole turn in two parts, the first with so few digits that its multiples are exact
-_TURN = 6.28125
-_TURN_REST = 0.001935307179586476925286766559
+_TWO_PI_HIGH = 6.28125
+_TWO_PI_LOW = 0.001935307179586476925286766559
 
 #: what is taken away from it is rounded to a whole number: it is so large that its last place counts 1
-_WHOLE = 1.5 * 2.0**52
+_ROUNDING_MAGIC = 1.5 * 2.0**52
 
 _SQUARINGS = 8
 
 
 def sine_and_cosine(angle: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Of an angle (rad) below 1e6: series for a quarter of what is left of it without whole turns, doubled twice."""
-    turns = _WHOLE - (_WHOLE - angle * (1 / (2 * math.pi)))
-    quarter = ((angle - turns * _TURN) - turns * _TURN_REST) * 0.25
+    turns = _ROUNDING_MAGIC - (_ROUNDING_MAGIC - angle * (1 / (2 * math.pi)))
+    quarter = ((angle - turns * _TWO_PI_HIGH) - turns * _TWO_PI_LOW) * 0.25
     square = quarter * quarter
-    sine, cosine = quarter * _series(_SINE[:8], square), _series(_COSINE, square)
+    sine, cosine = quarter * _polynomial(_SINE[:8], square), _polynomial(_COSINE, square)
     for _ in range(2):
         sine, cosine = 2 * sine * cosine, 1 - 2 * sine * sine
     return sine, cosine
 
 
-def sine_of_quarter(share: ca.SX) -> ca.SX:
+def sine_of_right_angle_share(share: ca.SX) -> ca.SX:
     """The sine of a share, from -1 to 1, of a right angle; to 1e-15."""
     angle = share * (math.pi / 2)
-    return angle * _series(_SINE, angle * angle)
+    return angle * _polynomial(_SINE, angle * angle)
 
 
 def arctangent(y: ca.SX, x: ca.SX) -> ca.SX:
@@ -50,18 +50,18 @@ def arctangent(y: ca.SX, x: ca.SX) -> ca.SX:
     bottom = ca.if_else(flat, x, ca.if_else(steep, size, size + x))
     rest = top / (bottom + 1e-300)
     base = ca.if_else(flat, 0, ca.if_else(steep, math.pi / 2, math.pi / 4))
-    return ca.sign(y) * (base + rest * _series(_ARCTANGENT, rest * rest))
+    return ca.sign(y) * (base + rest * _polynomial(_ARCTANGENT, rest * rest))
 
 
 def exponential(x: ca.SX) -> ca.SX:
     """Of a number of moderate size (|x| < 3 for 1e-13): a power of a series."""
-    power = _series(_EXPONENTIAL, x * 2.0**-_SQUARINGS)
+    power = _polynomial(_EXPONENTIAL, x * 2.0**-_SQUARINGS)
     for _ in range(_SQUARINGS):
         power = power * power
     return power
 
 
-def _series(coefficients: Sequence[float], x: ca.SX) -> ca.SX:
+def _polynomial(coefficients: Sequence[float], x: ca.SX) -> ca.SX:
     """A polynomial, the lowest power first, in pairs (Estrin's scheme): they do not wait for each other."""
     terms = [ca.SX(coefficient) for coefficient in coefficients]
     while len(terms) > 1:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 
-def product(a: ca.SX, b: ca.SX) -> ca.SX:
+def quaternion_product(a: ca.SX, b: ca.SX) -> ca.SX:
     """Quaternion product: the rotation b, then the rotation a."""
     w, v = a[0], a[1:4]
     return ca.vertcat(w * b[0] - ca.dot(v, b[1:4]), w * b[1:4] + b[0] * v + ca.cross(v, b[1:4]))
@@ -16,12 +16,12 @@ def conjugate(q: ca.SX) -> ca.SX:
     return ca.vertcat(q[0], -q[1:4])
 
 
-def normalised(q: ca.SX) -> ca.SX:
+def normalised_quaternion(q: ca.SX) -> ca.SX:
     """The unit quaternion of the same direction."""
     return q * (1 / ca.norm_2(q))
 
 
-def matrix(q: ca.SX) -> ca.SX:
+def rotation_matrix(q: ca.SX) -> ca.SX:
     """Rotation matrix (3, 3) of a unit quaternion."""
     w, x, y, z = ca.vertsplit(q)
     return ca.vertcat(
@@ -31,37 +31,37 @@ def matrix(q: ca.SX) -> ca.SX:
     )
 
 
-def rate(q: ca.SX, rates: ca.SX) -> ca.SX:
+def quaternion_rate(q: ca.SX, rates: ca.SX) -> ca.SX:
     """Time derivative of the quaternion for the angular velocity `rates` in the body frame."""
-    return product(q, ca.vertcat(0, rates)) / 2
+    return quaternion_product(q, ca.vertcat(0, rates)) / 2
 
 
-def about_z(angle: ca.SX) -> ca.SX:
+def quaternion_about_z(angle: ca.SX) -> ca.SX:
     """The rotation by an angle about the z axis."""
     return ca.vertcat(ca.cos(angle / 2), 0, 0, ca.sin(angle / 2))
 
 
-def of_euler_angles(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
+def quaternion_from_euler(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
     """The quaternion of the sequence yaw, pitch, roll (ZYX), rad."""
     about_x = ca.vertcat(ca.cos(roll / 2), ca.sin(roll / 2), 0, 0)
     about_y = ca.vertcat(ca.cos(pitch / 2), 0, ca.sin(pitch / 2), 0)
-    return product(about_z(yaw), product(about_y, about_x))
+    return quaternion_product(quaternion_about_z(yaw), quaternion_product(about_y, about_x))
 
 
 def euler_angles(q: ca.SX) -> ca.SX:
     """Roll, pitch and yaw of the sequence yaw, pitch, roll (ZYX), rad."""
-    r = matrix(q)
+    r = rotation_matrix(q)
     return ca.vertcat(ca.atan2(r[2, 1], r[2, 2]), ca.asin(ca.fmin(1, ca.fmax(-1, -r[2, 0]))), ca.atan2(r[1, 0], r[0, 0]))
 
 
-def rates_of_euler(roll: ca.SX, pitch: ca.SX) -> ca.SX:
+def euler_to_body_rates(roll: ca.SX, pitch: ca.SX) -> ca.SX:
     """The matrix (3, 3) that makes rates (body) of the time derivatives of roll, pitch and yaw."""
     cos, sin = ca.cos(roll), ca.sin(roll)
     about_y, about_z = ca.vertcat(0, cos, -sin), ca.vertcat(-ca.sin(pitch), sin * ca.cos(pitch), cos * ca.cos(pitch))
     return ca.horzcat(ca.SX([1, 0, 0]), about_y, about_z)
 
 
-def euler_of_rates(roll: ca.SX, pitch: ca.SX) -> ca.SX:
+def body_to_euler_rates(roll: ca.SX, pitch: ca.SX) -> ca.SX:
     """The matrix (3, 3) that makes time derivatives of roll, pitch and yaw of rates (body); singular at a pitch of 90 degrees."""
     cos, sin, steepness = ca.cos(roll), ca.sin(roll), ca.tan(pitch)
     about_y = ca.vertcat(sin * steepness, cos, sin / ca.cos(pitch))
@@ -78,7 +78,7 @@ def rotation_vector(q: ca.SX) -> ca.SX:
     return factor * shorter[1:4]
 
 
-def turned_by(vector: ca.SX) -> ca.SX:
+def quaternion_from_rotation_vector(vector: ca.SX) -> ca.SX:
     """The quaternion of a rotation vector (axis times angle, rad); a series where the angle is tiny."""
     angle_squared = ca.dot(vector, vector)
     angle = ca.sqrt(angle_squared + 1e-300)
@@ -86,7 +86,7 @@ def turned_by(vector: ca.SX) -> ca.SX:
     return ca.vertcat(ca.cos(angle / 2), factor * vector)
 
 
-def motion(position: ca.SX, orientation: ca.SX, velocity: ca.SX, rates: ca.SX) -> ca.SX:
+def motion_outputs(position: ca.SX, orientation: ca.SX, velocity: ca.SX, rates: ca.SX) -> ca.SX:
     """The published motion of a vehicle (the order of `interface.MOTION`) from world velocity and body rates."""
-    velocity_body = ca.mtimes(matrix(orientation).T, velocity)
+    velocity_body = ca.mtimes(rotation_matrix(orientation).T, velocity)
     return ca.vertcat(position, orientation, euler_angles(orientation), velocity, velocity_body, rates)

@@ -41,16 +41,16 @@ class Body(NamedTuple):
     axes: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 
-def standing_box(to_body: np.ndarray, edges: tuple[float, float], bottom: float, top: float) -> Box:
+def level_box(to_body: np.ndarray, edges: tuple[float, float], bottom: float, top: float) -> Box:
     """A box level in the body frame, about its z axis, in the frame that `to_body` (3, 3) turns into the body frame.
 
     `edges` along x and y (m), `bottom` and `top` heights above the centre of mass (m).
     """
     x, y, z = (to_body.T @ [0.0, 0.0, (top + bottom) / 2]).tolist()
-    return Box((edges[0] / 2, edges[1] / 2, (top - bottom) / 2), (x, y, z), quaternion(to_body.T))
+    return Box((edges[0] / 2, edges[1] / 2, (top - bottom) / 2), (x, y, z), quaternion_from_matrix(to_body.T))
 
 
-def quaternion(rotation: np.ndarray) -> Quaternion:
+def quaternion_from_matrix(rotation: np.ndarray) -> Quaternion:
     """The unit quaternion (x, y, z, w) of a rotation matrix (3, 3) that turns by clearly less than half a turn."""
     w = math.sqrt(1 + np.trace(rotation)) / 2
     x, y, z = (rotation[k - 1, k - 2] - rotation[k - 2, k - 1] for k in range(3))

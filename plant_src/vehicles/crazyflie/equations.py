@@ -10,4 +10,4 @@ from .parameters import AIRFRAME
 
 def block() -> Block:
     """The nano quadcopter in free flight."""
-    return multirotor_equations.block(AIRFRAME, "Crazyflie 2.x nano quadcopter in free flight")
+    return multirotor_equations.multirotor_block(AIRFRAME, "Crazyflie 2.x nano quadcopter in free flight")

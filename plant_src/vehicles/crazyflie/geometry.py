@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..common.shapes import Box, standing_box
+from ..common.shapes import Box, level_box
 from .parameters import AIRFRAME
 
 #: distance of the motor mounts, on which it stands, along x and y: the rotors' [pybullet-drones] (m)
@@ -16,7 +16,7 @@ FEET_HEIGHT, TOP_HEIGHT = -0.012, 0.017
 
 def boxes(to_body: np.ndarray) -> tuple[Box, ...]:
     """The shapes in a frame that `to_body` (3, 3) turns into the body frame."""
-    return (standing_box(to_body, (EDGE, EDGE), FEET_HEIGHT, TOP_HEIGHT),)
+    return (level_box(to_body, (EDGE, EDGE), FEET_HEIGHT, TOP_HEIGHT),)
 
 
 BODY = AIRFRAME.body(boxes)

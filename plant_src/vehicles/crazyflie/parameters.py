@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from ..multirotor.airframe import Airframe, Effects, Rotor
+from ..multirotor.airframe import Airframe, Rotor, RotorEffects
 
 #: with battery [pybullet-drones, bitcraze] (kg)
 MASS = 0.027
@@ -47,7 +47,7 @@ TORQUE_COEFFICIENT = 7.94e-12 * _PER_RPM_SQUARED
 #: at which the thrust is 2.25 times the weight [pybullet-drones]: 2274 rad/s (rad/s)
 MAX_ROTOR_SPEED = math.sqrt(2.25 * MASS * 9.81 / (4 * THRUST_COEFFICIENT))
 
-EFFECTS = Effects(
+EFFECTS = RotorEffects(
     rotor_time_constant=0.072,  # [rotorpy] (s)
     rotor_inertia=5e-8,  # assumed: a rod of 0.3 g [about bitcraze] and 45 mm (kg m2)
     rotor_drag=(10.2506e-7, 10.2506e-7, 7.553e-7),  # [foerster, rotorpy] (kg/rad)

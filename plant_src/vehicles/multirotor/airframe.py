@@ -14,9 +14,9 @@ import numpy as np
 
 from cosim.core.errors import InputError, Problem
 
-from ..common.shapes import Body, Box, Vector, quaternion
+from ..common.shapes import Body, Box, Vector, quaternion_from_matrix
 
-UP = (0.0, 0.0, 1.0)
+BODY_UP = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -24,14 +24,14 @@ class Rotor:
     """Its place in words and its position (m); the unit vector `axis` of its thrust, about which it turns; the sense (+1 or -1)
     in which its reaction turns the body about that axis."""
 
-    place: str
+    label: str
     position: Vector
-    sense: float
-    axis: Vector = UP
+    torque_sign: float
+    axis: Vector = BODY_UP
 
 
 @dataclass(frozen=True)
-class Effects:
+class RotorEffects:
     """Start values of the parameters that switch the effects beyond thrust and torque; zero leaves an effect out.
 
     `rotor_time_constant` s: first-order lag of the rotor speeds. `rotor_inertia` kg m2: of a rotor with its motor about its
@@ -63,21 +63,21 @@ class Airframe:
     torque_coefficient: float
     max_rotor_speed: float
     rotor_radius: float
-    effects: Effects = field(default_factory=Effects)
+    effects: RotorEffects = field(default_factory=RotorEffects)
     gravity: float = 9.81
 
     def __post_init__(self) -> None:
-        found = (*self._bad_numbers(), *self._bad_inertia(), *self._bad_rotors())
+        found = (*self._number_problems(), *self._inertia_problems(), *self._rotor_problems())
         if found:
             raise InputError([Problem(text, f"airframe {self.name}") for text in found])
 
     @property
-    def rotor_plane(self) -> Vector:
+    def rotor_centre(self) -> Vector:
         """Centre of the rotors (m)."""
         x, y, z = np.mean([rotor.position for rotor in self.rotors], axis=0).tolist()
         return x, y, z
 
-    def _bad_numbers(self) -> Iterator[str]:
+    def _number_problems(self) -> Iterator[str]:
         positive = ("mass", "thrust_coefficient", "torque_coefficient", "max_rotor_speed", "rotor_radius", "gravity")
         for name in positive:
             if not 0 < getattr(self, name) < math.inf:
@@ -86,21 +86,21 @@ class Airframe:
             if not all(0 <= number < math.inf for number in np.ravel(value)):
                 yield f"effects.{name}: found {value!r}, expected finite numbers of at least 0"
 
-    def _bad_inertia(self) -> Iterator[str]:
+    def _inertia_problems(self) -> Iterator[str]:
         tensor = np.asarray(self.inertia, float)
         if tensor.shape != (3, 3) or not np.isfinite(tensor).all():
             yield f"inertia: found {tensor.tolist()}, expected 3 rows of 3 finite numbers"
         elif not np.allclose(tensor, tensor.T, rtol=1e-12, atol=0):
             yield f"inertia: found {tensor.tolist()}, expected a symmetric tensor"
         else:
-            yield from _bad_moments(np.linalg.eigvalsh(tensor))
+            yield from _principal_moment_problems(np.linalg.eigvalsh(tensor))
 
-    def _bad_rotors(self) -> Iterator[str]:
+    def _rotor_problems(self) -> Iterator[str]:
         if not self.rotors:
             yield "rotors: found none, expected at least one"
         for number, rotor in enumerate(self.rotors, 1):
-            if rotor.sense not in (1, -1):
-                yield f"rotors[{number}].sense: found {rotor.sense!r}, expected 1 or -1"
+            if rotor.torque_sign not in (1, -1):
+                yield f"rotors[{number}].sense: found {rotor.torque_sign!r}, expected 1 or -1"
             if not math.isclose(math.hypot(*rotor.axis), 1, rel_tol=1e-9):
                 yield f"rotors[{number}].axis: found {rotor.axis}, expected a unit vector"
             if not all(map(math.isfinite, rotor.position)):
@@ -122,10 +122,10 @@ class Airframe:
         """What Bullet knows of it, in the principal-axis frame; `boxes` are made for the rotation (3, 3) to the body frame."""
         moments, to_body = self.principal_axes()
         x, y, z = moments.tolist()
-        return Body(self.mass, (x, y, z), boxes(to_body), axes=quaternion(to_body))
+        return Body(self.mass, (x, y, z), boxes(to_body), axes=quaternion_from_matrix(to_body))
 
 
-def _bad_moments(moments: np.ndarray) -> Iterator[str]:
+def _principal_moment_problems(moments: np.ndarray) -> Iterator[str]:
     """What is wrong with principal moments of inertia in ascending order; no body has one above the sum of the others."""
     small, middle, large = moments.tolist()
     if small <= 0:

@@ -18,16 +18,18 @@ import casadi as ca
 from .airframe import Airframe
 
 #: heights (in rotor radii) below this one count as this one: nearer to the surface the images do not describe the flow
-SMALLEST_HEIGHT = 0.5
+MIN_HEIGHT_RATIO = 0.5
 
 
 def thrust_factors(airframe: Airframe, height: ca.SX) -> list[ca.SX]:
     """For each rotor its thrust over that far from any surface, at a height (m) of the rotor plane above the surface."""
-    z = ca.fmax(height, SMALLEST_HEIGHT * airframe.rotor_radius)
+    z = ca.fmax(height, MIN_HEIGHT_RATIO * airframe.rotor_radius)
     places = [rotor.position[:2] for rotor in airframe.rotors]
-    return [1 / (1 - _inflow(airframe.rotor_radius, z, [math.dist(here, there) for there in places])) for here in places]
+    return [
+        1 / (1 - _inflow_reduction(airframe.rotor_radius, z, [math.dist(here, there) for there in places])) for here in places
+    ]
 
 
-def _inflow(radius: float, z: ca.SX, distances: list[float]) -> ca.SX:
+def _inflow_reduction(radius: float, z: ca.SX, distances: list[float]) -> ca.SX:
     """Share of a rotor's inflow that the images at these lateral distances (m) take away."""
     return sum((radius**2 / 2 * z / ca.sqrt(d**2 + 4 * z**2) ** 3 for d in distances), ca.SX(0))

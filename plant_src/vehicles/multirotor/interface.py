@@ -5,28 +5,36 @@ from __future__ import annotations
 from dataclasses import replace
 
 from cosim.core.component import Variable
-from cosim.core.units import parse
+from cosim.core.units import parse_unit
 
-from ..common.interface import CONTACT, EXTERNAL_LOADS, GROUND_DISTANCE, MOTION, WIND, initial, scalar
+from ..common.interface import (
+    CONTACT_OUTPUTS,
+    EXTERNAL_LOADS,
+    GROUND_DISTANCE_INPUT,
+    MOTION_OUTPUTS,
+    WIND_INPUTS,
+    initial_variables,
+    scalar_variable,
+)
 from .airframe import Airframe
 
 #: parameter -> its place in the inertia tensor, and by symmetry the one mirrored
-INERTIA = {f"inertia.{'xyz'[i]}{'xyz'[j]}": (i, j) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))}
+INERTIA_INDICES = {f"inertia.{'xyz'[i]}{'xyz'[j]}": (i, j) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))}
 
 
 def variables(airframe: Airframe) -> tuple[Variable, ...]:
     """Parameters, inputs and outputs; the start values of all but the initial ones are the airframe's."""
-    start = initial("xyz", "uvw", "pqr")
+    start = initial_variables("xyz", "uvw", "pqr")
     return (
         *start,
-        *_rigid_body(airframe),
-        *_effects(airframe),
-        _rotor_speed(airframe),
+        *_rigid_body_variables(airframe),
+        *_effect_variables(airframe),
+        _rotor_speed_variable(airframe),
         *EXTERNAL_LOADS,
-        *WIND,
-        *GROUND_DISTANCE,
-        *MOTION,
-        *CONTACT,
+        *WIND_INPUTS,
+        *GROUND_DISTANCE_INPUT,
+        *MOTION_OUTPUTS,
+        *CONTACT_OUTPUTS,
     )
 
 
@@ -37,45 +45,45 @@ def states(airframe: Airframe) -> tuple[str, ...]:
     return (*rigid, *(f"rotor_speed[{number}]" for number in range(1, len(airframe.rotors) + 1)))
 
 
-def constants(airframe: Airframe) -> int:
+def constant_count(airframe: Airframe) -> int:
     """How many numbers the equations are given: the parameters and the inverse of the inertia tensor."""
-    return 9 + sum(len(variable.slots) for variable in variables(airframe) if variable.causality == "parameter")
+    return 9 + sum(len(variable.scalar_names) for variable in variables(airframe) if variable.causality == "parameter")
 
 
-def _rigid_body(airframe: Airframe) -> tuple[Variable, ...]:
+def _rigid_body_variables(airframe: Airframe) -> tuple[Variable, ...]:
     """Mass and inertia, of which `airframe.Airframe` says what is possible."""
-    mass = scalar("mass", "kg", "with rotors and everything on board", "parameter", airframe.mass)
+    mass = scalar_variable("mass", "kg", "with rotors and everything on board", "parameter", airframe.mass)
     text = "inertia tensor about the centre of mass, body frame, rotors locked"
-    elements = {name: float(airframe.inertia[place]) for name, place in INERTIA.items()}
-    tensor = (scalar(name, "kg.m2", f"{text}: {name[-2:]}", "parameter", value) for name, value in elements.items())
+    elements = {name: float(airframe.inertia[place]) for name, place in INERTIA_INDICES.items()}
+    tensor = (scalar_variable(name, "kg.m2", f"{text}: {name[-2:]}", "parameter", value) for name, value in elements.items())
     return (mass, *tensor)
 
 
-def _rotor_speed(airframe: Airframe) -> Variable:
-    places = ", ".join(rotor.place for rotor in airframe.rotors)
+def _rotor_speed_variable(airframe: Airframe) -> Variable:
+    places = ", ".join(rotor.label for rotor in airframe.rotors)
     text = f"commanded speed of the rotors {places}; limited to what the motors reach"
     count = len(airframe.rotors)
     return Variable(
-        "rotor_speed", "Float64", "input", start=(0.0,) * count, unit=parse("rad/s"), shape=(count,), description=text
+        "rotor_speed", "Float64", "input", start=(0.0,) * count, unit=parse_unit("rad/s"), shape=(count,), description=text
     )
 
 
-def _effects(airframe: Airframe) -> tuple[Variable, ...]:
+def _effect_variables(airframe: Airframe) -> tuple[Variable, ...]:
     effects = airframe.effects
     return (
         _parameter("initial_rotor_speed", "rad/s", "initial speed of all rotors where they lag", 0.0, airframe.max_rotor_speed),
         _parameter("rotor_time_constant", "s", "lag of the rotor speeds; 0: none", effects.rotor_time_constant),
         _parameter("rotor_inertia", "kg.m2", "of a rotor with its motor; 0: no gyroscopic torque", effects.rotor_inertia),
-        *_along_axes("rotor_drag", "kg/rad", "drag of a rotor per its speed and air speed", effects.rotor_drag),
-        *_along_axes("body_drag", "kg/m", "drag of the body per squared air speed", effects.body_drag),
+        *_axis_parameters("rotor_drag", "kg/rad", "drag of a rotor per its speed and air speed", effects.rotor_drag),
+        *_axis_parameters("body_drag", "kg/m", "drag of the body per squared air speed", effects.body_drag),
         _parameter("ground_effect", "1", "share of the thrust gained near a surface; 0: none", effects.ground_effect, 1.0),
     )
 
 
-def _along_axes(name: str, unit: str, description: str, starts: tuple[float, float, float]) -> tuple[Variable, ...]:
+def _axis_parameters(name: str, unit: str, description: str, starts: tuple[float, float, float]) -> tuple[Variable, ...]:
     named = zip("xyz", starts, strict=True)
     return tuple(_parameter(f"{name}.{axis}", unit, f"{description}: {axis}, body frame", start) for axis, start in named)
 
 
 def _parameter(name: str, unit: str, description: str, start: float, maximum: float | None = None) -> Variable:
-    return replace(scalar(name, unit, description, "parameter", start), minimum=0.0, maximum=maximum)
+    return replace(scalar_variable(name, unit, description, "parameter", start), minimum=0.0, maximum=maximum)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..vessel.hull import shift
+from ..vessel.hull import transformation_matrix
 from . import parameters as p
 
 
@@ -17,7 +17,7 @@ class Hydrostatics:
 
     draught: ca.SX
     stiffness: ca.SX
-    settling: ca.SX
+    compliance: ca.SX
     footprint: ca.SX
 
 
@@ -28,12 +28,12 @@ def hydrostatics(mass: ca.SX, centre: ca.SX) -> Hydrostatics:
     area = 2 * p.WATERLINE_COEFFICIENT * p.LENGTH * p.PONTOON_BEAM
     c = p.WATERLINE_COEFFICIENT
     own = 2 * p.LENGTH * p.PONTOON_BEAM**3 / 12 * 6 * c**3 / ((1 + c) * (1 + 2 * c))
-    moments = ca.SX([own + area * p.PONTOON_DISTANCE**2, 0.8 * 2 * p.PONTOON_BEAM * p.LENGTH**3 / 12])
+    moments = ca.SX([own + area * p.PONTOON_OFFSET**2, 0.8 * 2 * p.PONTOON_BEAM * p.LENGTH**3 / 12])
     buoyancy_height = (5 * draught / 2 - volume / (2 * p.LENGTH * p.PONTOON_BEAM)) / 3
     metacentric_heights = buoyancy_height + moments / volume - (draught + centre[2])
     weight = p.WATER_DENSITY * p.GRAVITY
     stiffness = ca.vertcat(weight * area, weight * volume * metacentric_heights)
-    move = shift(ca.SX(p.FLOTATION))[2:5, 2:5]
+    move = transformation_matrix(ca.SX(p.CENTRE_OF_FLOTATION))[2:5, 2:5]
     settling = ca.inv(move.T @ ca.diag(stiffness) @ move)
     return Hydrostatics(draught, stiffness, settling, ca.vertcat(moments[1] / area, moments[0] / area, draught))
 
@@ -42,13 +42,13 @@ def linear_damping(mass: ca.SX, stiffness: ca.SX) -> ca.SX:
     """The diagonal (6) of the linear damping for the diagonal of the mass matrix."""
     frequencies = ca.sqrt(stiffness / mass[2:5])
     oscillating = 2 * ca.SX(p.DAMPING_RATIOS) * frequencies * mass[2:5]
-    sway, yaw = p.TIME_CONSTANTS
+    sway, yaw = p.DAMPING_TIME_CONSTANTS
     return ca.vertcat(p.MAX_THRUST / p.MAX_SPEED, mass[1] / sway, oscillating, mass[5] / yaw)
 
 
 def cross_flow_drag(draught: ca.SX) -> ca.SX:
     """N s2/m2 of one of the stations."""
-    slenderness, coefficients = zip(*p.HOERNER, strict=True)
+    slenderness, coefficients = zip(*p.CROSS_FLOW_DRAG_CURVE, strict=True)
     inside = ca.fmin(ca.fmax(p.PONTOON_BEAM / (2 * draught), slenderness[0]), slenderness[-1])
     coefficient = ca.pw_lin(inside, ca.DM(slenderness), ca.DM(coefficients))
-    return p.WATER_DENSITY / 2 * draught * coefficient * p.LENGTH / (p.STATIONS - 1)
+    return p.WATER_DENSITY / 2 * draught * coefficient * p.LENGTH / (p.STATION_COUNT - 1)

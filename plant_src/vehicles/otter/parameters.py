@@ -17,16 +17,16 @@ LENGTH, BEAM = 2.0, 1.08
 #: hull without payload (kg), its centre of mass (m), its radii of gyration about x, y, z (m)
 HULL_MASS = 55.0
 HULL_CENTRE = (0.2, 0.0, 0.2)
-GYRATION = (0.4 * BEAM, 0.25 * LENGTH, 0.25 * LENGTH)
+RADII_OF_GYRATION = (0.4 * BEAM, 0.25 * LENGTH, 0.25 * LENGTH)
 
 #: pontoons: beam and lateral position (m), coefficients of waterline and block
 PONTOON_BEAM = 0.25
-PONTOON_DISTANCE = 0.395
+PONTOON_OFFSET = 0.395
 WATERLINE_COEFFICIENT = 0.75
 BLOCK_COEFFICIENT = 0.4
 
 #: centre of the waterplane (m)
-FLOTATION = (-0.2, 0.0, 0.0)
+CENTRE_OF_FLOTATION = (-0.2, 0.0, 0.0)
 
 #: added mass in surge as a share of this (Soeding 1982), sway and heave as shares of the hull's mass, roll, pitch and yaw as
 #: shares of the moments of inertia
@@ -39,15 +39,15 @@ MAX_SPEED = 6 * 0.5144
 MAX_THRUST = 24.4 * GRAVITY
 
 #: time constants of sway and yaw (s), damping ratios of heave, roll and pitch, growth of yaw damping with the rate (s)
-TIME_CONSTANTS = (1.0, 1.0)
+DAMPING_TIME_CONSTANTS = (1.0, 1.0)
 DAMPING_RATIOS = (0.3, 0.2, 0.4)
 YAW_DAMPING_GROWTH = 10.0
 
 #: stations along the hull for the drag of the cross-flow
-STATIONS = 21
+STATION_COUNT = 21
 
 #: drag coefficient of a section over half of beam per draught (Hoerner's curve)
-HOERNER = (
+CROSS_FLOW_DRAG_CURVE = (
     (0.0109, 1.966),
     (0.1766, 1.9657),
     (0.3530, 1.8976),
@@ -78,7 +78,7 @@ MIN_PROPELLER_SPEED = -math.sqrt(0.5 * 13.6 * GRAVITY / THRUST_ASTERN)
 #: windage [assumed]: areas seen from ahead and from the side (m2) and drag coefficients, of the order of Fossen 2021, chapter
 #: 10.1; the drag of still air is part of the surge damping
 AIR_DENSITY = 1.225
-WINDAGE = (0.35, 0.55)
+PROJECTED_AREAS = (0.35, 0.55)
 WIND_COEFFICIENTS = (0.7, 0.9)
 WIND_HEIGHT = 0.25
 

@@ -12,7 +12,7 @@ from cosim.export.equations.model import ContinuousModel
 from cosim.export.fmu.block import Block
 
 from ..common import contact_maps, kinematics
-from ..common.elementary_functions import arctangent, sine_and_cosine, sine_of_quarter
+from ..common.elementary_functions import arctangent, sine_and_cosine, sine_of_right_angle_share
 from . import parameters as p
 from .geometry import DECK_CENTRE
 from .interface import STATES, VARIABLES
@@ -37,7 +37,7 @@ def rate(state: ca.SX, inputs: ca.SX) -> ca.SX:
 
 def hull_loads(v: ca.SX, r: ca.SX) -> ca.SX:
     """X, Y (N) and N (N m) of the water on the hulls, which move through it at v and r."""
-    return p.HULLS * ca.vertcat(0, p.Y_V * v + p.Y_R * r, p.N_V * v + p.N_R * r)
+    return p.HULL_COUNT * ca.vertcat(0, p.Y_V * v + p.Y_R * r, p.N_V * v + p.N_R * r)
 
 
 def air_drag(u: ca.SX, v: ca.SX) -> ca.SX:
@@ -51,7 +51,7 @@ def rudder_loads(u: ca.SX, v: ca.SX, r: ca.SX, rudder_angle: ca.SX) -> ca.SX:
     inflow_angle = arctangent(ahead * (v - p.RUDDER_ARM * r), ca.fabs(u))
     attack = ca.fmin(1, ca.fmax(-1, (rudder_angle - inflow_angle) / p.STALL_ANGLE))
     largest = p.WATER_DENSITY / 2 * p.RUDDER_MAX_LIFT_COEFFICIENT * p.RUDDER_AREA * ahead * u**2
-    lift = largest * sine_of_quarter(attack)
+    lift = largest * sine_of_right_angle_share(attack)
     side_force = lift * ca.cos(rudder_angle)
     return ca.vertcat(-lift * ca.sin(rudder_angle), side_force, -p.RUDDER_ARM * side_force)
 
@@ -64,13 +64,13 @@ def initial_state(parameters: ca.SX) -> ca.SX:
 def observe(state: ca.SX) -> ca.SX:
     """The published motion of the vessel and of its landing deck."""
     position = ca.vertcat(state[0:2], p.CENTRE_OF_MASS_HEIGHT)
-    orientation = kinematics.about_z(state[2])
-    to_world = kinematics.matrix(orientation)
+    orientation = kinematics.quaternion_about_z(state[2])
+    to_world = kinematics.rotation_matrix(orientation)
     rates = ca.vertcat(0, 0, state[5])
     velocity = to_world @ ca.vertcat(state[3:5], 0)
     to_deck = to_world @ ca.SX(DECK_CENTRE)
     deck = ca.vertcat(position + to_deck, velocity + ca.cross(rates, to_deck))
-    return ca.vertcat(kinematics.motion(position, orientation, velocity, rates), deck)
+    return ca.vertcat(kinematics.motion_outputs(position, orientation, velocity, rates), deck)
 
 
 def block() -> Block:
@@ -84,5 +84,5 @@ def block() -> Block:
         lambda state, inputs, parameters: rate(state, inputs),
         lambda state, inputs, parameters: ca.vertcat(observe(state), ca.SX.zeros(3)),
     )
-    shadow = contact_maps.PlanarBody(model, p.MASS, p.INERTIA[2], p.CENTRE_OF_MASS_HEIGHT, observe)
+    shadow = contact_maps.PlanarContactMaps(model, p.MASS, p.INERTIA[2], p.CENTRE_OF_MASS_HEIGHT, observe)
     return as_block(model, shadow.functions())

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
-from ..common.interface import CONTACT, CURRENT, DECK, EXTERNAL_LOADS, MOTION, WIND, initial, scalar
+from ..common.interface import (
+    CONTACT_OUTPUTS,
+    CURRENT_INPUTS,
+    DECK_OUTPUTS,
+    EXTERNAL_LOADS,
+    MOTION_OUTPUTS,
+    WIND_INPUTS,
+    initial_variables,
+    scalar_variable,
+)
 
-THRUST = scalar("thrust", "N", "thrust along the body's x axis, at the height and lateral position of the centre of mass")
-RUDDER_ANGLE = scalar("rudder_angle", "rad", "rudder deflection; positive: trailing edge and bow to starboard, yaw decreases")
+THRUST = scalar_variable(
+    "thrust", "N", "thrust along the body's x axis, at the height and lateral position of the centre of mass"
+)
+RUDDER_ANGLE = scalar_variable(
+    "rudder_angle", "rad", "rudder deflection; positive: trailing edge and bow to starboard, yaw decreases"
+)
 
-INPUTS = (THRUST, RUDDER_ANGLE, *EXTERNAL_LOADS, *WIND, *CURRENT)
-VARIABLES = (*initial("xy", "uv", "r"), *INPUTS, *MOTION, *DECK, *CONTACT)
+INPUTS = (THRUST, RUDDER_ANGLE, *EXTERNAL_LOADS, *WIND_INPUTS, *CURRENT_INPUTS)
+VARIABLES = (*initial_variables("xy", "uv", "r"), *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *CONTACT_OUTPUTS)
 
 STATES = ("position.x", "position.y", "attitude.yaw", "velocity_body.u", "velocity_body.v", "rates.r")

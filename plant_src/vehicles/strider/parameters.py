@@ -17,7 +17,7 @@ INERTIA = (0.4957, 0.2478, 0.6391)
 #: height of the centre of mass above the water [model] (m)
 CENTRE_OF_MASS_HEIGHT = 0.1245
 
-HULLS = 2
+HULL_COUNT = 2
 
 #: derivatives of the side force Y and the yaw moment N of one hull, at about 1 m/s [model, paper]
 Y_V = -3.899501881  # kg/s

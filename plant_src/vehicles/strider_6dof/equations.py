@@ -12,7 +12,7 @@ from ..strider.equations import air_drag, hull_loads, rudder_loads
 from ..strider.geometry import DECK_CENTRE
 from ..strider.parameters import CENTRE_OF_MASS_HEIGHT, INERTIA, MASS
 from ..vessel import floating_maps, vessel_equations
-from ..vessel.hull import Hull, Named, Situation, at
+from ..vessel.hull import Hull, LoadArguments, ValuesByName, load_of_force_at
 from ..vessel.wave_loads import Footprint
 from . import parameters as p
 from .geometry import BODY
@@ -22,55 +22,62 @@ _ORIGIN = ca.SX.zeros(3)  # of the body's frame: the centre of mass
 _FOOTPRINT = Footprint(
     ca.SX(p.LONGITUDINAL_MOMENT / p.WATERPLANE_AREA), ca.SX(p.TRANSVERSE_MOMENT / p.WATERPLANE_AREA), ca.SX(p.DRAUGHT)
 )
-_RIGID_BODY = np.diag([MASS] * 3 + list(INERTIA))
+_RIGID_BODY_MASS_MATRIX = np.diag([MASS] * 3 + list(INERTIA))
 
 
-def prepare(parameters: Named) -> Named:
+def derive_constants(parameters: ValuesByName) -> ValuesByName:
     """What the equations need of the parameters."""
     share = parameters["hydrodynamics"]
     return {
-        **vessel_equations.initial(parameters),
+        **vessel_equations.initial_parameters(parameters),
         "hydrodynamics": share,
-        "inverse": ca.inv(_RIGID_BODY + share * ca.SX(p.ADDED_MASS)),
+        "inverse": ca.inv(_RIGID_BODY_MASS_MATRIX + share * ca.SX(p.ADDED_MASS)),
         "wave.count": parameters["wave.count"],
-        "sea": vessel_equations.sea_of(parameters, _FOOTPRINT),
+        "sea": vessel_equations.wave_table_of(parameters, _FOOTPRINT),
     }
 
 
-def hull(constants: Named) -> Hull:
+def hull(constants: ValuesByName) -> Hull:
     """The vessel with these constants."""
     share = constants["hydrodynamics"]
     return Hull(
         mass=ca.SX(MASS),
-        centre=_ORIGIN,
+        centre_of_mass=_ORIGIN,
         inertia=ca.diag(ca.SX(INERTIA)),
         added_mass=share * ca.SX(p.ADDED_MASS),
-        flow_mass=share * ca.SX(p.FLOW_MASS),
-        inverse=constants["inverse"],
-        flotation=_ORIGIN,
-        deck=ca.SX(DECK_CENTRE),
-        rest=ca.SX([CENTRE_OF_MASS_HEIGHT, 0, 0]),
+        coriolis_added_mass=share * ca.SX(p.CORIOLIS_ADDED_MASS),
+        inverse_mass_matrix=constants["inverse"],
+        centre_of_flotation=_ORIGIN,
+        deck_centre=ca.SX(DECK_CENTRE),
+        equilibrium=ca.SX([CENTRE_OF_MASS_HEIGHT, 0, 0]),
         footprint=_FOOTPRINT,
         wave_count=share * constants["wave.count"],
-        sea=constants["sea"],
-        loads=lambda now: share * (water_loads(now) + wind_loads(now)) + at(_ORIGIN, ca.vertcat(now.inputs["thrust"], 0, 0)),
+        wave_table=constants["sea"],
+        loads=lambda now: (
+            share * (water_loads(now) + wind_loads(now)) + load_of_force_at(_ORIGIN, ca.vertcat(now.inputs["thrust"], 0, 0))
+        ),
     )
 
 
-def water_loads(now: Situation) -> ca.SX:
+def water_loads(now: LoadArguments) -> ca.SX:
     """Loads (6) of buoyancy less weight, damping and rudder."""
-    u, v, r = now.relative[0], now.relative[1], now.relative[5]
-    return restoring(now) + damping(now.relative) + in_plane(hull_loads(v, r), p.HULL_FORCE_HEIGHT) + rudder(now, u, v, r)
+    u, v, r = now.relative_velocity[0], now.relative_velocity[1], now.relative_velocity[5]
+    return (
+        restoring(now)
+        + damping(now.relative_velocity)
+        + load_from_planar(hull_loads(v, r), p.HULL_FORCE_HEIGHT)
+        + rudder(now, u, v, r)
+    )
 
 
-def restoring(now: Situation) -> ca.SX:
+def restoring(now: LoadArguments) -> ca.SX:
     """Buoyancy less weight, along the world's z axis, and righting moments relative to the slopes of the water.
 
     Buoyancy has no moment about the vertical: it acts at a lever, which is why the righting moment is a cross product with it.
     """
     up = now.frame.attitude[2, :].T
     heave, roll, pitch = p.STIFFNESS
-    lift = heave * (CENTRE_OF_MASS_HEIGHT + now.elevation - now.rise)
+    lift = heave * (CENTRE_OF_MASS_HEIGHT + now.elevation - now.height)
     lever = -ca.vertcat(pitch * (up[0] - now.slopes[0]), roll * (up[1] - now.slopes[1]), 0)
     return ca.vertcat(lift * up, ca.cross(lever, up))
 
@@ -81,31 +88,31 @@ def damping(relative: ca.SX) -> ca.SX:
     load = -ca.vertcat(0, 0, ca.SX(p.DAMPING) * ca.vertcat(w, roll_rate, pitch_rate), 0)
     for x, y in p.DRAG_POINTS:
         speed = w + y * roll_rate - x * pitch_rate
-        load += at(ca.SX([x, y, 0]), ca.vertcat(0, 0, -p.DRAG * ca.fabs(speed) * speed))
+        load += load_of_force_at(ca.SX([x, y, 0]), ca.vertcat(0, 0, -p.POINT_DRAG * ca.fabs(speed) * speed))
     return load
 
 
-def rudder(now: Situation, u: ca.SX, v: ca.SX, r: ca.SX) -> ca.SX:
+def rudder(now: LoadArguments, u: ca.SX, v: ca.SX, r: ca.SX) -> ca.SX:
     """Load of the rudder."""
-    return in_plane(rudder_loads(u, v, r, now.inputs["rudder_angle"]), p.RUDDER_HEIGHT)
+    return load_from_planar(rudder_loads(u, v, r, now.inputs["rudder_angle"]), p.RUDDER_HEIGHT)
 
 
-def wind_loads(now: Situation) -> ca.SX:
+def wind_loads(now: LoadArguments) -> ca.SX:
     """Drag of the air, at the centre of mass."""
-    return in_plane(air_drag(now.air[0], now.air[1]), 0.0)
+    return load_from_planar(air_drag(now.air_relative_velocity[0], now.air_relative_velocity[1]), 0.0)
 
 
-def in_plane(load: ca.SX, height: float) -> ca.SX:
+def load_from_planar(load: ca.SX, height: float) -> ca.SX:
     """X, Y and N, taken at a height above the centre of mass, as a load (6)."""
     return ca.vertcat(load[0:2], 0, -height * load[1], height * load[0], load[2])
 
 
-VESSEL = vessel_equations.Vessel(
-    "strider_6dof", "Strider V1.0 catamaran afloat, in six degrees of freedom", VARIABLES, prepare, hull
+VESSEL = vessel_equations.VesselModel(
+    "strider_6dof", "Strider V1.0 catamaran afloat, in six degrees of freedom", VARIABLES, derive_constants, hull
 )
 
 
 def block() -> Block:
     """The catamaran on open water."""
-    model = VESSEL.model()
-    return as_block(model, floating_maps.FloatingBody(model, VESSEL, BODY).functions())
+    model = VESSEL.create_continuous_model()
+    return as_block(model, floating_maps.FloatingContactMaps(model, VESSEL, BODY).functions())

@@ -3,27 +3,38 @@
 from __future__ import annotations
 
 from cosim.core.component import Variable
-from cosim.core.units import parse
+from cosim.core.units import parse_unit
 
-from ..common.interface import AFLOAT, CONTACT, CURRENT, DECK, EXTERNAL_LOADS, MOTION, WAVE_GAIN, WAVES, WIND, initial
+from ..common.interface import (
+    CONTACT_OUTPUTS,
+    CURRENT_INPUTS,
+    DECK_OUTPUTS,
+    EXTERNAL_LOADS,
+    FLOATING_INITIAL_PARAMETERS,
+    MOTION_OUTPUTS,
+    WAVE_GAIN_INPUT,
+    WAVE_PARAMETERS,
+    WIND_INPUTS,
+    initial_variables,
+)
 from ..strider.interface import RUDDER_ANGLE, THRUST
 
-HYDRODYNAMICS = Variable(
+HYDRODYNAMICS_PARAMETER = Variable(
     "hydrodynamics",
     "Float64",
     "parameter",
     "fixed",
     1.0,
-    parse("1"),
+    parse_unit("1"),
     (),
     "0 takes away the loads of water and air together with the weight: the vessel is a free rigid body",
     0.0,
     1.0,
 )
 
-PARAMETERS = (*initial("xy", "uvw", "pqr"), *AFLOAT, HYDRODYNAMICS, *WAVES)
-INPUTS = (THRUST, RUDDER_ANGLE, *EXTERNAL_LOADS, *WIND, *CURRENT, *WAVE_GAIN)
-VARIABLES = (*PARAMETERS, *INPUTS, *MOTION, *DECK, *CONTACT)
+PARAMETERS = (*initial_variables("xy", "uvw", "pqr"), *FLOATING_INITIAL_PARAMETERS, HYDRODYNAMICS_PARAMETER, *WAVE_PARAMETERS)
+INPUTS = (THRUST, RUDDER_ANGLE, *EXTERNAL_LOADS, *WIND_INPUTS, *CURRENT_INPUTS, *WAVE_GAIN_INPUT)
+VARIABLES = (*PARAMETERS, *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *CONTACT_OUTPUTS)
 
 #: how many numbers the equations make of the parameters
-CONSTANTS = 443
+CONSTANT_COUNT = 443

@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from ..strider.geometry import HULL_BEAM, HULL_BOTTOM, HULL_DISTANCE, HULL_LENGTH
-from ..strider.parameters import CENTRE_OF_MASS_HEIGHT, HULLS, INERTIA, MASS, RUDDER_AREA, WATER_DENSITY
+from ..strider.geometry import HULL_BEAM, HULL_BOTTOM, HULL_LENGTH, HULL_OFFSET
+from ..strider.parameters import CENTRE_OF_MASS_HEIGHT, HULL_COUNT, INERTIA, MASS, RUDDER_AREA, WATER_DENSITY
 
 GRAVITY = 9.81
 
@@ -20,15 +20,15 @@ DRAUGHT = -HULL_BOTTOM - CENTRE_OF_MASS_HEIGHT
 VOLUME = MASS / WATER_DENSITY
 
 #: 0.86: the hulls are nearly boxes
-BLOCK_COEFFICIENT = VOLUME / (HULLS * HULL_LENGTH * HULL_BEAM * DRAUGHT)
+BLOCK_COEFFICIENT = VOLUME / (HULL_COUNT * HULL_LENGTH * HULL_BEAM * DRAUGHT)
 
 #: U-shaped sections: (1 + 2 C_B) / 3 (Schneekluth and Bertram 1998, Ship Design for Efficiency and Economy, section 1.6)
 WATERPLANE_COEFFICIENT = (1 + 2 * BLOCK_COEFFICIENT) / 3
 
-WATERPLANE_AREA = HULLS * WATERPLANE_COEFFICIENT * HULL_LENGTH * HULL_BEAM  # m2
+WATERPLANE_AREA = HULL_COUNT * WATERPLANE_COEFFICIENT * HULL_LENGTH * HULL_BEAM  # m2
 
 #: second moments of the waterplane (m4), of both hulls; lengthwise reduced by the square of its coefficient
-TRANSVERSE_MOMENT = WATERPLANE_AREA * (HULL_DISTANCE**2 + HULL_BEAM**2 / 12)
+TRANSVERSE_MOMENT = WATERPLANE_AREA * (HULL_OFFSET**2 + HULL_BEAM**2 / 12)
 LONGITUDINAL_MOMENT = WATERPLANE_COEFFICIENT * WATERPLANE_AREA * HULL_LENGTH**2 / 12
 
 #: metacentric heights (m); the centre of buoyancy lies in the middle of the draught
@@ -43,8 +43,8 @@ STIFFNESS = (
 
 #: added mass of the sections (kg/m) by strip theory: a half circle of the draught sideways, a flat plate at the surface
 #: vertically (Newman 1977, Marine Hydrodynamics, table 4.3)
-_SIDEWAYS = HULLS * WATER_DENSITY * math.pi / 2 * DRAUGHT**2
-_VERTICAL = HULLS * WATER_DENSITY * math.pi / 8 * HULL_BEAM**2
+_SWAY_ADDED_MASS = HULL_COUNT * WATER_DENSITY * math.pi / 2 * DRAUGHT**2
+_HEAVE_ADDED_MASS = HULL_COUNT * WATER_DENSITY * math.pi / 8 * HULL_BEAM**2
 
 #: of the mass, along the hulls [assumed]: slender bodies have 3 to 8 %
 SURGE_ADDED_MASS_SHARE = 0.05
@@ -52,36 +52,36 @@ SURGE_ADDED_MASS_SHARE = 0.05
 ADDED_MASS = np.diag(
     [
         SURGE_ADDED_MASS_SHARE * MASS,
-        _SIDEWAYS * HULL_LENGTH,
-        _VERTICAL * HULL_LENGTH,
-        _VERTICAL * HULL_LENGTH * HULL_DISTANCE**2,
-        _VERTICAL * HULL_LENGTH**3 / 12,
-        _SIDEWAYS * HULL_LENGTH**3 / 12 + SURGE_ADDED_MASS_SHARE * MASS * HULL_DISTANCE**2,
+        _SWAY_ADDED_MASS * HULL_LENGTH,
+        _HEAVE_ADDED_MASS * HULL_LENGTH,
+        _HEAVE_ADDED_MASS * HULL_LENGTH * HULL_OFFSET**2,
+        _HEAVE_ADDED_MASS * HULL_LENGTH**3 / 12,
+        _SWAY_ADDED_MASS * HULL_LENGTH**3 / 12 + SURGE_ADDED_MASS_SHARE * MASS * HULL_OFFSET**2,
     ]
 )
 
 #: the derivatives of side force and yaw moment hold at speed: they contain what the added mass does in the plane
-FLOW_MASS = ADDED_MASS * np.diag([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
+CORIOLIS_ADDED_MASS = ADDED_MASS * np.diag([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
 
 #: of critical damping, in heave, roll and pitch [assumed], as Fossen's model of the Otter has them
 DAMPING_RATIOS = (0.3, 0.2, 0.4)
 
-_OSCILLATING = np.array([MASS, *INERTIA[:2]]) + np.diag(ADDED_MASS)[2:5]
+_OSCILLATING_INERTIA = np.array([MASS, *INERTIA[:2]]) + np.diag(ADDED_MASS)[2:5]
 
 #: rad/s
-NATURAL_FREQUENCIES = np.sqrt(np.array(STIFFNESS) / _OSCILLATING)
+NATURAL_FREQUENCIES = np.sqrt(np.array(STIFFNESS) / _OSCILLATING_INERTIA)
 
 #: linear damping of heave (kg/s), roll and pitch (kg m2/s)
-DAMPING = tuple((2 * np.array(DAMPING_RATIOS) * NATURAL_FREQUENCIES * _OSCILLATING).tolist())
+DAMPING = tuple((2 * np.array(DAMPING_RATIOS) * NATURAL_FREQUENCIES * _OSCILLATING_INERTIA).tolist())
 
 #: of a plate across the flow, for vertical motion [assumed] (Hoerner 1965, Fluid-Dynamic Drag, chapter 3)
 PLATE_DRAG_COEFFICIENT = 1.2
 
 #: the vertical drag acts at two points of each hull that give its mean square distance from the middle (m)
-DRAG_POINTS = tuple((x, y) for x in (-HULL_LENGTH / 12**0.5, HULL_LENGTH / 12**0.5) for y in (-HULL_DISTANCE, HULL_DISTANCE))
+DRAG_POINTS = tuple((x, y) for x in (-HULL_LENGTH / 12**0.5, HULL_LENGTH / 12**0.5) for y in (-HULL_OFFSET, HULL_OFFSET))
 
 #: N s2/m2 at each point
-DRAG = WATER_DENSITY / 2 * PLATE_DRAG_COEFFICIENT * WATERPLANE_AREA / len(DRAG_POINTS)
+POINT_DRAG = WATER_DENSITY / 2 * PLATE_DRAG_COEFFICIENT * WATERPLANE_AREA / len(DRAG_POINTS)
 
 #: heights of the points where hulls and rudder take side forces, from the centre of mass (m); the rudder is square [assumed]
 HULL_FORCE_HEIGHT = HULL_BOTTOM + DRAUGHT / 2

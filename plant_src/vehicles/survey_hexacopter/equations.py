@@ -10,4 +10,4 @@ from .parameters import AIRFRAME
 
 def block() -> Block:
     """The survey hexacopter in free flight."""
-    return multirotor_equations.block(AIRFRAME, "Survey hexacopter of the class of the Tarot FY680 in free flight")
+    return multirotor_equations.multirotor_block(AIRFRAME, "Survey hexacopter of the class of the Tarot FY680 in free flight")

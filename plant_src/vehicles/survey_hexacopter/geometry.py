@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..common.shapes import Box, standing_box
+from ..common.shapes import Box, level_box
 from .parameters import AIRFRAME
 
 #: distance of the landing skids' ends along x and y, assumed: the skids of this class of frame (m)
-TRACK = (0.30, 0.36)
+SKID_TRACK = (0.30, 0.36)
 
 #: bottom of the skids and top of the frame from the centre of mass, assumed (m)
 FEET_HEIGHT, TOP_HEIGHT = -0.22, 0.12
@@ -16,7 +16,7 @@ FEET_HEIGHT, TOP_HEIGHT = -0.22, 0.12
 
 def boxes(to_body: np.ndarray) -> tuple[Box, ...]:
     """The shapes in a frame that `to_body` (3, 3) turns into the body frame."""
-    return (standing_box(to_body, TRACK, FEET_HEIGHT, TOP_HEIGHT),)
+    return (level_box(to_body, SKID_TRACK, FEET_HEIGHT, TOP_HEIGHT),)
 
 
 BODY = AIRFRAME.body(boxes)

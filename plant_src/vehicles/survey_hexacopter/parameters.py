@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from ..multirotor.airframe import Airframe, Effects, Rotor
+from ..multirotor.airframe import Airframe, Rotor, RotorEffects
 
 #: of the motors from the middle [eagle] (m)
 ARM = 0.68 / 2
@@ -66,7 +66,7 @@ def _inertia() -> np.ndarray:
 
 INERTIA = _inertia()
 
-EFFECTS = Effects(
+EFFECTS = RotorEffects(
     rotor_time_constant=0.05,  # assumed: 0.03 s for propellers of 9 inch [mrs], longer for heavier ones (s)
     rotor_inertia=3.5e-4,  # assumed: a rod of 22 g and 0.4064 m, and the bell of the motor (kg m2)
     rotor_drag=(8.06428e-5, 8.06428e-5, 0.0),  # [rotors], for propellers of 10 inch (kg/rad)

@@ -17,11 +17,20 @@ import casadi as ca
 from cosim.export.equations.model import ContinuousModel
 
 from ..common import kinematics
-from ..common.contact_maps import LINEAR_ANGULAR, alarm, constants_of, contact, foreseen, symbols, symbols_after, symbols_before
+from ..common.contact_maps import (
+    TWIST_SIZE,
+    alarm_code,
+    contact_impulse,
+    correct_symbols,
+    create_symbols,
+    parameters_and_constants,
+    predict_symbols,
+    predicted_state,
+)
 from ..common.shapes import Body
 from .hull import Frame, Hull
-from .vessel_equations import Vessel
-from .wave_loads import surface
+from .vessel_equations import VesselModel
+from .wave_loads import create_surface_function
 
 
 class _Impulse(NamedTuple):
@@ -32,7 +41,7 @@ class _Impulse(NamedTuple):
 
 
 @dataclass(frozen=True)
-class FloatingBody:
+class FloatingContactMaps:
     """A vessel with the state of `vessel_model.Vessel`.
 
     Bullet's body has its centre of mass in the origin O of the vessel's frame and mass and inertia of `body`, whatever the
@@ -42,87 +51,91 @@ class FloatingBody:
     """
 
     model: ContinuousModel
-    vessel: Vessel
+    vessel: VesselModel
     body: Body
 
     def functions(self) -> list[ca.Function]:
         """The functions to export."""
-        return [self._spawn(), self._before(), self._after(), surface()]
+        return [self._initialize_function(), self._predict_function(), self._correct_function(), create_surface_function()]
 
-    def _spawn(self) -> ca.Function:
-        parameters, constants = constants_of(self.model)
+    def _initialize_function(self) -> ca.Function:
+        parameters, constants = parameters_and_constants(self.model)
         state = self.model.initial_state(constants)
-        frame = self.vessel.at(constants).frame(state[3:7])
-        motion = ca.vertcat(frame.to_world @ state[7:10], frame.attitude @ (frame.spin @ state[10:13]))
-        return ca.Function("shadow_spawn", [parameters], [constants, state, motion, motion, _pose(state)])
+        frame = self.vessel.hull_with(constants).frame(state[3:7])
+        motion = ca.vertcat(frame.to_world @ state[7:10], frame.attitude @ (frame.rates_to_angular_velocity @ state[10:13]))
+        return ca.Function("shadow_spawn", [parameters], [constants, state, motion, motion, _bullet_pose(state)])
 
-    def _before(self) -> ca.Function:
-        arguments = symbols_before(self.model)
+    def _predict_function(self) -> ca.Function:
+        arguments = predict_symbols(self.model)
         state, inputs, surroundings, constants, step = arguments[:5]
-        (carried,) = symbols(carried=6)
-        hull, attitude = self.vessel.at(constants), kinematics.matrix(state[3:7])
-        pressed = self._pressed(inputs, _about_centre(hull, attitude, carried), step)
-        end = foreseen(self.model, state, pressed, surroundings, constants, step)
+        (carried,) = create_symbols(carried=6)
+        hull, attitude = self.vessel.hull_with(constants), kinematics.rotation_matrix(state[3:7])
+        pressed = self._inputs_with_contact_force(inputs, _impulse_about_centre(hull, attitude, carried), step)
+        end = predicted_state(self.model, state, pressed, surroundings, constants, step)
         linear = (end[0:3] - state[0:3]) / step
-        angular = kinematics.rotation_vector(kinematics.product(end[3:7], kinematics.conjugate(state[3:7]))) / step
-        inertia = self._inertia(attitude)
-        twist = ca.vertcat(linear, angular) - ca.vertcat(carried[0:3] / self.body.mass, self._turned(attitude, carried[3:6]))
+        angular = kinematics.rotation_vector(kinematics.quaternion_product(end[3:7], kinematics.conjugate(state[3:7]))) / step
+        inertia = self._inertia_in_world(attitude)
+        twist = ca.vertcat(linear, angular) - ca.vertcat(
+            carried[0:3] / self.body.mass, self._angular_velocity_change(attitude, carried[3:6])
+        )
         torque = ca.cross(twist[3:6], inertia @ twist[3:6])
         path = ca.vertcat(state[0:3], end[0:3])
-        results = [state, end, twist, twist, torque, _pose(state), carried, path, alarm(end, path, arguments)]
+        results = [state, end, twist, twist, torque, _bullet_pose(state), carried, path, alarm_code(end, path, arguments)]
         return ca.Function("shadow_before", [*arguments, carried], results)
 
-    def _after(self) -> ca.Function:
-        arguments = symbols_after(self.model)
+    def _correct_function(self) -> ca.Function:
+        arguments = correct_symbols(self.model)
         start, predicted, twist, motion, constants, step = arguments
-        (previous,) = symbols(previous=6)
-        hull, attitude = self.vessel.at(constants), kinematics.matrix(start[3:7])
+        (previous,) = create_symbols(previous=6)
+        hull, attitude = self.vessel.hull_with(constants), kinematics.rotation_matrix(start[3:7])
         change = motion - twist
-        linear, angular = self.body.mass * change[0:3], self._inertia(attitude) @ change[3:6]
-        strength = contact(ca.norm_2(linear))
+        linear, angular = self.body.mass * change[0:3], self._inertia_in_world(attitude) @ change[3:6]
+        strength = contact_impulse(ca.norm_2(linear))
         found = ca.if_else(strength > 0, ca.vertcat(linear, angular), ca.SX.zeros(6)) + 0 * strength
         touched = ca.logic_or(strength > 0, ca.norm_2(previous) > 0)
-        surplus = _about_centre(hull, attitude, found - previous)
-        pose = _moved(start, motion, step)
+        surplus = _impulse_about_centre(hull, attitude, found - previous)
+        pose = _integrate_pose(start, motion, step)
         before, frame = hull.frame(predicted[3:7]), hull.frame(pose[3:7])
-        nu = predicted[7:13] + hull.inverse @ _load(hull, before, surplus)
+        nu = predicted[7:13] + hull.inverse_mass_matrix @ _impulse_load(hull, before, surplus)
         velocity = frame.to_world.T @ (before.to_world @ nu[0:3])  # that in the world stays, though Bullet has turned the body
         corrected = ca.vertcat(pose, velocity, nu[3:6], predicted[13:])
-        label = ca.vertcat(frame.to_world.T @ motion[0:3], ca.inv(frame.spin) @ (frame.attitude.T @ motion[3:6]))
+        label = ca.vertcat(
+            frame.to_world.T @ motion[0:3], ca.inv(frame.rates_to_angular_velocity) @ (frame.attitude.T @ motion[3:6])
+        )
         state = ca.if_else(touched, corrected, predicted)
         seen = ca.vertcat(state[0:7], ca.if_else(strength > 0, label, state[7:13]), state[13:])
         return ca.Function("shadow_after", [*arguments, previous], [state, strength, hull.observe(seen), found])
 
-    def _pressed(self, inputs: ca.SX, impulse: _Impulse, step: ca.SX) -> ca.SX:
+    def _inputs_with_contact_force(self, inputs: ca.SX, impulse: _Impulse, step: ca.SX) -> ca.SX:
         """The inputs with a held contact force among the external loads."""
-        names = [slot.name for slot in self.model.slots("input")]
+        names = [slot.name for slot in self.model.elements("input")]
         first = names.index("external_force.x")
         load = ca.vertcat(impulse.linear, impulse.angular) / step
-        return ca.vertcat(inputs[:first], inputs[first : first + LINEAR_ANGULAR] + load, inputs[first + LINEAR_ANGULAR :])
+        return ca.vertcat(inputs[:first], inputs[first : first + TWIST_SIZE] + load, inputs[first + TWIST_SIZE :])
 
-    def _inertia(self, attitude: ca.SX) -> ca.SX:
+    def _inertia_in_world(self, attitude: ca.SX) -> ca.SX:
         return attitude @ ca.diag(ca.SX(self.body.inertia)) @ attitude.T
 
-    def _turned(self, attitude: ca.SX, impulse: ca.SX) -> ca.SX:
+    def _angular_velocity_change(self, attitude: ca.SX, impulse: ca.SX) -> ca.SX:
         """The change of angular velocity of Bullet's body."""
         return attitude @ ((attitude.T @ impulse) / ca.SX(self.body.inertia))
 
 
-def _about_centre(hull: Hull, attitude: ca.SX, impulse: ca.SX) -> _Impulse:
-    return _Impulse(impulse[0:3], impulse[3:6] - ca.cross(attitude @ hull.centre, impulse[0:3]))
+def _impulse_about_centre(hull: Hull, attitude: ca.SX, impulse: ca.SX) -> _Impulse:
+    return _Impulse(impulse[0:3], impulse[3:6] - ca.cross(attitude @ hull.centre_of_mass, impulse[0:3]))
 
 
-def _load(hull: Hull, frame: Frame, impulse: _Impulse) -> ca.SX:
+def _impulse_load(hull: Hull, frame: Frame, impulse: _Impulse) -> ca.SX:
     """The impulse as a load in the equations of motion."""
-    lever = frame.attitude @ hull.centre
-    return frame.load(impulse.linear, impulse.angular + ca.cross(lever, impulse.linear))
+    lever = frame.attitude @ hull.centre_of_mass
+    return frame.generalised_force(impulse.linear, impulse.angular + ca.cross(lever, impulse.linear))
 
 
-def _moved(start: ca.SX, motion: ca.SX, step: ca.SX) -> ca.SX:
+def _integrate_pose(start: ca.SX, motion: ca.SX, step: ca.SX) -> ca.SX:
     """Position and orientation to which Bullet has moved the body."""
-    orientation = kinematics.product(kinematics.turned_by(motion[3:6] * step), start[3:7])
-    return ca.vertcat(start[0:3] + motion[0:3] * step, kinematics.normalised(orientation))
+    orientation = kinematics.quaternion_product(kinematics.quaternion_from_rotation_vector(motion[3:6] * step), start[3:7])
+    return ca.vertcat(start[0:3] + motion[0:3] * step, kinematics.normalised_quaternion(orientation))
 
 
-def _pose(state: ca.SX) -> ca.SX:
+def _bullet_pose(state: ca.SX) -> ca.SX:
     return ca.vertcat(state[0:3], state[4:7], state[3])

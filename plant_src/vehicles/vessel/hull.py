@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ..common import kinematics
-from ..common.interface import AFLOAT_STATES
-from .wave_loads import Footprint, Water, water
+from ..common.interface import VESSEL_STATES
+from .wave_loads import Footprint, WaveKinematics, wave_kinematics
 
-Named = Mapping[str, ca.SX]
+ValuesByName = Mapping[str, ca.SX]
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class Frame:
 
     attitude: ca.SX
     to_world: ca.SX
-    spin: ca.SX
-    from_stream: ca.SX
+    rates_to_angular_velocity: ca.SX
+    world_to_current_axes: ca.SX
 
     @property
     def heading(self) -> tuple[ca.SX, ca.SX]:
@@ -40,13 +40,13 @@ class Frame:
         length = ca.sqrt(x * x + y * y + 1e-300)
         return x / length, y / length
 
-    def load(self, force: ca.SX, torque: ca.SX) -> ca.SX:
+    def generalised_force(self, force: ca.SX, torque: ca.SX) -> ca.SX:
         """A force at O and a torque about it, both in the world frame, as a load in the equations of motion."""
-        return ca.vertcat(self.to_world.T @ force, self.spin.T @ (self.attitude.T @ torque))
+        return ca.vertcat(self.to_world.T @ force, self.rates_to_angular_velocity.T @ (self.attitude.T @ torque))
 
 
 @dataclass(frozen=True)
-class Situation:
+class LoadArguments:
     """What a hull is exposed to.
 
     `relative` is nu relative to the water with its waves, `air` the velocity of O relative to the air (3, body), `still_air`
@@ -55,19 +55,19 @@ class Situation:
 
     frame: Frame
     orientation: ca.SX
-    relative: ca.SX
-    air: ca.SX
-    still_air: ca.SX
-    rise: ca.SX
+    relative_velocity: ca.SX
+    air_relative_velocity: ca.SX
+    velocity: ca.SX
+    height: ca.SX
     elevation: ca.SX
     slopes: ca.SX
-    inputs: Named
+    inputs: ValuesByName
     actuators: ca.SX
 
 
-def upright(orientation: ca.SX) -> Frame:
+def level_frame(orientation: ca.SX) -> Frame:
     """The frame of a hull that is level at rest."""
-    attitude = kinematics.matrix(orientation)
+    attitude = kinematics.rotation_matrix(orientation)
     return Frame(attitude, attitude, ca.SX.eye(3), attitude.T)
 
 
@@ -83,114 +83,116 @@ class Hull:
     """
 
     mass: ca.SX
-    centre: ca.SX
+    centre_of_mass: ca.SX
     inertia: ca.SX
     added_mass: ca.SX
-    flow_mass: ca.SX
-    inverse: ca.SX
-    flotation: ca.SX
-    deck: ca.SX
-    rest: ca.SX
+    coriolis_added_mass: ca.SX
+    inverse_mass_matrix: ca.SX
+    centre_of_flotation: ca.SX
+    deck_centre: ca.SX
+    equilibrium: ca.SX
     footprint: Footprint
     wave_count: ca.SX
-    sea: ca.SX
-    loads: Callable[[Situation], ca.SX]
-    frame: Callable[[ca.SX], Frame] = upright
+    wave_table: ca.SX
+    loads: Callable[[LoadArguments], ca.SX]
+    frame: Callable[[ca.SX], Frame] = level_frame
 
-    def initial_state(self, initial: Named, actuators: int = 0) -> ca.SX:
+    def initial_state(self, initial: ValuesByName, actuators: int = 0) -> ca.SX:
         """The state from the parameters `initial.*`."""
         displacement = (initial[f"initial.{name}"] for name in ("heave", "roll", "pitch"))
-        height, roll, pitch = ca.vertsplit(self.rest + ca.vertcat(*displacement))
-        orientation = kinematics.of_euler_angles(roll, pitch, initial["initial.yaw"])
-        origin = initial["initial.position"] - (self.frame(orientation).attitude @ self.centre)[0:2]
+        height, roll, pitch = ca.vertsplit(self.equilibrium + ca.vertcat(*displacement))
+        orientation = kinematics.quaternion_from_euler(roll, pitch, initial["initial.yaw"])
+        origin = initial["initial.position"] - (self.frame(orientation).attitude @ self.centre_of_mass)[0:2]
         rates = initial["initial.rates"]
-        velocity = initial["initial.velocity_body"] - ca.cross(rates, self.centre)
+        velocity = initial["initial.velocity_body"] - ca.cross(rates, self.centre_of_mass)
         return ca.vertcat(origin, height, orientation, velocity, rates, initial["initial.time"], ca.SX.zeros(actuators))
 
-    def rate(self, state: ca.SX, inputs: Named) -> ca.SX:
+    def rate(self, state: ca.SX, inputs: ValuesByName) -> ca.SX:
         """Time derivative of position, orientation, nu and time."""
         orientation, nu = state[3:7], state[7:13]
         frame = self.frame(orientation)
         spin = nu[3:6]
-        sea = self._water(state, frame, inputs["wave_gain"])
-        current = frame.from_stream @ ca.vertcat(inputs["current"], 0)
+        sea = self._wave_kinematics(state, frame, inputs["wave_gain"])
+        current = frame.world_to_current_axes @ ca.vertcat(inputs["current"], 0)
         orbital, flow = frame.to_world.T @ sea.velocity, frame.to_world.T @ sea.acceleration
         drift = ca.vertcat(nu[0:3] - current, spin)
         relative = ca.vertcat(drift[0:3] - orbital, spin)
-        now = self._situation(state, frame, relative, sea, inputs)
+        now = self._load_arguments(state, frame, relative, sea, inputs)
         pull = frame.to_world.T @ ca.vertcat(sea.acceleration[0:2], 0)
-        force = self.loads(now) + self._external(frame, inputs)
-        force += self.rigid_body(pull) + self.added_mass[:, 0:3] @ (flow - ca.cross(spin, orbital))
-        force -= self._rigid_coriolis(drift) + coriolis(self.flow_mass, relative)
-        acceleration = self.inverse @ force - ca.vertcat(ca.cross(spin, current), ca.SX.zeros(3))
-        turning = kinematics.rate(orientation, frame.spin @ spin)
+        force = self.loads(now) + self._external_load(frame, inputs)
+        force += self.inertial_load(pull) + self.added_mass[:, 0:3] @ (flow - ca.cross(spin, orbital))
+        force -= self._rigid_body_coriolis(drift) + coriolis_load(self.coriolis_added_mass, relative)
+        acceleration = self.inverse_mass_matrix @ force - ca.vertcat(ca.cross(spin, current), ca.SX.zeros(3))
+        turning = kinematics.quaternion_rate(orientation, frame.rates_to_angular_velocity @ spin)
         return ca.vertcat(frame.to_world @ nu[0:3], turning, acceleration, 1)
 
-    def rigid_body(self, acceleration: ca.SX) -> ca.SX:
+    def inertial_load(self, acceleration: ca.SX) -> ca.SX:
         """The load that accelerates the rigid body like this without turning it."""
         force = self.mass * acceleration
-        return ca.vertcat(force, ca.cross(self.centre, force))
+        return ca.vertcat(force, ca.cross(self.centre_of_mass, force))
 
-    def _rigid_coriolis(self, nu: ca.SX) -> ca.SX:
+    def _rigid_body_coriolis(self, nu: ca.SX) -> ca.SX:
         velocity, spin = nu[0:3], nu[3:6]
-        force = self.mass * ca.cross(spin, velocity + ca.cross(spin, self.centre))
-        return ca.vertcat(force, ca.cross(spin, self.inertia @ spin) + ca.cross(self.centre, force))
+        force = self.mass * ca.cross(spin, velocity + ca.cross(spin, self.centre_of_mass))
+        return ca.vertcat(force, ca.cross(spin, self.inertia @ spin) + ca.cross(self.centre_of_mass, force))
 
-    def _water(self, state: ca.SX, frame: Frame, gain: ca.SX) -> Water:
-        place = state[0:2] + (frame.attitude @ self.flotation)[0:2]
-        felt = water(place, frame.heading, state[13], self.footprint, self.wave_count, self.sea)
-        return Water(gain * felt.elevation, gain * felt.slopes, gain * felt.velocity, gain * felt.acceleration)
+    def _wave_kinematics(self, state: ca.SX, frame: Frame, gain: ca.SX) -> WaveKinematics:
+        place = state[0:2] + (frame.attitude @ self.centre_of_flotation)[0:2]
+        felt = wave_kinematics(place, frame.heading, state[13], self.footprint, self.wave_count, self.wave_table)
+        return WaveKinematics(gain * felt.elevation, gain * felt.slopes, gain * felt.velocity, gain * felt.acceleration)
 
-    def _situation(self, state: ca.SX, frame: Frame, relative: ca.SX, sea: Water, inputs: Named) -> Situation:
+    def _load_arguments(
+        self, state: ca.SX, frame: Frame, relative: ca.SX, sea: WaveKinematics, inputs: ValuesByName
+    ) -> LoadArguments:
         cos, sin = frame.heading
         slopes = ca.vertcat(cos * sea.slopes[0] + sin * sea.slopes[1], cos * sea.slopes[1] - sin * sea.slopes[0])
         still_air = state[7:10]
         air = still_air - frame.to_world.T @ inputs["wind"]
-        return Situation(
-            frame, state[3:7], relative, air, still_air, state[2], sea.elevation, slopes, inputs, state[len(AFLOAT_STATES) :]
+        return LoadArguments(
+            frame, state[3:7], relative, air, still_air, state[2], sea.elevation, slopes, inputs, state[len(VESSEL_STATES) :]
         )
 
-    def _external(self, frame: Frame, inputs: Named) -> ca.SX:
+    def _external_load(self, frame: Frame, inputs: ValuesByName) -> ca.SX:
         force, torque = inputs["external_force"], inputs["external_torque"]
-        return frame.load(force, torque + ca.cross(frame.attitude @ self.centre, force))
+        return frame.generalised_force(force, torque + ca.cross(frame.attitude @ self.centre_of_mass, force))
 
     def observe(self, state: ca.SX) -> ca.SX:
         """The published motion of the centre of mass (`interface.MOTION`) and of the deck (`interface.DECK`)."""
         orientation, nu = state[3:7], state[7:13]
         frame = self.frame(orientation)
-        to_centre, to_deck = frame.attitude @ self.centre, frame.attitude @ self.deck
-        angular = frame.attitude @ (frame.spin @ nu[3:6])
+        to_centre, to_deck = frame.attitude @ self.centre_of_mass, frame.attitude @ self.deck_centre
+        angular = frame.attitude @ (frame.rates_to_angular_velocity @ nu[3:6])
         origin = frame.to_world @ nu[0:3]
         return ca.vertcat(
             state[0:3] + to_centre,
             orientation,
             kinematics.euler_angles(orientation),
             origin + ca.cross(angular, to_centre),
-            nu[0:3] + ca.cross(nu[3:6], self.centre),
+            nu[0:3] + ca.cross(nu[3:6], self.centre_of_mass),
             nu[3:6],
             state[0:3] + to_deck,
             origin + ca.cross(angular, to_deck),
         )
 
 
-def coriolis(mass: ca.SX, nu: ca.SX) -> ca.SX:
+def coriolis_load(mass: ca.SX, nu: ca.SX) -> ca.SX:
     """Coriolis and centripetal load of a mass matrix (6, 6) (Fossen 2021, equation 6.48 for added mass)."""
     momentum = mass @ nu
     force = ca.cross(nu[3:6], momentum[0:3])
     return ca.vertcat(force, ca.cross(nu[0:3], momentum[0:3]) + ca.cross(nu[3:6], momentum[3:6]))
 
 
-def at(point: ca.SX, force: ca.SX) -> ca.SX:
+def load_of_force_at(point: ca.SX, force: ca.SX) -> ca.SX:
     """The load of a force (3) that acts at a point of the hull."""
     return ca.vertcat(force, ca.cross(point, force))
 
 
-def shift(point: ca.SX) -> ca.SX:
+def transformation_matrix(point: ca.SX) -> ca.SX:
     """The matrix (6, 6) that makes the generalised velocity at a point of that at O (Fossen 2021, appendix C)."""
     return ca.blockcat([[ca.SX.eye(3), -ca.skew(point)], [ca.SX.zeros(3, 3), ca.SX.eye(3)]])
 
 
-def rigid_body(mass: ca.SX, centre: ca.SX, inertia: ca.SX) -> ca.SX:
+def rigid_body_mass_matrix(mass: ca.SX, centre: ca.SX, inertia: ca.SX) -> ca.SX:
     """The mass matrix (6, 6) about O of a body with its inertia (3, 3) about the centre of mass."""
-    move = shift(centre)
+    move = transformation_matrix(centre)
     return move.T @ ca.diagcat(mass * ca.SX.eye(3), inertia) @ move

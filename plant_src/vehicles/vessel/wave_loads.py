@@ -20,27 +20,27 @@ import casadi as ca
 from cosim.export.equations.wide_sum import sum_over_rows
 
 from ..common.elementary_functions import exponential, sine_and_cosine
-from ..common.interface import COMPONENTS
+from ..common.interface import MAX_WAVE_COMPONENTS
 
 GRAVITY = 9.81  # m/s2
 
-_SLOWEST = 1e-9  # rad/s: a wave of frequency 0 is no wave, not a division by 0
+_MIN_FREQUENCY = 1e-9  # rad/s: a wave of frequency 0 is no wave, not a division by 0
 
-_COLUMNS = 6  # of the table: amplitude, kx, ky, frequency, phase, g / frequency
-_SURFACE_COLUMNS = 5  # of the water itself: the first five
+_COLUMN_COUNT = 6  # of the table: amplitude, kx, ky, frequency, phase, g / frequency
+_SURFACE_COLUMN_COUNT = 5  # of the water itself: the first five
 
 
 @dataclass(frozen=True)
 class Footprint:
     """The waterplane: squares of its radii of gyration along and across the hull (m2), draught (m)."""
 
-    along: ca.SX
-    across: ca.SX
+    longitudinal: ca.SX
+    transverse: ca.SX
     draught: ca.SX
 
 
 @dataclass(frozen=True)
-class Water:
+class WaveKinematics:
     """What the hull feels of the waves, world frame: elevation (m), slopes along x and y, velocity (3, m/s) and acceleration
     (3, m/s2) of the water."""
 
@@ -50,17 +50,17 @@ class Water:
     acceleration: ca.SX
 
 
-def table(footprint: Footprint, amplitude: ca.SX, frequency: ca.SX, direction: ca.SX, phase: ca.SX) -> ca.SX:
+def wave_table(footprint: Footprint, amplitude: ca.SX, frequency: ca.SX, direction: ca.SX, phase: ca.SX) -> ca.SX:
     """The components as `water` needs them, column by column; the amplitude is that felt where the heading does not matter."""
     number = frequency**2 / GRAVITY
-    celerity = GRAVITY / ca.fmax(frequency, _SLOWEST)
-    felt = amplitude * ca.exp(-(number**2) * footprint.across / 2 - number * footprint.draught)
+    celerity = GRAVITY / ca.fmax(frequency, _MIN_FREQUENCY)
+    felt = amplitude * ca.exp(-(number**2) * footprint.transverse / 2 - number * footprint.draught)
     return ca.vertcat(felt, number * ca.cos(direction), number * ca.sin(direction), frequency, phase, celerity)
 
 
-def _term() -> ca.Function:
+def _wave_term() -> ca.Function:
     """One component: elevation, slopes, velocity and vertical acceleration."""
-    common, row = ca.SX.sym("common", 6), ca.SX.sym("row", _COLUMNS)
+    common, row = ca.SX.sym("common", 6), ca.SX.sym("row", _COLUMN_COUNT)
     x, y, time, cos_yaw, sin_yaw, slenderness = ca.vertsplit(common)
     amplitude, kx, ky, frequency, phase, celerity = ca.vertsplit(row)
     ahead = kx * cos_yaw + ky * sin_yaw
@@ -71,28 +71,30 @@ def _term() -> ca.Function:
     return ca.Function("wave", [common, row], [ca.vertcat(cosine, slopes, velocity, -(frequency**2) * cosine)])
 
 
-def _undulation() -> ca.Function:
+def _elevation_term() -> ca.Function:
     """One component of the free surface at (x, y, time): its row is amplitude, kx, ky, frequency and phase."""
-    place, row = ca.SX.sym("place", 3), ca.SX.sym("row", _SURFACE_COLUMNS)
+    place, row = ca.SX.sym("place", 3), ca.SX.sym("row", _SURFACE_COLUMN_COUNT)
     amplitude, kx, ky, frequency, phase = ca.vertsplit(row)
     angle = kx * place[0] + ky * place[1] - frequency * place[2] + phase
     return ca.Function("undulation", [place, row], [amplitude * sine_and_cosine(angle)[1]])
 
 
 #: called by the equations; loops in C
-SUM = sum_over_rows("waves", _term(), COMPONENTS)
-SURFACE = sum_over_rows("surface", _undulation(), COMPONENTS)
+WAVE_SUM = sum_over_rows("waves", _wave_term(), MAX_WAVE_COMPONENTS)
+SURFACE_SUM = sum_over_rows("surface", _elevation_term(), MAX_WAVE_COMPONENTS)
 
 
-def surface() -> ca.Function:
+def create_surface_function() -> ca.Function:
     """Place (x, y, time), number and table of components, column by column -> elevation of the water (m)."""
-    place, count, rows = ca.SX.sym("place", 3), ca.SX.sym("count"), ca.SX.sym("rows", COMPONENTS, _SURFACE_COLUMNS)
-    return ca.Function("shadow_surface", [place, count, ca.vec(rows)], [SURFACE(place, count, rows)])
+    place, count, rows = ca.SX.sym("place", 3), ca.SX.sym("count"), ca.SX.sym("rows", MAX_WAVE_COMPONENTS, _SURFACE_COLUMN_COUNT)
+    return ca.Function("shadow_surface", [place, count, ca.vec(rows)], [SURFACE_SUM(place, count, rows)])
 
 
-def water(place: ca.SX, heading: tuple[ca.SX, ca.SX], time: ca.SX, footprint: Footprint, count: ca.SX, sea: ca.SX) -> Water:
+def wave_kinematics(
+    place: ca.SX, heading: tuple[ca.SX, ca.SX], time: ca.SX, footprint: Footprint, count: ca.SX, sea: ca.SX
+) -> WaveKinematics:
     """The waves at a place (x, y), for a hull with this heading (cosine and sine of the yaw angle); `sea` is a `table`."""
-    common = ca.vertcat(place, time, *heading, (footprint.along - footprint.across) / 2)
-    felt = SUM(common, count, ca.reshape(sea, COMPONENTS, _COLUMNS))
+    common = ca.vertcat(place, time, *heading, (footprint.longitudinal - footprint.transverse) / 2)
+    felt = WAVE_SUM(common, count, ca.reshape(sea, MAX_WAVE_COMPONENTS, _COLUMN_COUNT))
     slopes = felt[1:3]
-    return Water(felt[0], slopes, felt[3:6], ca.vertcat(-GRAVITY * slopes, felt[6]))
+    return WaveKinematics(felt[0], slopes, felt[3:6], ca.vertcat(-GRAVITY * slopes, felt[6]))

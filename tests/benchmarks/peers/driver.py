@@ -51,7 +51,7 @@ class Clock:
 Outcome = tuple[float, float, float]
 
 
-def from_lengths(simulate: Callable[[int], float], steps: int) -> Outcome:
+def time_whole_runs(simulate: Callable[[int], float], steps: int) -> Outcome:
     """For importers that only run as a whole: what all steps but the first two cost, so that the start cancels.
 
     They are made twice over, since the start of a large ring takes longer than its steps and scatters.

@@ -10,7 +10,7 @@ import importer
 
 
 def run(ring: Ring) -> Outcome:
-    watch = importer.watched(importer.ring(Path(ring.fmu), ring.size), ring.steps, ["s0.y1"], sys.argv[4])
+    watch = importer.measure_run(importer.ring_system(Path(ring.fmu), ring.size), ring.steps, ["s0.y1"], sys.argv[4])
     return watch.cpu * ring.steps / 1e6, watch.wall * ring.steps / 1e6, 1.0
 
 

@@ -4,7 +4,7 @@ import tempfile
 from pathlib import Path
 from zipfile import ZipFile
 
-from driver import STEP, Outcome, Ring, from_lengths, main
+from driver import STEP, Outcome, Ring, main, time_whole_runs
 from fmpy.ssp.simulation import simulate_ssp
 
 SYSTEM = """<?xml version="1.0" encoding="UTF-8"?>
@@ -32,7 +32,7 @@ def run(ring: Ring) -> Outcome:
             result = simulate_ssp(str(ssp), stop_time=steps * STEP, step_size=STEP)
             return float(result[result.dtype.names[-1]][-1])
 
-        return from_lengths(simulate, ring.steps)
+        return time_whole_runs(simulate, ring.steps)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """SOFIRpy: simulate."""
 
-from driver import STEP, Outcome, Ring, from_lengths, main
+from driver import STEP, Outcome, Ring, main, time_whole_runs
 from sofirpy import simulate
 
 
@@ -20,7 +20,7 @@ def run(ring: Ring) -> Outcome:
         )
         return float(result["s0.y1"].iloc[-1])
 
-    return from_lengths(work, ring.steps)
+    return time_whole_runs(work, ring.steps)
 
 
 if __name__ == "__main__":

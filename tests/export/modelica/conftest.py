@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cosim.export.fmu.block import Block, BlockVariable
-from cosim.export.modelica import interpreter, load
+from cosim.export.modelica import load_block, load_interpreter
 from cosim.export.modelica.causality.interpreter import Interpreter
 
 CTYPES = {"Float64": ctypes.c_double, "Int32": ctypes.c_int32, "Enumeration": ctypes.c_int32, "Boolean": ctypes.c_bool}
@@ -68,7 +68,7 @@ class CompiledBlock:
         return text.decode() if text else None
 
 
-class Twins:
+class CompiledAndInterpreted:
     """The emitted C and the interpreter of one model, driven alike and compared bit for bit."""
 
     def __init__(self, c: CompiledBlock, python: Interpreter):
@@ -132,7 +132,7 @@ def _random(rng: np.random.Generator, variable: BlockVariable, scale: float) -> 
 
 
 @pytest.fixture
-def write(tmp_path: Path) -> Callable[[str], Path]:
+def write_model(tmp_path: Path) -> Callable[[str], Path]:
     """Writes Modelica text to a file that is named as its last class."""
 
     def write_file(text: str) -> Path:
@@ -144,16 +144,16 @@ def write(tmp_path: Path) -> Callable[[str], Path]:
 
 
 @pytest.fixture
-def twins(tmp_path: Path, write: Callable[[str], Path]) -> Callable[..., Twins]:
+def compile_both(tmp_path: Path, write: Callable[[str], Path]) -> Callable[..., CompiledAndInterpreted]:
     """Both forms of a model from its text, or from a file."""
 
     if shutil.which("gcc") is None:
         pytest.skip("needs gcc")
 
-    def open_model(source: str | Path, model: str | None = None) -> Twins:
+    def open_model(source: str | Path, model: str | None = None) -> CompiledAndInterpreted:
         path = write(source) if isinstance(source, str) else source
         folder = tmp_path / "c" / path.stem
         folder.mkdir(parents=True)
-        return Twins(CompiledBlock(load(path, model), folder), interpreter(path, model))
+        return CompiledAndInterpreted(CompiledBlock(load_block(path, model), folder), load_interpreter(path, model))
 
     return open_model

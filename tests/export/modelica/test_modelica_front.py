@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cosim.core.errors import InputError
-from cosim.export.modelica import load
+from cosim.export.modelica import load_block
 from cosim.export.modelica.frontend import rumoca
 
 PACKAGE = """package Lib
@@ -53,28 +53,28 @@ def test_a_model_uses_packages_beside_it_and_ships_their_sources(folder, twins):
 
 
 def test_files_beside_the_model_are_not_read(folder):
-    expected = load(folder / "Top.mo").files
+    expected = load_block(folder / "Top.mo").files
     (folder / "Broken.mo").write_text("this is no Modelica")
     (folder / "Twin.mo").write_text("model Top\n  output Real z;\nequation\n  z = 1;\nend Top;")
-    assert load(folder / "Top.mo").files == expected
+    assert load_block(folder / "Top.mo").files == expected
 
 
 def test_a_member_of_a_package_is_loaded_as_such(folder):
-    block = load(folder / "Lib" / "Double.mo")
+    block = load_block(folder / "Lib" / "Double.mo")
     assert (block.identifier, sorted(block.resources)) == ("Double", ["Lib/Double.mo", "Lib/package.mo"])
 
 
 def test_one_of_several_models_of_a_file(write):
     path = write("model A\n  output Real y;\nequation\n  y = 1;\nend A;\nmodel B\n  output Real z;\nequation\n  z = 2;\nend B;")
-    assert [v.name for v in load(path, "A").variables] == ["y"]
-    assert [v.name for v in load(path).variables] == ["z"]
+    assert [v.name for v in load_block(path, "A").variables] == ["y"]
+    assert [v.name for v in load_block(path).variables] == ["z"]
 
 
 def test_syntax_errors_come_with_file_and_line(folder):
     (folder / "Lib" / "Double.mo").write_text(MEMBER.replace("RealInput u;", "RealInput u"))
     (folder / "Top.mo").write_text(TOP.replace("output Real y;", "output Real ;"))
     with pytest.raises(InputError) as caught:
-        load(folder / "Top.mo")
+        load_block(folder / "Top.mo")
     places = {problem.where for problem in caught.value.problems}
     assert places == {f"{folder / 'Top.mo'}:3", f"{folder / 'Lib' / 'Double.mo'}:3"}
 
@@ -82,14 +82,14 @@ def test_syntax_errors_come_with_file_and_line(folder):
 def test_unknown_names_come_with_file_and_line(folder):
     (folder / "Lib" / "Double.mo").write_text(MEMBER.replace("2*u", "2*velocity"))
     with pytest.raises(InputError, match=r"Double.mo:7: unresolved component reference: 'velocity'"):
-        load(folder / "Top.mo")
+        load_block(folder / "Top.mo")
 
 
 def test_a_model_is_not_confused_with_a_member_of_the_same_name(folder):
     text = TOP.replace("Top", "Double").replace("  y = double.y;", "  y = sin(y) + double.y;")
     (folder / "Double.mo").write_text(text)
     with pytest.raises(InputError, match=r"models/Double.mo:7: algebraic loop: y \(Double.mo:7\)"):
-        load(folder / "Double.mo")
+        load_block(folder / "Double.mo")
 
 
 def test_a_panic_of_the_front_end_is_an_input_error(write):
@@ -102,20 +102,20 @@ equation
   end when;
 end M;""")
     with pytest.raises(InputError, match=r"M.mo: the Modelica front end failed on the model M"):
-        load(path)
+        load_block(path)
 
 
 def test_a_missing_model_and_a_missing_file(folder, write):
     with pytest.raises(InputError, match="no such Modelica file"):
-        load(folder / "Nothing.mo")
+        load_block(folder / "Nothing.mo")
     with pytest.raises(InputError, match=r"Top.mo: .*Other"):
-        load(folder / "Top.mo", "Other")
+        load_block(folder / "Top.mo", "Other")
 
 
 def test_another_version_of_the_front_end_is_refused(folder, monkeypatch):
     monkeypatch.setattr(rumoca, "RUMOCA_VERSION", "0.9.0")
     with pytest.raises(InputError, match=r"rumoca 0.10.2 is installed, but only 0.9.0 is known to work"):
-        load(folder / "Top.mo")
+        load_block(folder / "Top.mo")
 
 
 def test_a_place_that_the_front_end_knows_is_kept(write):
@@ -129,4 +129,4 @@ equation
   y = 1;
 end M;""")
     with pytest.raises(InputError, match=r"M.mo:5: typecheck failed: .*unevaluable array dimensions for 'v'"):
-        load(path)
+        load_block(path)

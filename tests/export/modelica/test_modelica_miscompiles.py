@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from cosim.core.errors import InputError
-from cosim.export.modelica import load
+from cosim.export.modelica import load_block
 
 TICKS = 500
 
@@ -78,7 +78,7 @@ end M;"""
 )
 def test_b_an_if_equation_that_the_front_end_decides_by_a_default_is_refused(write, equations):
     with pytest.raises(InputError, match=r"M.mo:7: the front end would decide this if-equation by the default of hold"):
-        load(write(FOLDED.format(equations)))
+        load_block(write(FOLDED.format(equations)))
 
 
 @pytest.mark.parametrize(
@@ -89,7 +89,7 @@ def test_b_an_if_equation_that_the_front_end_decides_by_a_default_is_refused(wri
     ],
 )
 def test_b_other_if_equations_on_parameters_are_not_refused(write, equations):
-    assert load(write(FOLDED.format(equations))).identifier == "M"
+    assert load_block(write(FOLDED.format(equations))).identifier == "M"
 
 
 def test_b_an_if_equation_on_a_constant_may_be_decided(twins):
@@ -180,4 +180,4 @@ equation
   y = a.y + c.y;
 end M;""")
     with pytest.raises(InputError, match='several functions named "f"; give them different names'):
-        load(path)
+        load_block(path)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cosim.export.modelica import load
+from cosim.export.modelica import load_block
 
 OWNERS = """package P
   block Gain
@@ -46,7 +46,7 @@ end M;"""
 
 
 def test_only_owned_parameters_can_be_set(write):
-    shown = {v.name: v.causality for v in load(write(OWNERS)).variables}
+    shown = {v.name: v.causality for v in load_block(write(OWNERS)).variables}
     parameters = {name for name, causality in shown.items() if causality == "parameter"}
     assert parameters == {"base", "n", "A", "b.k", "c.k", "many[2].k"}
     calculated = {name for name, causality in shown.items() if causality == "calculatedParameter"}
@@ -84,7 +84,7 @@ def test_parameters_take_effect_between_steps(twins):
 
 
 def test_descriptions_units_limits_and_starts(write):
-    block = load(write(OWNERS))
+    block = load_block(write(OWNERS))
     variables = {v.name: v for v in block.variables}
     assert (block.identifier, block.description, block.step_size) == ("M", "a model of owners", 0.01)
     base, gain, matrix, n = variables["base"], variables["c.k"], variables["A"], variables["n"]
@@ -191,5 +191,5 @@ end M;""")
 
 def test_the_same_source_gives_the_same_c(write):
     path = write(OWNERS)
-    assert load(path).files == load(path).files
-    assert str(path.parent) not in "".join(load(path).files.values())
+    assert load_block(path).files == load_block(path).files
+    assert str(path.parent) not in "".join(load_block(path).files.values())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from cosim.core.errors import InputError
-from cosim.export.modelica import load
+from cosim.export.modelica import load_block
 
 CASES = {
     "implicit der": ("Real x;", "2*der(x) = u;\n  y = x;", r"M.mo:8: this equation defines no variable: .* or der\(\) of one"),
@@ -105,7 +105,7 @@ equation
   end when;
 end M;""")
     with pytest.raises(InputError, match=message):
-        load(path)
+        load_block(path)
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ equation
   end when;
 end M;""")
     with pytest.raises(InputError, match=message):
-        load(path)
+        load_block(path)
 
 
 def test_a_recursive_function_is_refused(write):
@@ -145,12 +145,12 @@ equation
   y = f(u);
 end M;""")
     with pytest.raises(InputError, match="recursive function"):
-        load(path)
+        load_block(path)
 
 
 def test_a_for_equation_that_does_not_fit_its_placeholders_is_refused(write):
-    from cosim.export.modelica.frontend.reader import Reader
-    from cosim.export.modelica.frontend.rumoca import flatten
+    from cosim.export.modelica.frontend.reader import ModelReader
+    from cosim.export.modelica.frontend.rumoca import flatten_model
 
     path = write("""model M
   output Real x[4];
@@ -160,18 +160,18 @@ equation
   end for;
   der(x[4]) = 0;
 end M;""")
-    json, sources = flatten(path, None)
+    json, sources = flatten_model(path, None)
     json["structured_equations"][0]["first_equation_index"] = 1
     with pytest.raises(InputError, match=r"M.mo:\d: this for-equation was not unrolled by the front end"):
-        Reader(json, sources).model("M")
+        ModelReader(json, sources).read_model("M")
 
 
 def test_unknown_json_is_refused_not_dropped():
-    from cosim.export.modelica.frontend.reader import Reader
-    from cosim.export.modelica.frontend.rumoca import Sources
+    from cosim.export.modelica.frontend.reader import ModelReader
+    from cosim.export.modelica.frontend.rumoca import ModelicaSources
 
-    reader = Reader({"enum_literal_ordinals": {}}, Sources.of([]))
+    reader = ModelReader({"enum_literal_ordinals": {}}, ModelicaSources.from_files([]))
     with pytest.raises(InputError, match="the expression Quantum is not supported"):
-        reader.expression({"Quantum": {}})
+        reader.read_expression({"Quantum": {}})
     with pytest.raises(InputError, match="the statement Goto is not supported"):
-        reader.body([{"Goto": {}}])
+        reader.read_body([{"Goto": {}}])

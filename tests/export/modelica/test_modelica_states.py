@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from cosim.core.errors import ComponentError
-from cosim.export.modelica import load
+from cosim.export.modelica import load_block
 
 PENDULUM = """model Pendulum
   parameter Real w(unit = "rad/s") = 20;
@@ -355,8 +355,8 @@ def test_only_models_with_states_carry_the_integrator(write):
 equation
   y = time;
 end M;""")
-    assert "runge_kutta.h" not in load(sampled).files
-    assert "runge_kutta.h" in load(write(PENDULUM)).files
+    assert "runge_kutta.h" not in load_block(sampled).files
+    assert "runge_kutta.h" in load_block(write(PENDULUM)).files
 
 
 def test_a_state_that_escapes_is_a_failure(twins):

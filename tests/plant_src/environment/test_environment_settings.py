@@ -9,16 +9,16 @@ import pytest
 
 from cosim.core.errors import InputError
 from plant_src.environment import sea
-from plant_src.environment.settings import Environment, read
-from plant_src.environment.wind import deviations
-from plant_src.json_reader import Reader
+from plant_src.environment.settings import EnvironmentSettings, read_environment
+from plant_src.environment.wind import turbulence_intensities
+from plant_src.json_reader import JsonReader
 
 WIND = {"speed": 5.0, "direction": 1.0}
 
 
-def understood(**environment: Any) -> Environment:
-    reader = Reader()
-    found = read(reader, environment)
+def understood(**environment: Any) -> EnvironmentSettings:
+    reader = JsonReader()
+    found = read_environment(reader, environment)
     assert reader.problems == []
     return found
 
@@ -80,7 +80,7 @@ def test_all_problems_are_reported_together() -> None:
 
 
 def test_without_a_word_all_is_calm() -> None:
-    assert understood() == Environment(0, None, None, None)
+    assert understood() == EnvironmentSettings(0, None, None, None)
 
 
 def test_a_direction_is_that_towards_which_it_goes() -> None:
@@ -94,14 +94,14 @@ def test_the_mean_wind_says_how_strong_the_turbulence_is() -> None:
     found = understood(wind={**WIND, "turbulence": {}}).wind
     assert found and found.turbulence
     assert found.turbulence.airspeed == pytest.approx(5.0)
-    assert found.turbulence.deviations == pytest.approx(deviations(5.0, 6.096))
+    assert found.turbulence.intensities == pytest.approx(turbulence_intensities(5.0, 6.096))
 
 
 def test_turbulence_may_be_said_itself() -> None:
     turbulence = {"intensity": [0.5, 0.4, 0.3], "airspeed": 2.0, "height": 20.0}
     found = understood(wind={"speed": 0.0, "turbulence": turbulence}).wind
     assert found and found.turbulence
-    assert found.turbulence.deviations == (0.5, 0.4, 0.3)
+    assert found.turbulence.intensities == (0.5, 0.4, 0.3)
     assert (found.turbulence.airspeed, found.turbulence.height) == (2.0, 20.0)
 
 

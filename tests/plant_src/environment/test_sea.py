@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from validation import Measured
+from validation import MeasurementCheck
 
 from plant_src.environment import sea
 from plant_src.environment.spectrum import SIGNIFICANT_HEIGHTS, fully_developed_period, jonswap, pierson_moskowitz
@@ -31,18 +31,18 @@ def realisation(seed: int = 0, **waves):
     return sea({"seed": seed, "waves": waves})
 
 
-def test_pierson_moskowitz_has_its_significant_height(measured: Measured):
+def test_pierson_moskowitz_has_its_significant_height(measured: MeasurementCheck):
     height = 4 * math.sqrt(area(pierson_moskowitz, 2.5, 9.0))
     measured("Waves", "4 sqrt(m0), ITTC-modified Pierson-Moskowitz", height, 2.5, "m", "Hs, quadrature", relative=1e-6)
 
 
 @pytest.mark.parametrize("gamma", [1.0, 2.0, 3.3, 5.0, 7.0])
-def test_jonswap_has_its_significant_height(gamma, measured: Measured):
+def test_jonswap_has_its_significant_height(gamma, measured: MeasurementCheck):
     height, case = 4 * math.sqrt(area(jonswap, 2.5, 9.0, gamma)), f"gamma {gamma:g}"
     measured("Waves", "4 sqrt(m0), JONSWAP (DNV-RP-C205)", height, 2.5, "m", "Hs, quadrature", relative=0.01, case=case)
 
 
-def test_pierson_moskowitz_is_that_of_the_ittc(measured: Measured):
+def test_pierson_moskowitz_is_that_of_the_ittc(measured: MeasurementCheck):
     """S = A / w^5 exp(-B / w^4), A = 487 Hs^2 / T0^4, B = 1949 / T0^4."""
     w = np.linspace(0.6, 4.0, 50)
     ittc = 487 * 2.5**2 / 9.0**4 / w**5 * np.exp(-1949 / 9.0**4 / w**4)
@@ -56,7 +56,7 @@ def test_jonswap_is_peaked_by_gamma():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_amplitudes_hold_the_energy_between_the_cuts(seed, measured: Measured):
+def test_amplitudes_hold_the_energy_between_the_cuts(seed, measured: MeasurementCheck):
     """The fraction of a Pierson-Moskowitz sea below r times the peak frequency is exp(-5/4 / r^4)."""
     part = math.exp(-1.25 / 4**4) - math.exp(-1.25 / 0.5**4)
     waves = realisation(seed, **SWELL)
@@ -67,7 +67,7 @@ def test_amplitudes_hold_the_energy_between_the_cuts(seed, measured: Measured):
 
 @pytest.mark.parametrize("waves", [SWELL, {**SWELL, "spectrum": "jonswap", "spreading": 2}, CHOP])
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_half_an_hour_at_a_point_has_the_significant_height(waves, seed, measured: Measured):
+def test_half_an_hour_at_a_point_has_the_significant_height(waves, seed, measured: MeasurementCheck):
     components = realisation(seed, **waves)
     heights = np.array([components.elevation(12.0, -7.0, time) for time in HALF_HOUR])
     found, expected = 4 * heights.std(), waves["significant_height"]
@@ -84,13 +84,13 @@ def test_the_energy_lies_where_the_spectrum_has_it():
         assert abs((waves.frequency < ratio * peak).sum() * one - wanted) < 1.05 * one
 
 
-def test_dispersion_is_exact(measured: Measured):
+def test_dispersion_is_exact(measured: MeasurementCheck):
     waves = realisation(**SWELL)
     error = waves.wave_number - waves.frequency**2 / 9.81
     measured("Waves", "wave numbers", error, 0.0, "rad/m", "dispersion in deep water")
 
 
-def test_elevation_is_the_sum_of_travelling_waves(measured: Measured):
+def test_elevation_is_the_sum_of_travelling_waves(measured: MeasurementCheck):
     waves = realisation(4, **SWELL, direction=0.7, spreading=4)
     x, y, t = 31.0, -12.0, 77.5
     wave_vector = waves.wave_number * np.exp(1j * waves.direction)
@@ -108,7 +108,7 @@ def test_long_crests_run_one_way():
 
 
 @pytest.mark.parametrize("power", [1, 2, 10])
-def test_short_crests_spread_as_the_power_of_the_cosine(power, measured: Measured):
+def test_short_crests_spread_as_the_power_of_the_cosine(power, measured: MeasurementCheck):
     """E[cos^2 d] = (n + 1) / (n + 2) for the density cos^n d; bins of equal energy leave little to chance."""
     spread = realisation(**SWELL, direction=0.4, spreading=power).direction - 0.4
     found, expected, case = np.mean(np.cos(spread) ** 2), (power + 1) / (power + 2), f"n = {power}"

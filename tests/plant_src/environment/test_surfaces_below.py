@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from validation import Measured
+from validation import MeasurementCheck
 
 from plant_src.catalogue import MODELS
 from plant_src.environment import sea
 from plant_src.environment.sea import CALM
-from plant_src.environment.surfaces import HIGH, Below
+from plant_src.environment.surfaces import MAX_WAVE_EFFECT_HEIGHT, GroundDistance
 from plant_src.placement import Platform
 
 STRIDER = MODELS["strider"]
@@ -39,13 +39,13 @@ def ray(point: np.ndarray, centre: np.ndarray, attitude: Rotation) -> float | No
     return float(centre[2] + s * forward[2] + t * left[2]) if inside else None
 
 
-def test_a_tilting_deck_is_where_a_ray_meets_it(measured: Measured) -> None:
+def test_a_tilting_deck_is_where_a_ray_meets_it(measured: MeasurementCheck) -> None:
     random, met = np.random.default_rng(1), 0
     for _ in range(300):
         centre = random.uniform([-3, -3, 0.1], [3, 3, 0.5])
         attitude = Rotation.from_euler("ZYX", random.uniform([-3, -0.4, -0.4], [3, 0.4, 0.4]))
         point = centre + random.uniform([-0.5, -0.5, 0.4], [0.5, 0.5, 2.0])
-        below = Below([vessel(centre, attitude)], [], CALM)
+        below = GroundDistance([vessel(centre, attitude)], [], CALM)
         height = ray(point, centre, attitude)
         met += height is not None
         error = below.distance(*point, 0.0, 1.0) - (point[2] - (height or 0.0))
@@ -56,7 +56,7 @@ def test_a_tilting_deck_is_where_a_ray_meets_it(measured: Measured) -> None:
 
 
 def test_a_platform_is_below_when_it_is_under_and_lower() -> None:
-    below = Below([], [PLATFORM], CALM)
+    below = GroundDistance([], [PLATFORM], CALM)
     assert below.distance(5.9, -0.4, 2.0, 0.0, 1.0) == pytest.approx(0.75)
     assert below.distance(6.1, 0.0, 2.0, 0.0, 1.0) == 2.0
     assert below.distance(5.0, 0.0, 0.5, 0.0, 1.0) == 0.5
@@ -65,17 +65,17 @@ def test_a_platform_is_below_when_it_is_under_and_lower() -> None:
 def test_the_next_surface_counts() -> None:
     level = Rotation.identity()
     decks = [vessel((5.0, 0.0, height), level) for height in (0.3, 1.4, 3.0)]
-    assert Below(decks, [PLATFORM], CALM).distance(5.0, 0.0, 2.0, 0.0, 1.0) == pytest.approx(0.6)
+    assert GroundDistance(decks, [PLATFORM], CALM).distance(5.0, 0.0, 2.0, 0.0, 1.0) == pytest.approx(0.6)
 
 
 def test_an_upside_down_vessel_has_no_deck() -> None:
-    below = Below([vessel((0.0, 0.0, 0.3), Rotation.from_euler("x", np.pi))], [], CALM)
+    below = GroundDistance([vessel((0.0, 0.0, 0.3), Rotation.from_euler("x", np.pi))], [], CALM)
     assert below.distance(0.0, 0.0, 1.0, 0.0, 1.0) == 1.0
 
 
 def test_the_water_has_waves_where_they_matter() -> None:
     waves = sea({"sea_state": 3})
-    below = Below([], [], waves)
+    below = GroundDistance([], [], waves)
     assert below.distance(3.0, 4.0, 2.0, 5.0, 0.5) == pytest.approx(2.0 - 0.5 * waves.elevation(3.0, 4.0, 5.0))
-    assert below.distance(3.0, 4.0, HIGH + 1.0, 5.0, 0.5) == HIGH + 1.0
+    assert below.distance(3.0, 4.0, MAX_WAVE_EFFECT_HEIGHT + 1.0, 5.0, 0.5) == MAX_WAVE_EFFECT_HEIGHT + 1.0
     assert below.distance(3.0, 4.0, -5.0, 5.0, 1.0) == 0.0

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 from scipy.signal import welch
-from validation import Measured
+from validation import MeasurementCheck
 
-from plant_src.environment.noise import GRID, Channel, Noise
-from plant_src.environment.wind import Gusts, Turbulence, Wind, deviations, scales
+from plant_src.environment.noise import GRID_STEP, Channel, ColouredNoise
+from plant_src.environment.wind import DrydenGusts, Turbulence, Wind, turbulence_intensities, turbulence_scale_lengths
 
 DRYDEN = "Dryden, MIL-F-8785C"
 COUNT = 200_000
@@ -18,7 +18,7 @@ FAST, SLOW = 0.02, 0.5  # time constants (s)
 
 
 def sampled(*channels: Channel, seed: int = 1, count: int = COUNT) -> np.ndarray:
-    noise = Noise(seed, "test", channels)
+    noise = ColouredNoise(seed, "test", channels)
     return np.array([noise[k] for k in range(count)]).T
 
 
@@ -44,16 +44,16 @@ def test_noise_has_its_deviation(first_order, second_order):
 
 
 @pytest.mark.parametrize("lag", [1, 2, 4])
-def test_first_order_noise_is_discretised_exactly(first_order, lag, measured: Measured):
+def test_first_order_noise_is_discretised_exactly(first_order, lag, measured: MeasurementCheck):
     """exp(-t / T), also where the grid is as coarse as half a time constant: Euler's method would have 0.5 at the first lag."""
-    found, expected = correlation(first_order[0], lag), math.exp(-lag * GRID / FAST)
+    found, expected = correlation(first_order[0], lag), math.exp(-lag * GRID_STEP / FAST)
     measured("Wind and current", "correlation of first-order noise", found, expected, "1", "exp(-t/T)", within=0.01)
 
 
 @pytest.mark.parametrize("lag", [1, 2, 4])
-def test_second_order_noise_is_discretised_exactly(second_order, lag, measured: Measured):
+def test_second_order_noise_is_discretised_exactly(second_order, lag, measured: MeasurementCheck):
     """The transform of (1 + 3 (T w)^2) / (1 + (T w)^2)^2 is (1 - t / (2 T)) exp(-t / T)."""
-    t = lag * GRID / FAST
+    t = lag * GRID_STEP / FAST
     found, expected = correlation(second_order[0], lag), (1 - t / 2) * math.exp(-t)
     measured("Wind and current", "correlation of transverse gusts", found, expected, "1", "(1 - t/2T) exp(-t/T)", within=0.01)
 
@@ -61,7 +61,7 @@ def test_second_order_noise_is_discretised_exactly(second_order, lag, measured: 
 def test_noise_goes_on_where_blocks_meet(first_order):
     """The pairs of last and first value of the blocks of 256 are correlated as all others."""
     last, first = first_order[0][255:-1:256], first_order[0][256::256]
-    assert np.mean(last * first) / 4.0 == pytest.approx(math.exp(-GRID / FAST), abs=0.1)
+    assert np.mean(last * first) / 4.0 == pytest.approx(math.exp(-GRID_STEP / FAST), abs=0.1)
 
 
 def test_channels_do_not_depend_on_each_other(first_order):
@@ -69,14 +69,14 @@ def test_channels_do_not_depend_on_each_other(first_order):
 
 
 def test_noise_is_a_function_of_its_place():
-    noise, other = (Noise(3, "uav", [Channel(1.0, 0.3, 1.7)]) for _ in range(2))
+    noise, other = (ColouredNoise(3, "uav", [Channel(1.0, 0.3, 1.7)]) for _ in range(2))
     expected = [noise[k] for k in range(3000)]
     for k in (2999, 0, 511, 512, 2047, 1, 2999):
         assert other[k] == expected[k]
 
 
 def test_names_and_seeds_make_noises_of_their_own():
-    noises = [Noise(seed, name, [Channel(1.0, 0.3)]) for seed, name in ((1, "uav"), (1, "usv"), (2, "uav"))]
+    noises = [ColouredNoise(seed, name, [Channel(1.0, 0.3)]) for seed, name in ((1, "uav"), (1, "usv"), (2, "uav"))]
     assert len({noise[100] for noise in noises}) == 3
 
 
@@ -90,16 +90,16 @@ def dryden(omega: np.ndarray, deviation: float, length: float, speed: float, tra
 
 @pytest.fixture(scope="module")
 def gusts() -> tuple[Turbulence, np.ndarray]:
-    turbulence = Turbulence(deviations(5.0, 6.096), 6.096, 5.0)
-    made = Gusts(Wind((5.0, 0.0, 0.0), turbulence), turbulence, 1, "uav")
+    turbulence = Turbulence(turbulence_intensities(5.0, 6.096), 6.096, 5.0)
+    made = DrydenGusts(Wind((5.0, 0.0, 0.0), turbulence), turbulence, 1, "uav")
     return turbulence, np.array([made[k] for k in range(250_000)]).T
 
 
 @pytest.mark.parametrize(("axis", "transverse"), [(0, False), (1, True), (2, True)])
-def test_turbulence_has_drydens_spectrum(gusts, axis, transverse, measured: Measured):
+def test_turbulence_has_drydens_spectrum(gusts, axis, transverse, measured: MeasurementCheck):
     turbulence, values = gusts
-    length = scales(6.096)[transverse and axis == 2]
-    frequency, density = welch(values[axis], 1 / GRID, nperseg=8192)
+    length = turbulence_scale_lengths(6.096)[transverse and axis == 2]
+    frequency, density = welch(values[axis], 1 / GRID_STEP, nperseg=8192)
     omega = 2 * math.pi * frequency
     expected = dryden(omega, turbulence.deviations[axis], length, 5.0, transverse)
     for low, high in ((0.15, 0.6), (0.6, 2.5), (2.5, 10.0), (10.0, 40.0)):
@@ -108,7 +108,7 @@ def test_turbulence_has_drydens_spectrum(gusts, axis, transverse, measured: Meas
         measured("Wind and current", "spectrum of gusts, 4 bands", found, wanted, "m2/s", DRYDEN, relative=0.1, case=case)
 
 
-def test_turbulence_has_drydens_deviations(gusts, measured: Measured):
+def test_turbulence_has_drydens_deviations(gusts, measured: MeasurementCheck):
     """At 20 ft in a wind of 5 m/s there: 0.1 W20, and that over (0.177 + 0.000823 h)^0.4 = 0.519."""
     _, values = gusts
     level = 0.5 / (0.177 + 0.000823 * 20) ** 0.4
@@ -118,13 +118,13 @@ def test_turbulence_has_drydens_deviations(gusts, measured: Measured):
 
 def test_scales_are_those_of_the_standard():
     """Both forms meet at 1000 ft, where all scales are 1000 ft and all deviations 0.1 W20."""
-    assert scales(304.8) == pytest.approx((304.8, 304.8))
-    assert deviations(10.0, 304.8) == pytest.approx((1.0, 1.0, 1.0))
-    assert scales(6.096)[0] == pytest.approx(20 / (0.177 + 0.01646) ** 1.2 * 0.3048)
+    assert turbulence_scale_lengths(304.8) == pytest.approx((304.8, 304.8))
+    assert turbulence_intensities(10.0, 304.8) == pytest.approx((1.0, 1.0, 1.0))
+    assert turbulence_scale_lengths(6.096)[0] == pytest.approx(20 / (0.177 + 0.01646) ** 1.2 * 0.3048)
 
 
 def test_gusts_lie_along_the_wind():
     """Turned by the wind's direction, the same noise: u along it, v to the left."""
     turbulence = Turbulence((1.0, 0.3, 0.2), 10.0, 5.0)
-    east, north = (Gusts(Wind(velocity, turbulence), turbulence, 1, "uav")[40] for velocity in ((5.0, 0, 0), (0, 5.0, 0)))
+    east, north = (DrydenGusts(Wind(velocity, turbulence), turbulence, 1, "uav")[40] for velocity in ((5.0, 0, 0), (0, 5.0, 0)))
     assert north == pytest.approx((-east[1], east[0], east[2]))

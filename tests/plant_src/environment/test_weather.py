@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from validation import Measured
-from worlds import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, Trial, quadcopter, vessel
+from validation import MeasurementCheck
+from worlds import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, WorldHarness, quadcopter_settings, vessel_settings
 
 import cosim
 from cosim.core.errors import ComponentError, InputError
@@ -32,17 +32,20 @@ GUSTY = {
 
 
 def test_a_calm_world_has_no_environment() -> None:
-    names = [variable.name for variable in World("plant", {"uav": quadcopter([0, 0, 2]), "usv": vessel([0, 0])}).variables]
+    names = [
+        variable.name
+        for variable in World("plant", {"uav": quadcopter_settings([0, 0, 2]), "usv": vessel_settings([0, 0])}).variables
+    ]
     assert not [name for name in names if "environment" in name or "wind" in name or "wave" in name]
 
 
-def test_who_drifts_with_air_and_water_moves_as_in_a_calm(measured: Measured) -> None:
+def test_who_drifts_with_air_and_water_moves_as_in_a_calm(measured: MeasurementCheck) -> None:
     """Galilean invariance: water, air and vessel with the same velocity on top."""
     drift = np.array([0.4, -0.3])
     start = np.array([0.5, 0.1])  # through the water, world frame at yaw 0
-    calm = Trial({"usv": vessel([0.0, 0.0], velocity_body=[*start, 0.0])})
-    moving = Trial(
-        {"usv": vessel([0.0, 0.0], velocity_body=[*(start + drift), 0.0])},
+    calm = WorldHarness({"usv": vessel_settings([0.0, 0.0], velocity_body=[*start, 0.0])})
+    moving = WorldHarness(
+        {"usv": vessel_settings([0.0, 0.0], velocity_body=[*(start + drift), 0.0])},
         environment={"wind": {"velocity": [*drift, 0.0]}, "current": {"velocity": [*drift]}},
     )
     for trial in (calm, moving):
@@ -55,11 +58,11 @@ def test_who_drifts_with_air_and_water_moves_as_in_a_calm(measured: Measured) ->
     assert moving["usv.attitude.yaw"] == pytest.approx(calm["usv.attitude.yaw"], abs=1e-9)
 
 
-def test_who_drifts_with_the_air_flies_as_in_a_calm(measured: Measured) -> None:
+def test_who_drifts_with_the_air_flies_as_in_a_calm(measured: MeasurementCheck) -> None:
     drift = np.array([3.0, -2.0, 0.5])
-    calm = Trial({"uav": quadcopter([0.0, 0.0, 50.0], parameters=DRAG, velocity_body=[4.0, 1.0, 0.0])})
-    moving = Trial(
-        {"uav": quadcopter([0.0, 0.0, 50.0], parameters=DRAG, velocity_body=[7.0, -1.0, 0.5])},
+    calm = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, 50.0], parameters=DRAG, velocity_body=[4.0, 1.0, 0.0])})
+    moving = WorldHarness(
+        {"uav": quadcopter_settings([0.0, 0.0, 50.0], parameters=DRAG, velocity_body=[7.0, -1.0, 0.5])},
         environment={"wind": {"velocity": [*drift]}},
     )
     for trial in (calm, moving):
@@ -71,20 +74,26 @@ def test_who_drifts_with_the_air_flies_as_in_a_calm(measured: Measured) -> None:
 
 
 def test_the_wind_at_a_vehicle_is_published() -> None:
-    trial = Trial({"uav": quadcopter([0.0, 0.0, 2.5])}, environment={"wind": {"speed": 6.0, "profile": {"exponent": 0.5}}})
+    trial = WorldHarness(
+        {"uav": quadcopter_settings([0.0, 0.0, 2.5])}, environment={"wind": {"speed": 6.0, "profile": {"exponent": 0.5}}}
+    )
     assert trial.vector("uav.wind") == pytest.approx([3.0, 0.0, 0.0])
 
 
 def test_vehicles_meet_gusts_of_their_own() -> None:
     wind = {"speed": 5.0, "turbulence": {}}
-    trial = Trial({"a": quadcopter([0, 0, 20]), "b": quadcopter([0, 9, 20])}, environment={"wind": wind}).step(50)
+    trial = WorldHarness(
+        {"a": quadcopter_settings([0, 0, 20]), "b": quadcopter_settings([0, 9, 20])}, environment={"wind": wind}
+    ).step(50)
     assert trial["a.wind.y"] != trial["b.wind.y"]
-    alone = Trial({"b": quadcopter([0, 9, 20])}, environment={"wind": wind}).step(50)
+    alone = WorldHarness({"b": quadcopter_settings([0, 9, 20])}, environment={"wind": wind}).step(50)
     assert alone["b.wind.y"] == trial["b.wind.y"]
 
 
 def test_wind_and_current_can_be_told_at_any_time() -> None:
-    trial = Trial({"usv": vessel([0.0, 0.0], yaw=math.pi / 2)}, environment={"wind": {"speed": 0}, "current": {"speed": 0}})
+    trial = WorldHarness(
+        {"usv": vessel_settings([0.0, 0.0], yaw=math.pi / 2)}, environment={"wind": {"speed": 0}, "current": {"speed": 0}}
+    )
     assert np.abs(trial.step(100).vector("usv.position", "xy")).max() == 0.0
     trial["environment.current.x"] = 0.5
     trial.step(1000)
@@ -94,29 +103,29 @@ def test_wind_and_current_can_be_told_at_any_time() -> None:
 
 
 def test_what_is_not_finite_is_named() -> None:
-    trial = Trial({"usv": vessel([0.0, 0.0])}, environment={"current": {"speed": 0}})
+    trial = WorldHarness({"usv": vessel_settings([0.0, 0.0])}, environment={"current": {"speed": 0}})
     trial["environment.current.y"] = math.nan
     with pytest.raises(ComponentError, match=r"usv.current.y is nan, expected a finite number"):
         trial.step()
 
 
-def landing(environment: dict[str, Any], motion: str = "planar") -> Trial:
+def landing(environment: dict[str, Any], motion: str = "planar") -> WorldHarness:
     """Drop from 0.15 m in ground effect onto a moving, turning deck in gusts: flight, touchdown, rest."""
     height = DECK_TOP + REST_HEIGHT + 0.15
-    uav = quadcopter([-0.0135, 0.002, height], parameters=DRAG | {"ground_effect": 1.0, "rotor_time_constant": 0.05})
-    usv = vessel([0.0, 0.0], velocity_body=[0.2, 0.0, 0.0], rates=[0.0, 0.0, 0.2], motion=motion)
-    trial = Trial({"uav": uav, "usv": usv}, environment=environment)
+    uav = quadcopter_settings([-0.0135, 0.002, height], parameters=DRAG | {"ground_effect": 1.0, "rotor_time_constant": 0.05})
+    usv = vessel_settings([0.0, 0.0], velocity_body=[0.2, 0.0, 0.0], rates=[0.0, 0.0, 0.2], motion=motion)
+    trial = WorldHarness({"uav": uav, "usv": usv}, environment=environment)
     trial["uav.rotor_speed"], trial["usv.thrust"] = [120.0, 121.0, 119.0, 120.0], 1.0
     return trial
 
 
 @pytest.mark.parametrize("steps", [0, 5, 18, 22, 30, 120, 255, 256, 300])
-def test_a_state_is_returned_to_bit_for_bit_in_gusts(steps: int, measured: Measured) -> None:
+def test_a_state_is_returned_to_bit_for_bit_in_gusts(steps: int, measured: MeasurementCheck) -> None:
     differing = returned_to(landing(GUSTY).step(steps))
     measured("Determinism and saved states", "steps that differ after a return, in gusts", differing, 0, "1", AGAIN)
 
 
-def returned_to(trial: Trial) -> int:
+def returned_to(trial: WorldHarness) -> int:
     """How many of 60 steps differ when they are made again, twice."""
     state, before, begun = trial.world.get_state(), trial.bytes, trial.steps
     expected, differing = [trial.step().bytes for _ in range(60)], 0
@@ -154,21 +163,25 @@ def test_time_counts_from_the_start_of_the_run() -> None:
 def test_the_ground_is_where_rotors_feel_it() -> None:
     """Above a platform and a deck: from the centre of the rotors, 6 mm below the centre of mass, to the top."""
     on = {"parameters": {"ground_effect": 1.0}}
-    vehicles = {"a": quadcopter([0, 0, 1.0], **on), "b": quadcopter([9, 0, 1.0], **on), "c": quadcopter([20, 0, 1.0], **on)}
-    trial = Trial(vehicles | {"usv": vessel([9.0, 0.0])}, {"start": PLATFORM}, {"wind": {"speed": 0}})
-    distances = [shadow.surroundings[-1] for shadow in trial.world._fleet.shadows[:3]]
+    vehicles = {
+        "a": quadcopter_settings([0, 0, 1.0], **on),
+        "b": quadcopter_settings([9, 0, 1.0], **on),
+        "c": quadcopter_settings([20, 0, 1.0], **on),
+    }
+    trial = WorldHarness(vehicles | {"usv": vessel_settings([9.0, 0.0])}, {"start": PLATFORM}, {"wind": {"speed": 0}})
+    distances = [shadow.environment_inputs[-1] for shadow in trial.world._fleet.bodies[:3]]
     assert distances == pytest.approx([1.0 - PLATFORM_TOP, 1.0 - DECK_TOP, 1.0], abs=0.007)
     assert np.ptp(np.array(distances) - [1.0 - PLATFORM_TOP, 1.0 - DECK_TOP, 1.0]) < 1e-12
 
 
 def test_who_is_not_in_ground_effect_is_not_asked_for() -> None:
-    trial = Trial({"a": quadcopter([0, 0, 1.0])}, {"start": PLATFORM}, {"wind": {"speed": 0}}).step()
-    assert trial.world._fleet.shadows[0].surroundings[-1] == 1e3
+    trial = WorldHarness({"a": quadcopter_settings([0, 0, 1.0])}, {"start": PLATFORM}, {"wind": {"speed": 0}}).step()
+    assert trial.world._fleet.bodies[0].environment_inputs[-1] == 1e3
 
 
 def test_a_planar_vessel_in_waves_is_said(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING, "cosim.component"):
-        Trial({"usv": vessel([0.0, 0.0])}, environment={"sea_state": 3})
+        WorldHarness({"usv": vessel_settings([0.0, 0.0])}, environment={"sea_state": 3})
     assert "the planar vessel usv does not move with the waves" in caplog.text
 
 
@@ -184,7 +197,7 @@ def test_a_planar_vessel_in_waves_is_said(caplog: pytest.LogCaptureFixture) -> N
 )
 def test_faulty_settings_of_a_vehicle_are_refused(spec: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        World("plant", {"usv": vessel([0.0, 0.0], **spec)})
+        World("plant", {"usv": vessel_settings([0.0, 0.0], **spec)})
 
 
 @pytest.mark.parametrize(
@@ -198,19 +211,21 @@ def test_faulty_settings_of_a_vehicle_are_refused(spec: dict[str, Any], message:
 )
 def test_faulty_parameters_are_refused(parameters: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        World("plant", {"uav": quadcopter([0.0, 0.0, 2.0], parameters=parameters)})
+        World("plant", {"uav": quadcopter_settings([0.0, 0.0, 2.0], parameters=parameters)})
 
 
-def test_parameters_reach_the_equations(measured: Measured) -> None:
+def test_parameters_reach_the_equations(measured: MeasurementCheck) -> None:
     """Free fall with drag ends at sqrt(m g / body_drag)."""
-    trial = Trial({"uav": quadcopter([0.0, 0.0, 300.0], parameters={f"body_drag.{axis}": 0.1 for axis in "xyz"})}).step(800)
+    trial = WorldHarness(
+        {"uav": quadcopter_settings([0.0, 0.0, 300.0], parameters={f"body_drag.{axis}": 0.1 for axis in "xyz"})}
+    ).step(800)
     speed, terminal = -trial["uav.velocity.z"], math.sqrt(0.443892 * 9.81 / 0.1)
     measured("AR.Drone 2.0", "terminal velocity with body drag", speed, terminal, "m/s", "closed form", relative=1e-4)
 
 
 def test_the_elevation_at_a_vessel_is_that_of_the_sea() -> None:
     environment = {"seed": 3, "waves": {"significant_height": 0.05, "peak_period": 2.0}}
-    trial = Trial({"usv": vessel([2.0, 1.0], motion="6dof")}, environment=environment)
+    trial = WorldHarness({"usv": vessel_settings([2.0, 1.0], motion="6dof")}, environment=environment)
     waves = sea(environment)
     assert trial["usv.wave.elevation"] == pytest.approx(waves.elevation(2.0, 1.0, 0.0), abs=1e-13)
     trial["environment.wave_gain"] = 0.5
@@ -220,14 +235,14 @@ def test_the_elevation_at_a_vessel_is_that_of_the_sea() -> None:
 
 
 @pytest.mark.parametrize("steps", [0, 10, 22, 60, 300])
-def test_a_state_is_returned_to_bit_for_bit_in_waves(steps: int, measured: Measured) -> None:
+def test_a_state_is_returned_to_bit_for_bit_in_waves(steps: int, measured: MeasurementCheck) -> None:
     differing = returned_to(landing(GUSTY | {"sea_state": 1}, "6dof").step(steps))
     measured("Determinism and saved states", "steps that differ after a return, gusts and waves", differing, 0, "1", AGAIN)
 
 
 def test_a_vessel_rides_the_waves_that_are_seen() -> None:
     """Waves much longer than the vessel carry it up and down; half the gain, half the height."""
-    trial = Trial({"usv": vessel([0.0, 0.0], motion="6dof")}, environment={"sea_state": 3})
+    trial = WorldHarness({"usv": vessel_settings([0.0, 0.0], motion="6dof")}, environment={"sea_state": 3})
     trial["environment.wave_gain"] = 0.5
     rows = np.array([(trial["usv.position.z"], trial["usv.wave.elevation"]) for _ in range(1500) if trial.step()])
     heave, elevation = rows[500:].T - rows[500:].T.mean(axis=1, keepdims=True)
@@ -265,5 +280,5 @@ def test_a_payload_of_impossible_mass_is_refused_with_its_path(mass: float) -> N
 
 def test_floating_vessels_may_not_start_inside_each_other() -> None:
     with pytest.raises(InputError, match="overlaps") as caught:
-        World("plant", {"a": vessel([0.0, 0.0], motion="6dof"), "b": vessel([0.3, 0.0], motion="6dof")})
+        World("plant", {"a": vessel_settings([0.0, 0.0], motion="6dof"), "b": vessel_settings([0.3, 0.0], motion="6dof")})
     assert caught.value.problems[0].subject in [("arguments", "vehicles", name, "position") for name in "ab"]

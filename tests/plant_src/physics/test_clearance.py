@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from plant_src.physics.clearance import NEAR, Clearance, Enclosure
+from plant_src.physics.clearance import NEAR_DISTANCE, BoundingBox, Clearance
 
-CUBE = Enclosure((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5))  # 1 m wide
+CUBE = BoundingBox((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5))  # 1 m wide
 
 
 class Places:
     """Vehicles of 1 m and a platform, from `starts` to `ends` in one step."""
 
-    def __init__(self, starts: list[list[float]], platforms: tuple[Enclosure, ...] = ()):
+    def __init__(self, starts: list[list[float]], platforms: tuple[BoundingBox, ...] = ()):
         count = len(starts)
         self.path, self.anchor, self.leash = np.zeros((count, 2, 3)), np.zeros((count, 3)), np.zeros((count, 3))
         self.path[:] = np.array(starts)[:, None]
@@ -21,10 +21,12 @@ class Places:
         self.clearance = Clearance([CUBE] * count, platforms, *arrays)
 
     def survey(self) -> list[bool]:
-        return self.clearance.survey()
+        return self.clearance.find_near_vehicles()
 
 
-@pytest.mark.parametrize(("gap", "near"), [(-0.3, True), (0.99 * NEAR, True), (1.01 * NEAR, False), (5.0, False)])
+@pytest.mark.parametrize(
+    ("gap", "near"), [(-0.3, True), (0.99 * NEAR_DISTANCE, True), (1.01 * NEAR_DISTANCE, False), (5.0, False)]
+)
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_two_vehicles_are_near_each_other_or_not(gap: float, near: bool, axis: int) -> None:
     other = [0.2, 0.2, 0.2]
@@ -33,7 +35,7 @@ def test_two_vehicles_are_near_each_other_or_not(gap: float, near: bool, axis: i
 
 
 def test_a_platform_is_something_to_be_near_to() -> None:
-    floor = Enclosure((-9.0, -9.0, -2.0), (9.0, 9.0, -1.0))
+    floor = BoundingBox((-9.0, -9.0, -2.0), (9.0, 9.0, -1.0))
     assert Places([[0.0, 0.0, -0.48], [3.0, 0.0, 0.0]], (floor,)).survey() == [True, False]
 
 
@@ -50,18 +52,18 @@ def test_a_vehicle_alone_may_go_anywhere() -> None:
 
 
 def test_vehicles_share_the_way_and_a_platform_leaves_all_of_it() -> None:
-    wall = Enclosure((-3.5, -9.0, -9.0), (-2.5, 9.0, 9.0))  # 2 m from the first vehicle
+    wall = BoundingBox((-3.5, -9.0, -9.0), (-2.5, 9.0, 9.0))  # 2 m from the first vehicle
     places = Places([[0.0, 0.0, 0.0], [7.0, 1.0, 0.0]], (wall,))  # 6 m from each other
     places.survey()
-    assert places.leash[0].tolist() == [2 - NEAR, np.inf, np.inf]
-    assert places.leash[1].tolist() == [3 - NEAR / 2, np.inf, np.inf]
+    assert places.leash[0].tolist() == [2 - NEAR_DISTANCE, np.inf, np.inf]
+    assert places.leash[1].tolist() == [3 - NEAR_DISTANCE / 2, np.inf, np.inf]
 
 
 def test_nothing_comes_near_while_all_keep_to_their_leashes() -> None:
     random = np.random.default_rng(1)
     far = 0
     for _ in range(200):
-        places = Places(random.uniform(-3, 3, (4, 3)).tolist(), (Enclosure((-1.0, -1.0, -4.0), (1.0, 1.0, -3.5)),))
+        places = Places(random.uniform(-3, 3, (4, 3)).tolist(), (BoundingBox((-1.0, -1.0, -4.0), (1.0, 1.0, -3.5)),))
         if any(places.survey()):
             continue
         reach = np.minimum(places.leash, 10.0)
@@ -73,23 +75,23 @@ def test_nothing_comes_near_while_all_keep_to_their_leashes() -> None:
 
 def test_what_holds_is_what_a_survey_would_find_again() -> None:
     """Random places about the threshold: near pairs hold exactly as long as the survey says so."""
-    random, floor = np.random.default_rng(2), Enclosure((-9.0, -9.0, -2.0), (9.0, 9.0, -1.0))
+    random, floor = np.random.default_rng(2), BoundingBox((-9.0, -9.0, -2.0), (9.0, 9.0, -1.0))
     seen = set()
     for _ in range(300):
-        places = Places([[0.0, 0.0, -0.5 + NEAR / 2], [0.0, 0.0, 0.5 + NEAR]], (floor,))
+        places = Places([[0.0, 0.0, -0.5 + NEAR_DISTANCE / 2], [0.0, 0.0, 0.5 + NEAR_DISTANCE]], (floor,))
         before = places.survey()
-        places.path += random.uniform(-NEAR / 2, NEAR / 2, places.path.shape)
-        held = places.clearance.holds()
-        pairs = places.clearance._pairs
+        places.path += random.uniform(-NEAR_DISTANCE / 2, NEAR_DISTANCE / 2, places.path.shape)
+        held = places.clearance.is_valid()
+        pairs = places.clearance._near_pairs
         seen.add((held, before == places.survey()))
-        assert held == set(map(tuple, pairs)).issubset(map(tuple, places.clearance._pairs))
+        assert held == set(map(tuple, pairs)).issubset(map(tuple, places.clearance._near_pairs))
     assert len(seen) > 1
 
 
 def test_nothing_holds_before_a_survey_or_after_vehicles_were_placed() -> None:
     places = Places([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    assert not places.clearance.holds()
+    assert not places.clearance.is_valid()
     places.survey()
-    assert places.clearance.holds()
-    places.clearance.forget()
-    assert not places.clearance.holds()
+    assert places.clearance.is_valid()
+    places.clearance.invalidate()
+    assert not places.clearance.is_valid()

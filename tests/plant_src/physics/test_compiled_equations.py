@@ -6,7 +6,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
-from worlds import Trial, quadcopter
+from worlds import WorldHarness, quadcopter_settings
 
 from cosim.core import resources
 from cosim.core.errors import InputError
@@ -29,25 +29,25 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_missing_fmu_is_named(root: Path) -> None:
     with pytest.raises(InputError, match=r'vehicle model "ar_drone" cannot be read from ".*ar_drone.fmu": .*No such file'):
-        compiled_equations.load("ar_drone")
+        compiled_equations.load_library("ar_drone")
 
 
 def test_a_broken_fmu_is_named(root: Path) -> None:
     (root / "fmus" / "ar_drone.fmu").write_bytes(b"no archive")
     with pytest.raises(InputError, match=r'cannot be read from ".*ar_drone.fmu": File is not a zip file'):
-        compiled_equations.load("ar_drone")
+        compiled_equations.load_library("ar_drone")
 
 
 def test_an_fmu_for_other_platforms_is_named(root: Path) -> None:
     with ZipFile(root / "fmus" / "ar_drone.fmu", "w") as archive:
         archive.writestr("binaries/mars64/ar_drone.so", "")
     with pytest.raises(InputError, match=r'"binaries/.*/ar_drone\..*"; build it on this platform with `cosim build`'):
-        compiled_equations.load("ar_drone")
+        compiled_equations.load_library("ar_drone")
 
 
 def test_a_binary_is_unpacked_once_and_completely(cache: Path) -> None:
     for _ in range(2):
-        Trial({"uav": quadcopter([0.0, 0.0, 2.0])}).step()
+        WorldHarness({"uav": quadcopter_settings([0.0, 0.0, 2.0])}).step()
     (library,) = cache.iterdir()
     with ZipFile(resources.root() / "fmus" / "ar_drone.fmu") as archive:
         (member,) = [name for name in archive.namelist() if name.endswith(f"/ar_drone{library.suffix}")]

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import plant_reference as reference
 import pytest
-from validation import Measured
-from worlds import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, Trial, quadcopter, vessel
+from validation import MeasurementCheck
+from worlds import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, WorldHarness, quadcopter_settings, vessel_settings
 
 WEIGHT = reference.QUADCOPTER_MASS * reference.GRAVITY
 
@@ -18,25 +18,25 @@ def rotor_speed(share: float) -> list[float]:
     return [reference.HOVER_SPEED * math.sqrt(share)] * 4
 
 
-def on_deck(height: float = 0.001, **more: object) -> Trial:
+def on_deck(height: float = 0.001, **more: object) -> WorldHarness:
     """A quadcopter above the middle of the deck of a vessel in the origin."""
-    uav = quadcopter([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + height], **more)
-    return Trial({"uav": uav, "usv": vessel([0.0, 0.0])})
+    uav = quadcopter_settings([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + height], **more)
+    return WorldHarness({"uav": uav, "usv": vessel_settings([0.0, 0.0])})
 
 
 @pytest.fixture(scope="module")
-def parked() -> Trial:
+def parked() -> WorldHarness:
     """A quadcopter with its motors off, at rest on the deck for 2 s."""
     return on_deck().step(200)
 
 
-def test_at_rest_the_contact_force_is_the_weight(parked: Trial, measured: Measured) -> None:
+def test_at_rest_the_contact_force_is_the_weight(parked: WorldHarness, measured: MeasurementCheck) -> None:
     force = parked["uav.contact.force"]
     measured("Contact", "force of an AR.Drone at rest on a planar deck", force, WEIGHT, "N", "weight", relative=1e-3)
     assert parked["usv.contact.force"] == parked["uav.contact.force"]
 
 
-def test_thrust_reduces_the_contact_force(measured: Measured) -> None:
+def test_thrust_reduces_the_contact_force(measured: MeasurementCheck) -> None:
     trial = on_deck()
     trial["uav.rotor_speed"] = rotor_speed(0.3)
     trial.step(200)
@@ -44,19 +44,19 @@ def test_thrust_reduces_the_contact_force(measured: Measured) -> None:
     measured("Contact", "the same with 30 % of thrust", force, 0.7 * WEIGHT, "N", "weight less thrust", relative=1e-3)
 
 
-def test_at_rest_the_height_is_that_of_the_feet(parked: Trial, measured: Measured) -> None:
+def test_at_rest_the_height_is_that_of_the_feet(parked: WorldHarness, measured: MeasurementCheck) -> None:
     height = parked["uav.position.z"]
     measured("Contact", "its height", height, DECK_TOP + REST_HEIGHT, "m", "deck and feet", within=1e-4)
 
 
-def test_at_rest_velocities_read_zero(parked: Trial, measured: Measured) -> None:
+def test_at_rest_velocities_read_zero(parked: WorldHarness, measured: MeasurementCheck) -> None:
     """The velocity at the end of a free step would be 0.05 m/s: what gravity does in half of it."""
     measured("Contact", "its velocity", parked.vector("uav.velocity"), 0.0, "m/s", "rest", within=1e-5)
     assert np.abs(parked.vector("uav.rates", "pqr")).max() < 1e-4
 
 
-def test_touching_a_vessel_is_told_from_touching_a_platform(parked: Trial) -> None:
-    on_platform = Trial({"uav": quadcopter([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT])}, {"start": PLATFORM}).step(20)
+def test_touching_a_vessel_is_told_from_touching_a_platform(parked: WorldHarness) -> None:
+    on_platform = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT])}, {"start": PLATFORM}).step(20)
     assert (parked["uav.contact.touching"], parked["uav.contact.vessel"]) == (True, True)
     assert (on_platform["uav.contact.touching"], on_platform["uav.contact.vessel"]) == (True, False)
     assert (parked["usv.contact.touching"], parked["usv.contact.vessel"]) == (True, False)
@@ -85,7 +85,7 @@ def test_contact_force_is_the_mean_over_a_long_step() -> None:
     assert trial["uav.contact.force"] == pytest.approx(WEIGHT, rel=1e-3)
 
 
-def test_contact_conserves_momentum(measured: Measured) -> None:
+def test_contact_conserves_momentum(measured: MeasurementCheck) -> None:
     """A quadcopter slides onto a vessel at rest; in a few steps the air has hardly begun to act."""
     trial = on_deck(velocity_body=[1.0, 0.0, 0.0])
     trial["uav.rotor_speed"] = rotor_speed(0.3)
@@ -106,8 +106,8 @@ def test_friction_drags_the_vessel_along() -> None:
 
 def test_the_deck_carries_the_quadcopter_along() -> None:
     start = {"velocity_body": [0.5, 0.0, 0.0]}
-    uav = quadcopter([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.001], **start)
-    trial = Trial({"uav": uav, "usv": vessel([0.0, 0.0], **start, rates=[0.0, 0.0, 0.1])})
+    uav = quadcopter_settings([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.001], **start)
+    trial = WorldHarness({"uav": uav, "usv": vessel_settings([0.0, 0.0], **start, rates=[0.0, 0.0, 0.1])})
     trial["usv.thrust"], trial["usv.rudder_angle"] = 0.5, 0.1
     places = [place_on_deck(trial.step(100)) for _ in range(5)]
     assert np.linalg.norm(trial.vector("usv.position")) > 2.0
@@ -115,7 +115,7 @@ def test_the_deck_carries_the_quadcopter_along() -> None:
     assert trial.vector("uav.velocity") == pytest.approx(trial.vector("usv.deck.velocity"), abs=0.01)
 
 
-def place_on_deck(trial: Trial) -> np.ndarray:
+def place_on_deck(trial: WorldHarness) -> np.ndarray:
     """Horizontal position of the quadcopter in the frame of the deck."""
     x, y, _ = trial.vector("uav.position") - trial.vector("usv.deck.position")
     yaw = trial["usv.attitude.yaw"]
@@ -137,11 +137,11 @@ def test_take_off_from_the_deck() -> None:
     assert trial["uav.position.z"] - start == pytest.approx(height, abs=0.01)
 
 
-def test_two_pairs_do_not_notice_each_other(measured: Measured) -> None:
+def test_two_pairs_do_not_notice_each_other(measured: MeasurementCheck) -> None:
     """Nothing but rounding: when one of them touches down, Bullet's step is made again for all."""
-    pair = {"uav": quadcopter([0.0, 0.0, 0.4]), "usv": vessel([0.0, 0.0])}
-    distant = {"uav2": quadcopter([50.0, 0.0, 0.5]), "usv2": vessel([50.0, 0.0])}
-    alone, together = Trial(pair).step(100), Trial(pair | distant).step(100)
+    pair = {"uav": quadcopter_settings([0.0, 0.0, 0.4]), "usv": vessel_settings([0.0, 0.0])}
+    distant = {"uav2": quadcopter_settings([50.0, 0.0, 0.5]), "usv2": vessel_settings([50.0, 0.0])}
+    alone, together = WorldHarness(pair).step(100), WorldHarness(pair | distant).step(100)
     names = [variable.name for variable in alone.world.variables]
     change = max(np.max(np.abs(np.subtract(together[name], alone[name], dtype=float))) for name in names)
     measured("Fleets", "change of a pair by a distant second pair", change, 0.0, "SI", "the pair alone", within=1e-9)
@@ -149,7 +149,7 @@ def test_two_pairs_do_not_notice_each_other(measured: Measured) -> None:
 
 
 def test_vessels_push_each_other() -> None:
-    trial = Trial({"a": vessel([0.0, 0.0], velocity_body=[1.0, 0.0, 0.0]), "b": vessel([1.2, 0.0])})
+    trial = WorldHarness({"a": vessel_settings([0.0, 0.0], velocity_body=[1.0, 0.0, 0.0]), "b": vessel_settings([1.2, 0.0])})
     while not trial["b.contact.touching"]:
         trial.step()
     assert trial["a.contact.vessel"] and trial["b.contact.vessel"]
@@ -159,7 +159,7 @@ def test_vessels_push_each_other() -> None:
 
 def test_a_vessel_stops_at_a_platform() -> None:
     wall = {"size": [0.1, 4.0, 1.0], "position": [1.0, 0.0, 0.0]}
-    trial = Trial({"usv": vessel([0.0, 0.0])}, {"wall": wall})
+    trial = WorldHarness({"usv": vessel_settings([0.0, 0.0])}, {"wall": wall})
     trial["usv.thrust"] = 2.0
     trial.step(400)
     assert trial["usv.position.x"] == pytest.approx(0.95 - 0.4895, abs=2e-3)

@@ -8,8 +8,8 @@ import numpy as np
 import plant_reference as reference
 import pytest
 from plant_fmu import PlantFmu
-from validation import Measured
-from worlds import Trial, quadcopter, vessel
+from validation import MeasurementCheck
+from worlds import WorldHarness, quadcopter_settings, vessel_settings
 
 STEP = 0.01
 
@@ -62,8 +62,8 @@ def voyage() -> np.ndarray:
     return reference.integrate(reference.vessel_rate, start, rudder_schedule())
 
 
-def test_quadcopter_flies_as_its_equations_say(flight: np.ndarray, measured: Measured) -> None:
-    trial = Trial({"uav": {"model": "ar_drone", **QUADCOPTER_START}})
+def test_quadcopter_flies_as_its_equations_say(flight: np.ndarray, measured: MeasurementCheck) -> None:
+    trial = WorldHarness({"uav": {"model": "ar_drone", **QUADCOPTER_START}})
     positions, rates = [], []
     for duration, inputs in rotor_schedule():
         trial["uav.rotor_speed"] = inputs[:4]
@@ -77,8 +77,8 @@ def test_quadcopter_flies_as_its_equations_say(flight: np.ndarray, measured: Mea
     measured("AR.Drone 2.0", "rates in it, world", turning, 0.0, "rad/s", "DOP853", within=1e-6)
 
 
-def test_vessel_sails_as_its_equations_say(voyage: np.ndarray, measured: Measured) -> None:
-    trial = Trial({"usv": {"model": "strider", **VESSEL_START}})
+def test_vessel_sails_as_its_equations_say(voyage: np.ndarray, measured: MeasurementCheck) -> None:
+    trial = WorldHarness({"usv": {"model": "strider", **VESSEL_START}})
     positions = []
     for duration, inputs in rudder_schedule():
         trial["usv.thrust"], trial["usv.rudder_angle"] = inputs[:2]
@@ -108,14 +108,14 @@ def initial(start: dict[str, object], skip: str = "") -> dict[str, float]:
     return {f"initial.{name}": value for name, value in (named | {"yaw": start["yaw"]}).items() if name not in skip}
 
 
-def test_quadcopter_fmu_flies_as_its_equations_say(flight: np.ndarray, measured: Measured) -> None:
+def test_quadcopter_fmu_flies_as_its_equations_say(flight: np.ndarray, measured: MeasurementCheck) -> None:
     fmu = PlantFmu("ar_drone", initial(QUADCOPTER_START))
     names = [*(f"rotor_speed[{k}]" for k in (1, 2, 3, 4)), *LOADS]
     error = deviation(list(positions(fmu, names, "xyz", rotor_schedule())), flight[:, :3])
     measured("AR.Drone 2.0", "place in 10 s of tilting flight, FMU", error, 0.0, "m", "DOP853", within=1e-6)
 
 
-def test_vessel_fmu_sails_as_its_equations_say(voyage: np.ndarray, measured: Measured) -> None:
+def test_vessel_fmu_sails_as_its_equations_say(voyage: np.ndarray, measured: MeasurementCheck) -> None:
     fmu = PlantFmu("strider", initial(VESSEL_START, skip="velocity_body.w rates.p rates.q"))
     error = deviation(list(positions(fmu, ["thrust", "rudder_angle", *LOADS], "xy", rudder_schedule())), voyage[:, :2])
     measured("Strider, planar", "place in 60 s of rudder steps and a gust, FMU", error, 0.0, "m", "DOP853", within=1e-6)
@@ -141,7 +141,7 @@ def test_fmu_publishes_no_contact() -> None:
 
 
 def test_vessel_going_astern_is_pushed_to_the_other_side_by_its_rudder() -> None:
-    ahead, astern = (Trial({"usv": vessel([0.0, 0.0], velocity_body=[speed, 0.0, 0.0])}) for speed in (1.0, -1.0))
+    ahead, astern = (WorldHarness({"usv": vessel_settings([0.0, 0.0], velocity_body=[speed, 0.0, 0.0])}) for speed in (1.0, -1.0))
     for trial in (ahead, astern):
         trial["usv.rudder_angle"] = 0.2
         trial.step(10)
@@ -149,8 +149,8 @@ def test_vessel_going_astern_is_pushed_to_the_other_side_by_its_rudder() -> None
     assert astern["usv.rates.r"] > 0.01
 
 
-def test_hover_thrust_carries_the_weight(measured: Measured) -> None:
-    trial = Trial({"uav": quadcopter([0.0, 0.0, 5.0])})
+def test_hover_thrust_carries_the_weight(measured: MeasurementCheck) -> None:
+    trial = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, 5.0])})
     trial["uav.rotor_speed"] = [reference.HOVER_SPEED] * 4
     trial.step()
     speed = trial["uav.velocity.z"]  # of 0.1 m/s in free fall
@@ -159,18 +159,18 @@ def test_hover_thrust_carries_the_weight(measured: Measured) -> None:
     assert throttle == pytest.approx(0.6588, abs=1e-4)  # of the fact sheet
 
 
-def test_tumbling_without_torque_keeps_the_energy(measured: Measured) -> None:
-    trial = Trial({"uav": quadcopter([0.0, 0.0, 1000.0], rates=[3.0, 0.5, -2.0])})
+def test_tumbling_without_torque_keeps_the_energy(measured: MeasurementCheck) -> None:
+    trial = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, 1000.0], rates=[3.0, 0.5, -2.0])})
     rates = trial.vector("uav.rates", "pqr")
-    before = reference.turning_energy(rates)
+    before = reference.rotational_energy(rates)
     trial.step(1000)
-    after = reference.turning_energy(trial.vector("uav.rates", "pqr"))
+    after = reference.rotational_energy(trial.vector("uav.rates", "pqr"))
     assert np.abs(trial.vector("uav.rates", "pqr") - rates).max() > 0.1
     measured("AR.Drone 2.0", "energy after 10 s of tumbling", after, before, "J", "conservation", relative=1e-6)
 
 
 def test_a_step_longer_than_10_ms_is_split() -> None:
-    long, short = (Trial({"uav": {"model": "ar_drone", **QUADCOPTER_START}}) for _ in range(2))
+    long, short = (WorldHarness({"uav": {"model": "ar_drone", **QUADCOPTER_START}}) for _ in range(2))
     long.step(4, 0.025)
     short.step(12, 0.1 / 12)
     assert long.vector("uav.position") == pytest.approx(short.vector("uav.position"), abs=1e-12)

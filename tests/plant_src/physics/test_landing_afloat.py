@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import plant_reference as reference
 import pytest
-from validation import Measured
-from worlds import DECK_TOP, REST_HEIGHT, Trial, quadcopter, vessel
+from validation import MeasurementCheck
+from worlds import DECK_TOP, REST_HEIGHT, WorldHarness, quadcopter_settings, vessel_settings
 
 from plant_src.vehicles.strider_6dof import parameters as p
 
@@ -16,13 +16,13 @@ OTTER_DECK = 0.4 - 0.0377  # m above the water
 WAVES = {"seed": 2, "waves": {"significant_height": 0.05, "peak_period": 2.0}, "wind": {"velocity": [1.0, 0.0, 0.0]}}
 
 
-def landing(offset: tuple[float, float] = (0.15, 0.1), height: float = 0.02, **more: object) -> Trial:
+def landing(offset: tuple[float, float] = (0.15, 0.1), height: float = 0.02, **more: object) -> WorldHarness:
     """A quadcopter above the deck of a catamaran at rest."""
-    uav = quadcopter([*offset, DECK_TOP + REST_HEIGHT + height])
-    return Trial({"uav": uav, "usv": vessel([0.0, 0.0], motion="6dof")}, **more)
+    uav = quadcopter_settings([*offset, DECK_TOP + REST_HEIGHT + height])
+    return WorldHarness({"uav": uav, "usv": vessel_settings([0.0, 0.0], motion="6dof")}, **more)
 
 
-def test_the_weight_on_the_deck_sinks_and_heels_the_vessel(measured: Measured) -> None:
+def test_the_weight_on_the_deck_sinks_and_heels_the_vessel(measured: MeasurementCheck) -> None:
     """Hydrostatics: weight over stiffness, lever arms from where the quadcopter stands."""
     trial = landing().step(500)
     x, y, _ = trial.vector("uav.position") - trial.vector("usv.position")
@@ -49,11 +49,11 @@ def test_the_quadcopter_stays_where_it_landed() -> None:
     assert np.linalg.norm(trial.vector("usv.velocity")) < 1e-3
 
 
-def test_a_sideways_landing_conserves_momentum(measured: Measured) -> None:
+def test_a_sideways_landing_conserves_momentum(measured: MeasurementCheck) -> None:
     """Touchdown, 0.2 s of sliding and turning, and off again; without water and air the vessel is a free rigid body."""
-    uav = quadcopter([0.03, 0.01, DECK_TOP + REST_HEIGHT + 0.005], velocity_body=[1.0, -0.5, 0.0])
-    usv = vessel([0.0, 0.0], motion="6dof", rates=[0.0, 0.0, 0.2], parameters={"hydrodynamics": 0.0})
-    trial = Trial({"uav": uav, "usv": usv})
+    uav = quadcopter_settings([0.03, 0.01, DECK_TOP + REST_HEIGHT + 0.005], velocity_body=[1.0, -0.5, 0.0])
+    usv = vessel_settings([0.0, 0.0], motion="6dof", rates=[0.0, 0.0, 0.2], parameters={"hydrodynamics": 0.0})
+    trial = WorldHarness({"uav": uav, "usv": usv})
     before = momentum(trial)
     trial.step(26)
     assert trial["uav.contact.vessel"]
@@ -64,7 +64,7 @@ def test_a_sideways_landing_conserves_momentum(measured: Measured) -> None:
     measured("Contact", "momentum after a sideways landing", momentum(trial), before, "kg.m/s", "conservation", relative=1e-9)
 
 
-def momentum(trial: Trial) -> np.ndarray:
+def momentum(trial: WorldHarness) -> np.ndarray:
     return reference.QUADCOPTER_MASS * trial.vector("uav.velocity", "xy") + p.MASS * trial.vector("usv.velocity", "xy")
 
 
@@ -77,8 +77,10 @@ def test_after_a_landing_the_vessel_floats_again_as_before() -> None:
     assert trial["usv.attitude.pitch"] == pytest.approx(0.0, abs=1e-5)
 
 
-def test_the_otter_carries_a_quadcopter_on_its_deck(measured: Measured) -> None:
-    trial = Trial({"uav": quadcopter([0.0, 0.3, OTTER_DECK + 0.1]), "usv": {"model": "otter", "position": [0.0, 0.0]}}).step(400)
+def test_the_otter_carries_a_quadcopter_on_its_deck(measured: MeasurementCheck) -> None:
+    trial = WorldHarness(
+        {"uav": quadcopter_settings([0.0, 0.3, OTTER_DECK + 0.1]), "usv": {"model": "otter", "position": [0.0, 0.0]}}
+    ).step(400)
     assert trial["uav.contact.vessel"]
     assert trial["uav.contact.force"] == pytest.approx(WEIGHT, rel=1e-3)
     payload = 25.0 * 9.81 * 0.35  # N m/rad, by which its weight above the water makes the hull less stiff
@@ -87,7 +89,7 @@ def test_the_otter_carries_a_quadcopter_on_its_deck(measured: Measured) -> None:
 
 
 @pytest.mark.parametrize("steps", [0, 5, 7, 8, 9, 60, 200])
-def test_a_saved_state_is_returned_to_bit_for_bit_in_waves(steps: int, measured: Measured) -> None:
+def test_a_saved_state_is_returned_to_bit_for_bit_in_waves(steps: int, measured: MeasurementCheck) -> None:
     """In flight, at touchdown, at rest."""
     trial = landing(environment=WAVES).step(steps)
     trial["usv.thrust"] = 1.0
@@ -105,7 +107,7 @@ def test_a_saved_state_is_returned_to_bit_for_bit_in_waves(steps: int, measured:
 
 def test_a_vessel_stops_at_a_wall() -> None:
     wall = {"size": [0.1, 4.0, 1.0], "position": [1.0, 0.0, 0.0]}
-    trial = Trial({"usv": vessel([0.0, 0.0], motion="6dof")}, {"wall": wall})
+    trial = WorldHarness({"usv": vessel_settings([0.0, 0.0], motion="6dof")}, {"wall": wall})
     trial["usv.thrust"] = 2.0
     trial.step(600)
     assert trial["usv.position.x"] == pytest.approx(0.95 - 0.4895, abs=5e-3)

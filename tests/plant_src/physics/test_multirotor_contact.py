@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from worlds import DECK_TOP, PLATFORM, PLATFORM_TOP, Trial, vessel
+from worlds import DECK_TOP, PLATFORM, PLATFORM_TOP, WorldHarness, vessel_settings
 
 from plant_src.vehicles.crazyflie import geometry as crazyflie
 from plant_src.vehicles.survey_hexacopter import geometry as survey_hexacopter
@@ -12,10 +12,10 @@ FEET = {"crazyflie": crazyflie.FEET_HEIGHT, "survey_hexacopter": survey_hexacopt
 MASS = {"crazyflie": 0.027, "survey_hexacopter": 4.78}
 
 
-def dropped(model: str) -> Trial:
+def dropped(model: str) -> WorldHarness:
     """2 s after a fall from 5 cm onto a platform."""
     vehicle = {"model": model, "position": [0.1, -0.2, PLATFORM_TOP + 0.05 - FEET[model]], "yaw": 0.3}
-    return Trial({"uav": vehicle}, {"pad": PLATFORM}).step(200)
+    return WorldHarness({"uav": vehicle}, {"pad": PLATFORM}).step(200)
 
 
 @pytest.mark.parametrize("model", FEET)
@@ -32,12 +32,14 @@ def test_the_platform_carries_its_weight(model: str) -> None:
 
 def test_a_planar_deck_does_not_give_way_to_what_is_heavier_than_its_vessel() -> None:
     """Bullet's vessel of 4.11 kg could; after the blow the feet rise out of the deck by 8 % a step, as they do on a platform."""
-    vehicles = {"usv": vessel([0.0, 0.0]), "uav": {"model": "survey_hexacopter", "velocity_body": [0.0, 0.0, -0.3]}}
+    vehicles = {"usv": vessel_settings([0.0, 0.0]), "uav": {"model": "survey_hexacopter", "velocity_body": [0.0, 0.0, -0.3]}}
     heights, decks = {"deck": DECK_TOP, "platform": PLATFORM_TOP}, {}
     for deck, height in heights.items():
         position = [0.0, 0.0, height - FEET["survey_hexacopter"] + 0.0015]
         chosen = vehicles if deck == "deck" else {"uav": vehicles["uav"]}
-        trial = Trial({**chosen, "uav": {**vehicles["uav"], "position": position}}, {"pad": PLATFORM} if deck != "deck" else {})
+        trial = WorldHarness(
+            {**chosen, "uav": {**vehicles["uav"], "position": position}}, {"pad": PLATFORM} if deck != "deck" else {}
+        )
         decks[deck] = [trial.step()["uav.position.z"] - height for _ in range(60)]
     assert decks["deck"] == pytest.approx(decks["platform"], abs=2e-5)
 

@@ -6,7 +6,7 @@ import numpy as np
 import plant_reference as reference
 import pybullet
 import pytest
-from worlds import PLATFORM, PLATFORM_TOP, REST_HEIGHT, Trial, quadcopter
+from worlds import PLATFORM, PLATFORM_TOP, REST_HEIGHT, WorldHarness, quadcopter_settings
 
 SUB_STEPS = 40
 
@@ -34,7 +34,7 @@ def plain_drop(height: float, duration: float) -> float:
 def test_a_drop_agrees_with_plain_bullet(duration: float) -> None:
     """In the air and at rest; the centre of the box lies 0.0433 m above the feet, the centre of mass 0.056 m."""
     drop = 0.2
-    trial = Trial({"uav": quadcopter([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT + drop])}, {"start": PLATFORM}).step(
+    trial = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT + drop])}, {"start": PLATFORM}).step(
         round(duration / 0.01)
     )
     plain = plain_drop(PLATFORM_TOP + 0.0433 + drop, duration)

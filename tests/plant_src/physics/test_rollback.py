@@ -8,8 +8,8 @@ from pathlib import Path
 
 import plant_reference as reference
 import pytest
-from validation import Measured
-from worlds import DECK_TOP, REST_HEIGHT, Trial, quadcopter, vessel
+from validation import MeasurementCheck
+from worlds import DECK_TOP, REST_HEIGHT, WorldHarness, quadcopter_settings, vessel_settings
 
 from cosim.core.errors import ComponentError
 
@@ -17,18 +17,20 @@ AGAIN = "40 steps from flight, touchdown and rest, repeated"
 ROOT = Path(__file__).parents[3]
 
 
-def mission() -> Trial:
+def mission() -> WorldHarness:
     """Drop from 0.15 m onto a moving, turning deck: 17 steps of flight, touchdown, rest."""
-    uav = quadcopter([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.15], yaw=0.3, velocity_body=[0.3, 0.0, 0.0])
-    trial = Trial({"uav": uav, "usv": vessel([0.0, 0.0], velocity_body=[0.3, 0.0, 0.0], rates=[0.0, 0.0, 0.2])})
+    uav = quadcopter_settings([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.15], yaw=0.3, velocity_body=[0.3, 0.0, 0.0])
+    trial = WorldHarness({"uav": uav, "usv": vessel_settings([0.0, 0.0], velocity_body=[0.3, 0.0, 0.0], rates=[0.0, 0.0, 0.2])})
     trial["uav.rotor_speed"] = [120.0, 121.0, 119.0, 120.0]
     trial["usv.thrust"] = 1.0
     return trial
 
 
-def visit() -> Trial:
+def visit() -> WorldHarness:
     """Drop from 0.6 m onto the deck, take-off: Bullet takes part from the 34th step to the 81st."""
-    trial = Trial({"uav": quadcopter([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.6]), "usv": vessel([0.0, 0.0])})
+    trial = WorldHarness(
+        {"uav": quadcopter_settings([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.6]), "usv": vessel_settings([0.0, 0.0])}
+    )
     trial["uav.external_force.z"] = 1.0
     return trial
 
@@ -53,7 +55,7 @@ def test_a_state_is_returned_to_from_where_bullet_takes_part_or_not(steps: int) 
 
 
 @pytest.mark.parametrize("steps", [0, 5, 17, 18, 19, 20, 60, 200])
-def test_a_saved_state_is_returned_to_bit_for_bit(steps: int, measured: Measured) -> None:
+def test_a_saved_state_is_returned_to_bit_for_bit(steps: int, measured: MeasurementCheck) -> None:
     trial = mission().step(steps)
     state, before = trial.world.get_state(), trial.bytes
     expected = [trial.step().bytes for _ in range(40)]
@@ -107,8 +109,8 @@ print(digest.hexdigest(), trial["uav.contact.vessel"])
 """
 
 
-def test_two_processes_compute_the_same_bytes(measured: Measured) -> None:
-    script = SCRIPT.format(paths=[str(ROOT), str(ROOT / "tests/support")])
+def test_two_processes_compute_the_same_bytes(measured: MeasurementCheck) -> None:
+    script = SCRIPT.format(paths=[str(ROOT), str(ROOT / "tests/support"), str(Path(__file__).parent)])
     outcomes = [
         subprocess.run(
             [sys.executable, "-c", script], capture_output=True, text=True, check=True, env={"PYTHONHASHSEED": seed}

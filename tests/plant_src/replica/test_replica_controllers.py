@@ -9,15 +9,15 @@ import pytest
 from plant_src.replica.bus import Bus
 from plant_src.replica.pid import Pid
 from plant_src.replica.quadcopter import AttitudeController, Mixer, PositionController, Vtol
-from plant_src.replica.unit import Unit
+from plant_src.replica.unit import ReplicaFmu
 from plant_src.replica.vessel import Autopilot, Waypoints
 
 
-def step(unit: Unit, time: float = 0.0, **values: float) -> dict[str, float]:
+def step(unit: ReplicaFmu, time: float = 0.0, **values: float) -> dict[str, float]:
     """One step; "__" in names stands for the dot."""
-    unit.value |= {name.replace("__", "."): value for name, value in values.items()}
+    unit.values |= {name.replace("__", "."): value for name, value in values.items()}
     assert unit.do_step(time, 0.01)
-    return unit.value
+    return unit.values
 
 
 def bogacki_shampine(filtered: float, damped: float, n: float, h: float) -> float:
@@ -131,7 +131,7 @@ def test_the_course_points_to_the_waypoint(x: float, y: float) -> None:
 
 def test_a_waypoint_is_switched_one_sample_late_and_the_last_one_stays() -> None:
     unit = Waypoints(instance_name="waypoints")
-    unit.value |= {"waypoint_count": 2.0, "waypoint_x[1]": 10.0, "waypoint_x[2]": 20.0}
+    unit.values |= {"waypoint_count": 2.0, "waypoint_x[1]": 10.0, "waypoint_x[2]": 20.0}
     places = (0.0, 9.4, 9.6, 9.6, 19.4, 19.6, 19.6, 19.7)
     assert [step(unit, vehicle__position__x=x)["waypoint"] for x in places] == [1, 1, 1, 2, 2, 2, 2, 2]
 

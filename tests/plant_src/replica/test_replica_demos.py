@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from validation import Measured
+from validation import MeasurementCheck
 
 import cosim
 from cosim.results import Result
@@ -28,13 +28,13 @@ def distance(result: Result) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("waypoint", "time"), list(enumerate([5.5, 15.3, 22.5, 29.8, 36.3], start=1)))
-def test_the_box_is_sailed_in_time(box: Result, waypoint: int, time: float, measured: Measured) -> None:
+def test_the_box_is_sailed_in_time(box: Result, waypoint: int, time: float, measured: MeasurementCheck) -> None:
     found, case = box.kpis[f"waypoints.time[{waypoint}]"], f"waypoint {waypoint}"
     measured(REPLICA, "box pattern", found, time, "s", AGAIN, within=0.2, case=case)
 
 
 @pytest.mark.parametrize(("leg", "overshoot"), list(enumerate([0.94, 1.97, 1.01, 1.11, 1.59], start=1)))
-def test_the_box_is_left_as_far(box: Result, leg: int, overshoot: float, measured: Measured) -> None:
+def test_the_box_is_left_as_far(box: Result, leg: int, overshoot: float, measured: MeasurementCheck) -> None:
     found, case = box.kpis[f"overshoots.leg[{leg}]"], f"leg {leg}"
     measured(REPLICA, "overshoots of the box", found, overshoot, "m", AGAIN, within=0.1, case=case)
 
@@ -44,18 +44,18 @@ def test_the_box_fits_the_same_frame(box: Result) -> None:
     assert [x.min(), x.max(), y.min(), y.max()] == pytest.approx([-4.44, 5.30, -4.34, 4.22], abs=0.1)
 
 
-def test_the_vessel_keeps_its_speed(sweep: Result, measured: Measured) -> None:
+def test_the_vessel_keeps_its_speed(sweep: Result, measured: MeasurementCheck) -> None:
     straight = (sweep.time > 15) & (sweep.time < 20)
     speed = sweep["plant.usv.velocity.x"][straight].mean()
     measured(REPLICA, "mean speed of the vessel on a sweep", speed, 0.9988, "m/s", AGAIN, within=1e-3)
 
 
-def test_the_vessel_turns_as_fast(box: Result, measured: Measured) -> None:
+def test_the_vessel_turns_as_fast(box: Result, measured: MeasurementCheck) -> None:
     rate = np.abs(box["plant.usv.angular_velocity.z"]).max()
     measured(REPLICA, "largest yaw rate in the box", rate, 1.28, "rad/s", AGAIN, relative=0.03)
 
 
-def test_the_approach_dips_and_ends_on_the_deck(box: Result, measured: Measured) -> None:
+def test_the_approach_dips_and_ends_on_the_deck(box: Result, measured: MeasurementCheck) -> None:
     lowest, time, speed, error = (box.kpis[f"touchdown.{name}"] for name in ("lowest", "time", "speed", "error"))
     measured(REPLICA, "lowest height of the approach", lowest, 0.854, "m", AGAIN, within=0.03)
     measured(REPLICA, "touchdown", time, 13.06, "s", AGAIN, within=0.1)
@@ -80,7 +80,7 @@ def test_controllers_act_on_the_sample_before(box: Result) -> None:
 
 
 @pytest.mark.parametrize(("waypoint", "time"), list(enumerate([20.4, 41.3, 52.2], start=1)))
-def test_the_sweep_is_sailed_in_time(sweep: Result, waypoint: int, time: float, measured: Measured) -> None:
+def test_the_sweep_is_sailed_in_time(sweep: Result, waypoint: int, time: float, measured: MeasurementCheck) -> None:
     found, case = sweep.kpis[f"waypoints.time[{waypoint}]"], f"waypoint {waypoint}"
     measured(REPLICA, "sweep pattern", found, time, "s", AGAIN, within=0.3, case=case)
 

@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable, Mapping
 
 import pytest
-from fakes import Fake, outputs
+from fakes import FakeComponent, outputs
 
-from cosim.components.fmi import FmuFile, instantiate
+from cosim.components.fmi import FmuFile, create_component
 from cosim.core import resources
 from cosim.core.system import Connection, Endpoint, System
-from cosim.core.time_grid import exact
+from cosim.core.time_grid import exact_fraction
 from cosim.engine.run_loop import Settings, simulate
 
 Loads = Callable[..., dict[str, float]]
@@ -23,13 +23,13 @@ def loads(request: pytest.FixtureRequest) -> Loads:
 
     def evaluated(name: str, inputs: Mapping[str, float], **parameters: float) -> dict[str, float]:
         file = FmuFile(resources.root() / request.param / f"{name}.fmu")
-        source = Fake(outputs(*inputs), lambda values, time, step_size: None, start=inputs)
+        source = FakeComponent(outputs(*inputs), lambda values, time, step_size: None, start=inputs)
         connected = [Connection(Endpoint("in", slot), Endpoint("fmu", slot)) for slot in inputs]
-        components = {"in": source, "fmu": instantiate(file, "fmu")}
+        components = {"in": source, "fmu": create_component(file, "fmu")}
         wired = System(components, connected, (("in", "fmu"),), start_values={"fmu": parameters})
-        slots = [slot for v in file.description.variables if v.causality == "output" for slot in v.slots]
+        slots = [slot for v in file.description.variables if v.causality == "output" for slot in v.scalar_names]
         recording = simulate(
-            wired, Settings(exact(0), exact(0.01), exact(0.01), {s: Endpoint("fmu", s) for s in slots})
+            wired, Settings(exact_fraction(0), exact_fraction(0.01), exact_fraction(0.01), {s: Endpoint("fmu", s) for s in slots})
         ).recording
         return {slot: float(recording.columns[slot][-1]) for slot in slots}
 

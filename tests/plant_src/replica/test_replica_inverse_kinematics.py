@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 import cosim
-from plant_src.replica.inverse_kinematics import InverseKinematics, come_back, go_hover, low_pass, low_pass_at_rest
+from plant_src.replica.inverse_kinematics import (
+    InverseKinematics,
+    low_pass_matrices,
+    low_pass_steady_state,
+    return_move_acceleration,
+    stop_move_acceleration,
+)
 
 HOVER = 0.443892 * 9.81
 
@@ -16,7 +22,7 @@ HOVER = 0.443892 * 9.81
 def response(frequency: float) -> float:
     """Amplitude of the low-pass, stepped finely, at a frequency in Hz."""
     step_size = 1e-4
-    turn, gain = low_pass(step_size)
+    turn, gain = low_pass_matrices(step_size)
     z = np.exp(2j * math.pi * frequency * step_size)
     return float(abs(np.linalg.solve(z * np.eye(15) - turn, gain)[-1]))
 
@@ -27,18 +33,18 @@ def test_the_low_pass_is_a_butterworth_of_order_15_at_20_hertz(frequency: float)
 
 
 def test_the_low_pass_at_rest_stays_there() -> None:
-    turn, gain = low_pass(0.01)
-    state = low_pass_at_rest(4.3)
+    turn, gain = low_pass_matrices(0.01)
+    state = low_pass_steady_state(4.3)
     np.testing.assert_allclose(turn @ state + gain * 4.3, state, atol=1e-9)
 
 
 def controller(**values: float) -> dict[str, float]:
     """Outputs of a controller that hovers at its altitude."""
     unit = InverseKinematics(instance_name="inverse")
-    unit.value |= {"initial_force": HOVER, "altitude_command": 2.0, "vehicle.position.z": 2.0, **values}
+    unit.values |= {"initial_force": HOVER, "altitude_command": 2.0, "vehicle.position.z": 2.0, **values}
     unit.exit_initialization_mode()
     assert unit.do_step(0.0, 0.01)
-    return unit.value
+    return unit.values
 
 
 def test_without_accelerations_it_hovers_level() -> None:
@@ -61,7 +67,9 @@ def test_the_force_starts_at_zero_as_published() -> None:
     assert values["phi_command"] == pytest.approx(math.pi / 2)
 
 
-@pytest.mark.parametrize(("profile", "distance", "speed"), [(come_back, 0.0, 0.0), (go_hover, 100.0, 10.0)])
+@pytest.mark.parametrize(
+    ("profile", "distance", "speed"), [(return_move_acceleration, 0.0, 0.0), (stop_move_acceleration, 100.0, 10.0)]
+)
 def test_profiles_travel_as_far_as_published(profile, distance: float, speed: float) -> None:
     time = np.arange(0, 25, 1e-3) + 5e-4
     velocity = np.cumsum([profile(t) for t in time]) * 1e-3
@@ -70,7 +78,7 @@ def test_profiles_travel_as_far_as_published(profile, distance: float, speed: fl
     assert velocity.sum() * 1e-3 == pytest.approx(distance, abs=2e-2)
 
 
-@pytest.mark.parametrize(("profile", "largest"), [(come_back, 0.578), (go_hover, 1.875)])
+@pytest.mark.parametrize(("profile", "largest"), [(return_move_acceleration, 0.578), (stop_move_acceleration, 1.875)])
 def test_profiles_peak_as_published(profile, largest: float) -> None:
     values = [profile(t) for t in np.arange(0, 20, 1e-2)]
     assert (max(values), min(values)) == pytest.approx((largest, -largest), rel=2e-3)

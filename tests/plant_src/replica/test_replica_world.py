@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from validation import Measured
+from validation import MeasurementCheck
 
 from cosim.core.component import Ports
 from cosim.core.errors import ComponentError, InputError
@@ -86,7 +86,7 @@ def test_psi_is_clockwise(yaw: float) -> None:
     assert np.exp(1j * psi) == pytest.approx(np.exp(-1j * yaw))
 
 
-def test_it_falls_as_two_engine_steps_per_sample_make_it_fall(measured: Measured) -> None:
+def test_it_falls_as_two_engine_steps_per_sample_make_it_fall(measured: MeasurementCheck) -> None:
     trial = Trial({"position": [0, 0, 10]}).step(50)
     assert trial["uav.velocity.z"] == pytest.approx(-9.81 * 0.5)
     fall, expected = 10 - trial["uav.position.z"], 9.81 * HALF**2 * 100 * 101 / 2
@@ -146,7 +146,7 @@ def test_a_tilted_rotor_pulls_sideways() -> None:
     assert trial["uav.velocity.x"] > 0.03
 
 
-def test_the_links_of_the_rig_move_with_the_hull(measured: Measured) -> None:
+def test_the_links_of_the_rig_move_with_the_hull(measured: MeasurementCheck) -> None:
     """4.31 kg in x, 4.21 kg in y."""
     trial = Trial({"position": [0, 0, 100]}).step(10, usv__water__x=1.0, usv__water__y=2.0)
     *level, climb = trial.vector("usv.velocity")
@@ -191,7 +191,7 @@ def test_it_rests_on_its_feet(support: str) -> None:
     assert np.abs(trial.vector("uav.velocity")).max() < 1e-3
 
 
-def test_landing_sideways_pushes_the_vessel(measured: Measured) -> None:
+def test_landing_sideways_pushes_the_vessel(measured: MeasurementCheck) -> None:
     trial = Trial({"position": [0, 0, 0.33], "velocity_body": [0.3, 0, 0]}, {"position": [0, 0]}).step(40)
     share = 0.443892 / (0.443892 + 4.31)
     found, expected = trial["usv.velocity.x"], 0.3 * share

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mission_recording import TOUCHDOWN, mission
+from mission_recording import TOUCHDOWN, mission_result
 from scene_recording import scene_mission
 
 from cosim.core.errors import InputError
@@ -38,7 +38,7 @@ def test_an_empty_window_is_refused():
 
 def test_a_result_without_a_plant_is_refused():
     with pytest.raises(InputError, match="a plant with vehicles"):
-        ghosts(mission())
+        ghosts(mission_result())
 
 
 def test_frames_follow_the_mission():

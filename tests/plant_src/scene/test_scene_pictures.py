@@ -7,16 +7,16 @@ import pytest
 from scene_recording import scene_mission
 
 from cosim.core.errors import InputError
-from plant_src.catalogue import VEHICLES
+from plant_src.catalogue import VEHICLE_MODELS
 from plant_src.physics.client import pybullet
 from plant_src.scene.cameras import CAMERAS, NEAR, View
 from plant_src.scene.land import add_land, bank
-from plant_src.scene.light import rays, water_distance
-from plant_src.scene.looks import looks
-from plant_src.scene.mission import recorded
+from plant_src.scene.light import pixel_rays, water_distance
+from plant_src.scene.looks import vehicle_parts
+from plant_src.scene.mission import mission_of_result
 from plant_src.scene.models import Part
 from plant_src.scene.render import Layer, Scene
-from plant_src.scene.stage import Picture, Stage
+from plant_src.scene.stage import Picture, SolidRenderer
 
 SIZE = (160, 80)
 AHEAD = View(np.array([0.0, 0.0, 2.0]), np.array([10.0, 0.0, 2.0]))
@@ -25,25 +25,25 @@ UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
 def test_a_box_has_its_distance():
-    with Stage([RED]) as stage:
-        stage.place(0, [5.5, 0.0, 2.0], UPRIGHT)
-        depth = stage.picture(AHEAD, *SIZE).depth
+    with SolidRenderer([RED]) as stage:
+        stage.set_pose(0, [5.5, 0.0, 2.0], UPRIGHT)
+        depth = stage.render(AHEAD, *SIZE).depth
     assert depth[40, 80] == pytest.approx(5.0, abs=0.01)
     assert np.isinf(depth[0, 0])
 
 
 @pytest.mark.parametrize("place", [(6.0, 0.0, 2.0), (8.0, 2.0, 1.4), (8.0, -2.5, 2.6)])
 def test_a_ball_appears_where_the_camera_projects_it(place):
-    with Stage([Part("sphere", (0.3,), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))]) as stage:
-        stage.place(0, place, UPRIGHT)
-        y, x = np.nonzero(np.isfinite(stage.picture(AHEAD, *SIZE).depth))
+    with SolidRenderer([Part("sphere", (0.3,), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))]) as stage:
+        stage.set_pose(0, place, UPRIGHT)
+        y, x = np.nonzero(np.isfinite(stage.render(AHEAD, *SIZE).depth))
     assert AHEAD.pixels(np.array([place]), *SIZE)[0] == pytest.approx((x.mean() + 0.5, y.mean() + 0.5), abs=1.0)
 
 
 def test_parts_turn_with_their_thing():
-    with Stage([RED._replace(position=(1.0, 0.0, 0.0))]) as stage:
-        stage.place(0, [6.0, 0.0, 2.0], (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)))
-        _, x = np.nonzero(np.isfinite(stage.picture(AHEAD, *SIZE).depth))
+    with SolidRenderer([RED._replace(position=(1.0, 0.0, 0.0))]) as stage:
+        stage.set_pose(0, [6.0, 0.0, 2.0], (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)))
+        _, x = np.nonzero(np.isfinite(stage.render(AHEAD, *SIZE).depth))
     assert x.max() < 80  # the part is at (6, 1): left of the middle
 
 
@@ -55,9 +55,9 @@ def test_the_mirrored_view_shows_the_mirror_image_upside_down():
 
 def test_water_is_where_rays_meet_it():
     down = View(np.array([0.0, 0.0, 2.0]), np.array([2.0, 0.0, 0.0]))
-    distance = water_distance(down, rays(down, 161, 81))
+    distance = water_distance(down, pixel_rays(down, 161, 81))
     assert distance[40, 80] == pytest.approx(2.0 * math.sqrt(2), rel=1e-5)
-    level = water_distance(AHEAD, rays(AHEAD, 160, 80))
+    level = water_distance(AHEAD, pixel_rays(AHEAD, 160, 80))
     assert np.isinf(level[:40]).all()
     assert np.isfinite(level[40:]).all()
 
@@ -71,9 +71,9 @@ def test_banks_look_like_boxes_of_their_size(eye, monkeypatch):
     view = View(np.array(eye), np.array([9.0, 0.5, 0.1]))
     monkeypatch.setattr("plant_src.scene.land.BANKS", [ONE_BANK])
     found = Picture(np.zeros((80, 160, 3), np.uint8), np.full((80, 160), np.inf, np.float32))
-    add_land(found, view, rays(view, *SIZE))
-    with Stage([as_part(step) for step in ONE_BANK]) as stage:
-        drawn = stage.picture(view, *SIZE)
+    add_land(found, view, pixel_rays(view, *SIZE))
+    with SolidRenderer([as_part(step) for step in ONE_BANK]) as stage:
+        drawn = stage.render(view, *SIZE)
     seen = np.isfinite(found.depth)
     assert seen.sum() > 1000
     assert (seen != np.isfinite(drawn.depth)).sum() < 0.08 * seen.sum()
@@ -91,7 +91,7 @@ def test_the_mirror_image_of_a_bank_shows_its_shore(monkeypatch):
     view, pictures = View(np.array([0.0, 0.0, 3.0]), np.array([9.0, 0.5, 0.1])), []
     for one in (view, view.mirrored()):
         pictures.append(Picture(np.zeros((80, 160, 3), np.uint8), np.full((80, 160), np.inf, np.float32)))
-        add_land(pictures[-1], one, rays(one, *SIZE))
+        add_land(pictures[-1], one, pixel_rays(one, *SIZE))
     upright, mirrored = (np.isfinite(picture.depth) for picture in pictures)
     assert np.abs(upright.sum(axis=0) - mirrored[::-1].sum(axis=0)).max() <= 6
 
@@ -101,7 +101,7 @@ def test_land_hides_only_what_is_behind_it(monkeypatch):
     view = View(np.array([0.0, 0.0, 3.0]), np.array([9.0, 0.5, 0.1]))
     near, far = (Picture(np.zeros((80, 160, 3), np.uint8), np.full((80, 160), depth, np.float32)) for depth in (2.0, 50.0))
     for picture in (near, far):
-        add_land(picture, view, rays(view, *SIZE))
+        add_land(picture, view, pixel_rays(view, *SIZE))
     assert not near.colour.any()
     assert far.colour.any()
 
@@ -114,7 +114,7 @@ def as_part(step):
 @pytest.mark.parametrize("place", [(6.0, 0.0, 2.0), (8.0, 2.6, 1.4), (3.0, -1.3, 2.4), (0.2, 0.2, 2.0), (-5.0, 0.0, 2.0)])
 def test_a_window_holds_all_of_a_ball(place):
     """All points of it that are in the picture."""
-    window = AHEAD.window(np.array([place]), np.array([0.3]), *SIZE)
+    window = AHEAD.bounding_window(np.array([place]), np.array([0.3]), *SIZE)
     turns = np.random.default_rng(1).standard_normal((5000, 3))
     points = place + 0.3 * turns / np.linalg.norm(turns, axis=1)[:, None]
     x, y = AHEAD.pixels(points[points[:, 0] > NEAR], *SIZE).T
@@ -123,14 +123,14 @@ def test_a_window_holds_all_of_a_ball(place):
 
 
 def test_a_window_is_not_much_larger_than_its_ball():
-    left, right, top, bottom = AHEAD.window(np.array([[6.0, 0.0, 2.0]]), np.array([0.3]), *SIZE)
+    left, right, top, bottom = AHEAD.bounding_window(np.array([[6.0, 0.0, 2.0]]), np.array([0.3]), *SIZE)
     width = 2 * 0.3 / 6.0 * 80 / (2 * math.tan(0.3))
     assert width <= right - left <= width + 6
     assert width <= bottom - top <= width + 6
 
 
 def test_a_kept_backdrop_gives_the_same_pictures():
-    mission = recorded(scene_mission())
+    mission = mission_of_result(scene_mission())
     with Scene(mission) as scene:
         scene.render("landing", [900], [1.0], *SIZE)
         kept = scene.render("landing", [1100], [1.0], *SIZE)
@@ -139,7 +139,7 @@ def test_a_kept_backdrop_gives_the_same_pictures():
 
 
 def test_a_moved_camera_has_a_backdrop_of_its_own():
-    mission = recorded(scene_mission())
+    mission = mission_of_result(scene_mission())
     with Scene(mission) as scene:
         scene.render("chase", [600], [0.0], *SIZE)
         after = scene.render("chase", [1100], [0.0], *SIZE)
@@ -149,7 +149,7 @@ def test_a_moved_camera_has_a_backdrop_of_its_own():
 
 def layer_and_ghost(ghost_depth):
     grey, white = np.full((1, 1, 3), 51, np.uint8), np.full((1, 1, 3), 255, np.uint8)
-    layer = Layer.of(Picture(grey, np.full((1, 1), 5.0, np.float32)))
+    layer = Layer.from_solids(Picture(grey, np.full((1, 1), 5.0, np.float32)))
     before = float(layer.colour[0, 0, 0])
     layer.blend(Picture(white, np.full((1, 1), ghost_depth, np.float32)), 0.25)
     return before, float(layer.colour[0, 0, 0])
@@ -166,65 +166,70 @@ def test_a_ghost_behind_something_is_hidden():
 
 
 def test_a_ghost_covers_the_sky_by_its_share():
-    layer = Layer.of(Picture(np.zeros((1, 1, 3), np.uint8), np.full((1, 1), np.inf, np.float32)))
+    layer = Layer.from_solids(Picture(np.zeros((1, 1, 3), np.uint8), np.full((1, 1), np.inf, np.float32)))
     for share in (0.5, 0.5):
         layer.blend(Picture(np.full((1, 1, 3), 255, np.uint8), np.full((1, 1), 4.0, np.float32)), share)
-    assert layer.cover[0, 0] == pytest.approx(0.75)
+    assert layer.alpha[0, 0] == pytest.approx(0.75)
     assert layer.colour[0, 0].tolist() == pytest.approx([0.75] * 3)
 
 
 @pytest.mark.parametrize("name", CAMERAS)
 def test_every_camera_has_the_landing_in_its_picture(name):
-    mission = recorded(scene_mission())
+    mission = mission_of_result(scene_mission())
     for row in (mission.landing_rows()[-200], mission.landing_rows()[-1]):
         view = CAMERAS[name](mission, row)
-        for x, y in view.pixels(mission.places()[:, row], 200, 100):
+        for x, y in view.pixels(mission.positions()[:, row], 200, 100):
             assert 0 < x < 200
             assert 0 < y < 100
-        assert all((mission.places()[:, row] - view.eye) @ view.axes()[2] > 0)
+        assert all((mission.positions()[:, row] - view.eye) @ view.axes()[2] > 0)
 
 
 @pytest.mark.parametrize("name", CAMERAS)
 def test_cameras_stay_above_the_water(name):
-    mission = recorded(scene_mission())
+    mission = mission_of_result(scene_mission())
     assert all(CAMERAS[name](mission, row).eye[2] > 0.3 for row in range(0, 2001, 250))
 
 
 def test_the_quadcopter_is_seen_and_its_absence_too():
     result = scene_mission()
     row = 1100
-    with Scene(recorded(result)) as scene:
+    with Scene(mission_of_result(result)) as scene:
         with_vehicles = scene.render("chase", [row], [1.0], *SIZE).astype(int)
         without = scene.render("chase", [row], [0.0], *SIZE).astype(int)
         changed = np.abs(with_vehicles - without).sum(axis=2) > 60
-    x, y = CAMERAS["chase"](recorded(result), row).pixels(np.array([recorded(result).place("plant.uav", row)]), *SIZE)[0]
+    x, y = CAMERAS["chase"](mission_of_result(result), row).pixels(
+        np.array([mission_of_result(result).position("plant.uav", row)]), *SIZE
+    )[0]
     assert changed[round(y) - 2 : round(y) + 3, round(x) - 2 : round(x) + 3].any()
     assert not changed[:10].any()
 
 
 def test_pictures_are_the_same_every_time():
     def picture():
-        with Scene(recorded(scene_mission())) as scene:
+        with Scene(mission_of_result(scene_mission())) as scene:
             return scene.render("landing", [1000, 1200], [0.5, 1.0], *SIZE)
 
     assert np.array_equal(picture(), picture())
 
 
 def test_no_client_is_left_behind():
-    with Scene(recorded(scene_mission())) as scene:
-        clients = [scene.still.client, scene.moving.client]
+    with Scene(mission_of_result(scene_mission())) as scene:
+        clients = [scene.static.client, scene.vehicles.client]
         assert all(pybullet.getConnectionInfo(client)["isConnected"] for client in clients)
     assert not any(pybullet.getConnectionInfo(client)["isConnected"] for client in clients)
 
 
-@pytest.mark.parametrize("vehicle", VEHICLES)
+@pytest.mark.parametrize("vehicle", VEHICLE_MODELS)
 def test_every_vehicle_has_a_look_of_about_the_size_of_its_body(vehicle):
-    parts = looks(vehicle)
+    parts = vehicle_parts(vehicle)
     seen = max(math.hypot(*part.position) for part in parts)
-    solid = max(np.linalg.norm(box.corners(), axis=1).max() for box in next(iter(VEHICLES[vehicle].values())).body.boxes)
+    solid = max(np.linalg.norm(box.corners(), axis=1).max() for box in next(iter(VEHICLE_MODELS[vehicle].values())).body.boxes)
     assert 0.5 * solid < seen < 2.5 * solid
 
 
 def test_an_unknown_camera_is_refused():
-    with Scene(recorded(scene_mission())) as scene, pytest.raises(InputError, match='no camera "dek"; did you mean "deck"'):
+    with (
+        Scene(mission_of_result(scene_mission())) as scene,
+        pytest.raises(InputError, match='no camera "dek"; did you mean "deck"'),
+    ):
         scene.render("dek", [0], [1.0], *SIZE)

@@ -13,7 +13,7 @@ from plant_src.sensors.signals import SignalComponent
 STEP = 0.01  # s
 
 
-class SensorTrial:
+class SensorHarness:
     """A bound component in step mode; `parameters` are set before it is initialized."""
 
     def __init__(self, component: SignalComponent, start: float = 0.0, step: float = STEP, **inputs: Any):
@@ -23,10 +23,10 @@ class SensorTrial:
         component.enter_initialization_mode(start, 1e6)
         for variable in self._inputs.variables:
             self[variable.name] = component.get(variable.name)
-        self.feed(**inputs)
+        self.set_inputs(**inputs)
         component.exit_initialization_mode()
 
-    def feed(self, **values: Any) -> SensorTrial:
+    def set_inputs(self, **values: Any) -> SensorHarness:
         """Give inputs ("vehicle__position=(x, y, z)" for vehicle.position.x|y|z); in initialization the outputs follow."""
         for name, value in values.items():
             prefix = name.replace("__", ".")
@@ -38,7 +38,7 @@ class SensorTrial:
         self.component.get_outputs()
         return self
 
-    def step(self, count: int = 1) -> SensorTrial:
+    def step(self, count: int = 1) -> SensorHarness:
         for _ in range(count):
             self.component.set_inputs()
             self.component.do_step(self.start + self.steps * self.step_size, self.step_size)
@@ -74,7 +74,7 @@ class SensorTrial:
 
 def _ports(component: SignalComponent, causality: str) -> Ports:
     variables = [v for v in component.variables if v.causality == causality]
-    sizes = {dtype: sum(len(v.slots) for v in variables if v.dtype == dtype) for dtype in {v.dtype for v in variables}}
+    sizes = {dtype: sum(len(v.scalar_names) for v in variables if v.dtype == dtype) for dtype in {v.dtype for v in variables}}
     return Ports(variables, {dtype: np.zeros(size, dtype) for dtype, size in sizes.items()})
 
 
@@ -82,13 +82,13 @@ def _place(ports: Ports, name: str) -> tuple[np.ndarray, slice]:
     filled = dict.fromkeys(ports.arrays, 0)
     for variable in ports.variables:
         first = filled[variable.dtype]
-        filled[variable.dtype] = first + len(variable.slots)
+        filled[variable.dtype] = first + len(variable.scalar_names)
         if variable.name == name:
             return ports.arrays[variable.dtype], slice(first, filled[variable.dtype])
     raise KeyError(name)
 
 
-def configured(component: SignalComponent, **parameters: Any) -> SignalComponent:
+def with_parameters(component: SignalComponent, **parameters: Any) -> SignalComponent:
     """The component with parameters set ("gyroscope__bias" for gyroscope.bias)."""
     for name, value in parameters.items():
         component.set(name.replace("__", "."), value)

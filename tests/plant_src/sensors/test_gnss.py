@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sensor_trial import SensorTrial, configured
+from sensor_trial import SensorHarness, with_parameters
 
 from cosim.core.errors import InputError
 from plant_src.sensors.gnss import Gnss
@@ -23,7 +23,7 @@ def moving(trial, steps):
 
 
 def test_samples_come_at_the_rate_and_exactly_a_latency_late(measured):
-    trial = SensorTrial(configured(Gnss("gnss"), **EXACT, rate=5.0, latency=0.13))
+    trial = SensorHarness(with_parameters(Gnss("gnss"), **EXACT, rate=5.0, latency=0.13))
     now, position, time = moving(trial, 200).T
     newest = np.floor((now - 0.13) / 0.2 + 1e-9) * 0.2
     error = position - np.maximum(newest, 0)
@@ -32,30 +32,30 @@ def test_samples_come_at_the_rate_and_exactly_a_latency_late(measured):
 
 
 def test_without_latency_a_sample_is_seen_at_once():
-    trial = SensorTrial(configured(Gnss("gnss"), **EXACT, rate=10.0, latency=0.0))
+    trial = SensorHarness(with_parameters(Gnss("gnss"), **EXACT, rate=10.0, latency=0.0))
     now, position, _ = moving(trial, 100).T
     assert np.allclose(position, np.floor(now / 0.1 + 1e-9) * 0.1, atol=1e-12)
 
 
 def test_a_rate_that_is_no_part_of_the_step_rate_is_kept_on_average():
-    trial = SensorTrial(configured(Gnss("gnss"), **EXACT, rate=30.0, latency=0.0))
+    trial = SensorHarness(with_parameters(Gnss("gnss"), **EXACT, rate=30.0, latency=0.0))
     _, _, time = moving(trial, 300).T
     assert len(np.unique(time)) == pytest.approx(3.0 * 30, abs=1)
 
 
 def test_white_noise_has_its_standard_deviations(measured):
     parameters = {**EXACT, "horizontal_noise": 0.5, "vertical_noise": 2.0, "velocity_noise": 0.1}
-    gnss = configured(Gnss("gnss", seed=2), **parameters, rate=100.0, latency=0.0)
+    gnss = with_parameters(Gnss("gnss", seed=2), **parameters, rate=100.0, latency=0.0)
     names = [*POSITION, *(f"velocity.{axis}" for axis in "xyz")]
-    spread = SensorTrial(gnss).record(4000, names).std(axis=0)
+    spread = SensorHarness(gnss).record(4000, names).std(axis=0)
     expected = [0.5, 0.5, 2.0, 0.1, 0.1, 0.1]
     measured("Sensors", "GNSS noise, standard deviations", spread, expected, "m, m/s", "as set", relative=0.06)
 
 
 def test_the_drift_is_correlated_as_a_gauss_markov_process(measured):
     parameters = {**EXACT, "horizontal_drift": 1.0, "vertical_drift": 1.0, "correlation_time": 2.0}
-    gnss = configured(Gnss("gnss", seed=6), **parameters, rate=10.0, latency=0.0)
-    drift = SensorTrial(gnss, step=0.1).record(15000, POSITION)
+    gnss = with_parameters(Gnss("gnss", seed=6), **parameters, rate=10.0, latency=0.0)
+    drift = SensorHarness(gnss, step=0.1).record(15000, POSITION)
     assert drift.std() == pytest.approx(1.0, rel=0.05)
     for lag in (5, 20):
         correlation = np.mean(drift[lag:] * drift[:-lag]) / drift.var()
@@ -65,12 +65,12 @@ def test_the_drift_is_correlated_as_a_gauss_markov_process(measured):
 
 def test_the_first_fix_is_as_wrong_as_any():
     parameters = {**EXACT, "horizontal_drift": 3.0}
-    first = [SensorTrial(configured(Gnss("gnss", seed=seed), **parameters))["position.x"] for seed in range(300)]
+    first = [SensorHarness(with_parameters(Gnss("gnss", seed=seed), **parameters))["position.x"] for seed in range(300)]
     assert np.std(first) == pytest.approx(3.0, rel=0.13)
 
 
 def test_without_satellites_the_last_fix_stays_and_is_not_valid():
-    trial = SensorTrial(configured(Gnss("gnss"), **EXACT, rate=10.0, latency=0.0))
+    trial = SensorHarness(with_parameters(Gnss("gnss"), **EXACT, rate=10.0, latency=0.0))
     moving(trial, 50)
     trial.component.set("available", False)
     moving(trial, 50)
@@ -81,7 +81,9 @@ def test_without_satellites_the_last_fix_stays_and_is_not_valid():
 
 
 def test_sampling_noise_does_not_depend_on_the_step_size():
-    coarse, fine = (SensorTrial(configured(Gnss("gnss", seed=4), rate=10.0, latency=0.0), step=step) for step in (0.1, 0.01))
+    coarse, fine = (
+        SensorHarness(with_parameters(Gnss("gnss", seed=4), rate=10.0, latency=0.0), step=step) for step in (0.1, 0.01)
+    )
     for _ in range(20):
         assert np.allclose(coarse.step().vector("position"), fine.step(10).vector("position"), atol=1e-9)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from sensor_trial import STEP, SensorTrial, configured, quaternion
+from sensor_trial import STEP, SensorHarness, quaternion, with_parameters
 
 from cosim.core.errors import InputError
 from plant_src.sensors.imu import Imu
@@ -15,30 +15,30 @@ EXACT = {f"{kind}__{what}": 0.0 for kind in KINDS for what in ("noise_density", 
 
 
 def exact_imu(**parameters):
-    return configured(Imu("imu"), **EXACT, **parameters)
+    return with_parameters(Imu("imu"), **EXACT, **parameters)
 
 
 def test_at_rest_it_reads_one_g_upwards_in_any_attitude(measured):
     attitude = quaternion((1, 2, 3), 0.7)
-    trial = SensorTrial(exact_imu(), vehicle__orientation=attitude).step(3)
+    trial = SensorHarness(exact_imu(), vehicle__orientation=attitude).step(3)
     upwards = Rotation.from_quat([*attitude[1:], attitude[0]]).inv().apply([0, 0, 9.81])
     measured("Sensors", "IMU at rest, tilted", trial.vector("acceleration"), upwards, "m/s2", "gravity", within=1e-12)
 
 
 def test_in_free_fall_it_reads_nothing(measured):
-    trial = SensorTrial(exact_imu(), vehicle__velocity=(1.0, 2.0, 3.0))
+    trial = SensorHarness(exact_imu(), vehicle__velocity=(1.0, 2.0, 3.0))
     for step in range(1, 5):
-        trial.feed(vehicle__velocity=(1.0, 2.0, 3.0 - 9.81 * step * STEP)).step()
+        trial.set_inputs(vehicle__velocity=(1.0, 2.0, 3.0 - 9.81 * step * STEP)).step()
         measured("Sensors", "IMU in free fall", trial.vector("acceleration"), 0.0, "m/s2", "weightlessness", within=1e-12)
 
 
 def test_a_turn_on_a_circle_shows_the_centripetal_acceleration():
     speed, rate = 4.0, 0.8
     angles = rate * STEP * np.arange(4)
-    trial = SensorTrial(exact_imu(), vehicle__velocity=(speed, 0, 0), vehicle__rates=(0, 0, rate))
+    trial = SensorHarness(exact_imu(), vehicle__velocity=(speed, 0, 0), vehicle__rates=(0, 0, rate))
     for angle in angles[1:]:
         velocity = (speed * np.cos(angle), speed * np.sin(angle), 0)
-        trial.feed(vehicle__velocity=velocity, vehicle__orientation=quaternion((0, 0, 1), angle)).step()
+        trial.set_inputs(vehicle__velocity=velocity, vehicle__orientation=quaternion((0, 0, 1), angle)).step()
     mean = speed * rate * np.sin(rate * STEP / 2) / (rate * STEP / 2)  # over the step, along the direction halfway
     assert np.allclose(trial.vector("acceleration"), (0, mean, 9.81), atol=1e-10)
     assert np.array_equal(trial.vector("rates", "pqr"), (0, 0, rate))
@@ -46,15 +46,15 @@ def test_a_turn_on_a_circle_shows_the_centripetal_acceleration():
 
 def test_a_quaternion_that_changes_its_sign_changes_nothing():
     attitude = quaternion((1, 0, 0), 0.3)
-    trial = SensorTrial(exact_imu(), vehicle__orientation=attitude).step()
+    trial = SensorHarness(exact_imu(), vehicle__orientation=attitude).step()
     before = trial.vector("acceleration")
-    assert np.allclose(trial.feed(vehicle__orientation=-attitude).step().vector("acceleration"), before, atol=1e-12)
+    assert np.allclose(trial.set_inputs(vehicle__orientation=-attitude).step().vector("acceleration"), before, atol=1e-12)
 
 
 def test_scale_misalignment_bias_and_range():
     matrix = np.array([[1.1, 0.02, 0], [0, 0.9, -0.01], [0.03, 0, 1.0]])
     imu = exact_imu(gyroscope__matrix=matrix, gyroscope__bias=[0.1, 0.2, 0.3], gyroscope__range=2.0)
-    trial = SensorTrial(imu, vehicle__rates=(1.0, -2.0, 3.0)).step()
+    trial = SensorHarness(imu, vehicle__rates=(1.0, -2.0, 3.0)).step()
     wanted = np.clip(matrix @ (1.0, -2.0, 3.0) + (0.1, 0.2, 0.3), -2, 2)
     assert np.allclose(trial.vector("rates", "pqr"), wanted, atol=1e-14)
 
@@ -67,10 +67,10 @@ def allan_deviation(values, count):
 
 def test_white_noise_has_the_allan_deviation_of_its_density(measured):
     density = 3e-3
-    imu = configured(
+    imu = with_parameters(
         Imu("imu", seed=11), **{**EXACT, "gyroscope__noise_density": density, "accelerometer__noise_density": density}
     )
-    noise = SensorTrial(imu).record(20000, AXES) - (0, 0, 9.81, 0, 0, 0)
+    noise = SensorHarness(imu).record(20000, AXES) - (0, 0, 9.81, 0, 0, 0)
     for values in noise.T:
         for count in (1, 10, 50):
             found, expected, case = allan_deviation(values, count), density / np.sqrt(count * STEP), f"{count * STEP:g} s"
@@ -79,8 +79,8 @@ def test_white_noise_has_the_allan_deviation_of_its_density(measured):
 
 def test_the_wandering_bias_has_the_allan_deviation_of_a_random_walk(measured):
     walk = 2e-2
-    imu = configured(Imu("imu", seed=3), **{**EXACT, "gyroscope__bias_walk": walk, "accelerometer__bias_walk": walk})
-    bias = SensorTrial(imu).record(20000, AXES)
+    imu = with_parameters(Imu("imu", seed=3), **{**EXACT, "gyroscope__bias_walk": walk, "accelerometer__bias_walk": walk})
+    bias = SensorHarness(imu).record(20000, AXES)
     found = [allan_deviation(values, 50) for values in bias.T]
     found, expected = np.sqrt(np.mean(np.square(found))), walk * np.sqrt(50 * STEP / 3)
     measured("Sensors", "IMU bias walk, Allan deviation", found, expected, "m/s2, rad/s", ALLAN, relative=0.12)
@@ -88,7 +88,7 @@ def test_the_wandering_bias_has_the_allan_deviation_of_a_random_walk(measured):
 
 def test_the_bias_at_turn_on_has_its_standard_deviation_over_many_devices():
     parameters = {**EXACT, "gyroscope__turn_on_bias": 0.5}
-    biases = [SensorTrial(configured(Imu("imu", seed=seed), **parameters)).vector("rates", "pqr") for seed in range(150)]
+    biases = [SensorHarness(with_parameters(Imu("imu", seed=seed), **parameters)).vector("rates", "pqr") for seed in range(150)]
     assert np.std(biases) == pytest.approx(0.5, rel=0.12)
     assert abs(np.mean(biases)) < 0.5 * 4 / np.sqrt(450)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from sensor_trial import SensorTrial, configured
+from sensor_trial import SensorHarness, with_parameters
 
 from plant_src.sensors.marker_camera import MarkerCamera
 
@@ -17,9 +17,9 @@ def wxyz(turn):
 
 
 def look(vehicle, attitude, deck, deck_attitude, **parameters):
-    camera = configured(MarkerCamera("marker", seed=parameters.pop("seed", 0)), **{**EXACT, **parameters})
+    camera = with_parameters(MarkerCamera("marker", seed=parameters.pop("seed", 0)), **{**EXACT, **parameters})
     inputs = {"vehicle__position": vehicle, "vehicle__orientation": wxyz(attitude)}
-    return SensorTrial(camera, **inputs, deck__position=deck, deck__orientation=wxyz(deck_attitude))
+    return SensorHarness(camera, **inputs, deck__position=deck, deck__orientation=wxyz(deck_attitude))
 
 
 def projected(points, vehicle, attitude, tilt, mounting):
@@ -95,5 +95,5 @@ def test_the_share_of_drop_outs():
 
 def test_what_is_no_longer_seen_stays_where_it_was_seen_last():
     trial = look([0, 0, 2.0], LEVEL, [0.1, 0, 0], LEVEL, latency=0.05)
-    trial.step(20).feed(deck__position=(30.0, 0, 0)).step(20)
+    trial.step(20).set_inputs(deck__position=(30.0, 0, 0)).step(20)
     assert (trial["valid"], trial["position.x"], trial["time"]) == (False, pytest.approx(0.1), pytest.approx(0.2))

@@ -5,12 +5,12 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from sensor_trial import SensorTrial, configured
+from sensor_trial import SensorHarness, with_parameters
 
 from plant_src.sensors.deck_tracker import DeckTracker
-from plant_src.sensors.frames import from_angles
+from plant_src.sensors.frames import quaternion_from_euler
 from plant_src.sensors.history import History
-from plant_src.sensors.magnetometer import FIELD
+from plant_src.sensors.magnetometer import EARTH_FIELD
 from plant_src.sensors.navigation import Navigation
 
 STEP, UP = 0.01, np.array([0, 0, 9.81])
@@ -36,7 +36,7 @@ def felt(n):
     (_, v0, _, r0), (_, v1, _, r1) = (swing(max(k, 0) / 100) for k in (n - 1, n))
     turn = (r0.inv() * r1).as_rotvec()
     middle = r0 * Rotation.from_rotvec(turn / 2)
-    return middle.inv().apply((v1 - v0) / STEP + UP), turn / STEP, r1.inv().apply(FIELD)
+    return middle.inv().apply((v1 - v0) / STEP + UP), turn / STEP, r1.inv().apply(EARTH_FIELD)
 
 
 class Flight:
@@ -44,7 +44,7 @@ class Flight:
 
     def __init__(self, latency=0.0, gyro_bias=(0, 0, 0)):
         self.latency, self.bias = round(latency / STEP), np.array(gyro_bias)
-        self.trial = SensorTrial(Navigation("navigation"))
+        self.trial = SensorHarness(Navigation("navigation"))
         self.feed(0)
         self.trial.component.enter_initialization_mode(0.0, 100.0)
         self.trial.component.set_inputs()
@@ -54,7 +54,7 @@ class Flight:
         force, rates, field = felt(n)
         taken = max(0, (n - self.latency) // 10 * 10) / 100
         place, velocity, _, _ = swing(taken)
-        self.trial.feed(
+        self.trial.set_inputs(
             imu__acceleration=force,
             imu__rates=rates + self.bias,
             gnss__position=place,
@@ -106,7 +106,7 @@ def test_a_wrong_vertical_is_corrected_by_the_fixes():
     flight = Flight()
     flight.fly(1.5)
     state = flight.trial.component.get_state()
-    state["_orientation"] = from_angles(0.1, -0.1, 0.0)
+    state["_orientation"] = quaternion_from_euler(0.1, -0.1, 0.0)
     flight.trial.component.set_state(state)
     assert flight.fly(1.55, since=1.5)[2] > 0.1
     assert flight.fly(16, since=1.55)[2] < 0.014
@@ -143,11 +143,11 @@ def drive(tracker, seconds, speed=1.0, latency=0.1, marker=None):
 
 
 def test_the_deck_is_followed_without_lag():
-    tracker = drive(SensorTrial(DeckTracker("deck")), 10.0)
+    tracker = drive(SensorHarness(DeckTracker("deck")), 10.0)
     assert np.allclose(tracker.vector("position"), (10.0, 2.0, 0.3), atol=1e-3)
     assert np.allclose(tracker.vector("velocity"), (1.0, 0, 0), atol=1e-3)
 
 
 def test_a_marker_in_sight_outweighs_the_fixes():
-    tracker = drive(SensorTrial(configured(DeckTracker("deck"), sight_gain=0.2, fix_gain=0.2)), 10.0, marker=(0.05, 0, 0))
+    tracker = drive(SensorHarness(with_parameters(DeckTracker("deck"), sight_gain=0.2, fix_gain=0.2)), 10.0, marker=(0.05, 0, 0))
     assert tracker["position.x"] == pytest.approx(10.05, abs=0.01)

@@ -4,7 +4,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from sensor_trial import SensorTrial, configured
+from sensor_trial import SensorHarness, with_parameters
 
 from cosim.core.errors import InputError
 from plant_src.sensors.camera import Camera
@@ -19,9 +19,9 @@ def camera(tmp_path):
 
     def make(attitude=None, position=(0, 0, 5.0), parameters=None, **arguments):
         arguments = {"vehicles": {"uav": "ar_drone"}, "carrier": "uav", "size": [WIDTH, HEIGHT]} | arguments
-        made.append(configured(Camera("eye", folder=str(tmp_path / "frames"), **arguments), **parameters or {}))
+        made.append(with_parameters(Camera("eye", folder=str(tmp_path / "frames"), **arguments), **parameters or {}))
         x, y, z, w = (attitude or Rotation.identity()).as_quat()
-        return SensorTrial(made[-1], uav__position=position, uav__orientation=(w, x, y, z))
+        return SensorHarness(made[-1], uav__position=position, uav__orientation=(w, x, y, z))
 
     yield make
     for component in made:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from sensor_trial import SensorTrial, configured, quaternion
+from sensor_trial import SensorHarness, quaternion, with_parameters
 
 from cosim.core.errors import InputError
 from plant_src.sensors.rangefinder import Rangefinder
@@ -20,8 +20,8 @@ def sensor():
 
     def make(parameters=None, inputs=None, **arguments):
         exact = {"noise_floor": 0.0, "noise_share": 0.0, "rate": 100.0}
-        made.append(configured(Rangefinder("range", **arguments), **exact | (parameters or {})))
-        return SensorTrial(made[-1], **inputs or {})
+        made.append(with_parameters(Rangefinder("range", **arguments), **exact | (parameters or {})))
+        return SensorHarness(made[-1], **inputs or {})
 
     yield make
     for component in made:

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from sensor_trial import SensorTrial, configured
+from sensor_trial import SensorHarness, with_parameters
 
 from cosim.core.errors import ComponentError, InputError
 from plant_src.sensors.barometer import Barometer
@@ -20,7 +20,7 @@ from plant_src.sensors.rangefinder import Rangefinder
 
 
 def faulty(name, seed=0):
-    return configured(SignalFault(name, {"a[3]": "m", "b": ""}, seed=seed), noise__b=1.0, delay=0.07)
+    return with_parameters(SignalFault(name, {"a[3]": "m", "b": ""}, seed=seed), noise__b=1.0, delay=0.07)
 
 
 MAKERS = {
@@ -42,7 +42,7 @@ def make(request):
 
     def maker(**arguments):
         made.append(MAKERS[request.param]("sensor", **arguments))
-        return SensorTrial(made[-1])
+        return SensorHarness(made[-1])
 
     yield maker
     for component in made:
@@ -94,7 +94,7 @@ def test_to_ask_more_often_changes_nothing(make):
 def test_the_way_of_the_engine_is_the_way_of_single_calls(make):
     one, other = make(), make()
     clock = ctypes.c_double()
-    (call,) = other.component.turn(clock, 0.01)
+    (call,) = other.component.prepare_step_calls(clock, 0.01)
 
     def turn(count=1):
         clock.value = other.steps * 0.01

@@ -7,7 +7,7 @@ import ctypes
 import time
 
 import pytest
-from sensor_trial import SensorTrial, configured
+from sensor_trial import SensorHarness, with_parameters
 
 from plant_src.sensors.barometer import Barometer
 from plant_src.sensors.camera import Camera
@@ -25,7 +25,7 @@ ROUNDS, STEPS = 7, 2000
 
 
 def rotors(**parameters):
-    return configured(SignalFault("fault", {"rotor_speed[4]": "rad/s"}, gain_of="square"), **parameters)
+    return with_parameters(SignalFault("fault", {"rotor_speed[4]": "rad/s"}, gain_of="square"), **parameters)
 
 
 CONTENDERS = {
@@ -55,9 +55,9 @@ def test_cost_of_a_step():
     for name, make in CONTENDERS.items():
         component = make()
         above = {"vehicle__position": (0, 0, 2.0)} if "camera" in name or "range" in name else {}
-        SensorTrial(component, **above)
+        SensorHarness(component, **above)
         clock = ctypes.c_double()
-        (call,) = component.turn(clock, 0.01)
+        (call,) = component.prepare_step_calls(clock, 0.01)
         costs = []
         for _ in range(ROUNDS):
             component.begin()
@@ -69,7 +69,7 @@ def test_cost_of_a_step():
 
 def test_cost_of_a_picture(tmp_path):
     camera = Camera("eye", {"uav": "ar_drone", "usv": "strider"}, "uav", str(tmp_path))
-    SensorTrial(camera, uav__position=(0, 0, 3.0))
+    SensorHarness(camera, uav__position=(0, 0, 3.0))
     costs = []
     for number in range(ROUNDS):
         began = time.process_time()

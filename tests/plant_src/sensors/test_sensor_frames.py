@@ -23,19 +23,23 @@ def test_vectors_turn_as_in_scipy_and_back(q):
 
 @pytest.mark.parametrize("q", QUATERNIONS)
 def test_angles_are_those_of_scipy_and_lead_back(q):
-    roll, pitch, yaw = frames.angles(q)
+    roll, pitch, yaw = frames.euler_angles(q)
     assert np.allclose((yaw, pitch, roll), scipys(q).as_euler("ZYX"), atol=1e-12)
-    assert abs(np.dot(frames.from_angles(roll, pitch, yaw), q)) == pytest.approx(1, abs=1e-14)
+    assert abs(np.dot(frames.quaternion_from_euler(roll, pitch, yaw), q)) == pytest.approx(1, abs=1e-14)
 
 
 def test_products_and_rotation_vectors_are_those_of_scipy():
     for a, b in zip(QUATERNIONS[::2], QUATERNIONS[1::2], strict=True):
-        assert np.allclose(scipys(frames.product(a, b)).as_matrix(), (scipys(a) * scipys(b)).as_matrix(), atol=1e-14)
+        assert np.allclose(scipys(frames.quaternion_product(a, b)).as_matrix(), (scipys(a) * scipys(b)).as_matrix(), atol=1e-14)
         v = RANDOM.normal(size=3)
-        assert np.allclose(scipys(frames.rotation(v)).as_matrix(), Rotation.from_rotvec(v).as_matrix(), atol=1e-14)
+        assert np.allclose(
+            scipys(frames.quaternion_from_rotation_vector(v)).as_matrix(), Rotation.from_rotvec(v).as_matrix(), atol=1e-14
+        )
 
 
 def test_halfway_turns_by_half_of_the_shorter_way():
-    a, b = frames.rotation((0.0, 0.0, 0.2)), frames.rotation((0.0, 0.0, 0.8))
+    a, b = frames.quaternion_from_rotation_vector((0.0, 0.0, 0.2)), frames.quaternion_from_rotation_vector((0.0, 0.0, 0.8))
     for other in (b, [-x for x in b]):
-        assert np.allclose(frames.halfway(a, other), frames.rotation((0.0, 0.0, 0.5)), atol=1e-15)
+        assert np.allclose(
+            frames.midpoint_attitude(a, other), frames.quaternion_from_rotation_vector((0.0, 0.0, 0.5)), atol=1e-15
+        )

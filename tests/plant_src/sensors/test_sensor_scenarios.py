@@ -5,7 +5,7 @@ import numpy as np
 import cosim
 from cosim.core.component import Component
 from cosim.core.system import Connection, Endpoint, System
-from cosim.core.time_grid import exact
+from cosim.core.time_grid import exact_fraction
 from cosim.engine.run_loop import Event, Settings, simulate
 from plant_src.sensors.fault import SignalFault
 from plant_src.sensors.gnss import Gnss
@@ -77,7 +77,9 @@ def simulated(components, wires, record, stop, events=()):
 
     connections = [Connection(end(source), end(target)) for source, target in wires.items()]
     built = System(components, connections, tuple((name,) for name in components))
-    settings = Settings(exact("0"), exact(stop), exact("0.01"), {name: end(name) for name in record}, events=events)
+    settings = Settings(
+        exact_fraction("0"), exact_fraction(stop), exact_fraction("0.01"), {name: end(name) for name in record}, events=events
+    )
     outcome = simulate(built, settings)
     assert outcome.failure is None
     return outcome.recording
@@ -92,7 +94,10 @@ def test_in_the_importer_a_sensor_after_the_plant_is_in_step_with_it(executor):
     gnss.set("rate", 100.0)
     components = {"plant": Rising(), "gnss": gnss, "fault": SignalFault("fault", {"z": "m"})}
     wires = {"plant.position.z": "gnss.vehicle.position.z", "gnss.position.z": "fault.input.z"}
-    events = [Event(exact("0.5"), {"fault": {"mode": "frozen"}}), Event(exact("0.7"), {"fault": {"mode": "normal"}})]
+    events = [
+        Event(exact_fraction("0.5"), {"fault": {"mode": "frozen"}}),
+        Event(exact_fraction("0.7"), {"fault": {"mode": "normal"}}),
+    ]
     recording = simulated(components, wires, ["gnss.position.z", "fault.z"], "1", events)
     z, faulty = recording.columns["gnss.position.z"], recording.columns["fault.z"]
     assert np.allclose(z, recording.time, rtol=1e-15)

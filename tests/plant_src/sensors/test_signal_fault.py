@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from sensor_trial import SensorTrial
+from sensor_trial import SensorHarness
 
 from cosim.core.errors import ComponentError, InputError
 from plant_src.sensors.fault import SignalFault
 
 
-class Line(SensorTrial):
+class Line(SensorHarness):
     """One signal `rudder_angle`, fed with 1, 2, 3, ... in steps 1, 2, 3, ..."""
 
     def __init__(self, **arguments):
@@ -86,7 +86,7 @@ def test_added_noise_has_its_standard_deviation_and_no_mean():
 
 
 def test_only_the_affected_elements_fail():
-    trial = SensorTrial(SignalFault("fault", {"rotor_speed[4]": "rad/s", "extra": ""}))
+    trial = SensorHarness(SignalFault("fault", {"rotor_speed[4]": "rad/s", "extra": ""}))
     for name, value in (("affected.rotor_speed", [False, True, False, False]), ("affected.extra", False), ("mode", "stuck")):
         trial.component.set(name, value)
     trial["input.rotor_speed"], trial["input.extra"] = [1.0, 2.0, 3.0, 4.0], 5.0
@@ -101,7 +101,7 @@ def test_missing_that_affects_nothing_is_valid():
 
 
 def test_the_initial_value_is_passed_on_too():
-    trial = SensorTrial(SignalFault("fault", {"x": ""}), input__x=7.0)
+    trial = SensorHarness(SignalFault("fault", {"x": ""}), input__x=7.0)
     assert trial["x"] == 7.0
 
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from cosim.core.errors import InputError
 from plant_src.catalogue import MODELS
 from plant_src.vehicles.crazyflie.parameters import AIRFRAME
-from plant_src.vehicles.multirotor.airframe import Airframe, Effects, Rotor
+from plant_src.vehicles.multirotor.airframe import Airframe, Rotor, RotorEffects
 
 FAULTS = [
     ({"mass": -1.0}, "mass: found -1.0, expected a finite number greater than 0"),
@@ -26,7 +26,7 @@ FAULTS = [
     ({"rotors": ()}, "rotors: found none"),
     ({"rotors": (Rotor("nose", (0.1, 0.0, 0.0), 0.5),)}, r"rotors\[1\].sense: found 0.5, expected 1 or -1"),
     ({"rotors": (Rotor("nose", (0.1, 0.0, 0.0), 1.0, (0.0, 0.0, 2.0)),)}, r"rotors\[1\].axis: .* expected a unit vector"),
-    ({"effects": Effects(body_drag=(0.0, -0.1, 0.0))}, "effects.body_drag: found .* expected finite numbers of at least 0"),
+    ({"effects": RotorEffects(body_drag=(0.0, -0.1, 0.0))}, "effects.body_drag: found .* expected finite numbers of at least 0"),
 ]
 
 
@@ -38,7 +38,7 @@ def test_impossible_data_are_refused(change: dict, text: str) -> None:
 
 def test_all_faults_are_reported_together() -> None:
     with pytest.raises(InputError) as caught:
-        replace(AIRFRAME, mass=0.0, inertia=np.diag([1.0, 1.0, 3.0]), effects=Effects(ground_effect=-1.0))
+        replace(AIRFRAME, mass=0.0, inertia=np.diag([1.0, 1.0, 3.0]), effects=RotorEffects(ground_effect=-1.0))
     assert len(caught.value.problems) == 3
 
 
@@ -60,6 +60,6 @@ def test_principal_axes_make_the_inertia_diagonal(seed: int) -> None:
 def test_a_standing_vehicle_has_its_rotors_above_its_feet(name: str) -> None:
     model = MODELS[name]
     (box,) = model.body.boxes
-    assert model.rotor_plane is not None
-    assert box.corners()[:, 2].min() < 0 < model.rotor_plane[2]
+    assert model.rotor_centre is not None
+    assert box.corners()[:, 2].min() < 0 < model.rotor_centre[2]
     assert np.ptp(box.corners()[:, :2], axis=0).min() < 1.0

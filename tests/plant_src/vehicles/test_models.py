@@ -10,8 +10,8 @@ import pytest
 from fmpy import read_model_description
 
 from cosim.core import resources
-from plant_src.catalogue import MODELS, VEHICLES
-from plant_src.vehicles.common.interface import SURROUNDINGS
+from plant_src.catalogue import MODELS, VEHICLE_MODELS
+from plant_src.vehicles.common.interface import ENVIRONMENT_INPUTS
 from plant_src.vehicles.multirotor import multirotor_equations
 
 ALL = pytest.mark.parametrize("name", MODELS)
@@ -24,24 +24,24 @@ def equations(name: str) -> Any:
 @ALL
 def test_the_fmu_has_the_variables_of_the_catalogue(name: str) -> None:
     description = read_model_description(str(resources.root() / "fmus" / f"{name}.fmu"))
-    expected = {slot: variable.causality for variable in MODELS[name].interface for slot in variable.slots}
+    expected = {slot: variable.causality for variable in MODELS[name].interface for slot in variable.scalar_names}
     assert {variable.name: variable.causality for variable in description.modelVariables} == expected
 
 
 @ALL
 def test_surroundings_come_last_among_the_inputs(name: str) -> None:
-    inputs = [variable.name in SURROUNDINGS for variable in MODELS[name].interface if variable.causality == "input"]
+    inputs = [variable.name in ENVIRONMENT_INPUTS for variable in MODELS[name].interface if variable.causality == "input"]
     assert inputs == sorted(inputs)
 
 
-@pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.constants is not None])
+@pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.constant_count is not None])
 def test_the_number_of_constants_is_that_of_the_equations(name: str) -> None:
     model, module = MODELS[name], equations(name)
-    constants = multirotor_equations.constants if model.airframe else module.VESSEL.constants
-    assert constants(ca.SX.sym("parameters", len(model.slots("parameter")))).numel() == model.constants
+    constants = multirotor_equations.derive_constants if model.airframe else module.VESSEL.constants
+    assert constants(ca.SX.sym("parameters", len(model.slots("parameter")))).numel() == model.constant_count
 
 
 def test_strider_moves_in_the_plane_unless_told_otherwise() -> None:
-    assert [model.name for model in VEHICLES["strider"].values()] == ["strider", "strider_6dof"]
-    assert next(iter(VEHICLES["strider"])) == "planar"
-    assert list(VEHICLES["otter"]) == ["6dof"]
+    assert [model.name for model in VEHICLE_MODELS["strider"].values()] == ["strider", "strider_6dof"]
+    assert next(iter(VEHICLE_MODELS["strider"])) == "planar"
+    assert list(VEHICLE_MODELS["otter"]) == ["6dof"]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from plant_fmu import PlantFmu
-from validation import Measured
+from validation import MeasurementCheck
 
 import cosim
 from cosim.core import resources
@@ -71,7 +71,7 @@ def scenario(model: str, wind: dict[str, float]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("model", ROTORS)
-def test_world_and_fmus_of_both_versions_agree(model: str, tmp_path: Path, measured: Measured) -> None:
+def test_world_and_fmus_of_both_versions_agree(model: str, tmp_path: Path, measured: MeasurementCheck) -> None:
     wind = dict(zip(("wind.x", "wind.y", "wind.z"), WIND, strict=True))
     (file := tmp_path / "doors.json").write_text(json.dumps(scenario(model, wind)))
     result = cosim.run(file)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from multirotor_reference import GRAVITY, VEHICLES, Vehicle
 from plant_fmu import PlantFmu
-from validation import Measured
+from validation import MeasurementCheck
 
 from plant_src.vehicles.crazyflie.parameters import AIRFRAME
-from plant_src.vehicles.multirotor.multirotor_equations import Equations, constants
+from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations, derive_constants
 
 CRAZYFLIE, HEXACOPTER = VEHICLES["crazyflie"], VEHICLES["survey_hexacopter"]
 IMAGES = "Sanchez-Cuevas et al. 2017"
@@ -29,7 +29,7 @@ def kinetic_energy(fmu: PlantFmu, inertia: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("name", VEHICLES)
-def test_hover_speed_carries_the_weight(name: str, measured: Measured) -> None:
+def test_hover_speed_carries_the_weight(name: str, measured: MeasurementCheck) -> None:
     vehicle = VEHICLES[name]
     fmu = PlantFmu(name, {**HIGH, "initial_rotor_speed": vehicle.hover_speed})
     fmu.set(commands(vehicle, vehicle.hover_speed))
@@ -48,7 +48,7 @@ def test_hover_speed_carries_the_weight(name: str, measured: Measured) -> None:
 
 
 @pytest.mark.parametrize("name", VEHICLES)
-def test_tumbling_without_torque_keeps_the_energy(name: str, measured: Measured) -> None:
+def test_tumbling_without_torque_keeps_the_energy(name: str, measured: MeasurementCheck) -> None:
     rates = {"initial.rates.p": 3.0, "initial.rates.q": 0.5, "initial.rates.r": -2.0}
     fmu = PlantFmu(name, {**STILL, **rates})
     before = kinetic_energy(fmu, VEHICLES[name].inertia)
@@ -68,7 +68,7 @@ def test_tumbling_without_torque_keeps_the_energy(name: str, measured: Measured)
     assert np.abs(fmu.vector("rates", "pqr") - axis_before).max() > 0.1  # it has tumbled
 
 
-def test_rotors_follow_a_step_of_their_command_with_a_first_order_lag(measured: Measured) -> None:
+def test_rotors_follow_a_step_of_their_command_with_a_first_order_lag(measured: MeasurementCheck) -> None:
     """Climb from thrust k n^2 with n = c (1 - exp(-t/T)), integrated by hand."""
     lag, speed = 0.08, 1.1 * CRAZYFLIE.hover_speed
     fmu = PlantFmu("crazyflie", {**STILL, "rotor_time_constant": lag})
@@ -101,7 +101,7 @@ def test_a_lag_much_shorter_than_a_step_is_stable_and_like_none(lag: float) -> N
     assert found[0] == pytest.approx(found[1], abs=0.02)  # m/s; a quarter of a step of another thrust, three times
 
 
-def test_body_drag_ends_a_fall_at_the_terminal_velocity(measured: Measured) -> None:
+def test_body_drag_ends_a_fall_at_the_terminal_velocity(measured: MeasurementCheck) -> None:
     fmu = PlantFmu("survey_hexacopter", {**HIGH, "ground_effect": 0.0})
     fmu.step(10.0, 5)
     speed, terminal = -fmu.get("velocity.z"), np.sqrt(HEXACOPTER.mass * GRAVITY / HEXACOPTER.body_drag[2])
@@ -110,7 +110,7 @@ def test_body_drag_ends_a_fall_at_the_terminal_velocity(measured: Measured) -> N
     )
 
 
-def test_rotor_drag_ends_a_descent_at_the_terminal_velocity(measured: Measured) -> None:
+def test_rotor_drag_ends_a_descent_at_the_terminal_velocity(measured: MeasurementCheck) -> None:
     speed, drag = 0.97 * CRAZYFLIE.hover_speed, CRAZYFLIE.rotor_drag[2]
     fmu = PlantFmu("crazyflie", {**HIGH, "initial_rotor_speed": speed, "ground_effect": 0.0})
     fmu.set(commands(CRAZYFLIE, speed))
@@ -137,13 +137,13 @@ def test_a_falling_body_drifts_with_the_wind() -> None:
 
 @pytest.mark.parametrize("name", VEHICLES)
 @pytest.mark.parametrize("height", [0.1, 0.5, 0.8, 1.5, 3.0, 10.0])
-def test_ground_effect_adds_the_published_share_of_thrust(name: str, height: float, measured: Measured) -> None:
+def test_ground_effect_adds_the_published_share_of_thrust(name: str, height: float, measured: MeasurementCheck) -> None:
     """`height` in rotor radii; below half a radius the effect no longer grows."""
     vehicle = VEHICLES[name]
     fmu = PlantFmu(name, {**STILL, "ground_effect": 1.0, "rotor_time_constant": 0.0})
     fmu.set({**commands(vehicle, vehicle.hover_speed), "ground_distance": height * vehicle.radius})
     fmu.step(0.01)
-    share = 1 / (1 - vehicle.blowing(max(height, 0.5) * vehicle.radius)) - 1
+    share = 1 / (1 - vehicle.inflow_reduction(max(height, 0.5) * vehicle.radius)) - 1
     thrust = fmu.get("velocity.z") / 0.01
     measured(
         "Crazyflie and survey hexacopter",
@@ -171,7 +171,7 @@ def rates_after_a_moment(parameters: dict[str, float], speeds: dict[str, float],
     return fmu.vector("rates", "pqr")
 
 
-def test_spinning_rotors_turn_a_pitching_body_about_its_roll_axis(measured: Measured) -> None:
+def test_spinning_rotors_turn_a_pitching_body_about_its_roll_axis(measured: MeasurementCheck) -> None:
     """Rotors 2, 4 and 6 turn counter-clockwise: their momentum H along z, carried along at q, takes the torque -q H about x."""
     inertia, speed, moment = 3.5e-4, 400.0, 1e-5
     speeds = {f"rotor_speed[{number}]": speed for number in (2, 4, 6)}
@@ -214,8 +214,8 @@ def test_the_rate_of_the_state_is_the_derivative_of_a_step() -> None:
     inputs = np.concatenate([1600 + random.standard_normal(4), 0.01 * random.standard_normal(6), [1, 2, 3], [0.05]])
     body = [AIRFRAME.mass, *np.diag(AIRFRAME.inertia), 0.0, 0.0, 0.0]
     effects = [0.07, 5e-8, 1e-6, 2e-6, 1e-6, 0.01, 0.02, 0.03, 1.0]
-    parameters = constants(ca.DM([*np.zeros(10), *body, 0.0, *effects])).full().ravel()
-    equations, symbols = Equations(AIRFRAME), [ca.SX.sym("", len(vector)) for vector in (state, inputs, parameters)]
+    parameters = derive_constants(ca.DM([*np.zeros(10), *body, 0.0, *effects])).full().ravel()
+    equations, symbols = MultirotorEquations(AIRFRAME), [ca.SX.sym("", len(vector)) for vector in (state, inputs, parameters)]
     rate = ca.Function("rate", symbols, [equations.rate(*symbols)])(state, inputs, parameters)
-    after = ca.Function("after", symbols, [equations.step(*symbols, ca.SX(moment))])(state, inputs, parameters)
+    after = ca.Function("after", symbols, [equations.step_with_effects(*symbols, ca.SX(moment))])(state, inputs, parameters)
     assert ((after - state) / moment).full().ravel() == pytest.approx(rate.full().ravel(), rel=1e-3, abs=1e-3)

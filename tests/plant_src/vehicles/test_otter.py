@@ -5,24 +5,24 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from otter_reference import Otter
-from validation import Measured
-from worlds import Trial
+from validation import MeasurementCheck
+from worlds import WorldHarness
 
 GOLDEN, NUMPY = "golden value of MSS `otter.m`", "`otter.m` a second time in NumPy"
 FLIP = np.array([1.0, -1.0, -1.0])
 ORIGIN_FROM_CENTRE = -np.array([0.153125, 0.0, 0.246875])  # with the reference payload, forward-left-up
 
 
-def otter(**more: object) -> Trial:
-    return Trial({"usv": {"model": "otter", "position": [0.0, 0.0], **more}})
+def otter(**more: object) -> WorldHarness:
+    return WorldHarness({"usv": {"model": "otter", "position": [0.0, 0.0], **more}})
 
 
-def run(trial: Trial, port: float, starboard: float, steps: int) -> Trial:
+def run(trial: WorldHarness, port: float, starboard: float, steps: int) -> WorldHarness:
     trial["usv.propeller_speed"] = [port, starboard]
     return trial.step(steps)
 
 
-def origin(trial: Trial) -> np.ndarray:
+def origin(trial: WorldHarness) -> np.ndarray:
     """Position of the origin of the hull's frame, by its published attitude."""
     w, *v = trial.vector("usv.orientation", "wxyz")
     turned = np.cross(v, ORIGIN_FROM_CENTRE)
@@ -30,7 +30,7 @@ def origin(trial: Trial) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def dash() -> tuple[Trial, float]:
+def dash() -> tuple[WorldHarness, float]:
     """30 s at 100 rad/s from rest, and when 63.2 % of the final speed were reached."""
     trial, reached = otter(), 0.0
     while trial.steps < 3000:
@@ -40,24 +40,24 @@ def dash() -> tuple[Trial, float]:
     return trial, reached
 
 
-def test_speed_is_thrust_over_damping(dash: tuple[Trial, float], measured: Measured) -> None:
+def test_speed_is_thrust_over_damping(dash: tuple[WorldHarness, float], measured: MeasurementCheck) -> None:
     u, thrust, damping = dash[0]["usv.velocity_body.u"], 221.6, 24.4 * 9.81 / (6 * 0.5144)
     measured("Otter", "speed at 100/100 rad/s", u, 2.85735, "m/s", GOLDEN, within=5e-6)
     measured("Otter", "the same, as thrust over damping", u, thrust / damping, "m/s", "closed form", relative=1e-6)
 
 
-def test_time_to_speed(dash: tuple[Trial, float], measured: Measured) -> None:
+def test_time_to_speed(dash: tuple[WorldHarness, float], measured: MeasurementCheck) -> None:
     measured("Otter", "time to 63.2 % of it from rest", dash[1], 1.26, "s", GOLDEN, within=1e-9)
 
 
-def test_sinkage_and_trim(dash: tuple[Trial, float], measured: Measured) -> None:
+def test_sinkage_and_trim(dash: tuple[WorldHarness, float], measured: MeasurementCheck) -> None:
     """Bow down is a positive pitch here."""
     measured("Otter", "sinkage with 25 kg of payload", -origin(dash[0])[2], 0.03771, "m", GOLDEN, within=5e-6)
     trim = np.degrees(dash[0]["usv.attitude.pitch"])
     measured("Otter", "trim, bow down", trim, 1.49063, "deg", GOLDEN, within=5e-6)
 
 
-def test_coasting(measured: Measured) -> None:
+def test_coasting(measured: MeasurementCheck) -> None:
     trial = run(otter(), 100.0, 100.0, 3000)
     start = origin(trial)[0]
     run(trial, 0.0, 0.0, 2000)
@@ -65,27 +65,27 @@ def test_coasting(measured: Measured) -> None:
     measured("Otter", "speed left after them", trial["usv.velocity_body.u"], 0.0, "m/s", GOLDEN, within=5e-6)
 
 
-def test_mass_matrix(measured: Measured) -> None:
+def test_mass_matrix(measured: MeasurementCheck) -> None:
     casadi = pytest.importorskip("casadi")
     from plant_src.vehicles.otter import equations
 
-    model = equations.VESSEL.model(equations.SampledShafts)
+    model = equations.VESSEL.create_continuous_model(equations.OtterModel)
     parameters = np.concatenate([np.ravel(v.start) for v in model.variables if v.causality == "parameter"])
-    assert model.constants is not None
-    inverse = casadi.DM(equations.VESSEL.unpacked(model.constants(casadi.SX(parameters)))["inverse"])
+    assert model.derived_parameters is not None
+    inverse = casadi.DM(equations.VESSEL.constants_by_name(model.derived_parameters(casadi.SX(parameters)))["inverse"])
     diagonal = np.diag(np.linalg.inv(inverse.full()))
     golden = [85.282, 162.500, 135.000, 17.657, 32.894, 40.045]
     measured("Otter", "diagonal of the mass matrix", diagonal, golden, "kg, kg.m2", GOLDEN, within=5e-4)
 
 
-def test_without_thrust_it_rests(measured: Measured) -> None:
+def test_without_thrust_it_rests(measured: MeasurementCheck) -> None:
     trial = otter().step(1000)
     measured("Otter", "speed after 10 s at zero thrust", trial.vector("usv.velocity"), 0.0, "m/s", "equilibrium", within=1e-12)
     measured("Otter", "way in them", trial.vector("usv.position", "xy"), 0.0, "m", "equilibrium", within=1e-9)
 
 
 @pytest.mark.parametrize(("payload", "turning"), [(0.0, 100), (25.0, 800), (45.0, 100)])
-def test_circle_agrees_with_an_independent_implementation(payload: float, turning: int, measured: Measured) -> None:
+def test_circle_agrees_with_an_independent_implementation(payload: float, turning: int, measured: MeasurementCheck) -> None:
     """1 s ahead, then a turning circle, with the reference payload for 8 s."""
     reference, trial = Otter(payload), otter(parameters={"payload_mass": payload})
     for _ in range(50):
@@ -110,11 +110,11 @@ def centre(reference: Otter) -> np.ndarray:
     return FLIP * (reference.eta[:3] + rotation(reference.eta[3:]) @ reference.centre)
 
 
-def test_current_carries_it_like_the_independent_implementation(measured: Measured) -> None:
+def test_current_carries_it_like_the_independent_implementation(measured: MeasurementCheck) -> None:
     reference = Otter(current=(0.3, 0.2))
     for _ in range(50):
         reference.eta = reference.trim(reference.eta)
-    trial = Trial({"usv": {"model": "otter", "position": [0.0, 0.0]}}, environment={"current": {"velocity": [0.3, -0.2]}})
+    trial = WorldHarness({"usv": {"model": "otter", "position": [0.0, 0.0]}}, environment={"current": {"velocity": [0.3, -0.2]}})
     offset = trial.vector("usv.position")[:2] - centre(reference)[:2]
     run(trial, 80.0, 50.0, 200)
     for _ in range(200):
@@ -138,7 +138,9 @@ def test_port_propeller_turns_to_starboard() -> None:
 
 
 def test_wind_from_abeam_pushes_and_heels_it() -> None:
-    trial = Trial({"usv": {"model": "otter", "position": [0.0, 0.0]}}, environment={"wind": {"velocity": [0.0, 10.0, 0.0]}})
+    trial = WorldHarness(
+        {"usv": {"model": "otter", "position": [0.0, 0.0]}}, environment={"wind": {"velocity": [0.0, 10.0, 0.0]}}
+    )
     trial.step(300)
     assert trial["usv.velocity.y"] > 0.1
     assert trial["usv.attitude.roll"] < -1e-3

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from plant_fmu import PlantFmu
-from validation import Measured
+from validation import MeasurementCheck
 
 import cosim
 from cosim.core import resources
@@ -80,7 +80,7 @@ def scenario(model: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("model", VESSELS)
-def test_world_and_fmus_of_both_versions_agree(model: str, tmp_path: Path, measured: Measured) -> None:
+def test_world_and_fmus_of_both_versions_agree(model: str, tmp_path: Path, measured: MeasurementCheck) -> None:
     (file := tmp_path / "doors.json").write_text(json.dumps(scenario(model)))
     result = cosim.run(file)
     alone = PlantFmu(model, scalars(parameters(model)))

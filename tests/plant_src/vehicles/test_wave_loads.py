@@ -7,9 +7,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from floating_reference import felt
-from validation import Measured
-from worlds import Trial, vessel
+from floating_reference import wave_kinematics
+from validation import MeasurementCheck
+from worlds import WorldHarness, vessel_settings
 
 from plant_src.environment import sea
 from plant_src.environment.sea import Sea
@@ -28,10 +28,10 @@ def swell(height: float, period: float, direction: float = 0.0) -> dict[str, Any
 
 @pytest.mark.parametrize("vehicle", VESSELS)
 @pytest.mark.parametrize("direction", [0.0, 1.2])
-def test_long_waves_carry_the_hull(vehicle: dict[str, Any], direction: float, measured: Measured) -> None:
+def test_long_waves_carry_the_hull(vehicle: dict[str, Any], direction: float, measured: MeasurementCheck) -> None:
     """It rises with the water and lies on its slopes: waves of 150 m and more."""
-    trial = Trial({"usv": {**vehicle, "position": [0.0, 0.0]}}, environment=swell(0.5, 10.0, direction))
-    calm = Trial({"usv": {**vehicle, "position": [0.0, 0.0]}})
+    trial = WorldHarness({"usv": {**vehicle, "position": [0.0, 0.0]}}, environment=swell(0.5, 10.0, direction))
+    calm = WorldHarness({"usv": {**vehicle, "position": [0.0, 0.0]}})
     rise, water, heel = [], [], []
     for _ in range(300):
         trial.step(10)
@@ -53,19 +53,19 @@ def test_long_waves_carry_the_hull(vehicle: dict[str, Any], direction: float, me
 
 def test_short_waves_pass_under_the_hull() -> None:
     """Waves of 0.4 m length, half that of the hull, leave it within a fiftieth of their height."""
-    trial = Trial({"usv": vessel([0.0, 0.0], motion="6dof")}, environment=swell(0.1, 0.5))
+    trial = WorldHarness({"usv": vessel_settings([0.0, 0.0], motion="6dof")}, environment=swell(0.1, 0.5))
     heights = [trial.step()["usv.position.z"] for _ in range(500)]
     assert np.ptp(heights) < 0.002
 
 
 def test_gain_scales_the_waves() -> None:
-    trials = [Trial({"usv": vessel([0.0, 0.0], motion="6dof")}, environment=swell(0.02, 3.0)) for _ in range(2)]
+    trials = [WorldHarness({"usv": vessel_settings([0.0, 0.0], motion="6dof")}, environment=swell(0.02, 3.0)) for _ in range(2)]
     trials[1]["environment.wave_gain"] = 0.5
     full, half = (np.array([trial.step()["usv.position.z"] for _ in range(300)]) - p.CENTRE_OF_MASS_HEIGHT for trial in trials)
     assert half == pytest.approx(full / 2, abs=0.01 * np.abs(full).max())
 
 
-def test_the_hull_feels_what_linear_theory_says(measured: Measured) -> None:
+def test_the_hull_feels_what_linear_theory_says(measured: MeasurementCheck) -> None:
     """Against the functions of numpy: elevation, slopes, velocity, acceleration."""
     random, count = np.random.default_rng(1), 5
     frequency = random.uniform(1.0, 7.0, count)
@@ -78,10 +78,10 @@ def test_the_hull_feels_what_linear_theory_says(measured: Measured) -> None:
         for column in (getattr(components, name) for name in ("amplitude", "frequency", "direction", "phase"))
     ]
     heading = ca.SX(np.cos(0.7)), ca.SX(np.sin(0.7))
-    water = wave_loads.water(
-        ca.SX([3.0, -2.0]), heading, ca.SX(11.0), footprint, ca.SX(count), wave_loads.table(footprint, *columns)
+    water = wave_loads.wave_kinematics(
+        ca.SX([3.0, -2.0]), heading, ca.SX(11.0), footprint, ca.SX(count), wave_loads.wave_table(footprint, *columns)
     )
-    for found, expected in zip(vars(water).values(), felt(components, 3.0, -2.0, 0.7, 11.0), strict=True):
+    for found, expected in zip(vars(water).values(), wave_kinematics(components, 3.0, -2.0, 0.7, 11.0), strict=True):
         values = ca.evalf(found).full().ravel()
         measured("Waves", "what the hull feels of them", values, expected, "m, 1, m/s, m/s2", "linear theory", relative=1e-11)
 
@@ -95,7 +95,7 @@ def test_sine_and_cosine_are_those_of_numpy() -> None:
 
 def test_the_sine_of_a_share_of_a_right_angle_is_that_of_numpy() -> None:
     shares = np.random.default_rng(2).uniform(-1, 1, 5000)
-    (found,) = computed(lambda share: (elementary_functions.sine_of_quarter(share),), shares)
+    (found,) = computed(lambda share: (elementary_functions.sine_of_right_angle_share(share),), shares)
     assert np.abs(found - np.sin(np.pi / 2 * shares)).max() < 1e-15
 
 

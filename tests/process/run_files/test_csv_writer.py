@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from cosim.core.recording import Recording
-from cosim.process.journal import ROWS, SIZE, Journal, Phase
-from cosim.process.run_files.csv_writer import Lines, LiveCsv
-from cosim.process.run_files.folder import HEADER_FILE, ROWS_FILE, TEXTS_FILE, Column, Header, TextReader
+from cosim.process.journal import JOURNAL_SIZE, ROW_COUNT, Journal, Phase
+from cosim.process.run_files.csv_writer import CsvLineReader, LiveCsvWriter
+from cosim.process.run_files.folder import HEADER_FILE, ROWS_FILE, TEXTS_FILE, Column, RowsHeader, TextReader
 from cosim.results.csv_files import write_csv
 
 ROWS_COUNT = 1234
@@ -35,12 +35,12 @@ def table() -> np.ndarray:
     return rows
 
 
-def header(table: np.ndarray) -> Header:
+def header(table: np.ndarray) -> RowsHeader:
     """As the run describes its rows; one signal is recorded under two names."""
     fields = {name: table.dtype.fields[name] for name in table.dtype.names}
     columns = [Column(name, kind.str, offset, kind.kind == "b", "") for name, (kind, offset) in fields.items()]
     twin = Column("twin", "<i8", fields["whole"][1], False, "")
-    return Header(5, 1, 100, 2, table.dtype.itemsize, [twin, *columns], [], [(0, "first"), (len(columns) + 2, "last")])
+    return RowsHeader(5, 1, 100, 2, table.dtype.itemsize, [twin, *columns], [], [(0, "first"), (len(columns) + 2, "last")])
 
 
 def texts(rows: int) -> dict[str, np.ndarray]:
@@ -71,19 +71,19 @@ def running(table: np.ndarray, folder: Path) -> Journal:
     (run / HEADER_FILE).write_text(json.dumps(asdict(header(table))))
     (run / ROWS_FILE).write_bytes(table.tobytes())
     write_texts(run)
-    journal = Journal(bytearray(SIZE))
-    journal.put_files(run, folder / "result.csv")
-    journal.enter(Phase.STEPPING)
+    journal = Journal(bytearray(JOURNAL_SIZE))
+    journal.set_run_files(run, folder / "result.csv")
+    journal.enter_phase(Phase.STEPPING)
     return journal
 
 
 def test_lines_have_the_format_of_results(table, tmp_path):
     write_texts(tmp_path)
     described = header(table)
-    lines, file = Lines(described, TextReader(tmp_path, described)), io.BytesIO(table.tobytes())
-    text = lines.first()
-    while lines.written < ROWS_COUNT:
-        text += lines.next(file, ROWS_COUNT)
+    lines, file = CsvLineReader(described, TextReader(tmp_path, described)), io.BytesIO(table.tobytes())
+    text = lines.header_line()
+    while lines.row_count < ROWS_COUNT:
+        text += lines.read_lines(file, ROWS_COUNT)
     assert text == expected(table, tmp_path, ROWS_COUNT)
 
 
@@ -91,15 +91,15 @@ def test_the_file_is_whole_at_every_moment_even_when_an_update_is_interrupted(ta
     monkeypatch.setattr("cosim.process.run_files.csv_writer.FIRST", 0.0)
     monkeypatch.setattr("cosim.process.run_files.csv_writer.EVERY", 0.0)
     journal = running(table, tmp_path)
-    csv, next_lines = LiveCsv(journal), Lines.next
+    csv, next_lines = LiveCsvWriter(journal), CsvLineReader.read_lines
     csv.update()
     for n, rows in enumerate((1, 2, 600, 601, 1100, ROWS_COUNT)):
-        journal[ROWS] = rows
+        journal[ROW_COUNT] = rows
         if n % 2:
-            monkeypatch.setattr(Lines, "next", lambda self, *more: next_lines(self, *more) and interrupt())
+            monkeypatch.setattr(CsvLineReader, "next", lambda self, *more: next_lines(self, *more) and interrupt())
             with pytest.raises(KeyboardInterrupt):
                 csv.update()
-            monkeypatch.setattr(Lines, "next", next_lines)
+            monkeypatch.setattr(CsvLineReader, "next", next_lines)
         csv.update()
         assert (tmp_path / "result.csv").read_bytes() == expected(table, tmp_path, rows)
 
@@ -115,20 +115,20 @@ def test_texts_are_followed_as_they_are_written(table, tmp_path):
     whole = file.read_bytes()
     file.write_bytes(whole[:-3])
     reader = TextReader(tmp_path, header(table))
-    assert reader.row(599) == ["a", 'quoted, "x"']
-    assert reader.row(1233) == ["", "\N{SNOWMAN}\n"]
+    assert reader.read_row(599) == ["a", 'quoted, "x"']
+    assert reader.read_row(1233) == ["", "\N{SNOWMAN}\n"]
     file.write_bytes(whole)
-    assert reader.row(1233) == ["", "end"]
-    assert reader.row(3) == ["a", ""]
+    assert reader.read_row(1233) == ["", "end"]
+    assert reader.read_row(3) == ["a", ""]
 
 
 def test_the_final_file_is_not_replaced(table, tmp_path):
     """An update that comes too late, when the run has left its loop."""
     journal, final = running(table, tmp_path), tmp_path / "result.csv"
-    journal[ROWS] = 10
-    csv = LiveCsv(journal)
-    assert csv._begin(1.0) is False and csv._begin(1.0)
-    journal.enter(Phase.QUIET)
+    journal[ROW_COUNT] = 10
+    csv = LiveCsvWriter(journal)
+    assert csv._open_copies(1.0) is False and csv._open_copies(1.0)
+    journal.enter_phase(Phase.IDLE)
     final.write_text("final")
-    csv._append(float("inf"))
+    csv._append_rows(float("inf"))
     assert final.read_text() == "final"

@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from fakes import counter
-from helpers import end, system
+from helpers import endpoint, make_system
 
 from cosim.engine.run_loop import Settings, simulate
 from cosim.process.run_files.row_store import read_rows
@@ -16,10 +16,10 @@ STEPS = 3000
 
 
 def recorded(every=1, **more):
-    columns = {"a.y": end("a.y"), "a.n": end("a.n")}
+    columns = {"a.y": endpoint("a.y"), "a.n": endpoint("a.n")}
     interval = Fraction(every, 100)
     settings = Settings(Fraction(0), Fraction(STEPS, 100), Fraction(1, 100), columns, interval, **more)
-    return simulate(system({"a": counter()}), settings).recording
+    return simulate(make_system({"a": counter()}), settings).recording
 
 
 @pytest.fixture
@@ -59,6 +59,6 @@ def test_csv_is_written_from_a_file_of_rows(small_chunks, tmp_path):
 
 def test_no_signals_make_rows_without_bytes(tmp_path):
     settings = Settings(Fraction(0), Fraction(1), Fraction(1, 100), rows_file=tmp_path / "rows")
-    recording = simulate(system({"a": counter()}), settings).recording
+    recording = simulate(make_system({"a": counter()}), settings).recording
     assert len(recording.time) == 101
     assert not recording.columns

@@ -8,14 +8,14 @@ from pathlib import Path
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 
 
-def tried(act):
+def attempt(act):
     try:
         return act()
     except OSError as error:
         return type(error).__name__
 
 
-class Prowler(Fmi2Slave):
+class SandboxProbe(Fmi2Slave):
     """`private`, `own` (files), `port` and `process` are what it goes for."""
 
     def __init__(self, private, own, port, process, **arguments):
@@ -23,7 +23,7 @@ class Prowler(Fmi2Slave):
         self.y = 0.0
         self.register_variable(Real("y", causality=Fmi2Causality.output))
         here = Path(__file__)
-        self.acts = {
+        self.attempts = {
             "write beside its source": lambda: here.with_name("mine.txt").write_text("mine"),
             "write to the system": lambda: Path("/usr/lib/mine.txt").write_text("mine"),
             "write to its own folder": lambda: Path(own).write_text("mine"),
@@ -35,7 +35,7 @@ class Prowler(Fmi2Slave):
         }
 
     def exit_initialization_mode(self):
-        print(json.dumps({what: tried(act) for what, act in self.acts.items()}))
+        print(json.dumps({what: attempt(act) for what, act in self.attempts.items()}))
 
     def do_step(self, current_time, step_size):
         return True

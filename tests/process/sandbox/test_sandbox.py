@@ -15,11 +15,19 @@ from pathlib import Path
 import pytest
 
 from cosim.core.errors import InputError
-from cosim.process.sandbox import Settings, active, available, command, enter, interpreter_folders, landlock
+from cosim.process.sandbox import (
+    SandboxSettings,
+    bubblewrap_command,
+    enter_sandbox,
+    find_available_sandboxes,
+    interpreter_folders,
+    landlock,
+    probe_restrictions,
+)
 
-AVAILABLE = available()
+AVAILABLE = find_available_sandboxes()
 needs_landlock = pytest.mark.skipif(not AVAILABLE.landlock, reason="this kernel has no Landlock")
-needs_closed_tcp = pytest.mark.skipif(AVAILABLE.landlock < landlock.NETWORK_VERSION, reason="Landlock without TCP rules")
+needs_closed_tcp = pytest.mark.skipif(AVAILABLE.landlock < landlock.NETWORK_ABI, reason="Landlock without TCP rules")
 needs_bubblewrap = pytest.mark.skipif(not AVAILABLE.bubblewrap, reason="no bubblewrap that works")
 
 #: a worker enters the sandbox, tries something, and says what came of it
@@ -126,7 +134,7 @@ class TestNetwork:
         with listener(socket.SOCK_DGRAM) as server:
             assert worker(SEND.format(port=server.getsockname()[1])) == 3
 
-    @pytest.mark.skipif(AVAILABLE.landlock < landlock.SCOPE_VERSION, reason="Landlock without signals")
+    @pytest.mark.skipif(AVAILABLE.landlock < landlock.SCOPE_ABI, reason="Landlock without signals")
     def test_processes_outside_get_no_signals(self):
         assert worker(f"os.kill({os.getpid()}, 0)") == "PermissionError"
 
@@ -157,7 +165,7 @@ class TestLimits:
         """What is said was tried out: a confined process cannot list the root folder."""
         said = worker("__import__('dataclasses').asdict(active())", memory=2 << 30, open_files=99, confine="available")
         assert said["files_confined"] is (AVAILABLE.landlock > 0)
-        assert said["tcp_closed"] is (AVAILABLE.landlock >= landlock.NETWORK_VERSION)
+        assert said["tcp_closed"] is (AVAILABLE.landlock >= landlock.NETWORK_ABI)
         assert (said["own_session"], said["no_new_privileges"], said["open_files"]) == (True, True, 99)
         assert said["memory"] > 2 << 30
 
@@ -198,15 +206,15 @@ def test_a_worker_does_not_outlive_its_parent():
 @needs_landlock
 def test_a_folder_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(InputError, match="nowhere does not exist"):
-        enter(Settings(readable=(tmp_path / "nowhere",)))
-    assert not active().files_confined
+        enter_sandbox(SandboxSettings(readable=(tmp_path / "nowhere",)))
+    assert not probe_restrictions().files_confined
 
 
 def test_confinement_that_the_kernel_lacks_is_refused_before_anything_is_changed(monkeypatch):
     monkeypatch.setattr(landlock, "version", lambda: 0)
     limits = resource.getrlimit(resource.RLIMIT_AS)
     with pytest.raises(InputError, match=r"Landlock is needed \(Linux 5.13"):
-        enter(Settings(confine="required"))
+        enter_sandbox(SandboxSettings(confine="required"))
     assert resource.getrlimit(resource.RLIMIT_AS) == limits
 
 
@@ -214,13 +222,13 @@ def test_confinement_that_the_kernel_lacks_is_refused_before_anything_is_changed
 def test_a_network_that_the_kernel_cannot_close_is_refused(monkeypatch):
     monkeypatch.setattr(landlock, "version", lambda: 3)
     with pytest.raises(InputError, match="needs Landlock 4"):
-        enter(Settings(confine="required"))
+        enter_sandbox(SandboxSettings(confine="required"))
 
 
 def strict(code: str, **folders: list[Path]) -> subprocess.CompletedProcess[str]:
     """A Python program in strict mode."""
     readable = [*interpreter_folders(), *folders.get("readable", [])]
-    words = command([sys.executable, "-c", code], readable, folders.get("writable", []))
+    words = bubblewrap_command([sys.executable, "-c", code], readable, folders.get("writable", []))
     return subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
 
 
@@ -258,4 +266,4 @@ class TestStrict:
 def test_strict_mode_without_bubblewrap_is_refused(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(InputError, match="the strict sandbox needs bubblewrap"):
-        command(["true"], [])
+        bubblewrap_command(["true"], [])

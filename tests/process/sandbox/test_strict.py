@@ -15,11 +15,13 @@ from typing import Any
 
 import pytest
 
-from cosim.process.sandbox import available
+from cosim.process.sandbox import find_available_sandboxes
 
 pytestmark = [
-    pytest.mark.skipif(not available().bubblewrap, reason="no bubblewrap that works"),
-    pytest.mark.skipif(not available().landlock, reason="this kernel has no Landlock, which FMUs in a sandbox need"),
+    pytest.mark.skipif(not find_available_sandboxes().bubblewrap, reason="no bubblewrap that works"),
+    pytest.mark.skipif(
+        not find_available_sandboxes().landlock, reason="this kernel has no Landlock, which FMUs in a sandbox need"
+    ),
 ]
 
 

@@ -6,20 +6,20 @@ from multiprocessing import Pipe
 
 import numpy as np
 import pytest
-from fakes import Fake, inputs, outputs
-from helpers import end, system
+from fakes import FakeComponent, inputs, outputs
+from helpers import endpoint, make_system
 
 import cosim.report.live.feed
 from cosim.core.component import Variable
 from cosim.core.errors import ComponentError
-from cosim.core.time_grid import Grid
+from cosim.core.time_grid import TimeGrid
 from cosim.engine.run_loop import Event, Settings, simulate
-from cosim.process.run_files.folder import Column, Header
-from cosim.report.live.control import Control
-from cosim.report.live.feed import Feed
+from cosim.process.run_files.folder import Column, RowsHeader
+from cosim.report.live.control import LiveControl
+from cosim.report.live.feed import RowFeed
 
 STEP = Fraction(1, 60)
-GRID = Grid.of(Fraction(0), Fraction(1), STEP)
+GRID = TimeGrid.from_times(Fraction(0), Fraction(1), STEP)
 
 
 class Steered:
@@ -29,10 +29,10 @@ class Steered:
         self.commands, self.refuse = commands, refuse
         self.here, there = Pipe()
         gain = Variable("k", causality="parameter", variability="tunable", start=1.0, minimum=0.0, maximum=9.0)
-        self.fake = Fake([gain, *inputs("u"), *outputs("y")], self.step, start={"k": 1.0})
+        self.fake = FakeComponent([gain, *inputs("u"), *outputs("y")], self.step, start={"k": 1.0})
         self.fake.set = self.set
-        self.system = system({"a": self.fake})
-        self.control = Control(there, self.system, GRID, speed, {"rows": 61})
+        self.system = make_system({"a": self.fake})
+        self.control = LiveControl(there, self.system, GRID, speed, {"rows": 61})
         self.count = 0
         self.here.send_bytes(b"{}")
         self.send()
@@ -52,8 +52,8 @@ class Steered:
         self.send()
 
     def run(self, events=(), control=True):
-        columns = {"y": end("a.y")}
-        settings = Settings(Fraction(0), Fraction(1), STEP, columns, events=events, control=self.control if control else None)
+        columns = {"y": endpoint("a.y")}
+        settings = Settings(Fraction(0), Fraction(1), STEP, columns, events=events, step_hook=self.control if control else None)
         return simulate(self.system, settings)
 
     def said(self):
@@ -79,7 +79,7 @@ def test_what_was_set_is_told_as_events_at_exactly_that_time():
     """Seven sixtieths of a second have no decimal text."""
     run = Steered({0: [change(2.0)], 6: [change(4.0)], 7: [change(5)]})
     values = run.run().recording.columns["y"]
-    events = run.control.end()
+    events = run.control.finish()
     assert [event["time"] for event in events] == [0.0, 0.1, "7/60"]
     repeated = [Event(Fraction(str(e["time"])), {"a": {"k": e["set"]["a.k"]}}) for e in events]
     assert Steered({}).run(repeated, control=False).recording.columns["y"].tolist() == values.tolist()
@@ -108,7 +108,7 @@ def test_a_component_that_refuses_a_value_ends_the_run_as_at_an_event():
     outcome = run.run()
     assert (str(outcome.failure), outcome.macro_steps) == ("a: set failed: it does not like it", 4)
     assert run.said()[-1]["error"] == "a: set failed: it does not like it"
-    assert run.control.end() == []
+    assert run.control.finish() == []
 
 
 @pytest.mark.parametrize("value", [9.5, -1, True, "2", [1.0], None, 10**400])
@@ -126,11 +126,11 @@ def recorded(tmp_path):
     rows["x"], rows["n"], rows["b"] = np.arange(101) ** 2, np.arange(101), np.arange(101) % 2
     rows.tofile(tmp_path / "rows")
     columns = [Column(name, dtype[name].str, dtype.fields[name][1], name == "b", "") for name in dtype.names]
-    return tmp_path, Header(0, 1, 100, 2, dtype.itemsize, columns, [], [])
+    return tmp_path, RowsHeader(0, 1, 100, 2, dtype.itemsize, columns, [], [])
 
 
 def test_rows_come_as_columns_of_floats(recorded):
-    feed = Feed(*recorded, expected=101)
+    feed = RowFeed(*recorded, expected_rows=101)
     assert (feed.available(0), feed.available(101), feed.capacity) == (0, 101, 101)
     time, x, n, b = np.frombuffer(feed.read(10, 3), "<f4").reshape(4, 3)
     assert time == pytest.approx([0.2, 0.22, 0.24])
@@ -139,6 +139,6 @@ def test_rows_come_as_columns_of_floats(recorded):
 
 def test_rows_of_long_runs_are_thinned(recorded, monkeypatch):
     monkeypatch.setattr(cosim.report.live.feed, "MOST_VALUES", 4 * 26)
-    feed = Feed(*recorded, expected=101)
+    feed = RowFeed(*recorded, expected_rows=101)
     assert (feed.stride, feed.available(1), feed.available(9), feed.capacity) == (4, 1, 3, 26)
     assert np.frombuffer(feed.read(1, 25), "<f4").reshape(4, 25)[2].tolist() == list(range(4, 101, 4))

@@ -1,14 +1,14 @@
 """The page of a run that goes on, in a real browser."""
 
 import pytest
-from watched import Watched, until
+from watched import LiveRun, wait_until
 
 from cosim.results import Result
 
 
 @pytest.fixture
 def run(tmp_path):
-    run = Watched(tmp_path, "free_flight", "--stop-time", "6", "--real-time", "0.2")
+    run = LiveRun(tmp_path, "free_flight", "--stop-time", "6", "--real-time", "0.2")
     run.command("pause")  # until the page is there
     yield run
     run.process.kill()
@@ -30,7 +30,7 @@ def page(chromium, run):
 
 
 def waiting(page, condition):
-    return until(lambda: page.wait_for_timeout(30) or page.evaluate(condition))
+    return wait_until(lambda: page.wait_for_timeout(30) or page.evaluate(condition))
 
 
 def test_a_run_is_watched_steered_and_replayed(run, page):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from watched import Watched, until
+from watched import LiveRun, wait_until
 
 import cosim
 from cosim.report.live.viewing import open_browser
@@ -25,19 +25,19 @@ FORCE = "vessel.external_force.y"
 @pytest.fixture(scope="module")
 def paused(tmp_path_factory):
     """A run that stands still; nothing that a test asks of it may move it."""
-    run = Watched(tmp_path_factory.mktemp("paused"), "free_flight", "--stop-time", str(STOP), "--real-time", "0.1")
+    run = LiveRun(tmp_path_factory.mktemp("paused"), "free_flight", "--stop-time", str(STOP), "--real-time", "0.1")
     assert run.command("pause")["paused"]
     rows = run.count()
     yield run
     assert run.count() == rows
     assert run.end() in (0, 3)
-    assert run.about()["live_events"] == []
+    assert run.run_metadata()["live_events"] == []
 
 
 @pytest.fixture
 def begun(tmp_path):
     """A run at its beginning, slow enough to be caught there."""
-    run = Watched(tmp_path, "free_flight", "--stop-time", str(STOP), "--real-time", "0.1")
+    run = LiveRun(tmp_path, "free_flight", "--stop-time", str(STOP), "--real-time", "0.1")
     run.command("pause")
     yield run
     run.process.kill()
@@ -59,7 +59,7 @@ def test_steps_are_single_ones_and_looking_changes_nothing(begun):
     before = begun.count()
     for more in (1, 2, 3):
         assert begun.command("step")["paused"]
-        until(lambda wanted=before + more: begun.count() == wanted)
+        wait_until(lambda wanted=before + more: begun.count() == wanted)
     assert begun.end() in (0, 3)
     assert same(Result.from_csv(begun.out / "result.csv"), cosim.run("free_flight", stop_time=STOP))
 
@@ -69,7 +69,7 @@ def test_what_was_set_stands_in_the_result_as_events_that_repeat_it(begun):
     before = begun.count()
     for _ in range(7):
         begun.command("step")
-    until(lambda: begun.count() == before + 7)
+    wait_until(lambda: begun.count() == before + 7)
     begun.command("set", name=FORCE, value=-2)
     described = {each["name"]: each["value"] for each in begun.page()["adjustable"]}
     assert (described["usv.speed_command"], described[FORCE]) == (0.5, -2)
@@ -256,7 +256,7 @@ def test_the_browser_is_shown_the_page_without_its_address_in_any_list_of_proces
     browser.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
     open_browser("http://127.0.0.1:1/secret/", tmp_path)
-    until(seen.exists)
+    wait_until(seen.exists)
     page = Path(seen.read_text())
     assert "secret" not in str(page)
     assert 'url=http://127.0.0.1:1/secret/"' in page.read_text()

@@ -9,7 +9,7 @@ from cosim.core.errors import CheckError
 from cosim.core.recording import Recording
 from cosim.results import Result
 from cosim.results.comparison import Tolerance, compare
-from cosim.results.comparison.reference import changes, thinned, write_reference
+from cosim.results.comparison.reference import decimate, describe_provenance_changes, write_reference
 
 TIME = np.arange(2001) / 100
 SWITCH = TIME >= 7.77
@@ -25,7 +25,7 @@ TOLERANCES = {"a.x": Tolerance(absolute=0.01), "a.on": Tolerance(time=0.1)}
 
 
 def test_few_rows_describe_the_run_closely():
-    reference = thinned(swing(), TOLERANCES)
+    reference = decimate(swing(), TOLERANCES)
     assert list(reference) == ["a.x", "a.on"]
     assert len(reference.time) < 120
     assert (reference.time[0], reference.time[-1]) == (0, 20)
@@ -33,19 +33,19 @@ def test_few_rows_describe_the_run_closely():
 
 
 def test_rows_are_close_where_something_happens():
-    time = thinned(swing(), TOLERANCES).time
+    time = decimate(swing(), TOLERANCES).time
     before, after = time[time < 7.77][-1], time[time >= 7.77][0]
     assert after - before <= 0.05
     assert np.diff(time).max() == pytest.approx(0.64)
 
 
 def test_without_a_tolerance_every_row_that_matters_is_kept():
-    assert len(thinned(swing(), {"b": Tolerance()}).time) == 2001
+    assert len(decimate(swing(), {"b": Tolerance()}).time) == 2001
 
 
 def test_texts_are_kept_where_they_change():
     phases = np.where(SWITCH, "land", "climb").astype(object)
-    reference = thinned(swing(phase=phases), {"phase": Tolerance()})
+    reference = decimate(swing(phase=phases), {"phase": Tolerance()})
     assert next(iter(reference.time[reference["phase"] == "land"])) == 7.77
 
 
@@ -85,5 +85,5 @@ def test_what_cannot_be_met_becomes_no_reference(run, tolerances, reason, tmp_pa
 
 def test_changes_name_what_is_different():
     later = {"versions": {"numpy": "3"}, "machine": {"system": "Linux"}, "sha256": {"a.fmu": "13", "b.py": "7"}}
-    assert changes(METADATA, METADATA) == []
-    assert changes(METADATA, later) == ["numpy 2 -> 3", "a.fmu", "b.py"]
+    assert describe_provenance_changes(METADATA, METADATA) == []
+    assert describe_provenance_changes(METADATA, later) == ["numpy 2 -> 3", "a.fmu", "b.py"]

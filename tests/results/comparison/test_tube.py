@@ -9,7 +9,7 @@ from cosim.core.recording import Recording
 from cosim.results import Result
 from cosim.results.comparison import Tolerance, compare
 from cosim.results.comparison.comparison import Comparer
-from cosim.results.comparison.tube import even_spacing
+from cosim.results.comparison.tube import uniform_spacing
 
 
 def recorded(time, **columns):
@@ -88,14 +88,14 @@ def test_even_rows_are_searched_faster_and_as_well(seed):
     lower, upper = searched(time, time, values, reach)
     comparer = Comparer(recorded(time, x=values), recorded(time, x=values))
     tube = comparer.tube("x", Tolerance(0, 0, reach))
-    assert even_spacing(time) == pytest.approx(0.01)
+    assert uniform_spacing(time) == pytest.approx(0.01)
     assert tube.lower == pytest.approx(lower, abs=1e-9)
     assert tube.upper == pytest.approx(upper, abs=1e-9)
 
 
 def test_uneven_rows_are_not_taken_for_even_ones():
-    assert even_spacing(np.array([0, 0.01, 0.02, 0.031])) == 0
-    assert even_spacing(np.array([0.0, 0.0])) == even_spacing(np.array([1.0])) == 0
+    assert uniform_spacing(np.array([0, 0.01, 0.02, 0.031])) == 0
+    assert uniform_spacing(np.array([0.0, 0.0])) == uniform_spacing(np.array([1.0])) == 0
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -9,11 +9,11 @@ from cosim import __version__
 from cosim.core import resources
 from cosim.core.component import Variable
 from cosim.core.errors import InputError
-from cosim.scenario import assemble
-from cosim.studies.controller_bench.candidate import Interface, interface, problems, source
-from cosim.studies.controller_bench.role import read_role, roles
-from cosim.studies.controller_bench.score import Scores, is_current, rows, senses, verdict
-from cosim.studies.controller_bench.substitution import Transplant
+from cosim.scenario import prepare
+from cosim.studies.controller_bench.candidate import CandidateInterface, interface_problems, parse_source, read_interface
+from cosim.studies.controller_bench.role import read_role, role_names
+from cosim.studies.controller_bench.score import RunKpis, compare_kpis, compare_values, is_current, merge_senses
+from cosim.studies.controller_bench.substitution import ControllerSubstitution
 
 ROOT = resources.root()
 SCENARIOS = {"uav_inverse_kinematics": "demo3_inverse_kinematics"}
@@ -32,26 +32,26 @@ class Bare(Fmi2Slave):
 """
 
 
-@pytest.mark.parametrize("name", roles())
+@pytest.mark.parametrize("name", role_names())
 def test_every_shipped_controller_of_a_role_fits_it(name):
     role = read_role(name)
     assert role.controllers
     for path in role.controllers:
-        assert problems(role, interface(source(str(path)))) == [], path
+        assert interface_problems(role, read_interface(parse_source(str(path)))) == [], path
 
 
-@pytest.mark.parametrize("name", roles())
+@pytest.mark.parametrize("name", role_names())
 def test_it_can_be_put_back_into_a_scenario(name, tmp_path):
     """performance_5 holds its controllers inside a system inside a system."""
     role = read_role(name)
-    candidate = source(str(min(role.controllers)))
+    candidate = parse_source(str(min(role.controllers)))
     scenario = ROOT / f"scenarios/{SCENARIOS.get(name, 'performance_5')}.json"
-    transplant = Transplant(role, candidate, interface(candidate), scenario)
+    transplant = ControllerSubstitution(role, candidate, read_interface(candidate), scenario)
     path = transplant.write(tmp_path)
-    assert path and len(transplant.places) == 1
-    assembly = assemble(path)
+    assert path and len(transplant.replaced_components) == 1
+    assembly = prepare(path)
     try:
-        place = transplant.places[0]
+        place = transplant.replaced_components[0]
         assert any(component == place or component.startswith(f"{place}.") for component in assembly.system.components)
         assert str(min(role.controllers)) in {str(file) for file in assembly.files().values()}
     finally:
@@ -60,30 +60,32 @@ def test_it_can_be_put_back_into_a_scenario(name, tmp_path):
 
 def test_a_scenario_without_the_role_is_left_alone(tmp_path):
     role = read_role("usv_autopilot")
-    candidate = source(str(min(role.controllers)))
+    candidate = parse_source(str(min(role.controllers)))
     scenario = ROOT / "scenarios/demo3_inverse_kinematics.json"
-    assert Transplant(role, candidate, interface(candidate), scenario).write(tmp_path) is None
+    assert ControllerSubstitution(role, candidate, read_interface(candidate), scenario).write(tmp_path) is None
     assert list(tmp_path.iterdir()) == []
 
 
 def test_other_json_is_no_scenario_and_a_bad_one_is_refused(tmp_path):
     role = read_role("usv_autopilot")
-    candidate = source(str(min(role.controllers)))
-    shape = interface(candidate)
+    candidate = parse_source(str(min(role.controllers)))
+    shape = read_interface(candidate)
     (tmp_path / "data.json").write_text('{"checks": []}')
-    assert Transplant(role, candidate, shape, tmp_path / "data.json").write(tmp_path / "out") is None
+    assert ControllerSubstitution(role, candidate, shape, tmp_path / "data.json").write(tmp_path / "out") is None
     (tmp_path / "bad.json").write_text('{"name": "bad", "components": {"a": {"fmu": 5}}}')
     with pytest.raises(InputError, match=r"bad.json:1:.*components.a.fmu"):
-        Transplant(role, candidate, shape, tmp_path / "bad.json").write(tmp_path / "out")
+        ControllerSubstitution(role, candidate, shape, tmp_path / "bad.json").write(tmp_path / "out")
 
 
 def test_ports_that_lead_nowhere_disappear_with_what_sets_them(tmp_path):
     """The cascade as one FMU shows no port `landing_time`: it is a parameter of the nested system around it."""
     keeper = tmp_path / "bare.py"
     keeper.write_text(BARE)
-    candidate = source(f"{keeper}:Bare")
+    candidate = parse_source(f"{keeper}:Bare")
     scenario = ROOT / "scenarios/performance_5.json"
-    path = Transplant(read_role("uav_controller"), candidate, interface(candidate), scenario).write(tmp_path / "out")
+    path = ControllerSubstitution(read_role("uav_controller"), candidate, read_interface(candidate), scenario).write(
+        tmp_path / "out"
+    )
     assert path is not None
     written = json.loads(path.read_text())
     assert written["components"]["demo1"]["parameters"] == {}
@@ -91,16 +93,16 @@ def test_ports_that_lead_nowhere_disappear_with_what_sets_them(tmp_path):
     assert nested["ports"] == {"parameters": {}}
     assert nested["components"]["uav"]["python"] == f"{keeper}:Bare"
     assert {each["to"].split(".")[0] for each in nested["connections"]} == {"plant", "usv"}
-    assemble(path).free()
+    prepare(path).free()
 
 
 def test_scenarios_do_not_share_their_changed_systems(tmp_path):
     """Both have a `uav` with a position controller in it, in systems with different parameters."""
-    candidate = source(str(ROOT / "fmus/python/position_controller.fmu"))
-    shape, role = interface(candidate), read_role("uav_position")
+    candidate = parse_source(str(ROOT / "fmus/python/position_controller.fmu"))
+    shape, role = read_interface(candidate), read_role("uav_position")
     systems = []
     for name in ("demo1_box", "demo2_sweep"):
-        path = Transplant(role, candidate, shape, ROOT / f"scenarios/{name}.json").write(tmp_path)
+        path = ControllerSubstitution(role, candidate, shape, ROOT / f"scenarios/{name}.json").write(tmp_path)
         assert path is not None
         systems.append(json.loads(path.read_text())["components"]["uav"]["system"])
     assert systems[0] != systems[1]
@@ -124,7 +126,7 @@ def test_scenarios_do_not_share_their_changed_systems(tmp_path):
     ],
 )
 def test_verdicts(value, other, sense, expected):
-    assert verdict(value, other, sense) == expected
+    assert compare_values(value, other, sense) == expected
 
 
 def test_checks_say_what_is_better_where_the_function_does_not():
@@ -134,12 +136,12 @@ def test_checks_say_what_is_better_where_the_function_does_not():
         {"kpi": "c.v", "min": 0, "max": 1},
         {"kpi": "d.v", "equals": True},
     ]
-    assert senses({"b.v": "lower"}, checks) == {"a.v": "lower", "b.v": "lower", "d.v": "higher"}
+    assert merge_senses({"b.v": "lower"}, checks) == {"a.v": "lower", "b.v": "lower", "d.v": "higher"}
 
 
 def test_kpis_that_others_lack_are_shown_without_a_verdict():
-    candidate = Scores({"a.v": 1.0, "b.v": 2.0}, {"a.v": "m"}, {"a.v": "lower", "b.v": "lower"})
-    first, second = rows(candidate, Scores({"a.v": 0.5}, {}, {}), None, [])
+    candidate = RunKpis({"a.v": 1.0, "b.v": 2.0}, {"a.v": "m"}, {"a.v": "lower", "b.v": "lower"})
+    first, second = compare_kpis(candidate, RunKpis({"a.v": 0.5}, {}, {}), None, [])
     assert (first.unit, first.shipped, first.against_shipped, first.last) == ("m", 0.5, "worse", None)
     assert (second.shipped, second.against_shipped) == (None, "")
 
@@ -157,7 +159,7 @@ def test_a_run_is_current_until_a_file_of_it_changes(tmp_path):
 
 
 def candidate_of(inputs=(), outputs=(), parameters=()):
-    return Interface(*({name: Variable(name) for name in names} for names in (inputs, outputs, parameters)))
+    return CandidateInterface(*({name: Variable(name) for name in names} for names in (inputs, outputs, parameters)))
 
 
 @pytest.mark.parametrize(
@@ -173,12 +175,12 @@ def candidate_of(inputs=(), outputs=(), parameters=()):
     ],
 )
 def test_misfits_are_named(found, message):
-    assert message in problems(read_role("usv_autopilot"), found)[0].message
+    assert message in interface_problems(read_role("usv_autopilot"), found)[0].message
 
 
 def test_what_is_set_has_to_be_a_variable():
     found = candidate_of(outputs=["thrust", "rudder_angle"], parameters=["heading_P", "waypoint_x[1]"])
-    (problem,) = problems(read_role("usv_autopilot"), found, ["heading_p", "waypoint_x", "heading_P"])
+    (problem,) = interface_problems(read_role("usv_autopilot"), found, ["heading_p", "waypoint_x", "heading_P"])
     assert problem.message == 'it has no variable "heading_p"; did you mean "heading_P"?'
 
 
@@ -187,9 +189,9 @@ def test_what_is_set_has_to_be_a_variable():
     [
         (read_role, "usv_autopilo", 'there is no role "usv_autopilo"; did you mean "usv_autopilot"?'),
         (read_role, "captain", 'there is no role "captain"; valid: uav_altitude, '),
-        (source, "none.fmu", 'there is no file "none.fmu"'),
-        (source, "lazy.json:Pilot", "expected my.fmu, my.py:Class, my.mo:Model or a nested system my.json"),
-        (source, "lazy.py", "expected my.fmu, my.py:Class, my.mo:Model or a nested system my.json"),
+        (parse_source, "none.fmu", 'there is no file "none.fmu"'),
+        (parse_source, "lazy.json:Pilot", "expected my.fmu, my.py:Class, my.mo:Model or a nested system my.json"),
+        (parse_source, "lazy.py", "expected my.fmu, my.py:Class, my.mo:Model or a nested system my.json"),
     ],
 )
 def test_wrong_words_are_refused(function, text, message):

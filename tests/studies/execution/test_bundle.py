@@ -2,11 +2,11 @@
 
 import pytest
 
-from cosim.studies.execution.bundle import bundle
+from cosim.studies.execution.bundle import collect_bundle
 
 
 def files(lag, settings):
-    return set(bundle(lag.folder / "lag.json", [settings]).files)
+    return set(collect_bundle(lag.folder / "lag.json", [settings]).files)
 
 
 @pytest.mark.parametrize("settings", [{"/components/lag/parameters": {"fault": "table.txt"}}, {"lag.fault": "table.txt"}])

@@ -3,17 +3,17 @@
 import pytest
 
 from cosim.core.errors import InputError
-from cosim.studies.execution.job import Job, Record, key
-from cosim.studies.execution.run_store import FILE, Ledger
+from cosim.studies.execution.job import Job, Record, run_key
+from cosim.studies.execution.run_store import RUN_STORE_FILE, RunStore
 
-KEYS = [key("scenario", {"run": run}) for run in range(4)]
+KEYS = [run_key("scenario", {"run": run}) for run in range(4)]
 
 
 def filled(folder, *records):
-    with Ledger(folder) as ledger:
+    with RunStore(folder) as ledger:
         for record in records:
             ledger.add(record)
-    return folder / FILE
+    return folder / RUN_STORE_FILE
 
 
 def test_records_are_found_again(tmp_path):
@@ -22,7 +22,7 @@ def test_records_are_found_again(tmp_path):
         Record(KEYS[1], failure="no", output="x\ny"),
     ]
     filled(tmp_path, *records)
-    with Ledger(tmp_path) as ledger:
+    with RunStore(tmp_path) as ledger:
         assert [ledger[key] for key in KEYS[:2]] == records
         assert [key in ledger for key in KEYS] == [True, True, False, False]
 
@@ -33,7 +33,7 @@ def test_a_line_that_was_not_finished_is_cut_off(tmp_path):
     for length in range(len(whole) - 1, whole.index(b"\n"), -7):
         file.write_bytes(whole[:length])
         filled(tmp_path, Record(KEYS[1], {"a": 3.0}))
-        with Ledger(tmp_path) as ledger:
+        with RunStore(tmp_path) as ledger:
             assert [ledger[key].kpis["a"] for key in KEYS[:2]] == [1.0, 3.0]
 
 
@@ -42,48 +42,48 @@ def test_a_line_that_cannot_be_read_costs_no_other_one(tmp_path, line):
     file = filled(tmp_path, Record(KEYS[0], {"a": 1.0}))
     file.write_bytes(file.read_bytes() + line + b"\n")
     filled(tmp_path, Record(KEYS[1], {"a": 2.0}))
-    with Ledger(tmp_path) as ledger:
+    with RunStore(tmp_path) as ledger:
         assert [ledger[key].kpis["a"] for key in KEYS[:2]] == [1.0, 2.0]
-        assert ledger.unreadable == 1
+        assert ledger.unreadable_lines == 1
 
 
 @pytest.mark.parametrize("content", [b"notes\nof mine\n", b"notes", b'{"time": 1}\n'])
 def test_a_foreign_file_is_left_alone(tmp_path, content):
-    (tmp_path / FILE).write_bytes(content)
+    (tmp_path / RUN_STORE_FILE).write_bytes(content)
     with pytest.raises(InputError, match="is no file of finished runs"):
-        Ledger(tmp_path)
-    assert (tmp_path / FILE).read_bytes() == content
+        RunStore(tmp_path)
+    assert (tmp_path / RUN_STORE_FILE).read_bytes() == content
 
 
 def test_of_a_first_line_nothing_may_be_left(tmp_path):
-    (tmp_path / FILE).write_bytes(b'{"key": "0123')
+    (tmp_path / RUN_STORE_FILE).write_bytes(b'{"key": "0123')
     filled(tmp_path, Record(KEYS[0]))
-    with Ledger(tmp_path) as ledger:
+    with RunStore(tmp_path) as ledger:
         assert KEYS[0] in ledger
 
 
 def test_jobs_are_asked_for_once(tmp_path):
     filled(tmp_path, Record(KEYS[0]))
-    with Ledger(tmp_path) as ledger:
+    with RunStore(tmp_path) as ledger:
         jobs = [Job(KEYS[n], {}) for n in (0, 1, 2, 1)]
-        assert [job.key for job in ledger.open_jobs(jobs)] == [KEYS[1], KEYS[2]]
+        assert [job.key for job in ledger.claim_jobs(jobs)] == [KEYS[1], KEYS[2]]
 
 
 def test_failures_are_open_when_they_are_to_be_tried_again(tmp_path):
     filled(tmp_path, Record(KEYS[0], {"a": 1}), Record(KEYS[1], failure="no"))
-    with Ledger(tmp_path, retry=True) as ledger:
+    with RunStore(tmp_path, retry_failed=True) as ledger:
         assert [key in ledger for key in KEYS[:2]] == [True, False]
         ledger.add(Record(KEYS[1], {"a": 2}))
-    with Ledger(tmp_path) as ledger:
+    with RunStore(tmp_path) as ledger:
         assert ledger[KEYS[1]] == Record(KEYS[1], {"a": 2})
 
 
 def test_a_folder_has_one_sweep_at_a_time(tmp_path):
-    with Ledger(tmp_path), pytest.raises(InputError, match="another sweep is writing to"):
-        Ledger(tmp_path)
-    Ledger(tmp_path).__enter__().__exit__()
+    with RunStore(tmp_path), pytest.raises(InputError, match="another sweep is writing to"):
+        RunStore(tmp_path)
+    RunStore(tmp_path).__enter__().__exit__()
 
 
 def test_a_key_depends_on_files_and_settings_and_not_on_their_order():
-    assert key("a", {"x": 1, "y": 2}) == key("a", {"y": 2, "x": 1})
-    assert len({key("a", {"x": 1}), key("b", {"x": 1}), key("a", {"x": 2}), key("a", {"z": 1})}) == 4
+    assert run_key("a", {"x": 1, "y": 2}) == run_key("a", {"y": 2, "x": 1})
+    assert len({run_key("a", {"x": 1}), run_key("b", {"x": 1}), run_key("a", {"x": 2}), run_key("a", {"z": 1})}) == 4

@@ -8,29 +8,29 @@ from scipy import stats
 
 from cosim.studies.design import Point
 from cosim.studies.execution.job import Record
-from cosim.studies.summary.statistics import Group, causes, groups, wilson
-from cosim.studies.sweep import Row
+from cosim.studies.summary.statistics import RunGroup, failure_causes, group_rows, wilson_interval
+from cosim.studies.sweep import SweepRow
 
 
 @pytest.mark.parametrize(("successes", "count"), [(0, 10), (1, 10), (7, 9), (50, 1000), (10, 10)])
 def test_intervals_are_those_of_scipy(successes, count):
     expected = stats.binomtest(successes, count).proportion_ci(0.95, method="wilson")
-    assert wilson(successes, count) == pytest.approx((expected.low, expected.high), abs=1e-12)
+    assert wilson_interval(successes, count) == pytest.approx((expected.low, expected.high), abs=1e-12)
 
 
 def test_nothing_is_known_without_runs():
-    assert wilson(0, 0) == (0.0, 1.0)
+    assert wilson_interval(0, 0) == (0.0, 1.0)
 
 
 def row(run, value, label="a", failure=""):
-    return Row(
+    return SweepRow(
         run, Point({"f": label}, {}), Record(str(run), {} if failure else {"k": value}, failure), not failure and value < 5
     )
 
 
 def test_statistics_are_those_of_the_finite_values():
     values = [3.0, 9.0, float("nan"), 4.0, float("inf"), 1.0]
-    (group,) = groups(lambda: [row(run, value) for run, value in enumerate(values)], [])
+    (group,) = group_rows(lambda: [row(run, value) for run, value in enumerate(values)], [])
     ((name, found),) = group.statistics()
     finite = np.array([3.0, 9.0, 4.0, 1.0])
     expected = {"count": 4, "mean": 4.25, "std": finite.std(ddof=1), "min": 1, "median": 3.5, "max": 9}
@@ -40,19 +40,22 @@ def test_statistics_are_those_of_the_finite_values():
 
 
 def test_groups_come_in_the_order_of_the_runs_and_failures_count():
-    found = groups(lambda: [row(0, 1.0, "b"), row(1, 9.0, "a"), row(2, 0.0, "b", "broken")], ["f"])
-    assert [(g.labels["f"], g.runs, g.failed, g.passed, g.rate) for g in found] == [("b", 2, 1, 1, 0.5), ("a", 1, 0, 0, 0.0)]
+    found = group_rows(lambda: [row(0, 1.0, "b"), row(1, 9.0, "a"), row(2, 0.0, "b", "broken")], ["f"])
+    assert [(g.labels["f"], g.runs, g.failed, g.passed, g.success_rate) for g in found] == [
+        ("b", 2, 1, 1, 0.5),
+        ("a", 1, 0, 0, 0.0),
+    ]
 
 
 def test_a_run_that_several_points_have_counts_once_in_intervals():
     """Eight points of each group, and two runs, the same in both: one of them is a success."""
     rows = [replace(row(run, 9 * (run % 2), "ab"[run // 8]), record=Record(str(run % 2), {}), shared=True) for run in range(16)]
-    for group in groups(lambda: rows, ["f"]):
-        assert (group.runs, group.distinct, group.rate, group.interval) == (8, 2, 0.5, wilson(1, 2))
+    for group in group_rows(lambda: rows, ["f"]):
+        assert (group.runs, group.distinct, group.success_rate, group.interval) == (8, 2, 0.5, wilson_interval(1, 2))
 
 
 def test_one_value_has_no_spread():
-    group = Group({})
+    group = RunGroup({})
     group.add(row(0, 2.0))
     ((_, found),) = group.statistics()
     assert np.isnan(found["std"])
@@ -60,4 +63,4 @@ def test_one_value_has_no_spread():
 
 def test_the_most_frequent_cause_comes_first():
     rows = [row(0, 0, failure="x"), row(1, 0, failure="y"), row(2, 1.0), row(3, 0, failure="y")]
-    assert causes(rows) == [("y", 2, 1), ("x", 1, 0)]
+    assert failure_causes(rows) == [("y", 2, 1), ("x", 1, 0)]

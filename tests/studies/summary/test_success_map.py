@@ -13,12 +13,12 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
 from cosim.core.errors import InputError
-from cosim.report.figures import style, svg
+from cosim.report.figures import figure_style, figure_to_svg
 from cosim.studies.execution.job import Record
-from cosim.studies.summary.statistics import wilson
+from cosim.studies.summary.statistics import wilson_interval
 from cosim.studies.summary.success_map import success_maps
 from cosim.studies.summary.success_map_figure import draw_map
-from cosim.studies.sweep import Row, Sweep
+from cosim.studies.sweep import Sweep, SweepRow
 
 SPEED = {"name": "speed", "set": "usv.speed_command", "values": [0.5, 1.0]}
 CONTROLLER = {"name": "controller", "levels": {"old": {}, "new": {"uav.vtol.landing_time": 8.0}}}
@@ -30,14 +30,14 @@ def sweep_of(folder, **more):
     content = {"name": "s", "scenario": "demo1_box", "factors": [CONTROLLER, SPEED], "seeds": SEEDS, "success": [LIMIT]}
     content = {**content, "maps": [{"x": "speed", "y": "controller"}], **more}
     (folder / "s.json").write_text(json.dumps(content))
-    return Sweep.of(folder / "s.json")
+    return Sweep.from_file(folder / "s.json")
 
 
 def rows(sweep, errors):
     """Runs with these lateral errors; None is a run that crashed."""
     for run, error in errors.items():
         record = Record(str(run), {} if error is None else {"landing.lateral_error": error}, "crashed" if error is None else "")
-        yield Row(run, sweep.design[run], record, error is not None and error <= 0.1)
+        yield SweepRow(run, sweep.design[run], record, error is not None and error <= 0.1)
 
 
 #: the runs of (old, 0.5), (old, 1.0) and (new, 0.5); those of (new, 1.0) are not made yet
@@ -75,7 +75,7 @@ def test_panels_tell_further_factors_apart(tmp_path):
     sweep = sweep_of(tmp_path, maps=[{"x": "speed", "y": "seed", "columns": "controller"}, {"x": "seed", "y": "speed"}])
     panels, flat = success_maps(sweep, rows(sweep, ERRORS))
     assert [each.name for each in (panels, flat)] == ["success_map_1", "success_map_2"]
-    assert panels.along("seed") == [1, 2, 3]
+    assert panels.axis_labels("seed") == [1, 2, 3]
     assert [run.number for run in panels.cell(None, "old", 2, 1.0).runs] == [4]
     assert [run.number for run in flat.cell(None, None, 0.5, 3).runs] == [2, 8]
 
@@ -87,14 +87,14 @@ def test_a_run_that_several_points_have_counts_once_in_intervals(tmp_path):
     sweep = sweep_of(tmp_path, factors=factors, seeds=None)
     (found,) = success_maps(sweep, rows(sweep, {0: 0.01, 1: 0.01}))
     cell = found.cell(None, None, "old", 0.5)
-    assert (cell.share, cell.interval) == (1.0, wilson(1, 1))
+    assert (cell.success_rate, cell.interval) == (1.0, wilson_interval(1, 1))
 
 
 def test_levels_that_are_nothing_or_equal_in_python_have_cells_of_their_own(tmp_path):
     speeds = SPEED | {"set": "/components/usv/period", "values": [None, 1, 1.0]}
     sweep = sweep_of(tmp_path, factors=[CONTROLLER, speeds], seeds=None)
     (found,) = success_maps(sweep, rows(sweep, dict(enumerate([0.1, 0.2, 0.3]))))
-    assert [[run.number for run in found.cell(None, None, "old", x).runs] for x in found.along("speed")] == [[0], [1], [2]]
+    assert [[run.number for run in found.cell(None, None, "old", x).runs] for x in found.axis_labels("speed")] == [[0], [1], [2]]
     draw_map(found)
 
 
@@ -140,7 +140,7 @@ CROWDED = {
 def test_texts_lie_inside_the_figure_and_beside_each_other(tmp_path, name):
     factors, spec = CROWDED[name]
     (found,) = success_maps(sweep_of(tmp_path, factors=factors, maps=[spec]), [])
-    with style():
+    with figure_style():
         figure = draw_map(found)
         FigureCanvasAgg(figure).draw()
         texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text()]
@@ -153,7 +153,9 @@ def test_texts_lie_inside_the_figure_and_beside_each_other(tmp_path, name):
 
 
 def test_in_svg_every_cell_with_a_run_is_a_link(success_map):
-    text = svg(draw_map(success_map, lambda cell: f"run-{cell.shown.number}" if cell.shown else ""))
+    text = figure_to_svg(
+        draw_map(success_map, lambda cell: f"run-{cell.representative_run.number}" if cell.representative_run else "")
+    )
     assert re.findall('xlink:href="(run[^"]*)"', text) == ["run-2", "run-4", "run-6"]
 
 

@@ -4,14 +4,14 @@ import re
 from html.parser import HTMLParser
 
 import pytest
-from lag_sweeps import SEGV
+from lag_sweeps import SEGV_ORDER
 
-from cosim.studies.summary.page import _design
+from cosim.studies.summary.page import _design_rows
 from cosim.studies.sweep import Sweep
 
 #: a run that ends above 0.2 is no success; the last one crashes
 STARTS = {"name": "start", "levels": {"low": {"lag.y_start": 1.0}, "high": {"lag.y_start": 3.0}}}
-TIMES = {"name": "T", "levels": {"quick": {"lag.T": 0.05}, "never": {"lag.T": 0.5, "lag.fault": SEGV}}}
+TIMES = {"name": "T", "levels": {"quick": {"lag.T": 0.05}, "never": {"lag.T": 0.5, "lag.fault": SEGV_ORDER}}}
 STUDY = {
     "factors": [STARTS, TIMES],
     "settings": {"/record": {"signals": ["lag.y"], "interval": 0.05}},
@@ -117,6 +117,6 @@ def test_a_replay_is_made_once(lag, replayed, results):
 @pytest.mark.parametrize("design", [{"kind": "full_factorial"}, {"kind": "latin_hypercube", "runs": 4}])
 def test_of_many_levels_the_ends_are_shown(lag, design):
     normal = {"name": "start", "set": "lag.y_start", "distribution": {"kind": "normal", "mean": 0, "std": 1, "count": 24}}
-    sweep = Sweep.of(lag.write("many", factors=[normal], design=design))
+    sweep = Sweep.from_file(lag.write("many", factors=[normal], design=design))
     levels = [point.labels["start"] for point in sweep.design]
-    assert dict(_design(sweep))["start"] == f"{min(levels):.4g} ... {max(levels):.4g}"
+    assert dict(_design_rows(sweep))["start"] == f"{min(levels):.4g} ... {max(levels):.4g}"

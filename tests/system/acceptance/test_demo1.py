@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import cosim
-from cosim.api import checks
+from cosim.api import evaluate_scenario_checks
 from cosim.core import resources
 
 
@@ -22,7 +22,7 @@ def demo():
 
 def test_every_check_is_met(demo):
     assembly, result = demo
-    outcomes = checks(assembly, result)
+    outcomes = evaluate_scenario_checks(assembly, result)
     assert len(outcomes) == 5
     assert [outcome.check["kpi"] for outcome in outcomes if not outcome.passed] == []
 

@@ -5,14 +5,14 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
-from helpers import run, system
+from helpers import make_system, run_system
 
 import cosim
-from cosim.api import checks, execute
-from cosim.components.fmi import FmuFile, instantiate
+from cosim.api import evaluate_scenario_checks, execute
+from cosim.components.fmi import FmuFile, create_component
 from cosim.core import resources
 from cosim.core.system import Endpoint
-from cosim.core.time_grid import exact
+from cosim.core.time_grid import exact_fraction
 from cosim.engine.run_loop import Settings, simulate
 
 FMUS = sorted(resources.root().glob("fmus/**/*.fmu"))
@@ -33,7 +33,7 @@ def test_fmpy_finds_no_problem(path):
 
 @pytest.mark.parametrize("path", FMUS, ids=label)
 def test_start_values_are_those_of_the_description(path):
-    component = instantiate(FmuFile(path), "fmu")
+    component = create_component(FmuFile(path), "fmu")
     seen = {}
 
     class Look:
@@ -44,7 +44,7 @@ def test_start_values_are_those_of_the_description(path):
             seen.update({v.name: (component.get(v.name), v.start) for v in component.variables if v.start is not None})
             component.exit_initialization_mode()
 
-    run(system({"fmu": Look()}), 0.01, 0.01)
+    run_system(make_system({"fmu": Look()}), 0.01, 0.01)
     assert {name: tuple(np.atleast_1d(found)) for name, (found, _) in seen.items()} == {
         name: tuple(np.atleast_1d(start)) for name, (_, start) in seen.items()
     }
@@ -59,9 +59,12 @@ def test_fmus_are_finite_and_repeat_themselves(path):
 
 def outputs_over_a_second(path):
     file = FmuFile(path)
-    names = [slot for v in file.description.variables if v.causality == "output" for slot in v.slots]
+    names = [slot for v in file.description.variables if v.causality == "output" for slot in v.scalar_names]
     columns = {name: Endpoint("fmu", name) for name in names}
-    outcome = simulate(system({"fmu": instantiate(file, "fmu")}), Settings(exact(0), exact(1), exact(0.01), columns))
+    outcome = simulate(
+        make_system({"fmu": create_component(file, "fmu")}),
+        Settings(exact_fraction(0), exact_fraction(1), exact_fraction(0.01), columns),
+    )
     assert outcome.failure is None
     return np.array([outcome.recording.columns[name].astype(float) for name in names])
 
@@ -90,7 +93,7 @@ def test_scenarios_run_for_two_seconds(path):
 @pytest.mark.parametrize("path", SCENARIOS, ids=label)
 def test_scenarios_meet_their_checks(path):
     assembly = cosim.load(path)
-    outcomes = checks(assembly, execute(assembly))
+    outcomes = evaluate_scenario_checks(assembly, execute(assembly))
     assert outcomes
     assert [(outcome.check, outcome.value) for outcome in outcomes if not outcome.passed] == []
 

@@ -9,7 +9,7 @@ WARNING, ERROR, FATAL = 1, 3, 4
 #: what is still allowed after an error
 AFTER_ERROR = ("FreeInstance", "Reset", "SetFMUstate", "SetFMUState")
 #: letters of the life cycle: instantiate, set, get, setup, enter and exit initialization, step, terminate, free, logging
-LETTERS = {
+CALL_LETTERS = {
     "Instantiate": "I",
     "SetupExperiment": "u",
     "SetDebugLogging": "l",
@@ -19,7 +19,7 @@ LETTERS = {
     "Terminate": "T",
     "FreeInstance": "F",
 }
-LIFE = {
+LIFE_CYCLE = {
     2: re.compile(r"I[sl]*u[s]*E[sg]*Xg*(s*Dg*)*s*TF"),
     3: re.compile(r"I[sl]*E[sg]*Xg*(s*Dg*)*s*TF"),
 }
@@ -37,10 +37,10 @@ def calls(lines: Iterable[str]) -> Iterator[tuple[str, str]]:
 
 def letter(function: str) -> str:
     name = function.removesuffix("CoSimulation")
-    return LETTERS.get(name, "s" if name.startswith("Set") else "g" if name.startswith("Get") else "?")
+    return CALL_LETTERS.get(name, "s" if name.startswith("Set") else "g" if name.startswith("Get") else "?")
 
 
-def life(lines: Iterable[str]) -> str:
+def life_cycle(lines: Iterable[str]) -> str:
     """The life of the FMU's only instance as a word of letters."""
     return "".join(
         letter(function) for _, function in calls(lines) if not function.startswith(("status", "GetTypes", "GetVersion"))
@@ -49,7 +49,7 @@ def life(lines: Iterable[str]) -> str:
 
 def violations(lines: Sequence[str]) -> list[str]:
     """Every call that a rule forbids; empty for an obedient importer."""
-    return [*_after_bad_status(lines), *_get_after_set(lines), *_times(lines)]
+    return [*_after_bad_status(lines), *_get_after_set(lines), *_time_violations(lines)]
 
 
 def _after_bad_status(lines: Sequence[str]) -> Iterator[str]:
@@ -78,7 +78,7 @@ def _get_after_set(lines: Sequence[str]) -> Iterator[str]:
             yield f"{who}: {what} after a Set without DoStep"
 
 
-def _times(lines: Sequence[str]) -> Iterator[str]:
+def _time_violations(lines: Sequence[str]) -> Iterator[str]:
     """Each step starts where the last one ended, to the last bit of one addition."""
     ends: dict[str, float] = {}
     for line in lines:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from fault_fmu import FaultFmus, build_library
-from fault_runs import Runner
+from fault_runs import CommandRunner
 
 
 @pytest.fixture(scope="session")
@@ -28,7 +28,7 @@ def version(request: pytest.FixtureRequest) -> int:
 
 
 @pytest.fixture(scope="session")
-def runner() -> Iterator[Runner]:
-    runner = Runner()
+def runner() -> Iterator[CommandRunner]:
+    runner = CommandRunner()
     yield runner
     runner.close()

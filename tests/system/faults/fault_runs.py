@@ -19,7 +19,7 @@ CONDITIONS = {"limit": 60, "stdin": os.devnull, "sandbox": None, "executor": "au
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CommandResult:
     """Exit code and wall time (s) of a command, ids of processes that outlived it, and what stands in its folder."""
 
     folder: Path
@@ -49,12 +49,12 @@ class Outcome:
         return report.read_text().splitlines() if report.exists() else ["the process ended early"]
 
     @cached_property
-    def temporaries(self) -> list[str]:
+    def temporary_files(self) -> list[str]:
         """What was left in the folder for temporary files."""
         return sorted(path.name for path in (self.folder / "tmp").iterdir())
 
 
-class Runner:
+class CommandRunner:
     """Runs commands in processes forked from one that has imported everything; or anew, by `python -m cosim`."""
 
     def __init__(self) -> None:
@@ -64,19 +64,19 @@ class Runner:
     def close(self) -> None:
         self._server.communicate()
 
-    def cosim(self, folder: Path, *arguments: object, **conditions: Any) -> Outcome:
+    def cosim(self, folder: Path, *arguments: object, **conditions: Any) -> CommandResult:
         """A command in `folder`, with temporary files in folder/tmp, under conditions other than CONDITIONS."""
         (folder / "tmp").mkdir(exist_ok=True)
         request = {**CONDITIONS, **conditions, "arguments": [*map(str, arguments)], "folder": str(folder)}
         assert self._server.stdin is not None and self._server.stdout is not None
         print(json.dumps(request), file=self._server.stdin, flush=True)
-        return Outcome(folder, **json.loads(self._server.stdout.readline()))
+        return CommandResult(folder, **json.loads(self._server.stdout.readline()))
 
-    def run(self, folder: Path, fmu: Path, deadlines: dict[str, float] | None = None, **conditions: Any) -> Outcome:
+    def run(self, folder: Path, fmu: Path, deadlines: dict[str, float] | None = None, **conditions: Any) -> CommandResult:
         """`cosim run` of a scenario around the FMU; results in folder/out."""
         words = ("run", scenario(folder, fmu, deadlines), "--output-dir", "out", "--no-report")
         return self.cosim(folder, *words, **conditions)
 
-    def simulate(self, folder: Path, fmu: Path, *words: str, **conditions: Any) -> Outcome:
+    def simulate(self, folder: Path, fmu: Path, *words: str, **conditions: Any) -> CommandResult:
         """`cosim simulate` of the FMU alone; results in folder/result.csv."""
         return self.cosim(folder, "simulate", fmu, "--output-file", "result.csv", *words, **conditions)

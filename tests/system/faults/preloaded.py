@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import Any
 
 from cosim.cli import main
-from cosim.engine import Kind, executor_kind, run_loop
-from cosim.process.sandbox import Settings, enter, interpreter_folders
+from cosim.engine import ExecutorKind, executor_class, run_loop
+from cosim.process.sandbox import SandboxSettings, enter_sandbox, interpreter_folders
 
 PRELOADED = (
     "api",
@@ -38,33 +38,33 @@ PRELOADED = (
 PR_SET_CHILD_SUBREAPER = 36
 
 
-def serve() -> dict[str, Any] | None:
+def serve_requests() -> dict[str, Any] | None:
     """Answer requests until the input ends; in a child that is to run a command, return the request."""
     for line in sys.stdin:
         request = json.loads(line)
         began = time.monotonic()
         child = os.fork()
         if child == 0:
-            prepare(**request)
+            prepare_child(**request)
             return dict(request)
-        code = outcome(child, began + request["limit"])
+        code = wait_for_exit(child, began + request["limit"])
         answer = {"code": code, "seconds": time.monotonic() - began, "processes": end_orphans()}
         print(json.dumps(answer), flush=True)
     return None
 
 
-def prepare(folder: str, stdin: str, executor: Kind, **_: Any) -> None:
+def prepare_child(folder: str, stdin: str, executor: ExecutorKind, **_: Any) -> None:
     os.setsid()
     os.chdir(folder)
     os.environ["TMPDIR"], tempfile.tempdir = str(Path(folder, "tmp")), None
-    run_loop.executor_kind = lambda kind: executor_kind(executor)
+    run_loop.executor_class = lambda kind: executor_class(executor)
     for number, name, flags in ((0, stdin, os.O_RDWR), (1, "stdout", os.O_WRONLY), (2, "stderr", os.O_WRONLY)):
         file = os.open(name, flags | os.O_CREAT, 0o666)
         os.dup2(file, number)
         os.close(file)
 
 
-def outcome(child: int, limit: float) -> int:
+def wait_for_exit(child: int, limit: float) -> int:
     """Exit code of the child, which is killed when it has not ended by the limit."""
     while True:
         ended, status = os.waitpid(child, os.WNOHANG)
@@ -92,11 +92,11 @@ def end_orphans(grace: float = 0.2) -> list[int]:
     return left
 
 
-def end(request: dict[str, Any]) -> None:
+def run_and_exit(request: dict[str, Any]) -> None:
     """Run the command and end like an interpreter, but for taking its modules apart, which takes longer than the command."""
     code = 0
     try:
-        confined(**request) if request["sandbox"] else observed(request["arguments"])
+        run_sandboxed(**request) if request["sandbox"] else run_observed(request["arguments"])
     except SystemExit as ended:
         code = ended.code if isinstance(ended.code, int) else 1
     atexit._run_exitfuncs()
@@ -105,7 +105,7 @@ def end(request: dict[str, Any]) -> None:
     os._exit(code)
 
 
-def state() -> dict[str, Any]:
+def process_state() -> dict[str, Any]:
     """What belongs to the whole process and no FMU may change."""
     own = ctypes.CDLL(None)
     own.getenv.restype = own.setlocale.restype = ctypes.c_char_p
@@ -125,20 +125,20 @@ def state() -> dict[str, Any]:
     }
 
 
-def confined(arguments: list[str], sandbox: dict[str, Any], **_: Any) -> None:
+def run_sandboxed(arguments: list[str], sandbox: dict[str, Any], **_: Any) -> None:
     """The command in a process that reads what Python needs and the folder, and writes only to the listed folders."""
     places = {"readable": (*interpreter_folders(), Path.cwd()), "writable": tuple(map(Path, sandbox.pop("writable")))}
-    enter(Settings(**places, **sandbox, confine="required"))
+    enter_sandbox(SandboxSettings(**places, **sandbox, confine="required"))
     main(arguments)
 
 
-def observed(arguments: list[str]) -> None:
+def run_observed(arguments: list[str]) -> None:
     """The command as `python -m cosim` runs it, and a report of what it changed."""
-    before, report = state(), Path("changes").absolute()
+    before, report = process_state(), Path("changes").absolute()
     try:
         main(arguments)
     finally:
-        after = state()
+        after = process_state()
         report.write_text("\n".join(f"{name}: {before[name]} -> {after[name]}" for name in before if before[name] != after[name]))
 
 
@@ -149,6 +149,6 @@ if __name__ == "__main__":
     for module in ("fmpy.fmi2", "fmpy.fmi3", "rich.console", "rich.table", "email.parser"):
         import_module(module)
     gc.freeze()
-    request = serve()
+    request = serve_requests()
     if request:
-        end(request)
+        run_and_exit(request)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from fault_fmu import COUNT
+from fault_fmu import STEP_COUNT
 
-from cosim.process.sandbox import available, landlock
+from cosim.process.sandbox import find_available_sandboxes, landlock
 
 MIB = 1 << 20
 pytestmark = pytest.mark.skipif(
-    available().landlock < landlock.NETWORK_VERSION, reason="this kernel cannot confine files and network (Linux 6.7)"
+    find_available_sandboxes().landlock < landlock.NETWORK_ABI, reason="this kernel cannot confine files and network (Linux 6.7)"
 )
 
 
@@ -34,7 +34,7 @@ def contained(fmus, runner, tmp_path, version):
 def test_a_good_fmu_notices_nothing(contained, tmp_path):
     done, _ = contained()
     assert done.code == 0, done.err
-    assert len((tmp_path / "results/result.csv").read_text().splitlines()) == COUNT + 2
+    assert len((tmp_path / "results/result.csv").read_text().splitlines()) == STEP_COUNT + 2
 
 
 def test_it_writes_to_no_other_folder(contained, tmp_path):

@@ -8,12 +8,12 @@ import sys
 from dataclasses import dataclass
 
 import pytest
-from fault_fmu import COUNT, function_name, scenario
-from fault_runs import Outcome
+from fault_fmu import STEP_COUNT, function_name, scenario
+from fault_runs import CommandResult
 
-from cosim.engine import available as native_available
+from cosim.engine import native_available as native_available
 
-ALL = COUNT + 1
+ALL = STEP_COUNT + 1
 #: a hang is found within its deadline and half a second; the process around it takes its time, too
 DEADLINES, SLACK = {"load": 0.5, "initialization": 0.5, "step": 0.5, "end": 0.5}, 3.0
 
@@ -38,12 +38,12 @@ def table(*cases: Case) -> pytest.MarkDecorator:
     return pytest.mark.parametrize(("case", "version"), chosen)
 
 
-def check(done: Outcome, case: Case, version: int) -> None:
+def check(done: CommandResult, case: Case, version: int) -> None:
     assert done.code == case.code, done.err
     assert len(done.rows) == case.rows, done.err
     assert case.words.format(f=function_name(version, case.order.split()[0])) in done.err
     assert "Traceback" not in done.err
-    assert [name for name in done.temporaries if name.startswith("cosim-")] == []
+    assert [name for name in done.temporary_files if name.startswith("cosim-")] == []
     assert (done.processes, done.changes) == ([], [])
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from fault_fmu import COUNT, scenario
+from fault_fmu import STEP_COUNT, scenario
 from test_fault_statuses import T5
 
-ALL = COUNT + 1
+ALL = STEP_COUNT + 1
 STEP = "lag: fmi3DoStep" + T5
 READ = "fmi3GetFloat64 failed at t = 0 s: status 3 (error): the number of values is not that of these variables"
 ARRAY = '<Dimension start="3"/>'

@@ -11,19 +11,19 @@ from typing import Any
 
 import pytest
 from call_rules import calls, violations
-from fault_fmu import COUNT, FaultFmus, lag_output, scenario
-from fault_runs import Outcome, Runner
+from fault_fmu import STEP_COUNT, FaultFmus, lag_output, scenario
+from fault_runs import CommandResult, CommandRunner
 from test_fault_crashes import ALL, CRASHES, DEADLINES, EXIT, FAILED, LATE, SIGNAL, SLACK, T5, Case, check, table
 
-from cosim.process.sandbox import available, landlock
+from cosim.process.sandbox import find_available_sandboxes, landlock
 
 needs_landlock = pytest.mark.skipif(
-    available().landlock < landlock.NETWORK_VERSION, reason="this kernel cannot confine files and network (Linux 6.7)"
+    find_available_sandboxes().landlock < landlock.NETWORK_ABI, reason="this kernel cannot confine files and network (Linux 6.7)"
 )
-needs_bubblewrap = pytest.mark.skipif(not available().bubblewrap, reason="no bubblewrap that works")
+needs_bubblewrap = pytest.mark.skipif(not find_available_sandboxes().bubblewrap, reason="no bubblewrap that works")
 
 
-def run(runner: Runner, folder: Path, components: dict[str, Any], *words: str, **more: Any) -> Outcome:
+def run(runner: CommandRunner, folder: Path, components: dict[str, Any], *words: str, **more: Any) -> CommandResult:
     """A run without supervisor whose components are in processes of their own."""
     conditions = {name: more.pop(name) for name in ("limit", "stdin", "executor") if name in more}
     apart = {name: {"fmu": str(fmu), "isolation": "fmu"} for name, fmu in components.items()}
@@ -102,7 +102,7 @@ def test_the_others_end_in_order(fmus, runner, tmp_path, version):
     assert f"second: fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.err
     assert [row["first.y"] for row in done.rows] == [lag_output(n) for n in range(6)]
     assert {who for who, what in calls(fmus.lines()) if what == "FreeInstance"} == {"first", "third"}
-    assert (done.processes, done.changes, done.temporaries) == ([], [], [])
+    assert (done.processes, done.changes, done.temporary_files) == ([], [], [])
 
 
 @pytest.mark.parametrize("order", ["GetReal 9 discard", "DoStep 3 error", "DoStep 3 fatal", "EnterInitializationMode 1 fatal"])
@@ -170,8 +170,8 @@ class TestSandbox:
 
     def test_a_good_fmu_notices_nothing(self, confined):
         done = confined("- 1 error", "--sandbox")
-        assert (done.code, len(done.rows)) == (0, COUNT + 1), done.err
-        assert [row["lag.y"] for row in done.rows] == [lag_output(n) for n in range(COUNT + 1)]
+        assert (done.code, len(done.rows)) == (0, STEP_COUNT + 1), done.err
+        assert [row["lag.y"] for row in done.rows] == [lag_output(n) for n in range(STEP_COUNT + 1)]
 
     @pytest.mark.parametrize(("words", "written"), [((), True), (("--sandbox",), False)], ids=["free", "sandbox"])
     def test_it_writes_to_no_folder_of_others(self, confined, tmp_path, words, written):

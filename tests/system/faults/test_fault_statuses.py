@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import pytest
-from fault_fmu import COUNT, function_name, lag_output, scenario
+from fault_fmu import STEP_COUNT, function_name, lag_output, scenario
 
 T5 = " failed at t = 0.05 s: "
 T8 = " failed at t = 0.08 s: "
@@ -23,8 +23,8 @@ class Case:
 
 
 CASES = [
-    Case("- 1 error", "", 0, COUNT + 1),
-    Case("DoStep 6 warning", "WARNING lag: told to return warning", 0, COUNT + 1),
+    Case("- 1 error", "", 0, STEP_COUNT + 1),
+    Case("DoStep 6 warning", "WARNING lag: told to return warning", 0, STEP_COUNT + 1),
     Case("DoStep 6 discard", "lag: {f}" + T5 + "status 2 (discard): told to return discard"),
     Case("DoStep 6 discard", "told to return discard; it says that it came to t = 0.05 s", versions=(2,)),
     Case("DoStep 6 error", "lag: {f}" + T5 + "status 3 (error): told to return error"),
@@ -40,15 +40,15 @@ CASES = [
     Case("GetReal 9 error", "lag: {f}" + T5 + "status 3 (error)"),
     Case("DoStep 6 terminate", "", 0, 7),
     Case("DoStep 6 early", "lag: do_step" + T5 + "reached only t = 0.055", versions=(3,)),
-    Case("DoStep 6 event", "", 0, COUNT + 1, versions=(3,)),
+    Case("DoStep 6 event", "", 0, STEP_COUNT + 1, versions=(3,)),
     Case("Instantiate 1 error", "lag: {f} failed: told to return error", rows=0),
     Case("EnterInitializationMode 1 error", "lag: {f} failed at t = 0 s: status 3 (error)", rows=0),
     Case("ExitInitializationMode 1 error", "lag: {f} failed at t = 0 s: status 3 (error)", rows=0),
-    Case("Terminate 1 error", "lag: {f} failed: status 3 (error)", rows=COUNT + 1),
-    Case("DoStep 6 log_directives", "WARNING lag: %s%s%n%d%f 100%", 0, COUNT + 1),
-    Case("DoStep 6 log_null", "WARNING lag:", 0, COUNT + 1),
-    Case("DoStep 6 log_bytes", "WARNING lag: bad \N{REPLACEMENT CHARACTER}", 0, COUNT + 1),
-    Case("DoStep 6 log_long", "WARNING lag: yyyy", 0, COUNT + 1),
+    Case("Terminate 1 error", "lag: {f} failed: status 3 (error)", rows=STEP_COUNT + 1),
+    Case("DoStep 6 log_directives", "WARNING lag: %s%s%n%d%f 100%", 0, STEP_COUNT + 1),
+    Case("DoStep 6 log_null", "WARNING lag:", 0, STEP_COUNT + 1),
+    Case("DoStep 6 log_bytes", "WARNING lag: bad \N{REPLACEMENT CHARACTER}", 0, STEP_COUNT + 1),
+    Case("DoStep 6 log_long", "WARNING lag: yyyy", 0, STEP_COUNT + 1),
 ]
 TABLE = [pytest.param(case, v, id=f"FMI{v} {case.order}") for case in CASES for v in case.versions]
 
@@ -93,7 +93,7 @@ def test_outputs_are_read_after_a_step_with_a_flag_too(fmus, runner, tmp_path, w
     words = ("run", file, "--output-dir", "out", "--no-report", "--isolation", isolation)
     done = runner.cosim(tmp_path, *words, executor=executor)
     assert done.code == 0, done.err
-    count = {"event": COUNT + 1, "terminate": 7}[what]
+    count = {"event": STEP_COUNT + 1, "terminate": 7}[what]
     assert [row["lag.y"] for row in done.rows] == [lag_output(n) for n in range(count)]
 
 
@@ -200,7 +200,7 @@ def test_a_floating_point_mode_that_comes_with_the_binary_is_changed_back(fmus, 
     done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", "--isolation", isolation)
     assert done.code == 0, done.err
     assert "WARNING lag: changed the floating-point mode of the process; it was changed back" in done.err
-    assert [row["lag.y"] for row in done.rows] == [lag_output(n) for n in range(COUNT + 1)]
+    assert [row["lag.y"] for row in done.rows] == [lag_output(n) for n in range(STEP_COUNT + 1)]
 
 
 @pytest.mark.parametrize("executor", ["python", "native"])

@@ -9,7 +9,7 @@ import re
 
 import pytest
 from call_rules import calls, violations
-from fault_fmu import COUNT, FaultFmus
+from fault_fmu import STEP_COUNT, FaultFmus
 
 RETURNS = ["warning", "discard", "error", "fatal", "nan"]
 CRASHES = ["segv", "exit_0", "sleep"]
@@ -43,7 +43,7 @@ def judge(fmus, runner, names: list[str], version: int, n: int, what: str, **con
     done = runner.run(fmus.folder, fmus(version, f"* {n} {what}"), deadlines=deadlines, limit=20, **conditions)
     where = f"{what} at call {n} ({name}): {done.err}"
     assert done.code in ((0,) if what in ("warning", "nan") else (0, 1) if name in LAST else (1,)), where
-    assert len(done.rows) == (expected_rows(names, n) if done.code and name not in LAST else COUNT + 1), where
+    assert len(done.rows) == (expected_rows(names, n) if done.code and name not in LAST else STEP_COUNT + 1), where
     assert done.code == 0 or re.search(r"^(WARNING |ERROR )?lag: ", done.err, re.MULTILINE), where
     assert violations(fmus.lines()) == [], where
     assert [folder for folder in done.temporaries if folder.startswith("cosim-")] == [], where
@@ -53,8 +53,8 @@ def judge(fmus, runner, names: list[str], version: int, n: int, what: str, **con
 def test_a_healthy_run_is_long_enough(healthy):
     """Otherwise the sweep would pass over nothing."""
     for version in (2, 3):
-        assert healthy[version].count("DoStep") == COUNT
-        assert expected_rows(healthy[version], len(healthy[version])) == COUNT + 1
+        assert healthy[version].count("DoStep") == STEP_COUNT
+        assert expected_rows(healthy[version], len(healthy[version])) == STEP_COUNT + 1
 
 
 @pytest.mark.parametrize("what", RETURNS + CRASHES)

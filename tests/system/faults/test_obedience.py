@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import pytest
-from call_rules import LIFE, calls, life, violations
-from fault_fmu import COUNT, scenario
+from call_rules import LIFE_CYCLE, calls, life_cycle, violations
+from fault_fmu import STEP_COUNT, scenario
 
 PLACES = ["Instantiate 1", "EnterInitializationMode 1", "ExitInitializationMode 1", "GetReal 1", "GetReal 9", "DoStep 6"]
 
 
 def test_a_life_is_as_the_standard_draws_it(fmus, runner, tmp_path, version):
     assert runner.run(tmp_path, fmus(version)).code == 0
-    assert LIFE[version].fullmatch(life(fmus.lines()))
+    assert LIFE_CYCLE[version].fullmatch(life_cycle(fmus.lines()))
     assert violations(fmus.lines()) == []
 
 
@@ -44,7 +44,7 @@ def test_inputs_are_set_before_a_step_and_read_only_after_it(fmus, runner, tmp_p
     assert violations(fmus.lines()) == []
     for name in ("lag", "twin"):
         own = [function for who, function in calls(fmus.lines()) if who == name]
-        assert own.count("DoStep") == COUNT
+        assert own.count("DoStep") == STEP_COUNT
 
 
 def test_the_first_step_starts_at_the_start_time(fmus, runner, tmp_path, version):
@@ -52,7 +52,7 @@ def test_the_first_step_starts_at_the_start_time(fmus, runner, tmp_path, version
     assert runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report").code == 0
     steps = [line for line in fmus.lines() if "DoStep" in line]
     assert steps[0].split()[2] == "t=2.5"
-    assert len(steps) == COUNT
+    assert len(steps) == STEP_COUNT
 
 
 def test_the_rules_find_what_is_forbidden():

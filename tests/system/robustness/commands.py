@@ -14,7 +14,7 @@ from typing import Any
 TICKER = Path(__file__).parent / "ticker.py"
 
 
-def until(condition: Callable[[], Any], limit: float = 30.0) -> Any:
+def wait_until(condition: Callable[[], Any], limit: float = 30.0) -> Any:
     """The first true value of a condition, or the last false one."""
     end = time.monotonic() + limit
     while not (value := condition()) and time.monotonic() < end:
@@ -22,7 +22,7 @@ def until(condition: Callable[[], Any], limit: float = 30.0) -> Any:
     return value
 
 
-class Workplace:
+class CommandFolder:
     """A folder to run commands in; temporary files go to its folder tmp, results to out."""
 
     def __init__(self, folder: Path):
@@ -54,18 +54,18 @@ class Workplace:
         out, err = process.communicate(timeout=100)
         return subprocess.CompletedProcess(process.args, process.returncode, out, err)
 
-    def reached(self, name: str) -> bool:
+    def wait_for_file(self, name: str) -> bool:
         """Wait for a file that a component makes."""
-        return bool(until((self.folder / name).exists))
+        return bool(wait_until((self.folder / name).exists))
 
     def processes(self) -> list[int]:
         """Processes that were started here and are still there."""
         mark = f"WORKPLACE={self.folder}\0".encode()
         return [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit() and mark in _environment(entry)]
 
-    def left(self) -> list[str]:
+    def leftovers(self) -> list[str]:
         """Everything that should not be there when a command has ended: processes, temporary files, hidden files."""
-        until(lambda: not self.processes(), 3.0)
+        wait_until(lambda: not self.processes(), 3.0)
         hidden = [path.name for path in self.folder.rglob(".*")]
         return [*map(str, self.processes()), *(path.name for path in self.tmp.iterdir()), *hidden]
 
@@ -77,7 +77,7 @@ def _environment(process: Path) -> bytes:
         return b""
 
 
-def children(process: int) -> list[int]:
+def child_processes(process: int) -> list[int]:
     try:
         return [int(word) for word in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
     except OSError:

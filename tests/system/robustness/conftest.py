@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from commands import Workplace
+from commands import CommandFolder
 
 
 @pytest.fixture
-def workplace(tmp_path: Path) -> Workplace:
-    return Workplace(tmp_path / "work")
+def workplace(tmp_path: Path) -> CommandFolder:
+    return CommandFolder(tmp_path / "work")

@@ -22,7 +22,7 @@ def picture(result):
     return Figure()
 """
 #: every key of the format is used once
-INNER: dict[str, Any] = {
+INNER_SYSTEM: dict[str, Any] = {
     "components": {"g": {"python": "blocks.py:Gain", "period": 1}, "h": {"python": "blocks.py:Gain"}},
     "connections": [{"from": "g.y", "to": "h.u", "delay": 1}],
     "algorithm": {"kind": "staged", "stages": [["g"], ["h"]]},
@@ -61,7 +61,7 @@ SCENARIO: dict[str, Any] = {
 }
 
 
-def furnish(folder: Path, probe: Path) -> Path:
+def write_scenario_files(folder: Path, probe: Path) -> Path:
     """The folder with the files that the scenario names; the scenario itself is not in it."""
     shutil.copy(BLOCKS, folder)
     shutil.copy(probe, folder / "probe.fmu")

@@ -16,10 +16,10 @@ from pathlib import Path
 
 import cosim
 
-NOTHING = {"/record": {"signals": []}, "/kpis": [], "/checks": [], "/figures": []}
+NO_OUTPUTS = {"/record": {"signals": []}, "/kpis": [], "/checks": [], "/figures": []}
 
 
-def inventory() -> dict[str, int]:
+def resource_usage() -> dict[str, int]:
     gc.collect()
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return {
@@ -35,28 +35,28 @@ def entries(folder: str) -> int:
     return sum(1 for _ in Path(folder).iterdir())
 
 
-def over_runs(scenario: str, count: int) -> list[dict[str, int]]:
+def measure_runs(scenario: str, count: int) -> list[dict[str, int]]:
     """After the first runs, in which caches and memory pools fill, and after as many as asked for."""
     looks, first = [], max(20, min(50, count // 2))
     for n in range(1, first + count + 1):
-        cosim.run(scenario, NOTHING | {"/record": {"signals": ["*"]}}, stop_time=0.05)
+        cosim.run(scenario, NO_OUTPUTS | {"/record": {"signals": ["*"]}}, stop_time=0.05)
         if n in (first, first + count):
-            looks.append(inventory())
+            looks.append(resource_usage())
     return looks
 
 
-def over_steps(scenario: str, count: int) -> list[dict[str, int]]:
+def measure_steps(scenario: str, count: int) -> list[dict[str, int]]:
     """After a tenth of the steps, and after all of them."""
     looks = []
 
     def look(finished: int, steps: int) -> None:
         if finished in (steps // 10, steps):
-            looks.append(inventory())
+            looks.append(resource_usage())
 
-    cosim.run(scenario, NOTHING, stop_time=str(Fraction(count, 100)), observers=[look])
+    cosim.run(scenario, NO_OUTPUTS, stop_time=str(Fraction(count, 100)), observers=[look])
     return looks
 
 
 if __name__ == "__main__":
-    before, after = {"runs": over_runs, "steps": over_steps}[sys.argv[2]](sys.argv[1], int(sys.argv[3]))
+    before, after = {"runs": measure_runs, "steps": measure_steps}[sys.argv[2]](sys.argv[1], int(sys.argv[3]))
     print(json.dumps({what: after[what] - before[what] for what in before}))

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 Path_ = tuple[Any, ...]
 
 #: what stands in scenarios by mistake or malice; text of a file is written from them by `json.dumps`, so NaN too
-ODD = (None, True, False, "", 0, -1, 1.5, -0.0, [], {}, [[]], [None], {"": None})
+ODD_VALUES = (None, True, False, "", 0, -1, 1.5, -0.0, [], {}, [[]], [None], {"": None})
 NUMBERS = ("NaN", "1/0", "1/60", "-1/3", "1e400", "0x10", "1e999999999", "9" * 5000, "1_0", float("nan"), float("inf"))
-LARGE = (1e308, 5e-324, 10**18, 10**400, 2**63, -(2**63) - 1)
+LARGE_NUMBERS = (1e308, 5e-324, 10**18, 10**400, 2**63, -(2**63) - 1)
 NAMES = ("a", "a.y", "inner.x", "b.u", "*", "**", ".", "..", "a.", ".y", "a.y.z", "a[1]", "a[", "$", "x" * 300)
 CHARACTERS = ("\0", "\ud800", "é", "\n", "\u202e")
 FILES = ("/", "/dev/null", "/dev/zero", "/proc/self/mem", "scenario.json", "inner.json", "blocks.py", "probe.fmu", "profile.csv")
@@ -26,45 +26,45 @@ FUNCTIONS = (
     "../blocks.py:Gain",
     "kpis.py:last",
 )
-TELLING = st.sampled_from((*ODD, *NUMBERS, *LARGE, *NAMES, *CHARACTERS, *FILES, *FUNCTIONS))
-SCALARS = st.one_of(st.integers(), st.floats(), st.text(max_size=8), st.booleans(), TELLING)
+SUSPICIOUS_VALUES = st.sampled_from((*ODD_VALUES, *NUMBERS, *LARGE_NUMBERS, *NAMES, *CHARACTERS, *FILES, *FUNCTIONS))
+SCALARS = st.one_of(st.integers(), st.floats(), st.text(max_size=8), st.booleans(), SUSPICIOUS_VALUES)
 VALUES = st.one_of(
-    TELLING,
+    SUSPICIOUS_VALUES,
     st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=4), inner, max_size=3)),
 )
 
 
-def places(value: Any, path: Path_ = ()) -> Iterator[Path_]:
+def all_paths(value: Any, path: Path_ = ()) -> Iterator[Path_]:
     """The paths of everything below a JSON value."""
     inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, element in inner:
         yield (*path, key)
-        yield from places(element, (*path, key))
+        yield from all_paths(element, (*path, key))
 
 
-def at(value: Any, path: Path_) -> Any:
+def value_at(value: Any, path: Path_) -> Any:
     for key in path:
         value = value[key]
     return value
 
 
 def _drop(draw: Callable[..., Any], document: Any, path: Path_) -> None:
-    del at(document, path[:-1])[path[-1]]
+    del value_at(document, path[:-1])[path[-1]]
 
 
 def _replace(draw: Callable[..., Any], document: Any, path: Path_) -> None:
-    at(document, path[:-1])[path[-1]] = copy.deepcopy(draw(VALUES))  # what is changed next must not be the list in TELLING
+    value_at(document, path[:-1])[path[-1]] = copy.deepcopy(draw(VALUES))  # what is changed next must not be the list in TELLING
 
 
 def _rename(draw: Callable[..., Any], document: Any, path: Path_) -> None:
-    parent = at(document, path[:-1])
+    parent = value_at(document, path[:-1])
     if isinstance(parent, dict):
         key = str(path[-1])
         parent[draw(st.sampled_from([key[:-1], key + "s", key.upper(), key[::-1], "", "a.b", "\ud800"]))] = parent.pop(key)
 
 
 def _duplicate(draw: Callable[..., Any], document: Any, path: Path_) -> None:
-    parent = at(document, path[:-1])
+    parent = value_at(document, path[:-1])
     if isinstance(parent, list):
         parent.insert(path[-1], copy.deepcopy(parent[path[-1]]))
     else:
@@ -73,26 +73,26 @@ def _duplicate(draw: Callable[..., Any], document: Any, path: Path_) -> None:
 
 def _swap(draw: Callable[..., Any], document: Any, path: Path_) -> None:
     """A value of another place of the same document."""
-    other = draw(st.sampled_from(list(places(document))))
-    at(document, path[:-1])[path[-1]] = copy.deepcopy(at(document, other))
+    other = draw(st.sampled_from(list(all_paths(document))))
+    value_at(document, path[:-1])[path[-1]] = copy.deepcopy(value_at(document, other))
 
 
 def _nest(draw: Callable[..., Any], document: Any, path: Path_) -> None:
-    value = at(document, path)
+    value = value_at(document, path)
     for _ in range(draw(st.sampled_from([1, 3, 99, 150]))):
         value = [value] if draw(st.booleans()) else {"x": value}
-    at(document, path[:-1])[path[-1]] = value
+    value_at(document, path[:-1])[path[-1]] = value
 
 
 def _retype(draw: Callable[..., Any], document: Any, path: Path_) -> None:
-    value = at(document, path)
-    at(document, path[:-1])[path[-1]] = draw(st.sampled_from([str(value), [value], {"value": value}, bool(value)]))
+    value = value_at(document, path)
+    value_at(document, path[:-1])[path[-1]] = draw(st.sampled_from([str(value), [value], {"value": value}, bool(value)]))
 
 
 def _scale(draw: Callable[..., Any], document: Any, path: Path_) -> None:
-    value = at(document, path)
+    value = value_at(document, path)
     if isinstance(value, int | float) and not isinstance(value, bool):
-        at(document, path[:-1])[path[-1]] = value * draw(st.sampled_from([-1, 0, 0.3, 1e9, 1e300, 10**30]))
+        value_at(document, path[:-1])[path[-1]] = value * draw(st.sampled_from([-1, 0, 0.3, 1e9, 1e300, 10**30]))
 
 
 OPERATIONS = (_drop, _replace, _replace, _rename, _duplicate, _swap, _nest, _retype, _scale)
@@ -103,7 +103,7 @@ def mutants(draw: Callable[..., Any], document: Any) -> Any:
     """The document after one to three changes."""
     changed = copy.deepcopy(document)
     for _ in range(draw(st.integers(1, 3))):
-        if paths := list(places(changed)):
+        if paths := list(all_paths(changed)):
             operation = draw(st.sampled_from(OPERATIONS))
             operation(draw, changed, draw(st.sampled_from(paths)))
     return changed

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from good_scenario import INNER, SCENARIO, furnish
-from mutations import at
+from good_scenario import INNER_SYSTEM, SCENARIO, write_scenario_files
+from mutations import value_at
 
 import cosim
 from cosim import cli
@@ -26,16 +26,16 @@ Change = Callable[[Any], object]
 def put(path: str, value: Any) -> Change:
     """Set the value at a path such as "components/a/period"."""
     keys = [int(key) if key.isdigit() else key for key in path.split("/")]
-    return lambda document: at(document, tuple(keys[:-1])).__setitem__(keys[-1], value)
+    return lambda document: value_at(document, tuple(keys[:-1])).__setitem__(keys[-1], value)
 
 
 def drop(path: str) -> Change:
     keys = [int(key) if key.isdigit() else key for key in path.split("/")]
-    return lambda document: at(document, tuple(keys[:-1])).pop(keys[-1])
+    return lambda document: value_at(document, tuple(keys[:-1])).pop(keys[-1])
 
 
 def add(path: str, value: Any) -> Change:
-    return lambda document: at(document, tuple(path.split("/"))).append(value)
+    return lambda document: value_at(document, tuple(path.split("/"))).append(value)
 
 
 #: text of the file, and what is said
@@ -135,8 +135,8 @@ CHANGES: dict[str, tuple[Change, str]] = {
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory, probes: dict[int, Path]) -> Path:
-    folder = furnish(tmp_path_factory.mktemp("bad"), probes[2])
-    (folder / "inner.json").write_text(json.dumps(INNER))
+    folder = write_scenario_files(tmp_path_factory.mktemp("bad"), probes[2])
+    (folder / "inner.json").write_text(json.dumps(INNER_SYSTEM))
     (folder / "scenario.json").write_text(TEXT)
     (folder / "leaves.py").write_text("raise SystemExit(0)")
     (folder / "panics.py").write_text("raise BaseException('lost')")
@@ -151,7 +151,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory, probes: dict[int, Path]) ->
 def refused(folder: Path, text: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "scenario.json").write_text(text)
     begin = time.process_time()
-    code = cli._code(["run", str(folder / "scenario.json"), "--isolation", "none", "--output-dir", str(folder / "out")])
+    code = cli._run_command_line(
+        ["run", str(folder / "scenario.json"), "--isolation", "none", "--output-dir", str(folder / "out")]
+    )
     taken = time.process_time() - begin
     errors = capsys.readouterr().err
     assert code == 2, errors

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from commands import TICKER, Workplace
+from commands import TICKER, CommandFolder
 
 import cosim
 from cosim.core import resources
@@ -25,7 +25,7 @@ PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
 SHORT, LONG = {"stop": 0.5, "arguments": {"pause": 0}}, {"stop": 1.5, "arguments": {"pause": 0.01}}
 
 
-def kept(workplace: Workplace) -> int:
+def kept(workplace: CommandFolder) -> int:
     """Rows of the result file, which are good whatever happened."""
     if not (workplace.out / "result.csv").exists():
         return 0
@@ -43,7 +43,7 @@ def full_disk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return library
 
 
-class Disk(Workplace):
+class Disk(CommandFolder):
     """A place whose folder out is on a disk that is full after `operations`."""
 
     def __init__(self, folder: Path, library: Path, operations: int):
@@ -62,7 +62,7 @@ class Disk(Workplace):
         _, errors = self.process.communicate(timeout=100)
         full = struct.unpack("l", self._left.read_bytes())[0] < 0
         where = f"{self.operations} operations: {errors}"
-        assert self.left() == [], where
+        assert self.leftovers() == [], where
         rows, whole = kept(self), round(1 + 100 * self._stop())
         assert rows <= whole
         if self.process.returncode == 0:
@@ -98,7 +98,7 @@ def test_a_disk_that_is_full_after_each_number_of_operations(full_disk, tmp_path
 
 def test_a_real_disk_that_is_too_small_for_the_result(tmp_path):
     """30 000 rows: their numbers fit, their texts do not."""
-    workplace = Workplace(tmp_path / "work")
+    workplace = CommandFolder(tmp_path / "work")
     file = workplace.scenario(300, arguments={"pause": 0})
     script = f"""mkdir out && mount -t tmpfs -o size=1200k none out || exit 99
         {sys.executable} -m cosim run {file} --output-dir out --no-report; code=$?

@@ -7,7 +7,7 @@ import signal
 import time
 
 import pytest
-from commands import TICKER, Workplace, until
+from commands import TICKER, CommandFolder, wait_until
 
 import cosim
 
@@ -18,10 +18,10 @@ def entry(name: str) -> dict[str, str]:
     return {"name": name, "python": f"{TICKER}:{name}"}
 
 
-def interrupted(workplace: Workplace, place: str, *options: str, times: int = 1, **scenario: object) -> float:
+def interrupted(workplace: CommandFolder, place: str, *options: str, times: int = 1, **scenario: object) -> float:
     """Interrupt a run at a place; the time (s) it took to end."""
     process = workplace.start("run", workplace.scenario(0.5, **scenario), *RUN, *options)
-    assert workplace.reached(f"reached-{place}"), process.communicate()
+    assert workplace.wait_for_file(f"reached-{place}"), process.communicate()
     began = time.monotonic()
     for _ in range(times):
         process.send_signal(signal.SIGINT)
@@ -31,11 +31,11 @@ def interrupted(workplace: Workplace, place: str, *options: str, times: int = 1,
     assert process.returncode == 130, errors
     assert errors.splitlines()[-1] == "interrupted"
     assert "Traceback" not in errors
-    assert workplace.left() == []
+    assert workplace.leftovers() == []
     return taken
 
 
-def rows(workplace: Workplace) -> int:
+def rows(workplace: CommandFolder) -> int:
     file = workplace.out / "result.csv"
     return len(cosim.Result.from_csv(file).time) if file.exists() else 0
 
@@ -70,7 +70,7 @@ def test_a_second_interrupt_does_not_ask(workplace):
 def test_the_end_of_the_terminal_is_no_loss(workplace):
     """What ends a process politely, such as a closed terminal or `timeout`, counts as an interrupt."""
     process = workplace.start("run", workplace.scenario(), *RUN)
-    before = until(lambda: rows(workplace))
+    before = wait_until(lambda: rows(workplace))
     process.send_signal(signal.SIGTERM)
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 130, errors

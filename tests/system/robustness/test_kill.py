@@ -10,7 +10,7 @@ import time
 from dataclasses import dataclass, field
 
 import pytest
-from commands import Workplace, children, until
+from commands import CommandFolder, child_processes, wait_until
 from ticker import tens
 
 import cosim
@@ -20,7 +20,7 @@ PROMISE = 1.0
 
 
 def victims(supervisor: int, whom: str) -> list[int]:
-    child = children(supervisor)
+    child = child_processes(supervisor)
     return {"supervisor": [supervisor], "child": child, "both": [supervisor, *child]}[whom]
 
 
@@ -28,7 +28,7 @@ def victims(supervisor: int, whom: str) -> list[int]:
 class Killed:
     """A run that goes on until somebody is killed."""
 
-    place: Workplace
+    place: CommandFolder
     whom: str
     delay: float
     moment: float = field(init=False)
@@ -37,7 +37,7 @@ class Killed:
         self.process = self.place.start("run", self.place.scenario(), "--output-dir", "out", "--no-report")
 
     def begin(self) -> float:
-        assert self.place.reached("started"), self.process.communicate()
+        assert self.place.wait_for_file("started"), self.process.communicate()
         self.started = float((self.place.folder / "started").read_text())
         return self.started + self.delay
 
@@ -49,12 +49,12 @@ class Killed:
         _, self.errors = self.process.communicate(timeout=30)
 
     def judge(self) -> None:
-        assert until(lambda: not self.place.processes(), 5.0)
-        assert until(lambda: self.process.returncode is not None)
+        assert wait_until(lambda: not self.place.processes(), 5.0)
+        assert wait_until(lambda: self.process.returncode is not None)
         if self.whom == "child":
             assert self.process.returncode == 1, self.errors
             assert "the process was ended by signal 9 (SIGKILL" in self.errors
-            assert self.place.left() == []
+            assert self.place.leftovers() == []
         file = self.place.out / "result.csv"
         if not file.exists():
             assert self.whom != "child" and self.moment - self.started <= PROMISE
@@ -71,7 +71,7 @@ def together(folder, seed: int, count: int = 10) -> None:
     """Several runs at once, each killed at a moment of its own."""
     draw = random.Random(seed)  # noqa: S311 - the same moments each time
     who = ["supervisor", "child", "both"]
-    runs = [Killed(Workplace(folder / str(n)), who[n % 3], draw.uniform(0.0, 4.0)) for n in range(count)]
+    runs = [Killed(CommandFolder(folder / str(n)), who[n % 3], draw.uniform(0.0, 4.0)) for n in range(count)]
     for run in sorted(runs, key=Killed.begin):
         run.kill()
     for run in runs:
@@ -138,8 +138,8 @@ def test_one_fmu_alone_leaves_nothing_when_its_process_is_killed(workplace):
         "0.01",
     )
     process = workplace.start(*words)
-    assert until(lambda: (workplace.folder / "x.csv").exists())
-    os.kill(children(process.pid)[0], signal.SIGKILL)
+    assert wait_until(lambda: (workplace.folder / "x.csv").exists())
+    os.kill(child_processes(process.pid)[0], signal.SIGKILL)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 1, errors
     assert workplace.left() == []

@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
-from commands import TICKER, Workplace, children, until
+from commands import TICKER, CommandFolder, child_processes, wait_until
 
 import cosim
 
@@ -25,15 +25,15 @@ def probe(probes):
     return probes[3]
 
 
-def scenario(place: Workplace, probe: Path, stop: float = 1000.0) -> Path:
+def scenario(place: CommandFolder, probe: Path, stop: float = 1000.0) -> Path:
     """A ticker and two FMUs, each in a process of its own."""
     fmus = {name: {"fmu": str(probe), "isolation": "fmu"} for name in ("lag", "twin")}
     return place.scenario(stop, components={"ticker": {"python": f"{TICKER}:Ticker"}, **fmus})
 
 
 def family(supervisor: int) -> dict[str, list[int]]:
-    (child,) = children(supervisor)
-    return {"supervisor": [supervisor], "child": [child], "worker": children(child)[:1], "everybody": [supervisor, child]}
+    (child,) = child_processes(supervisor)
+    return {"supervisor": [supervisor], "child": [child], "worker": child_processes(child)[:1], "everybody": [supervisor, child]}
 
 
 OTHERS = [pytest.param(whom, marks=pytest.mark.long) for whom in ("child", "everybody")]
@@ -49,7 +49,7 @@ def test_nothing_stays_and_the_rows_can_be_read(workplace, probe, whom):
         os.kill(victim, signal.SIGKILL)
     moment = time.monotonic()
     _, errors = process.communicate(timeout=30)
-    assert until(lambda: not workplace.processes(), 5.0)
+    assert wait_until(lambda: not workplace.processes(), 5.0)
     if whom in ("child", "worker"):
         assert process.returncode == 1
         assert "signal 9 (SIGKILL" in errors
@@ -71,17 +71,17 @@ def test_a_killed_worker_leaves_no_descriptor_in_the_importer(workplace, probe, 
     monkeypatch.chdir(workplace.folder)
     file = scenario(workplace, probe, 1.0)
     cosim.run(file)  # imports
-    before, others = sorted(DESCRIPTORS.iterdir()), children(os.getpid())
+    before, others = sorted(DESCRIPTORS.iterdir()), child_processes(os.getpid())
 
     def killer(finished: int, count: int) -> None:
         if finished == 50:
-            lag, _ = (child for child in children(os.getpid()) if child not in others)
+            lag, _ = (child for child in child_processes(os.getpid()) if child not in others)
             os.kill(lag, signal.SIGKILL)
 
     with pytest.raises(cosim.ComponentError, match=r"lag: .* failed at t = 0.5 s: .*signal 9") as caught:
         cosim.run(file, observers=[killer])
     assert len(caught.value.result.time) == 51
-    assert (sorted(DESCRIPTORS.iterdir()), children(os.getpid()), list(workplace.tmp.iterdir())) == (before, others, [])
+    assert (sorted(DESCRIPTORS.iterdir()), child_processes(os.getpid()), list(workplace.tmp.iterdir())) == (before, others, [])
 
 
 PROGRAM = """
@@ -93,7 +93,7 @@ cosim.run(sys.argv[1], observers=[wait])
 """
 
 
-def folders(place: Workplace) -> set[str]:
+def folders(place: CommandFolder) -> set[str]:
     return {path.name.rpartition("-")[0] for path in place.tmp.iterdir()}
 
 

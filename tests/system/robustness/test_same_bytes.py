@@ -11,7 +11,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from commands import Workplace
+from commands import CommandFolder
 
 import cosim
 from cosim.core import resources
@@ -30,7 +30,7 @@ SURROUNDINGS = {
 }
 
 
-def digest(workplace: Workplace, scenario: str, environment: dict[str, str], folder: str, options: tuple[str, ...]) -> str:
+def digest(workplace: CommandFolder, scenario: str, environment: dict[str, str], folder: str, options: tuple[str, ...]) -> str:
     place = workplace.folder / folder
     place.mkdir(exist_ok=True)
     words = ("run", scenario, "--stop-time", "6", "--output-dir", "out", "--no-report", *options)
@@ -74,7 +74,7 @@ def alone(fmu: Path, folder: Path, stop: float, step: float, **start: float) -> 
     file = folder / "result.csv"
     values = [word for name, value in start.items() for word in ("--start-value", f"{name}={value!r}")]
     words = ["simulate", str(fmu), "--stop-time", repr(stop), "--step-size", repr(step), "--output-file", str(file)]
-    assert cli._code([*words, *values, "--isolation", "none"]) == 0
+    assert cli._run_command_line([*words, *values, "--isolation", "none"]) == 0
     result = cosim.Result.from_csv(file)
     return {"time": result.time, **result.recording.columns}
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from good_scenario import INNER, SCENARIO, furnish
+from good_scenario import INNER_SYSTEM, SCENARIO, write_scenario_files
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 from mutations import mutants
@@ -44,8 +44,8 @@ def in_parts(short: int, long: int) -> pytest.MarkDecorator:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory, probes: dict[int, Path]) -> Path:
-    folder = furnish(tmp_path_factory.mktemp("mutants"), probes[3])
-    assert write(folder, SCENARIO, INNER, limit=60)  # what is imported once is no time of a mutant
+    folder = write_scenario_files(tmp_path_factory.mktemp("mutants"), probes[3])
+    assert write(folder, SCENARIO, INNER_SYSTEM, limit=60)  # what is imported once is no time of a mutant
     import_module("matplotlib.figure")
     return folder
 
@@ -76,7 +76,7 @@ def write(folder: Path, scenario: Any, inner: Any, limit: float = 2.0) -> bool:
 
 
 def test_the_scenario_is_good_before_it_is_changed(folder):
-    assert write(folder, SCENARIO, INNER)
+    assert write(folder, SCENARIO, INNER_SYSTEM)
 
 
 @in_parts(500, 100_000)
@@ -86,7 +86,7 @@ def test_mutated_scenarios(folder, count):
     @count
     @given(mutants(SCENARIO))
     def change(scenario):
-        results.add(write(folder, scenario, INNER))
+        results.add(write(folder, scenario, INNER_SYSTEM))
 
     change()
     assert results == {True, False}
@@ -97,7 +97,7 @@ def test_mutated_nested_systems(folder, count):
     results = set()
 
     @count
-    @given(mutants(INNER))
+    @given(mutants(INNER_SYSTEM))
     def change(inner):
         results.add(write(folder, SCENARIO, inner))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real, String
 
 
-def dawdle(where):
+def signal_and_sleep(where):
     """Say that this place is reached, and stay for long."""
     Path(f"reached-{where}").touch()
     time.sleep(60)
@@ -22,7 +22,7 @@ def tens(count):
     return f'"{count // 10:.0f}" tens, é'
 
 
-class Ticker(Fmi2Slave):
+class SlowCounter(Fmi2Slave):
     """Each step lasts `pause` s; `count` counts the steps, `tens` says in words how many tens, `clock` is the wall clock (s).
 
     `slow` names the place where it stays: load, initialization, step, stubborn (a step that no interrupt ends), or nowhere.
@@ -36,11 +36,11 @@ class Ticker(Fmi2Slave):
             self.register_variable(Real(name, causality=Fmi2Causality.output))
         self.register_variable(String("tens", causality=Fmi2Causality.output))
         if slow == "load":
-            dawdle("load")
+            signal_and_sleep("load")
 
     def exit_initialization_mode(self):
         if self.slow == "initialization":
-            dawdle("initialization")
+            signal_and_sleep("initialization")
         self.clock = time.monotonic()
         Path("starting").write_text(repr(self.clock))
         Path("starting").rename("started")
@@ -50,31 +50,31 @@ class Ticker(Fmi2Slave):
         self.count, self.clock = self.count + 1, time.monotonic()
         self.tens = tens(self.count)
         if self.count == 20:
-            self.twentieth_step()
+            self.block_in_step()
         return True
 
-    def twentieth_step(self):
+    def block_in_step(self):
         if self.slow == "step":
-            dawdle("step")
+            signal_and_sleep("step")
         while self.slow == "stubborn":
             with suppress(KeyboardInterrupt):
-                dawdle("stubborn")
+                signal_and_sleep("stubborn")
 
 
-def rows(result):
+def row_count(result):
     return {"number": len(result.time)}
 
 
 def slow_kpi(result):
-    dawdle("kpi")
+    signal_and_sleep("kpi")
     return {"value": 1}
 
 
 def slow_figure(result):
-    dawdle("figure")
+    signal_and_sleep("figure")
 
 
-def picture(result):
+def plot_count(result):
     from matplotlib.figure import Figure
 
     figure = Figure()

@@ -21,22 +21,22 @@ class Isolation:
     deadlines: Deadlines = field(default_factory=Deadlines)
     sandbox: bool = False
 
-    def entrance(self, fmu: Path, temporary: Path, importer: int) -> Callable[[], None]:
+    def worker_setup(self, fmu: Path, temporary: Path, importer: int) -> Callable[[], None]:
         """What a worker of the process `importer` does before it loads foreign code; raises InputError where it cannot."""
-        from ....process.sandbox import Settings, enter, interpreter_folders, landlock
+        from ....process.sandbox import SandboxSettings, enter_sandbox, interpreter_folders, landlock
 
         readable = (fmu, *interpreter_folders()) if self.sandbox else ()
         confine = "required" if self.sandbox else "never"
-        settings = Settings(readable=readable, writable=(temporary,), confine=confine, parent=importer)  # type: ignore[arg-type]
+        settings = SandboxSettings(readable=readable, writable=(temporary,), confine=confine, parent=importer)  # type: ignore[arg-type]
 
         def entrance() -> None:
-            left = self.sandbox and _leave_network()
+            left = self.sandbox and _unshare_network()
             # no kernel is refused for rules about a network that is not there
-            enter(replace(settings, network=left and landlock.version() < landlock.NETWORK_VERSION))
+            enter_sandbox(replace(settings, network=left and landlock.abi_version() < landlock.NETWORK_ABI))
 
         return entrance
 
 
-def _leave_network() -> bool:
+def _unshare_network() -> bool:
     """From now on this process has a network of its own, without any device; where that is forbidden, nothing changes."""
     return sys.platform == "linux" and ctypes.CDLL(None).unshare(_CLONE_NEWUSER | _CLONE_NEWNET) == 0

@@ -9,35 +9,35 @@ from collections.abc import Iterable
 from typing import Any
 
 #: the command to take a turn, and the answer that all is well, are the same empty line
-TURN = DONE = b"\n"
+STEP_COMMAND = STEP_DONE = b"\n"
 
 #: bytes of one read
-PIECE = 1 << 16
+READ_SIZE = 1 << 16
 
 #: so often a descriptor is looked at before sleep (0.3 us each)
-LOOKS = 40
+SPIN_COUNT = 40
 #: so often at most sleep comes at once after looking was in vain
-MOST_SLEEPS = 512
+MAX_SPIN_BACKOFF = 512
 
 
-def encode(message: Any) -> bytes:
-    return json.dumps(message, default=_plain).encode() + b"\n"
+def encode_line(message: Any) -> bytes:
+    return json.dumps(message, default=_encode_value).encode() + b"\n"
 
 
-def decode(line: bytes) -> Any:
+def decode_line(line: bytes) -> Any:
     """Raises ValueError for anything but JSON."""
-    return json.loads(line, object_hook=_restored)
+    return json.loads(line, object_hook=_decode_bytes)
 
 
-def _plain(value: Any) -> Any:
+def _encode_value(value: Any) -> Any:
     return {"bytes": value.hex()} if isinstance(value, bytes) else value.tolist()
 
 
-def _restored(value: dict[str, Any]) -> Any:
+def _decode_bytes(value: dict[str, Any]) -> Any:
     return bytes.fromhex(value["bytes"]) if value.keys() == {"bytes"} else value
 
 
-class Vigil:
+class SpinningPoller:
     """Waits for descriptors that will soon be ready, awake for a moment: falling asleep and being woken costs more.
 
     Where that was in vain, because the other process has more to do or no processor of its own, it sleeps at once the next time,
@@ -48,40 +48,40 @@ class Vigil:
         self._poll = select.poll()
         for descriptor in descriptors:
             self._poll.register(descriptor, select.POLLIN)
-        self.forget = self._poll.unregister
-        self._sleeps, self._next_sleeps = 0, 1
+        self.unregister = self._poll.unregister
+        self._spins_to_skip, self._next_backoff = 0, 1
 
     def wait(self, milliseconds: float) -> list[tuple[int, int]]:
         """What is ready, at the latest after this time."""
-        return self._awake() or self._poll.poll(milliseconds)
+        return self._spin() or self._poll.poll(milliseconds)
 
     def read(self, reader: int) -> bytes:
         """What can be read, sooner or later."""
-        self._awake()
-        return os.read(reader, PIECE)
+        self._spin()
+        return os.read(reader, READ_SIZE)
 
-    def _awake(self) -> list[tuple[int, int]]:
-        if self._sleeps:
-            self._sleeps -= 1
+    def _spin(self) -> list[tuple[int, int]]:
+        if self._spins_to_skip:
+            self._spins_to_skip -= 1
             return []
         poll = self._poll.poll
-        for _ in range(LOOKS):
+        for _ in range(SPIN_COUNT):
             if ready := poll(0):
-                self._next_sleeps = 1
+                self._next_backoff = 1
                 return ready
-        self._sleeps, self._next_sleeps = self._next_sleeps, min(2 * self._next_sleeps, MOST_SLEEPS)
+        self._spins_to_skip, self._next_backoff = self._next_backoff, min(2 * self._next_backoff, MAX_SPIN_BACKOFF)
         return []
 
 
-def read_line(reader: int, vigil: Vigil) -> bytes:
+def read_line(reader: int, vigil: SpinningPoller) -> bytes:
     """The next command; empty when there is nobody any more who could send one."""
     line = vigil.read(reader)
     while line[-1:] != b"\n" and line:
-        line += os.read(reader, PIECE)
+        line += os.read(reader, READ_SIZE)
     return line
 
 
-def write(writer: int, line: bytes) -> None:
+def write_line(writer: int, line: bytes) -> None:
     """Write the whole line."""
     while (written := os.write(writer, line)) < len(line):
         line = line[written:]

@@ -11,224 +11,229 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ....core import component_log
-from ....core.component import Call, Component, Ports, StepResult
+from ....core.component import Component, Ports, PreparedCall, StepResult
 from ....core.errors import ComponentError, InputError
-from ....process.journal import CALL, Phase
-from ....process.temporary_folders import WORKER, LockedFolder
+from ....process.journal import CALL_NUMBER, Phase
+from ....process.temporary_folders import WORKER_PREFIX, LockedFolder
 from ..file import FmuFile
 from ..instance import DISCARD, OK, FmuInstance
 from .isolation import Isolation
-from .pipes import DONE, TURN, decode, encode
-from .process import Lost, Process
-from .shared_memory import Block, pairs, texts
+from .pipes import STEP_COMMAND, STEP_DONE, decode_line, encode_line
+from .process import WorkerLost, WorkerProcess
+from .shared_memory import SharedMemoryBlock, matching_buffers, string_array
 from .worker import Worker
 
 
-class Ended(ComponentError):
+class WorkerEnded(ComponentError):
     """The worker ended or had to be ended."""
 
 
-class RemoteFmu(Component):
+class IsolatedFmu(Component):
     """An FMU as `FmuInstance` is one, with the same results; a crash, exit or hang of it is a ComponentError."""
 
     binds_everything = False
 
-    def __init__(self, kind: type[FmuInstance], file: FmuFile, instance_name: str, logging_on: bool, isolation: Isolation):
+    def __init__(
+        self, instance_class: type[FmuInstance], file: FmuFile, instance_name: str, logging_on: bool, isolation: Isolation
+    ):
         if not hasattr(os, "fork"):
             raise InputError("FMUs in processes of their own need an operating system with fork (Linux, macOS)")
-        file.check_platform()
-        self.name, self._file, self._kind, self.isolation = instance_name, file, kind, isolation
+        file.check_binary()
+        self.name, self._file, self._instance_class, self.isolation = instance_name, file, instance_class, isolation
         self.description = file.description
         self.variables, self.has_state = self.description.variables, self.description.has_state
         self._logging_on = logging_on
-        self._process: Process | None = None
-        self._temporary: LockedFolder | None = None
+        self._process: WorkerProcess | None = None
+        self._temporary_folder: LockedFolder | None = None
         #: the deadline that holds now
         self._deadline = isolation.deadlines.load
         #: the command that is being carried out, and the names of the calls of a turn
-        self._command, self._calls = "bind", [""]
+        self._command, self._call_names = "bind", [""]
         self._result: StepResult | None = None
 
     # -- life cycle ----------------------------------------------------------------------------------------------------
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         folder = self._file.acquire()
-        self._temporary = LockedFolder(WORKER)
-        self._block = Block(inputs, outputs)
-        self._clock = self._block.clock
-        self._in, self._out = pairs(self._block.inputs, inputs), pairs(outputs, self._block.outputs)
-        self._texts_in, self._texts_out = texts(inputs), texts(outputs)
-        self._has_texts = len(self._texts_in) + len(self._texts_out) > 0
-        self._start(folder, Path(self._temporary.name))
-        self._ask("bind")
+        self._temporary_folder = LockedFolder(WORKER_PREFIX)
+        self._shared_memory = SharedMemoryBlock(inputs, outputs)
+        self._clock = self._shared_memory.clock
+        self._input_buffers, self._output_buffers = (
+            matching_buffers(self._shared_memory.inputs, inputs),
+            matching_buffers(outputs, self._shared_memory.outputs),
+        )
+        self._input_strings, self._output_strings = string_array(inputs), string_array(outputs)
+        self._has_strings = len(self._input_strings) + len(self._output_strings) > 0
+        self._start_worker(folder, Path(self._temporary_folder.name))
+        self._execute("bind")
         self._deadline = self.isolation.deadlines.initialization
 
-    def _start(self, folder: Path, temporary: Path) -> None:
+    def _start_worker(self, folder: Path, temporary: Path) -> None:
         import_module(f"fmpy.fmi{self.description.major}")  # once here and not once in every worker
-        enter = self.isolation.entrance(folder, temporary, os.getpid())
+        enter = self.isolation.worker_setup(folder, temporary, os.getpid())
 
         def serve(commands: int, answers: int) -> None:
-            instance = self._kind(self._file.lent(), self.name, self._logging_on)
-            Worker(instance, self._block, enter).serve(commands, answers, temporary)
+            instance = self._instance_class(self._file.share(), self.name, self._logging_on)
+            Worker(instance, self._shared_memory, enter).serve(commands, answers, temporary)
 
-        self._process = Process(self.name, self._block.journal, serve)
+        self._process = WorkerProcess(self.name, self._shared_memory.journal, serve)
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
-        self._ask("enter_initialization_mode", start_time, stop_time)
+        self._execute("enter_initialization_mode", start_time, stop_time)
 
     def exit_initialization_mode(self) -> None:
-        self._ask("exit_initialization_mode")
+        self._execute("exit_initialization_mode")
         self._deadline = self.isolation.deadlines.step
 
     def terminate(self) -> None:
         self._deadline = self.isolation.deadlines.end
-        if not self._file.corrupt:
-            self._at_the_end("terminate")
+        if not self._file.has_fatal_error:
+            self._request_final("terminate")
 
     def free(self) -> None:
         self._deadline = self.isolation.deadlines.end
-        if self._process and not self._file.corrupt:
-            self._at_the_end("free")
+        if self._process and not self._file.has_fatal_error:
+            self._request_final("free")
         if self._process:
-            self._end()
-        if self._temporary:
-            self._temporary.cleanup()
-            self._temporary = None
+            self._stop_worker()
+        if self._temporary_folder:
+            self._temporary_folder.cleanup()
+            self._temporary_folder = None
             self._file.release()
 
-    def _at_the_end(self, command: str) -> None:
+    def _request_final(self, command: str) -> None:
         """Whatever becomes of the worker now, the results are complete."""
         try:
             if self._process:
-                self._ask(command)
-        except Ended as ended:
-            component_log.message(self.name, component_log.WARNING, f"{ended.function} failed: {ended.reason}")
+                self._execute(command)
+        except WorkerEnded as ended:
+            component_log.log_message(self.name, component_log.WARNING, f"{ended.function} failed: {ended.reason}")
 
-    def _end(self) -> None:
+    def _stop_worker(self) -> None:
         assert self._process is not None
-        self._process.end()
+        self._process.stop()
         self._process = None
 
     # -- access off the hot path ---------------------------------------------------------------------------------------
 
     def set(self, name: str, value: Any) -> None:
-        self._ask("set", name, value)
+        self._execute("set", name, value)
 
     def get(self, name: str) -> Any:
-        return self._ask("get", name)
+        return self._execute("get", name)
 
     def get_state(self) -> Any:
-        return self._ask("get_state")
+        return self._execute("get_state")
 
     def set_state(self, state: Any) -> None:
-        self._ask("set_state", state)
+        self._execute("set_state", state)
 
     def free_state(self, state: Any) -> None:
-        self._ask("free_state", state)
+        self._execute("free_state", state)
 
     # -- steps ---------------------------------------------------------------------------------------------------------
 
     def set_inputs(self) -> None:
         self._copy_inputs()
-        self._ask("set_inputs", self._texts_in.tolist())
+        self._execute("set_inputs", self._input_strings.tolist())
 
     def do_step(self, time: float, step_size: float) -> StepResult | None:
-        result = self._ask("do_step", time, step_size)
+        result = self._execute("do_step", time, step_size)
         return result and StepResult(*result)
 
     def get_outputs(self) -> None:
-        found = self._ask("get_outputs")
+        found = self._execute("get_outputs")
         self._copy_outputs()
         if found:
-            self._texts_out[:] = found
+            self._output_strings[:] = found
 
-    def turn(self, clock: ctypes.c_double, step_size: float) -> Sequence[Call]:
-        self._calls = self._ask("prepare", step_size)
-        turn = self._turn_with_texts if self._has_texts else self._turn
-        return [Call(turn, (clock,), "a step in its own process")]
+    def prepare_step_calls(self, clock: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
+        self._call_names = self._execute("prepare", step_size)
+        turn = self._step_with_strings if self._has_strings else self._step
+        return [PreparedCall(turn, (clock,), "a step in its own process")]
 
-    def _turn(self, clock: ctypes.c_double) -> int:
+    def _step(self, clock: ctypes.c_double) -> int:
         self._clock.value = clock.value
-        for target, source in self._in:
+        for target, source in self._input_buffers:
             target[:] = source
         self._command = "turn"
-        answer = self._request(TURN)
-        result = None if answer == DONE else self._value(answer)
-        for target, source in self._out:
+        answer = self._request(STEP_COMMAND)
+        result = None if answer == STEP_DONE else self._parse_answer(answer)
+        for target, source in self._output_buffers:
             target[:] = source
-        return OK if result is None else self._ended_early(result)
+        return OK if result is None else self._store_early_return(result)
 
-    def _turn_with_texts(self, clock: ctypes.c_double) -> int:
+    def _step_with_strings(self, clock: ctypes.c_double) -> int:
         self._clock.value = clock.value
         self._copy_inputs()
-        result, found = self._ask("turn", self._texts_in.tolist())
+        result, found = self._execute("turn", self._input_strings.tolist())
         self._copy_outputs()
-        self._texts_out[:] = found
-        return self._ended_early(result) if result else OK
+        self._output_strings[:] = found
+        return self._store_early_return(result) if result else OK
 
-    def _ended_early(self, result: Sequence[Any]) -> int:
+    def _store_early_return(self, result: Sequence[Any]) -> int:
         self._result = StepResult(*result)
         return DISCARD
 
-    def failed(self, name: str, status: int) -> StepResult:
+    def interpret_status(self, name: str, status: int) -> StepResult:
         assert self._result is not None
         return self._result
 
     def _copy_inputs(self) -> None:
-        for target, source in self._in:
+        for target, source in self._input_buffers:
             target[:] = source
 
     def _copy_outputs(self) -> None:
-        for target, source in self._out:
+        for target, source in self._output_buffers:
             target[:] = source
 
     # -- commands and answers ------------------------------------------------------------------------------------------
 
-    def _ask(self, command: str, *arguments: Any) -> Any:
+    def _execute(self, command: str, *arguments: Any) -> Any:
         self._command = command
-        return self._value(self._request(encode([command, *arguments])))
+        return self._parse_answer(self._request(encode_line([command, *arguments])))
 
     def _request(self, line: bytes) -> bytes:
         process = self._process
         if process is None:
-            raise Ended(self.name, self._command, "its process has ended before")
+            raise WorkerEnded(self.name, self._command, "its process has ended before")
         try:
             return process.request(line, self._deadline)
-        except Lost as lost:
-            self._end()
-            self._blame(str(lost))
+        except WorkerLost as lost:
+            self._stop_worker()
+            self._raise_worker_ended(str(lost))
         except BaseException:  # interrupted: the answer would come to a question that nobody asks any more
-            self._end()
+            self._stop_worker()
             raise
 
-    def _value(self, answer: bytes) -> Any:
-        if answer == DONE:
+    def _parse_answer(self, answer: bytes) -> Any:
+        if answer == STEP_DONE:
             return None
-        message = self._decoded(answer)
-        self._file.corrupt = self._file.corrupt or bool(message.get("corrupt"))
+        message = self._decode_answer(answer)
+        self._file.has_fatal_error = self._file.has_fatal_error or bool(message.get("corrupt"))
         if "failed" in message:
             raise ComponentError(*message["failed"])
         if "refused" in message:
             raise InputError(message["refused"])
         return message["value"]
 
-    def _decoded(self, answer: bytes) -> dict[str, Any]:
+    def _decode_answer(self, answer: bytes) -> dict[str, Any]:
         try:
-            message = decode(answer)
+            message = decode_line(answer)
         except ValueError:
             message = None
         if not isinstance(message, dict) or not {"value", "failed", "refused"} & message.keys():
-            self._end()
-            raise Ended(self.name, self._command, "its process answered with something that is no answer")
+            self._stop_worker()
+            raise WorkerEnded(self.name, self._command, "its process answered with something that is no answer")
         return message
 
-    def _blame(self, reason: str) -> NoReturn:
+    def _raise_worker_ended(self, reason: str) -> NoReturn:
         """Raise the error for what the worker was doing when it ended, as its journal says."""
-        journal = self._block.journal
+        journal = self._shared_memory.journal
         if journal.phase == Phase.CALLING:
             activity = journal.activity()
             time = None if math.isnan(activity.time) else activity.time
-            raise Ended(self.name, activity.function, reason, time)
-        if self._command == "turn" and 0 <= journal[CALL] < len(self._calls):
-            raise Ended(self.name, self._calls[journal[CALL]], reason, self._clock.value)
-        raise Ended(self.name, self._command, reason)
+            raise WorkerEnded(self.name, activity.function, reason, time)
+        if self._command == "turn" and 0 <= journal[CALL_NUMBER] < len(self._call_names):
+            raise WorkerEnded(self.name, self._call_names[journal[CALL_NUMBER]], reason, self._clock.value)
+        raise WorkerEnded(self.name, self._command, reason)

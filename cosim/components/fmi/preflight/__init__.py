@@ -11,22 +11,32 @@ from pathlib import Path
 
 from ....core.errors import InputError
 from . import rules_model, rules_structure, rules_values, rules_variables
-from .archive import Archive, open_file
+from .archive import Archive, open_regular_file
 from .binary import check_binary
-from .findings import DESCRIPTION, Finding, Flaw, Rule, refuse
-from .limits import LIMITS, Limits
-from .model_description import Model
-from .platform import this_machine
-from .xml import parse
-from .xml_reader import read_model, repeated
+from .findings import DESCRIPTION_FILE, FatalFinding, Finding, Rule, raise_errors
+from .limits import DEFAULT_LIMITS, PreflightLimits
+from .model_description import ModelDescription
+from .platform import current_platform
+from .xml import parse_xml
+from .xml_reader import check_repeated_elements, read_model
 
-__all__ = ["DESCRIPTION", "LIMITS", "Examination", "Finding", "Limits", "examine", "extract", "open_file", "refuse"]
+__all__ = [
+    "DESCRIPTION_FILE",
+    "DEFAULT_LIMITS",
+    "Examination",
+    "Finding",
+    "PreflightLimits",
+    "examine",
+    "extract",
+    "open_regular_file",
+    "raise_errors",
+]
 
 MISSING = Rule("archive.description", "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5")
 CHANGED = Rule("archive.changed", "limits")
 #: of one check; who has that many will look at the first ones first
-_MOST_FINDINGS = 100
-_CHECKS: Sequence[Callable[[Model], Iterator[Finding]]] = (
+_MAX_FINDINGS_PER_CHECK = 100
+_CHECKS: Sequence[Callable[[ModelDescription], Iterator[Finding]]] = (
     *rules_model.CHECKS,
     *rules_variables.CHECKS,
     rules_values.check_starts,
@@ -41,52 +51,52 @@ class Examination:
     `stamp` tells whether the file is still the one that was examined.
     """
 
-    stamp: tuple[int, ...] = ()
+    file_identity: tuple[int, ...] = ()
     members: Sequence[str] = ()
-    model: Model | None = None
+    model: ModelDescription | None = None
     findings: list[Finding] = field(default_factory=list)
-    binary: list[Finding] = field(default_factory=list)
+    binary_findings: list[Finding] = field(default_factory=list)
 
 
-def examine(path: Path, limits: Limits = LIMITS) -> Examination:
+def examine(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> Examination:
     """Examine archive, model description and binary of an FMU; nothing is written, and nothing of it is executed.
 
     Raises InputError when there is no such file. What is wrong with the FMU itself is in the findings.
     """
     result = Examination()
-    with open_file(path) as file:
-        result.stamp = _stamp(file)
+    with open_regular_file(path) as file:
+        result.file_identity = _file_identity(file)
         try:
-            _examine(Archive(file, limits), limits, result)
-        except Flaw as flaw:
+            _examine_archive(Archive(file, limits), limits, result)
+        except FatalFinding as flaw:
             result.findings.append(flaw.finding)
         except OSError as error:
             raise InputError(f'FMU "{path}" cannot be read: {error.strerror}') from None
     return result
 
 
-def _examine(archive: Archive, limits: Limits, result: Examination) -> None:
+def _examine_archive(archive: Archive, limits: PreflightLimits, result: Examination) -> None:
     """In order of need: what is wrong with the archive is told before anything in it is read."""
     result.findings += archive.findings
     if _has_errors(archive.findings):
         return
     result.members = list(archive.members)
-    if DESCRIPTION not in archive.members:
-        raise Flaw(MISSING(f"There is no item named '{DESCRIPTION}' in the archive"))
-    root = parse(archive.read(DESCRIPTION), DESCRIPTION, limits)
+    if DESCRIPTION_FILE not in archive.members:
+        raise FatalFinding(MISSING(f"There is no item named '{DESCRIPTION_FILE}' in the archive"))
+    root = parse_xml(archive.read(DESCRIPTION_FILE), DESCRIPTION_FILE, limits)
     model = result.model = read_model(root)
-    result.findings += repeated(root)
+    result.findings += check_repeated_elements(root)
     for check in _CHECKS:
-        result.findings += islice(check(model), _MOST_FINDINGS)
-    result.findings += islice(rules_values.check_dimensions(model, limits), _MOST_FINDINGS)
+        result.findings += islice(check(model), _MAX_FINDINGS_PER_CHECK)
+    result.findings += islice(rules_values.check_dimensions(model, limits), _MAX_FINDINGS_PER_CHECK)
     if not _has_errors(result.findings):
-        result.binary += _binary_findings(archive, model, limits)
+        result.binary_findings += _binary_findings(archive, model, limits)
 
 
-def _binary_findings(archive: Archive, model: Model, limits: Limits) -> Iterator[Finding]:
+def _binary_findings(archive: Archive, model: ModelDescription, limits: PreflightLimits) -> Iterator[Finding]:
     try:
-        yield from check_binary(archive, model, this_machine(), limits)
-    except Flaw as flaw:
+        yield from check_binary(archive, model, current_platform(), limits)
+    except FatalFinding as flaw:
         yield flaw.finding
 
 
@@ -94,22 +104,22 @@ def _has_errors(findings: Sequence[Finding]) -> bool:
     return any(finding.rule.severity == "error" for finding in findings)
 
 
-def extract(path: Path, examination: Examination, folder: Path, limits: Limits = LIMITS) -> None:
+def extract(path: Path, examination: Examination, folder: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> None:
     """Write the members of an examined FMU below `folder`.
 
     Raises InputError when the file is no longer the one that was examined, is not safe, or holds damaged data.
     """
-    with open_file(path) as file:
+    with open_regular_file(path) as file:
         try:
-            if _stamp(file) != examination.stamp:
-                raise Flaw(CHANGED("the file was changed after it had been examined"))
+            if _file_identity(file) != examination.file_identity:
+                raise FatalFinding(CHANGED("the file was changed after it had been examined"))
             archive = Archive(file, limits)
-            refuse(path, archive.findings)
+            raise_errors(path, archive.findings)
             archive.extract(folder)
-        except Flaw as flaw:
-            refuse(path, [flaw.finding])
+        except FatalFinding as flaw:
+            raise_errors(path, [flaw.finding])
 
 
-def _stamp(file: BufferedReader) -> tuple[int, ...]:
+def _file_identity(file: BufferedReader) -> tuple[int, ...]:
     status = os.fstat(file.fileno())
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns

@@ -9,10 +9,10 @@ from pathlib import Path
 from . import elf, macho, pe
 from .archive import Archive
 from .findings import Finding, Rule
-from .library import Damaged, Library
-from .limits import Limits
-from .model_description import Model
-from .platform import Machine
+from .library import InvalidLibrary, SharedLibrary
+from .limits import PreflightLimits
+from .model_description import ModelDescription
+from .platform import FmuPlatform
 
 _BINARIES = "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5.1"
 _FUNCTIONS = "FMI 2.0.5 sections 2.1 and 4.2, FMI 3.0.2 section 2.5"
@@ -23,23 +23,23 @@ FUNCTIONS = Rule("binary.functions", _FUNCTIONS)
 SIZE = Rule("binary.size", "limits")
 NEEDED = Rule("binary.needed", _BINARIES, "warning")
 
-_READERS: Mapping[str, Callable[[bytes, str], Library]] = {
+_READERS: Mapping[str, Callable[[bytes, str], SharedLibrary]] = {
     ".so": elf.read_library,
     ".dll": pe.read_library,
     ".dylib": macho.read_library,
 }
-_SUFFIXES = (".so", ".dll", ".dylib")
-_STATE = ("FreeFMUState", "GetFMUState", "SerializeFMUState", "SerializedFMUStateSize", "SetFMUState")
-_COMMON = (
+_LIBRARY_SUFFIXES = (".so", ".dll", ".dylib")
+_STATE_FUNCTIONS = ("FreeFMUState", "GetFMUState", "SerializeFMUState", "SerializedFMUStateSize", "SetFMUState")
+_COMMON_FUNCTIONS = (
     *("DoStep", "EnterInitializationMode", "ExitInitializationMode", "FreeInstance", "GetBoolean", "GetDirectionalDerivative"),
     *("GetString", "GetVersion", "Reset", "SetBoolean", "SetDebugLogging", "SetString", "Terminate"),
 )
-_FMI2_ONLY = (
+_FMI2_FUNCTIONS = (
     *("CancelStep", "DeSerializeFMUstate", "GetBooleanStatus", "GetInteger", "GetIntegerStatus", "GetReal"),
     *("GetRealOutputDerivatives", "GetRealStatus", "GetStatus", "GetStringStatus", "GetTypesPlatform", "Instantiate"),
     *("SetInteger", "SetReal", "SetRealInputDerivatives", "SetupExperiment"),
 )
-_FMI3_ONLY = (
+_FMI3_FUNCTIONS = (
     *("ActivateModelPartition", "CompletedIntegratorStep", "DeserializeFMUState", "EnterConfigurationMode"),
     *("EnterContinuousTimeMode", "EnterEventMode", "EnterStepMode", "EvaluateDiscreteStates", "ExitConfigurationMode"),
     *("GetAdjointDerivative", "GetContinuousStateDerivatives", "GetContinuousStates", "GetEventIndicators"),
@@ -51,66 +51,74 @@ _FMI3_ONLY = (
 )
 _FMI3_TYPES = ("Binary", "Clock", "Float32", "Float64", *(f"{s}Int{bits}" for s in ("", "U") for bits in (8, 16, 32, 64)))
 #: the functions that a Co-Simulation FMU exports, by FMI version
-REQUIRED = {
-    2: frozenset(f"fmi2{name}" for name in (*_COMMON, *_FMI2_ONLY, *(name.replace("FMUState", "FMUstate") for name in _STATE))),
+REQUIRED_FUNCTIONS = {
+    2: frozenset(
+        f"fmi2{name}"
+        for name in (*_COMMON_FUNCTIONS, *_FMI2_FUNCTIONS, *(name.replace("FMUState", "FMUstate") for name in _STATE_FUNCTIONS))
+    ),
     3: frozenset(
         f"fmi3{name}"
-        for name in (*_COMMON, *_FMI3_ONLY, *_STATE, *(f"{v}{kind}" for v in ("Get", "Set") for kind in _FMI3_TYPES))
+        for name in (
+            *_COMMON_FUNCTIONS,
+            *_FMI3_FUNCTIONS,
+            *_STATE_FUNCTIONS,
+            *(f"{v}{kind}" for v in ("Get", "Set") for kind in _FMI3_TYPES),
+        )
     ),
 }
 
 
-def platforms(names: Iterable[str]) -> list[str]:
+def list_platforms(names: Iterable[str]) -> list[str]:
     """The platforms that an FMU has binaries for, as it calls them, and "c-code" if it brings sources."""
     parts = [name.split("/") for name in names]
-    folders = {part[1] for part in parts if len(part) == 3 and part[0] == "binaries" and part[2].endswith(_SUFFIXES)}
+    folders = {part[1] for part in parts if len(part) == 3 and part[0] == "binaries" and part[2].endswith(_LIBRARY_SUFFIXES)}
     sources = any(part[0] == "sources" and part[-1].endswith((".c", ".cpp")) for part in parts if len(part) > 1)
     return [*sorted(folders), *(["c-code"] if sources else [])]
 
 
-def check_binary(archive: Archive, model: Model, machine: Machine, limits: Limits) -> Iterator[Finding]:
+def check_binary(archive: Archive, model: ModelDescription, machine: FmuPlatform, limits: PreflightLimits) -> Iterator[Finding]:
     """Whether the library for this machine is there, whole, and exports what FMI demands. Raises Flaw for damaged data."""
-    folder = machine.folder(model.major)
-    present = platforms(archive.members)
+    folder = machine.binary_folder(model.major)
+    present = list_platforms(archive.members)
     if folder not in present:
-        names = folder if folder == machine.tuple_name else f"{machine.tuple_name} ({folder})"
+        names = folder if folder == machine.platform_tuple else f"{machine.platform_tuple} ({folder})"
         yield PLATFORM(f"has no binary for {names}; it has: {', '.join(present) or 'no binaries'}")
         return
-    identifier = (model.interface or {}).get("modelIdentifier", "")
+    identifier = (model.co_simulation or {}).get("modelIdentifier", "")
     member = f"binaries/{folder}/{identifier}{machine.suffix}"
     if member not in archive.members:
         there = ", ".join(name for name in archive.members if name.startswith(f"binaries/{folder}/"))
         yield PRESENT(f"the library cannot be loaded: {member} does not exist; there is: {there}")
-    elif archive.members[member].size > limits.library:
-        yield SIZE(f"the library has {archive.members[member].size} bytes, expected at most {limits.library}", member)
+    elif archive.members[member].size > limits.max_library_size:
+        yield SIZE(f"the library has {archive.members[member].size} bytes, expected at most {limits.max_library_size}", member)
     else:
         yield from _check_library(archive, member, model.major, machine)
 
 
-def _check_library(archive: Archive, member: str, major: int, machine: Machine) -> Iterator[Finding]:
+def _check_library(archive: Archive, member: str, major: int, machine: FmuPlatform) -> Iterator[Finding]:
     try:
         library = _READERS[machine.suffix](archive.read(member), machine.architecture)
-    except Damaged as damage:
+    except InvalidLibrary as damage:
         yield FORMAT(f"the library cannot be loaded: it {damage}", member)
         return
-    if missing := sorted(REQUIRED[major] - library.exports):
+    if missing := sorted(REQUIRED_FUNCTIONS[major] - library.exports):
         shown = ", ".join(missing[:5]) + (f" and {len(missing) - 5} more" if len(missing) > 5 else "")
         yield FUNCTIONS(f"the library does not export {shown}", member)
-    for name in library.needed:
-        if not _is_found(name, library, archive, member):
+    for name in library.needed_libraries:
+        if not _is_library_found(name, library, archive, member):
             yield NEEDED(f"needs the library {name}, which this machine does not seem to have", member)
 
 
-def _is_found(name: str, library: Library, archive: Archive, member: str) -> bool:
+def _is_library_found(name: str, library: SharedLibrary, archive: Archive, member: str) -> bool:
     """Whether the loader will probably find a library: beside the FMU's own, in its search path, or known to the system."""
-    if f"{member.rpartition('/')[0]}/{name}" in archive.members and any("ORIGIN" in folder for folder in library.search):
+    if f"{member.rpartition('/')[0]}/{name}" in archive.members and any("ORIGIN" in folder for folder in library.search_folders):
         return True
-    own = [Path(folder) for folder in library.search if folder.startswith("/")]
+    own = [Path(folder) for folder in library.search_folders if folder.startswith("/")]
     environment = [Path(folder) for folder in os.environ.get("LD_LIBRARY_PATH", "").split(":") if folder]
-    return any((folder / name).is_file() for folder in (*own, *environment)) or _is_known(name)
+    return any((folder / name).is_file() for folder in (*own, *environment)) or _is_in_loader_cache(name)
 
 
-def _is_known(name: str) -> bool:
+def _is_in_loader_cache(name: str) -> bool:
     """Whether the loader's own list names a library; where there is no list, nothing is known against it."""
     try:
         return name.encode() + b"\0" in Path("/etc/ld.so.cache").read_bytes()

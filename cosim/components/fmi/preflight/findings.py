@@ -10,8 +10,8 @@ from typing import Literal
 from ....core.errors import InputError
 
 Severity = Literal["error", "warning"]
-DESCRIPTION = "modelDescription.xml"
-_MOST_SHOWN = 100
+DESCRIPTION_FILE = "modelDescription.xml"
+_MAX_SHOWN = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,16 +37,16 @@ class Finding:
     line: int = 0
 
     @property
-    def place(self) -> str:
+    def location(self) -> str:
         """ "modelDescription.xml:12", or less where less is known."""
-        return printable(self.member) + (f":{self.line}" if self.line else "")
+        return escape_unprintable(self.member) + (f":{self.line}" if self.line else "")
 
     def __str__(self) -> str:
-        place = f"{self.place}: " if self.place else ""
-        return f"{place}{printable(self.message)} [{self.rule.name}, {self.rule.source}]"
+        place = f"{self.location}: " if self.location else ""
+        return f"{place}{escape_unprintable(self.message)} [{self.rule.name}, {self.rule.source}]"
 
 
-class Flaw(Exception):
+class FatalFinding(Exception):
     """A finding after which nothing more can be examined."""
 
     def __init__(self, finding: Finding):
@@ -54,17 +54,17 @@ class Flaw(Exception):
         self.finding = finding
 
 
-def refuse(path: Path, findings: Iterable[Finding]) -> None:
+def raise_errors(path: Path, findings: Iterable[Finding]) -> None:
     """Raises InputError with all errors among the findings; of very many, with the first ones and their number."""
     errors = [finding for finding in findings if finding.rule.severity == "error"]
-    lines = [f'"{path}": {finding}' for finding in dict.fromkeys(errors[:_MOST_SHOWN])]
-    if len(errors) > _MOST_SHOWN:
-        lines.append(f'"{path}": and {len(errors) - _MOST_SHOWN} more errors')
+    lines = [f'"{path}": {finding}' for finding in dict.fromkeys(errors[:_MAX_SHOWN])]
+    if len(errors) > _MAX_SHOWN:
+        lines.append(f'"{path}": and {len(errors) - _MAX_SHOWN} more errors')
     if lines:
         raise InputError(lines)
 
 
-def printable(text: str, length: int = 300) -> str:
+def escape_unprintable(text: str, length: int = 300) -> str:
     """Text of an FMU on one line: control characters are made visible, what is very long is shortened."""
     text = text[: length + 1]
     shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)

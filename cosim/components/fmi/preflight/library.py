@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 
-class Damaged(Exception):
+class InvalidLibrary(Exception):
     """The file is no library that could be loaded; says why."""
 
 
 @dataclass(frozen=True, slots=True)
-class Library:
+class SharedLibrary:
     """Exported functions, libraries it needs, and folders where it looks for them."""
 
     exports: frozenset[str]
-    needed: Sequence[str] = ()
-    search: Sequence[str] = ()
+    needed_libraries: Sequence[str] = ()
+    search_folders: Sequence[str] = ()

@@ -8,7 +8,7 @@ from typing import Any
 
 #: first the default, then what else `initial` may be (FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.4)
 _EXACT, _DERIVED, _ANY = ("exact",), ("calculated", "approx"), ("calculated", "exact", "approx")
-INITIAL: Mapping[tuple[str, str], Sequence[str]] = {
+ALLOWED_INITIAL: Mapping[tuple[str, str], Sequence[str]] = {
     ("structuralParameter", "fixed"): _EXACT,
     ("structuralParameter", "tunable"): _EXACT,
     ("parameter", "fixed"): _EXACT,
@@ -53,16 +53,16 @@ class ModelVariable:
     causality: str
     variability: str
     attributes: Mapping[str, str]
-    starts: Sequence[str] | None
+    start_words: Sequence[str] | None
     dimensions: Sequence[Mapping[str, str]]
     aliases: Sequence[Mapping[str, str]]
     line: int
-    declared: TypeDefinition | None
+    declared_type: TypeDefinition | None
 
     @property
     def initial(self) -> str:
         """What is written, else the default of causality and variability; "" where there is none."""
-        return self.attributes.get("initial") or INITIAL.get((self.causality, self.variability), ("",))[0]
+        return self.attributes.get("initial") or ALLOWED_INITIAL.get((self.causality, self.variability), ("",))[0]
 
     @property
     def is_float(self) -> bool:
@@ -70,7 +70,7 @@ class ModelVariable:
 
     def attribute(self, name: str) -> str | None:
         """Its own attribute, else that of its declared type."""
-        return self.attributes.get(name) or (self.declared.attributes.get(name) if self.declared else None)
+        return self.attributes.get(name) or (self.declared_type.attributes.get(name) if self.declared_type else None)
 
     def __str__(self) -> str:
         return f'variable "{self.name}"'
@@ -80,10 +80,10 @@ class ModelVariable:
 class Unknown:
     """A row of the model structure. `group` is the FMI 3.0 name of the list it stands in."""
 
-    group: str
+    element: str
     reference: str
     dependencies: Sequence[str] | None
-    kinds: Sequence[str] | None
+    dependency_kinds: Sequence[str] | None
     line: int
 
 
@@ -92,24 +92,24 @@ class UnitDefinition:
     """A unit; `base` are the attributes of its BaseUnit, None without one."""
 
     name: str
-    base: Mapping[str, str] | None
-    display: Sequence[str]
+    base_unit: Mapping[str, str] | None
+    display_units: Sequence[str]
     line: int
 
 
 @dataclass(frozen=True)
-class Model:
+class ModelDescription:
     """A model description. `root` are the attributes of the root, `interface` those of CoSimulation (None: not offered)."""
 
     major: int
     root: Mapping[str, str]
-    interface: Mapping[str, str] | None
-    experiment: Mapping[str, str]
+    co_simulation: Mapping[str, str] | None
+    default_experiment: Mapping[str, str]
     variables: Sequence[ModelVariable]
     types: Sequence[TypeDefinition]
     units: Sequence[UnitDefinition]
-    structure: Sequence[Unknown]
-    categories: Sequence[str]
+    model_structure: Sequence[Unknown]
+    log_categories: Sequence[str]
     lines: Mapping[str, int]
     by_reference: Mapping[str, ModelVariable] = field(init=False, repr=False)
 

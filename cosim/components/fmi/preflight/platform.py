@@ -11,7 +11,7 @@ _ARCHITECTURES = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "
 
 
 @dataclass(frozen=True, slots=True)
-class Machine:
+class FmuPlatform:
     """A platform: `tuple_name` is its folder in FMI 3.0 ("x86_64-linux"), `name` the one in FMI 2.0 ("linux64")."""
 
     system: str
@@ -19,23 +19,23 @@ class Machine:
     suffix: str
 
     @property
-    def name(self) -> str:
+    def fmi2_platform(self) -> str:
         system = "win" if self.system == "windows" else self.system
         return f"{system}{32 if self.architecture == 'x86' else 64}"
 
     @property
-    def tuple_name(self) -> str:
+    def platform_tuple(self) -> str:
         return f"{self.architecture}-{self.system}"
 
-    def folder(self, major: int) -> str:
-        return self.name if major == 2 else self.tuple_name
+    def binary_folder(self, major: int) -> str:
+        return self.fmi2_platform if major == 2 else self.platform_tuple
 
 
-def this_machine() -> Machine:
+def current_platform() -> FmuPlatform:
     """The machine that this program runs on."""
     system, suffix = _SYSTEMS.get(sys.platform, (sys.platform, ".so"))
     machine = platform.machine().lower()
     architecture = _ARCHITECTURES.get(machine, machine)
     if architecture == "x86_64" and sys.maxsize <= 2**32:
         architecture = "x86"
-    return Machine(system, architecture, suffix)
+    return FmuPlatform(system, architecture, suffix)

@@ -6,10 +6,10 @@ import math
 import re
 from collections.abc import Iterable, Iterator
 
-from ....core.units import BASE
-from .findings import DESCRIPTION, Finding, Rule
-from .model_description import Model, UnitDefinition
-from .values import real, value
+from ....core.units import BASE_UNITS
+from .findings import DESCRIPTION_FILE, Finding, Rule
+from .model_description import ModelDescription, UnitDefinition
+from .values import parse_float, parse_value
 
 _ROOT = "FMI 2.0.5 section 2.2.1, FMI 3.0.2 section 2.4.1"
 _INTERFACE = "FMI 2.0.5 section 4.3.1, FMI 3.0.2 sections 2.4.2 and 4.4"
@@ -34,86 +34,86 @@ CATEGORIES = Rule("categories.unique", _CATEGORIES, "warning")
 _C_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
-def check_names(model: Model) -> Iterator[Finding]:
+def check_names(model: ModelDescription) -> Iterator[Finding]:
     line = model.lines[""]
     attribute = "guid" if model.major == 2 else "instantiationToken"
     if not model.root.get(attribute):
-        yield TOKEN(f"lacks the attribute {attribute}", DESCRIPTION, line)
+        yield TOKEN(f"lacks the attribute {attribute}", DESCRIPTION_FILE, line)
     if not model.root.get("modelName"):
-        yield NAME("lacks the attribute modelName", DESCRIPTION, line)
-    if model.interface is None:
-        yield INTERFACE("offers no Co-Simulation interface", DESCRIPTION, line)
+        yield NAME("lacks the attribute modelName", DESCRIPTION_FILE, line)
+    if model.co_simulation is None:
+        yield INTERFACE("offers no Co-Simulation interface", DESCRIPTION_FILE, line)
         return
     line = model.lines["CoSimulation"]
-    identifier = model.interface.get("modelIdentifier", "")
+    identifier = model.co_simulation.get("modelIdentifier", "")
     if not _C_IDENTIFIER.fullmatch(identifier):
-        yield IDENTIFIER(f'found modelIdentifier "{identifier}", expected a C identifier', DESCRIPTION, line)
+        yield IDENTIFIER(f'found modelIdentifier "{identifier}", expected a C identifier', DESCRIPTION_FILE, line)
 
 
-def check_units(model: Model) -> Iterator[Finding]:
-    for name, place in _twice((unit.name, unit.line) for unit in model.units):
-        yield UNIT_NAME(f'the unit "{name}" is defined twice', DESCRIPTION, place)
+def check_units(model: ModelDescription) -> Iterator[Finding]:
+    for name, place in _find_duplicates((unit.name, unit.line) for unit in model.units):
+        yield UNIT_NAME(f'the unit "{name}" is defined twice', DESCRIPTION_FILE, place)
     for unit in model.units:
-        yield from _wrong_base(unit)
+        yield from _check_unit_base(unit)
 
 
-def _wrong_base(unit: UnitDefinition) -> Iterator[Finding]:
-    for name, text in (unit.base or {}).items():
+def _check_unit_base(unit: UnitDefinition) -> Iterator[Finding]:
+    for name, text in (unit.base_unit or {}).items():
         try:
-            good = int(text) is not None if name in BASE else math.isfinite(real(text))
+            good = int(text) is not None if name in BASE_UNITS else math.isfinite(parse_float(text))
         except ValueError:
             good = False
-        if not good or (name == "factor" and real(text) == 0):
-            kind = "an integer" if name in BASE else "a finite number, a factor not 0"
-            yield UNIT_BASE(f'unit "{unit.name}": found {name}="{text}", expected {kind}', DESCRIPTION, unit.line)
+        if not good or (name == "factor" and parse_float(text) == 0):
+            kind = "an integer" if name in BASE_UNITS else "a finite number, a factor not 0"
+            yield UNIT_BASE(f'unit "{unit.name}": found {name}="{text}", expected {kind}', DESCRIPTION_FILE, unit.line)
 
 
-def check_types(model: Model) -> Iterator[Finding]:
-    for name, place in _twice((definition.name, definition.line) for definition in model.types):
-        yield TYPE_NAME(f'the type "{name}" is defined twice', DESCRIPTION, place)
+def check_types(model: ModelDescription) -> Iterator[Finding]:
+    for name, place in _find_duplicates((definition.name, definition.line) for definition in model.types):
+        yield TYPE_NAME(f'the type "{name}" is defined twice', DESCRIPTION_FILE, place)
     for definition in model.types:
         if not definition.kind:
-            yield TYPE_KIND(f'the type "{definition.name}" is of no kind that FMI knows', DESCRIPTION, definition.line)
+            yield TYPE_KIND(f'the type "{definition.name}" is of no kind that FMI knows', DESCRIPTION_FILE, definition.line)
         for what, words in (("item", [item[0] for item in definition.items]), ("value", [item[1] for item in definition.items])):
-            for word, _ in _twice((word, 0) for word in words):
+            for word, _ in _find_duplicates((word, 0) for word in words):
                 text = f'the {what} "{word}" of enumeration "{definition.name}" stands twice'
-                yield ITEMS(text, DESCRIPTION, definition.line)
+                yield ITEMS(text, DESCRIPTION_FILE, definition.line)
         for name, word in definition.items:
             try:
-                value(word, "Int64")
+                parse_value(word, "Int64")
             except ValueError:
                 text = f'the item "{name}" of enumeration "{definition.name}" is "{word}", expected an integer'
-                yield ITEMS(text, DESCRIPTION, definition.line)
+                yield ITEMS(text, DESCRIPTION_FILE, definition.line)
         if definition.kind == "Enumeration" and not definition.items:
-            yield TYPE_KIND(f'the enumeration "{definition.name}" has no items', DESCRIPTION, definition.line)
+            yield TYPE_KIND(f'the enumeration "{definition.name}" has no items', DESCRIPTION_FILE, definition.line)
 
 
-def check_experiment(model: Model) -> Iterator[Finding]:
+def check_experiment(model: ModelDescription) -> Iterator[Finding]:
     line = model.lines.get("DefaultExperiment", 0)
     numbers: dict[str, float] = {}
     for name in ("startTime", "stopTime", "stepSize", "tolerance"):
-        if (text := model.experiment.get(name)) is None:
+        if (text := model.default_experiment.get(name)) is None:
             continue
         try:
-            numbers[name] = real(text)
+            numbers[name] = parse_float(text)
         except ValueError:
             numbers[name] = math.nan
         if not math.isfinite(numbers[name]):
-            yield EXPERIMENT_VALUE(f'found {name}="{text}", expected a finite number', DESCRIPTION, line)
+            yield EXPERIMENT_VALUE(f'found {name}="{text}", expected a finite number', DESCRIPTION_FILE, line)
     start, stop = numbers.get("startTime", 0.0), numbers.get("stopTime", math.inf)
     if stop <= start:
-        yield EXPERIMENT(f"found stopTime {stop:g}, expected more than the startTime {start:g}", DESCRIPTION, line)
+        yield EXPERIMENT(f"found stopTime {stop:g}, expected more than the startTime {start:g}", DESCRIPTION_FILE, line)
     for name in ("stepSize", "tolerance"):
         if numbers.get(name, 1.0) <= 0:
-            yield EXPERIMENT(f"found {name} {numbers[name]:g}, expected more than 0", DESCRIPTION, line)
+            yield EXPERIMENT(f"found {name} {numbers[name]:g}, expected more than 0", DESCRIPTION_FILE, line)
 
 
-def check_categories(model: Model) -> Iterator[Finding]:
-    for name, _ in _twice((name, 0) for name in model.categories):
-        yield CATEGORIES(f'the log category "{name}" stands twice', DESCRIPTION, model.lines["LogCategories"])
+def check_categories(model: ModelDescription) -> Iterator[Finding]:
+    for name, _ in _find_duplicates((name, 0) for name in model.log_categories):
+        yield CATEGORIES(f'the log category "{name}" stands twice', DESCRIPTION_FILE, model.lines["LogCategories"])
 
 
-def _twice(names: Iterable[tuple[str, int]]) -> Iterator[tuple[str, int]]:
+def _find_duplicates(names: Iterable[tuple[str, int]]) -> Iterator[tuple[str, int]]:
     """Those that were there before."""
     seen: set[str] = set()
     for name, place in names:

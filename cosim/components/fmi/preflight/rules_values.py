@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Iterator, Mapping, Sequence
 
-from .findings import DESCRIPTION, Finding, Rule
-from .limits import Limits
-from .model_description import Model, ModelVariable
-from .values import real, value
+from .findings import DESCRIPTION_FILE, Finding, Rule
+from .limits import PreflightLimits
+from .model_description import ModelDescription, ModelVariable
+from .values import parse_float, parse_value
 
 _START = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.5"
 _DIMENSION = "FMI 3.0.2 section 2.4.7.2"
 
 MISSING = Rule("start.missing", _START)
-UNWANTED = Rule("start.unwanted", _START, "warning")
+UNEXPECTED = Rule("start.unwanted", _START, "warning")
 VALUE = Rule("start.value", _START)
 FINITE = Rule("start.finite", _START)
 INFINITE = Rule("start.infinite", _START, "warning")
@@ -26,45 +26,47 @@ LIMIT_VALUE = Rule("variable.limit-value", _START, "warning")
 DIMENSION = Rule("variable.dimension", _DIMENSION)
 SIZE = Rule("variable.size", "limits")
 
-_TEXTS = ("String", "Binary", "Clock", "")
+_NON_NUMERIC_TYPES = ("String", "Binary", "Clock", "")
 
 
-def check_starts(model: Model) -> Iterator[Finding]:
+def check_starts(model: ModelDescription) -> Iterator[Finding]:
     for variable in model.variables:
         if variable.kind not in ("Clock", ""):
-            yield from _wrong_presence(variable)
-        if variable.kind not in _TEXTS:
-            yield from _wrong_values(variable)
+            yield from _check_start_presence(variable)
+        if variable.kind not in _NON_NUMERIC_TYPES:
+            yield from _check_start_values(variable)
 
 
-def _wrong_presence(variable: ModelVariable) -> Iterator[Finding]:
+def _check_start_presence(variable: ModelVariable) -> Iterator[Finding]:
     initial, causality = variable.initial, variable.causality
-    if not variable.starts and (initial in ("exact", "approx") or causality == "input"):
+    if not variable.start_words and (initial in ("exact", "approx") or causality == "input"):
         why = "inputs" if causality == "input" else f'initial="{initial}"'
-        yield _at(MISSING, variable, f"has no start value, which is needed for {why}")
-    if variable.starts is not None and (initial == "calculated" or causality == "independent"):
+        yield _variable_finding(MISSING, variable, f"has no start value, which is needed for {why}")
+    if variable.start_words is not None and (initial == "calculated" or causality == "independent"):
         why = "it is independent" if causality == "independent" else 'initial="calculated"'
-        yield _at(UNWANTED, variable, f"has a start value, but {why}")
+        yield _variable_finding(UNEXPECTED, variable, f"has a start value, but {why}")
 
 
-def _wrong_values(variable: ModelVariable) -> Iterator[Finding]:
-    low, high = yield from _limits(variable)
-    for word in variable.starts or ():
+def _check_start_values(variable: ModelVariable) -> Iterator[Finding]:
+    low, high = yield from _read_limits(variable)
+    for word in variable.start_words or ():
         try:
-            number = value(word, variable.kind)
+            number = parse_value(word, variable.kind)
         except ValueError:
-            text = f'start value "{" ".join(variable.starts or ())}" of {variable} is no {variable.kind}'
-            yield VALUE(text, DESCRIPTION, variable.line)
+            text = f'start value "{" ".join(variable.start_words or ())}" of {variable} is no {variable.kind}'
+            yield VALUE(text, DESCRIPTION_FILE, variable.line)
             return
         if not math.isfinite(number):
             harmless = math.isinf(number) and variable.causality not in ("input", "output")
-            yield _at(INFINITE if harmless else FINITE, variable, f"found start value {word}, expected a finite number")
+            yield _variable_finding(
+                INFINITE if harmless else FINITE, variable, f"found start value {word}, expected a finite number"
+            )
         elif not low <= number <= high:
-            yield _at(_range_rule(variable), variable, f"found start value {word}, expected {low:g} to {high:g}")
-    yield from _wrong_items(variable)
+            yield _variable_finding(_range_rule(variable), variable, f"found start value {word}, expected {low:g} to {high:g}")
+    yield from _check_enumeration_start(variable)
 
 
-def _limits(variable: ModelVariable) -> Generator[Finding, None, tuple[float, float]]:
+def _read_limits(variable: ModelVariable) -> Generator[Finding, None, tuple[float, float]]:
     """Returns (min, max), infinite where there is none that can be read."""
     limits = {"min": -math.inf, "max": math.inf}
     for name in limits:
@@ -72,11 +74,11 @@ def _limits(variable: ModelVariable) -> Generator[Finding, None, tuple[float, fl
             continue
         limit = read_limit(text)
         if limit is None:
-            yield _at(LIMIT_VALUE, variable, f'found {name}="{text}", expected a number')
+            yield _variable_finding(LIMIT_VALUE, variable, f'found {name}="{text}", expected a number')
         else:
             limits[name] = limit
     if limits["min"] > limits["max"]:
-        yield _at(LIMIT, variable, f"min {limits['min']:g} is above max {limits['max']:g}")
+        yield _variable_finding(LIMIT, variable, f"min {limits['min']:g} is above max {limits['max']:g}")
         return -math.inf, math.inf
     return limits["min"], limits["max"]
 
@@ -84,7 +86,7 @@ def _limits(variable: ModelVariable) -> Generator[Finding, None, tuple[float, fl
 def read_limit(text: str) -> float | None:
     """A limit, also of integers, where tools write more than their range; None when it is none that can be read."""
     try:
-        limit = real(text.strip())
+        limit = parse_float(text.strip())
     except ValueError:
         return None
     return None if math.isnan(limit) else limit
@@ -95,57 +97,57 @@ def _range_rule(variable: ModelVariable) -> Rule:
     return RANGE if variable.causality in ("input", "parameter", "structuralParameter") else OWN_RANGE
 
 
-def _wrong_items(variable: ModelVariable) -> Iterator[Finding]:
-    if variable.kind == "Enumeration" and variable.declared and variable.declared.items:
-        values = {item[1].strip() for item in variable.declared.items}
-        for word in variable.starts or ():
+def _check_enumeration_start(variable: ModelVariable) -> Iterator[Finding]:
+    if variable.kind == "Enumeration" and variable.declared_type and variable.declared_type.items:
+        values = {item[1].strip() for item in variable.declared_type.items}
+        for word in variable.start_words or ():
             if word not in values:
-                text = f'found start value {word}, expected an item of "{variable.declared.name}"'
-                yield _at(_range_rule(variable), variable, text)
+                text = f'found start value {word}, expected an item of "{variable.declared_type.name}"'
+                yield _variable_finding(_range_rule(variable), variable, text)
 
 
-def check_dimensions(model: Model, limits: Limits) -> Iterator[Finding]:
+def check_dimensions(model: ModelDescription, limits: PreflightLimits) -> Iterator[Finding]:
     for variable in model.variables:
         if not variable.dimensions:
             shape: Sequence[int] | None = ()
         else:
-            shape = yield from _shape(model, variable)
+            shape = yield from _read_shape(model, variable)
         if shape is None:
             continue
         size = math.prod(shape)
-        if size > limits.array:
-            yield _at(SIZE, variable, f"has {size} elements, expected at most {limits.array}")
-        elif variable.starts and len(variable.starts) not in (1, size):
-            yield _at(COUNT, variable, f"found {len(variable.starts)} start values, expected {size}")
+        if size > limits.max_array_size:
+            yield _variable_finding(SIZE, variable, f"has {size} elements, expected at most {limits.max_array_size}")
+        elif variable.start_words and len(variable.start_words) not in (1, size):
+            yield _variable_finding(COUNT, variable, f"found {len(variable.start_words)} start values, expected {size}")
 
 
-def _shape(model: Model, variable: ModelVariable) -> Generator[Finding, None, Sequence[int] | None]:
+def _read_shape(model: ModelDescription, variable: ModelVariable) -> Generator[Finding, None, Sequence[int] | None]:
     """Returns the sizes, or None when one of them is unknown."""
     sizes = [dimension_size(model, dimension) for dimension in variable.dimensions]
     for size, dimension in zip(sizes, variable.dimensions, strict=True):
         if size is None or size < 1:
             found = " ".join(f'{name}="{text}"' for name, text in dimension.items()) or "nothing"
             text = f"found a dimension with {found}, expected start > 0 or the reference of a structural parameter that is"
-            yield _at(DIMENSION, variable, text)
+            yield _variable_finding(DIMENSION, variable, text)
     good = [size for size in sizes if size]
     return good if len(good) == len(sizes) else None
 
 
-def dimension_size(model: Model, dimension: Mapping[str, str]) -> int | None:
+def dimension_size(model: ModelDescription, dimension: Mapping[str, str]) -> int | None:
     """The size of a dimension before anything is set; None when it is not said clearly."""
     reference, text = dimension.get("valueReference"), dimension.get("start")
     if (reference is None) == (text is None):
         return None
     if reference is not None:
         source = model.by_reference.get(reference.strip())
-        if source is None or source.dimensions or source.causality != "structuralParameter" or len(source.starts or ()) != 1:
+        if source is None or source.dimensions or source.causality != "structuralParameter" or len(source.start_words or ()) != 1:
             return None
-        text = (source.starts or ("",))[0]
+        text = (source.start_words or ("",))[0]
     try:
-        return int(value((text or "").strip(), "UInt64"))
+        return int(parse_value((text or "").strip(), "UInt64"))
     except ValueError:
         return None
 
 
-def _at(rule: Rule, variable: ModelVariable, text: str) -> Finding:
-    return rule(f"{variable}: {text}", DESCRIPTION, variable.line)
+def _variable_finding(rule: Rule, variable: ModelVariable, text: str) -> Finding:
+    return rule(f"{variable}: {text}", DESCRIPTION_FILE, variable.line)

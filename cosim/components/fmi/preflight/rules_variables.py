@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 
 from ....core.errors import did_you_mean
-from .findings import DESCRIPTION, Finding, Rule
-from .model_description import INITIAL, Model, ModelVariable
+from .findings import DESCRIPTION_FILE, Finding, Rule
+from .model_description import ALLOWED_INITIAL, ModelDescription, ModelVariable
 
 _VARIABLES = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7"
 _ATTRIBUTES = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.4"
@@ -20,7 +20,7 @@ NAME = Rule("variable.name", _VARIABLES)
 UNIQUE = Rule("variable.unique", _VARIABLES)
 CONVENTION = Rule("variable.convention", "FMI 2.0.5 section 2.2.9, FMI 3.0.2 section 2.4.7.5.1", "warning")
 KIND = Rule("variable.type", _VARIABLES)
-WORD = Rule("variable.word", _ATTRIBUTES)
+ATTRIBUTE_VALUE = Rule("variable.word", _ATTRIBUTES)
 COMBINATION = Rule("variable.combination", _ATTRIBUTES)
 CONTINUOUS = Rule("variable.continuous", _ATTRIBUTES)
 IMPLIED = Rule("variable.implied-continuous", _ATTRIBUTES, "warning")
@@ -35,153 +35,165 @@ UNIT = Rule("variable.unit", _UNITS, "warning")
 DERIVATIVE = Rule("variable.derivative", _TYPE_SPECIFIC)
 CLOCK = Rule("variable.clocks", "FMI 3.0.2 section 2.4.7.4")
 
-_WORDS = {
+_ATTRIBUTE_VALUES = {
     "causality": ("parameter", "calculatedParameter", "input", "output", "local", "independent", "structuralParameter"),
     "variability": ("constant", "fixed", "tunable", "discrete", "continuous"),
     "initial": ("exact", "approx", "calculated"),
 }
-_BARE = (
+_NAME_PATTERN = (
     r"(?:[A-Za-z_][A-Za-z0-9_]*|'(?:[A-Za-z0-9_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ]|\\['\"?\\abfnrtv])+')(?:\[[0-9]+(?:,[0-9]+)*\])?"
 )
-_STRUCTURED = re.compile(rf"{_BARE}(?:\.{_BARE})*|der\({_BARE}(?:\.{_BARE})*(?:,[0-9]+)?\)")
+_STRUCTURED_NAME = re.compile(rf"{_NAME_PATTERN}(?:\.{_NAME_PATTERN})*|der\({_NAME_PATTERN}(?:\.{_NAME_PATTERN})*(?:,[0-9]+)?\)")
 #: names among which the nearest one is looked for, which is slow
-_MOST_HINTS = 200
+_MAX_HINT_CANDIDATES = 200
 #: kinds of FMI 2.0 that are read and written by the same functions
-_BASE = {"Enumeration": "Int32"}
+_ACCESSOR_TYPES = {"Enumeration": "Int32"}
 
 
-def check_identity(model: Model) -> Iterator[Finding]:
+def check_identity(model: ModelDescription) -> Iterator[Finding]:
     """Names are there, are one line, unique and written as they are said to be."""
     seen: dict[str, int] = {}
     structured = model.root.get("variableNamingConvention") == "structured"
-    for name, line in _names(model):
+    for name, line in _all_names(model):
         if not name or not name.isprintable():
-            yield NAME(f'found the variable name "{name}", expected one without control characters', DESCRIPTION, line)
-        elif structured and not _STRUCTURED.fullmatch(name):
-            yield CONVENTION(f'the name "{name}" does not follow the structured naming convention', DESCRIPTION, line)
+            yield NAME(f'found the variable name "{name}", expected one without control characters', DESCRIPTION_FILE, line)
+        elif structured and not _STRUCTURED_NAME.fullmatch(name):
+            yield CONVENTION(f'the name "{name}" does not follow the structured naming convention', DESCRIPTION_FILE, line)
         if name in seen:
-            yield UNIQUE(f'the variable name "{name}" stands in line {seen[name]} too, expected once', DESCRIPTION, line)
+            yield UNIQUE(f'the variable name "{name}" stands in line {seen[name]} too, expected once', DESCRIPTION_FILE, line)
         seen.setdefault(name, line)
 
 
-def _names(model: Model) -> Iterator[tuple[str, int]]:
+def _all_names(model: ModelDescription) -> Iterator[tuple[str, int]]:
     for variable in model.variables:
         yield variable.name, variable.line
         for alias in variable.aliases:
             yield alias.get("name", ""), variable.line
 
 
-def check_kinds(model: Model) -> Iterator[Finding]:
+def check_kinds(model: ModelDescription) -> Iterator[Finding]:
     """Type, causality, variability and initial are words of FMI, and go together."""
     for variable in model.variables:
         if not variable.kind:
-            yield _at(KIND, variable, "has no type that this FMI version knows")
-        wrong = list(_wrong_words(variable))
+            yield _variable_finding(KIND, variable, "has no type that this FMI version knows")
+        wrong = list(_check_attribute_values(variable))
         yield from wrong
         if not wrong and variable.kind != "Clock":
-            yield from _wrong_combination(model, variable)
+            yield from _check_combination(model, variable)
     count = sum(variable.causality == "independent" for variable in model.variables)
     if count > 1 or (model.major == 3 and count == 0):
-        yield INDEPENDENT(f"found {count} independent variables, expected one", DESCRIPTION, model.lines[""])
+        yield INDEPENDENT(f"found {count} independent variables, expected one", DESCRIPTION_FILE, model.lines[""])
 
 
-def _wrong_words(variable: ModelVariable) -> Iterator[Finding]:
-    for attribute, words in _WORDS.items():
+def _check_attribute_values(variable: ModelVariable) -> Iterator[Finding]:
+    for attribute, words in _ATTRIBUTE_VALUES.items():
         word = variable.attributes.get(attribute, words[0])
         if word not in words:
-            yield _at(WORD, variable, f'found {attribute}="{word}"{did_you_mean(word, words)}')
+            yield _variable_finding(ATTRIBUTE_VALUE, variable, f'found {attribute}="{word}"{did_you_mean(word, words)}')
 
 
-def _wrong_combination(model: Model, variable: ModelVariable) -> Iterator[Finding]:
+def _check_combination(model: ModelDescription, variable: ModelVariable) -> Iterator[Finding]:
     causality, variability = variable.causality, variable.variability
-    allowed = INITIAL.get((causality, variability))
+    allowed = ALLOWED_INITIAL.get((causality, variability))
     if allowed is None:
-        yield _at(COMBINATION, variable, f'causality="{causality}" does not go with variability="{variability}"')
+        yield _variable_finding(COMBINATION, variable, f'causality="{causality}" does not go with variability="{variability}"')
         return
     if variability == "continuous" and variable.kind and not variable.is_float:
-        yield _at(CONTINUOUS, variable, f'type {variable.kind} does not go with variability="continuous"')
+        yield _variable_finding(CONTINUOUS, variable, f'type {variable.kind} does not go with variability="continuous"')
     if model.major == 2 and "variability" not in variable.attributes and variable.kind and not variable.is_float:
-        yield _at(IMPLIED, variable, f"lacks the variability, which makes it continuous; {variable.kind} is taken as discrete")
+        yield _variable_finding(
+            IMPLIED, variable, f"lacks the variability, which makes it continuous; {variable.kind} is taken as discrete"
+        )
     initial = variable.attributes.get("initial")
     if initial and (causality == "independent" or (causality == "input" and model.major == 2)):
-        yield _at(INITIAL_NOT_ALLOWED, variable, f'found initial="{initial}", expected none for causality="{causality}"')
+        yield _variable_finding(
+            INITIAL_NOT_ALLOWED, variable, f'found initial="{initial}", expected none for causality="{causality}"'
+        )
     elif initial and initial not in allowed:
         text = f'initial="{initial}" does not go with causality="{causality}" and variability="{variability}"'
-        yield _at(INITIAL_RULE, variable, text)
+        yield _variable_finding(INITIAL_RULE, variable, text)
 
 
-def check_references(model: Model) -> Iterator[Finding]:
+def check_references(model: ModelDescription) -> Iterator[Finding]:
     """Value references are numbers; FMI 3.0 has one for each variable, in FMI 2.0 those who share one are aliases."""
     groups: dict[tuple[str, int], list[ModelVariable]] = defaultdict(list)
     for variable in model.variables:
         text = variable.attributes.get("valueReference", "")
         if not re.fullmatch(r"\s*\+?[0-9]{1,10}\s*", text) or int(text) >= 2**32:
-            yield _at(REFERENCE, variable, f'found valueReference="{text}", expected a whole number from 0 to 4294967295')
+            yield _variable_finding(
+                REFERENCE, variable, f'found valueReference="{text}", expected a whole number from 0 to 4294967295'
+            )
         else:
-            kind = _BASE.get(variable.kind, variable.kind) if model.major == 2 else ""
+            kind = _ACCESSOR_TYPES.get(variable.kind, variable.kind) if model.major == 2 else ""
             groups[kind, int(text)].append(variable)
     for group in groups.values():
         if len(group) > 1:
-            yield from _wrong_sharing(group) if model.major == 3 else _wrong_aliases(group)
+            yield from _check_shared_references(group) if model.major == 3 else _check_aliases(group)
 
 
-def _wrong_sharing(group: Sequence[ModelVariable]) -> Iterator[Finding]:
+def _check_shared_references(group: Sequence[ModelVariable]) -> Iterator[Finding]:
     for variable in group[1:]:
         text = f'has the value reference of "{group[0].name}", expected one of its own'
-        yield _at(SHARED, variable, text)
+        yield _variable_finding(SHARED, variable, text)
 
 
-def _wrong_aliases(group: Sequence[ModelVariable]) -> Iterator[Finding]:
+def _check_aliases(group: Sequence[ModelVariable]) -> Iterator[Finding]:
     settable = [variable for variable in group if variable.causality in ("input", "parameter")]
     for variable in settable[1:]:
         text = f'has the value reference of "{settable[0].name}"; of inputs and parameters each needs its own'
-        yield _at(SHARED, variable, text)
+        yield _variable_finding(SHARED, variable, text)
     first = group[0]
     for variable in group[1:]:
         if (variable.variability == "constant") != (first.variability == "constant"):
-            yield _at(ALIAS, variable, f'is an alias of "{first.name}", but only one of them is constant')
+            yield _variable_finding(ALIAS, variable, f'is an alias of "{first.name}", but only one of them is constant')
         if variable.attribute("unit") != first.attribute("unit"):
-            yield _at(ALIAS, variable, f'is an alias of "{first.name}", but has another unit')
+            yield _variable_finding(ALIAS, variable, f'is an alias of "{first.name}", but has another unit')
 
 
-def check_links(model: Model) -> Iterator[Finding]:
+def check_declarations(model: ModelDescription) -> Iterator[Finding]:
     """What a variable names exists: declared type, unit, state, clocks."""
-    units = {unit.name: unit.display for unit in model.units}
+    units = {unit.name: unit.display_units for unit in model.units}
     for variable in model.variables:
-        yield from _wrong_declaration(model, variable)
-        yield from _wrong_units(variable, units)
+        yield from _check_declared_type(model, variable)
+        yield from _check_units(variable, units)
         state = variable.attributes.get("derivative", "").strip()
         if state and (state not in model.by_reference or not model.by_reference[state].is_float):
-            yield _at(DERIVATIVE, variable, f'found derivative="{state}", expected the reference of a floating-point variable')
+            yield _variable_finding(
+                DERIVATIVE, variable, f'found derivative="{state}", expected the reference of a floating-point variable'
+            )
         for clock in variable.attributes.get("clocks", "").split():
             if clock not in model.by_reference or model.by_reference[clock].kind != "Clock":
-                yield _at(CLOCK, variable, f'found "{clock}" among its clocks, expected the reference of a clock')
+                yield _variable_finding(CLOCK, variable, f'found "{clock}" among its clocks, expected the reference of a clock')
 
 
-def _wrong_declaration(model: Model, variable: ModelVariable) -> Iterator[Finding]:
+def _check_declared_type(model: ModelDescription, variable: ModelVariable) -> Iterator[Finding]:
     name = variable.attributes.get("declaredType")
     if name is None:
         if variable.kind == "Enumeration":
-            yield _at(DECLARED, variable, "is an enumeration without declaredType")
-    elif variable.declared is None:
-        hint = did_you_mean(name, (definition.name for definition in model.types[:_MOST_HINTS]))
-        yield _at(DECLARED, variable, f'found declaredType="{name}", which is not defined{hint}')
-    elif variable.kind and variable.declared.kind not in ("", variable.kind):
-        yield _at(DECLARED, variable, f'the type "{name}" is {variable.declared.kind}, the variable {variable.kind}')
+            yield _variable_finding(DECLARED, variable, "is an enumeration without declaredType")
+    elif variable.declared_type is None:
+        hint = did_you_mean(name, (definition.name for definition in model.types[:_MAX_HINT_CANDIDATES]))
+        yield _variable_finding(DECLARED, variable, f'found declaredType="{name}", which is not defined{hint}')
+    elif variable.kind and variable.declared_type.kind not in ("", variable.kind):
+        yield _variable_finding(
+            DECLARED, variable, f'the type "{name}" is {variable.declared_type.kind}, the variable {variable.kind}'
+        )
 
 
-def _wrong_units(variable: ModelVariable, units: dict[str, Sequence[str]]) -> Iterator[Finding]:
+def _check_units(variable: ModelVariable, units: dict[str, Sequence[str]]) -> Iterator[Finding]:
     if not variable.is_float:
         return
     unit, display = variable.attribute("unit"), variable.attributes.get("displayUnit")
     if unit is not None and unit not in units:
-        yield _at(UNIT, variable, f'the unit "{unit}" is not defined{did_you_mean(unit, islice(units, _MOST_HINTS))}')
+        yield _variable_finding(
+            UNIT, variable, f'the unit "{unit}" is not defined{did_you_mean(unit, islice(units, _MAX_HINT_CANDIDATES))}'
+        )
     elif display is not None and display not in units.get(unit or "", ()):
-        yield _at(UNIT, variable, f'the display unit "{display}" is not defined for unit "{unit or ""}"')
+        yield _variable_finding(UNIT, variable, f'the display unit "{display}" is not defined for unit "{unit or ""}"')
 
 
-def _at(rule: Rule, variable: ModelVariable, text: str) -> Finding:
-    return rule(f"{variable}: {text}", DESCRIPTION, variable.line)
+def _variable_finding(rule: Rule, variable: ModelVariable, text: str) -> Finding:
+    return rule(f"{variable}: {text}", DESCRIPTION_FILE, variable.line)
 
 
-CHECKS = (check_identity, check_kinds, check_references, check_links)
+CHECKS = (check_identity, check_kinds, check_references, check_declarations)

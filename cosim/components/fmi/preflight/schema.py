@@ -10,20 +10,20 @@ from typing import Any
 
 from lxml import etree
 
-from .findings import DESCRIPTION, Finding, Rule
+from .findings import DESCRIPTION_FILE, Finding, Rule
 
 SCHEMA = Rule("xml.schema", "XML schemas of FMI 2.0.5 and 3.0.2", "warning")
 #: member of the archive -> its schema, by FMI version; only FMI 3.0 standardizes the others
-SCHEMAS = {
-    (2, DESCRIPTION): "fmi2/fmi2ModelDescription.xsd",
-    (3, DESCRIPTION): "fmi3/fmi3ModelDescription.xsd",
+SCHEMA_FILES = {
+    (2, DESCRIPTION_FILE): "fmi2/fmi2ModelDescription.xsd",
+    (3, DESCRIPTION_FILE): "fmi3/fmi3ModelDescription.xsd",
     (3, "sources/buildDescription.xml"): "fmi3/fmi3BuildDescription.xsd",
     (3, "terminalsAndIcons/terminalsAndIcons.xml"): "fmi3/fmi3TerminalsAndIcons.xsd",
 }
 
 
 @cache
-def _schema(name: str) -> Any:
+def _load_schema(name: str) -> Any:
     """A schema, from the copies that FMPy brings."""
     fmpy = find_spec("fmpy")
     assert fmpy is not None and fmpy.origin is not None
@@ -32,7 +32,7 @@ def _schema(name: str) -> Any:
 
 def check_schema(root: Any, member: str, major: int) -> Iterator[Finding]:
     """What an XML document has that its schema does not allow, and what it lacks."""
-    schema = _schema(SCHEMAS[major, member])
+    schema = _load_schema(SCHEMA_FILES[major, member])
     if not schema.validate(root):
         for error in schema.error_log:
             yield SCHEMA(error.message.rstrip("."), member, error.line)

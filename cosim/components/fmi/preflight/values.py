@@ -9,23 +9,23 @@ _INTEGER = re.compile(r"[+-]?[0-9]{1,20}")
 _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 
 
-def value(word: str, kind: str) -> float | int | bool:
+def parse_value(word: str, kind: str) -> float | int | bool:
     """The value of one word for an FMI type. Raises ValueError when the type has no such value."""
     if kind == "Boolean":
         if word not in _BOOLEANS:
             raise ValueError(word)
         return _BOOLEANS[word]
-    return real(word) if kind.startswith("Float") else _integer(word, kind)
+    return parse_float(word) if kind.startswith("Float") else _parse_integer(word, kind)
 
 
-def real(word: str) -> float:
+def parse_float(word: str) -> float:
     """A floating-point number, which may be infinite or NaN. Raises ValueError."""
     if not _FLOAT.fullmatch(word.strip()):
         raise ValueError(word)
     return float(word)
 
 
-def _integer(word: str, kind: str) -> int:
+def _parse_integer(word: str, kind: str) -> int:
     if not _INTEGER.fullmatch(word.strip()):
         raise ValueError(word)
     bits = 64 if kind == "Enumeration" else int(kind.removeprefix("U").removeprefix("Int"))

@@ -7,15 +7,15 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from .findings import DESCRIPTION, Finding, Flaw, Rule
-from .model_description import Model, ModelVariable, TypeDefinition, UnitDefinition, Unknown
+from .findings import DESCRIPTION_FILE, FatalFinding, Finding, Rule
+from .model_description import ModelDescription, ModelVariable, TypeDefinition, UnitDefinition, Unknown
 
 _ROOT = "FMI 2.0.5 section 2.2.1, FMI 3.0.2 section 2.4.1"
 ROOT = Rule("model.root", _ROOT)
 VERSION = Rule("model.version", _ROOT)
 REPEATED = Rule("model.repeated", _ROOT)
 
-KINDS = {
+TYPE_NAMES = {
     2: {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String", "Enumeration": "Enumeration"},
     3: {
         **{f"Float{bits}": f"Float{bits}" for bits in (32, 64)},
@@ -32,64 +32,66 @@ _FMI2_GROUPS = {
 _FMI3_GROUPS = {
     name: name for name in ("Output", "ContinuousStateDerivative", "ClockedState", "InitialUnknown", "EventIndicator")
 }
-_FIXED = ("parameter", "calculatedParameter", "structuralParameter")
+_FIXED_CAUSALITIES = ("parameter", "calculatedParameter", "structuralParameter")
 #: no "3.0-beta": the C functions changed until 3.0
-_SUPPORTED = re.compile(r"2\.0(\.[0-9]+)?|3\.[0-9]+(\.[0-9]+)?")
+_SUPPORTED_VERSION = re.compile(r"2\.0(\.[0-9]+)?|3\.[0-9]+(\.[0-9]+)?")
 
 
-def read_model(root: Any) -> Model:
+def read_model(root: Any) -> ModelDescription:
     """The model description below a root element. Raises Flaw when it is of no FMI version that cosim knows."""
     if root.tag != "fmiModelDescription":
-        raise Flaw(ROOT(f"found <{root.tag}>, expected <fmiModelDescription>", DESCRIPTION, root.sourceline))
+        raise FatalFinding(ROOT(f"found <{root.tag}>, expected <fmiModelDescription>", DESCRIPTION_FILE, root.sourceline))
     version = root.get("fmiVersion", "of unknown version")
-    if not _SUPPORTED.fullmatch(version):
+    if not _SUPPORTED_VERSION.fullmatch(version):
         text = f"is an FMI {version} FMU; FMI 2.0 and 3.0 are supported"
-        raise Flaw(VERSION(text, DESCRIPTION, root.sourceline))
+        raise FatalFinding(VERSION(text, DESCRIPTION_FILE, root.sourceline))
     major = int(version[0])
     interface = root.find("CoSimulation")
-    types = [_type(element, major) for element in root.iterfind("TypeDefinitions/*")]
+    types = [_read_type(element, major) for element in root.iterfind("TypeDefinitions/*")]
     declared = {definition.name: definition for definition in types}
-    return Model(
+    return ModelDescription(
         major,
-        _attributes(root),
-        None if interface is None else _attributes(interface),
-        _attributes(root.find("DefaultExperiment")),
-        [_variable(element, major, declared) for element in root.iterfind("ModelVariables/*")],
+        _read_attributes(root),
+        None if interface is None else _read_attributes(interface),
+        _read_attributes(root.find("DefaultExperiment")),
+        [_read_variable(element, major, declared) for element in root.iterfind("ModelVariables/*")],
         types,
-        [_unit(element) for element in root.iterfind("UnitDefinitions/Unit")],
-        list(_structure(root, major)),
+        [_read_unit(element) for element in root.iterfind("UnitDefinitions/Unit")],
+        list(_read_structure(root, major)),
         [element.get("name", "") for element in root.iterfind("LogCategories/Category")],
         {"": root.sourceline} | {element.tag: element.sourceline for element in root},
     )
 
 
-def repeated(root: Any) -> Iterator[Finding]:
+def check_repeated_elements(root: Any) -> Iterator[Finding]:
     """Elements of which a second reader might take the other one."""
     counts = Counter(element.tag for element in root)
     for tag, count in counts.items():
         if count > 1:
-            yield REPEATED(f"<{tag}> stands {count} times, expected once", DESCRIPTION, root.find(tag).sourceline)
+            yield REPEATED(f"<{tag}> stands {count} times, expected once", DESCRIPTION_FILE, root.find(tag).sourceline)
 
 
-def _attributes(element: Any) -> dict[str, str]:
+def _read_attributes(element: Any) -> dict[str, str]:
     return {} if element is None else dict(element.items())
 
 
-def _type(element: Any, major: int) -> TypeDefinition:
+def _read_type(element: Any, major: int) -> TypeDefinition:
     typed = element
     if major == 2:
-        typed = next((child for child in element if child.tag in KINDS[2]), element)
-    kind = KINDS[major].get(typed.tag if major == 2 else typed.tag.removesuffix("Type"), "")
+        typed = next((child for child in element if child.tag in TYPE_NAMES[2]), element)
+    kind = TYPE_NAMES[major].get(typed.tag if major == 2 else typed.tag.removesuffix("Type"), "")
     items = [(item.get("name", ""), item.get("value", "")) for item in typed.iterfind("Item")]
-    return TypeDefinition(element.get("name", ""), kind, _attributes(typed) | _attributes(element), items, element.sourceline)
+    return TypeDefinition(
+        element.get("name", ""), kind, _read_attributes(typed) | _read_attributes(element), items, element.sourceline
+    )
 
 
-def _variable(element: Any, major: int, declared: Mapping[str, TypeDefinition]) -> ModelVariable:
+def _read_variable(element: Any, major: int, declared: Mapping[str, TypeDefinition]) -> ModelVariable:
     typed = element
     if major == 2:
-        typed = next((child for child in element if child.tag in KINDS[2]), element)
-    attributes = _attributes(typed) | _attributes(element)
-    kind = KINDS[major].get(typed.tag, "")
+        typed = next((child for child in element if child.tag in TYPE_NAMES[2]), element)
+    attributes = _read_attributes(typed) | _read_attributes(element)
+    kind = TYPE_NAMES[major].get(typed.tag, "")
     causality = attributes.get("causality", "local")
     return ModelVariable(
         attributes.get("name", ""),
@@ -97,21 +99,21 @@ def _variable(element: Any, major: int, declared: Mapping[str, TypeDefinition]) 
         causality,
         attributes.get("variability") or _default_variability(kind, causality, major),
         attributes,
-        _starts(element, kind, attributes.get("start"), major),
-        [_attributes(child) for child in element.iterfind("Dimension")],
-        [_attributes(child) for child in element.iterfind("Alias")],
+        _read_starts(element, kind, attributes.get("start"), major),
+        [_read_attributes(child) for child in element.iterfind("Dimension")],
+        [_read_attributes(child) for child in element.iterfind("Alias")],
         element.sourceline,
         declared.get(attributes.get("declaredType", "")),
     )
 
 
 def _default_variability(kind: str, causality: str, major: int) -> str:
-    if major == 3 and causality in _FIXED:
+    if major == 3 and causality in _FIXED_CAUSALITIES:
         return "fixed"
     return "continuous" if kind.startswith("Float") else "discrete"
 
 
-def _starts(element: Any, kind: str, text: str | None, major: int) -> Sequence[str] | None:
+def _read_starts(element: Any, kind: str, text: str | None, major: int) -> Sequence[str] | None:
     """Words of an attribute; FMI 3.0 strings and binaries have elements of their own, one for each value."""
     if kind in ("String", "Binary") and major == 3:
         return [child.get("value", "") for child in element.iterfind("Start")] or None
@@ -120,18 +122,18 @@ def _starts(element: Any, kind: str, text: str | None, major: int) -> Sequence[s
     return [text] if kind == "String" else text.split()
 
 
-def _unit(element: Any) -> UnitDefinition:
+def _read_unit(element: Any) -> UnitDefinition:
     base = element.find("BaseUnit")
     display = [child.get("name", "") for child in element.iterfind("DisplayUnit")]
-    return UnitDefinition(element.get("name", ""), None if base is None else _attributes(base), display, element.sourceline)
+    return UnitDefinition(element.get("name", ""), None if base is None else _read_attributes(base), display, element.sourceline)
 
 
-def _structure(root: Any, major: int) -> Iterator[Unknown]:
+def _read_structure(root: Any, major: int) -> Iterator[Unknown]:
     for group, path in (_FMI2_GROUPS if major == 2 else _FMI3_GROUPS).items():
         for element in root.iterfind(f"ModelStructure/{path}"):
-            yield _unknown(element, group, "index" if major == 2 else "valueReference")
+            yield _read_unknown(element, group, "index" if major == 2 else "valueReference")
 
 
-def _unknown(element: Any, group: str, attribute: str) -> Unknown:
+def _read_unknown(element: Any, group: str, attribute: str) -> Unknown:
     words = [None if (text := element.get(name)) is None else text.split() for name in ("dependencies", "dependenciesKind")]
     return Unknown(group, element.get(attribute, ""), words[0], words[1], element.sourceline)

@@ -11,38 +11,42 @@ import struct
 from dataclasses import dataclass
 from io import BufferedReader
 
-from .findings import Flaw, Rule
+from .findings import FatalFinding, Rule
 
 NO_ZIP = Rule("archive.zip", "APPNOTE 4.3")
 TRAILING = Rule("archive.trailing-data", "APPNOTE 4.3.16")
-CONTENTS = Rule("archive.contents", "APPNOTE 4.3.12")
+CENTRAL_DIRECTORY = Rule("archive.contents", "APPNOTE 4.3.12")
 HEADER = Rule("archive.header", "APPNOTE 4.3.7")
 
-_END, _ENTRY, _LOCAL = struct.Struct("<4s4H2LH"), struct.Struct("<4s6H3L5H2L"), struct.Struct("<4s5H3L2H")
+_END_RECORD, _DIRECTORY_HEADER, _LOCAL_HEADER = (
+    struct.Struct("<4s4H2LH"),
+    struct.Struct("<4s6H3L5H2L"),
+    struct.Struct("<4s5H3L2H"),
+)
 _END_MAGIC, _ENTRY_MAGIC, _LOCAL_MAGIC = b"PK\x05\x06", b"PK\x01\x02", b"PK\x03\x04"
-_LONGEST_COMMENT = 0xFFFF
+_MAX_COMMENT_SIZE = 0xFFFF
 #: on average, in the table of contents
-_LONGEST_ROW = 4096
-_IN_EXTRA = 0xFFFFFFFF
+_MAX_HEADER_SIZE = 4096
+_ZIP64_MARKER = 0xFFFFFFFF
 #: bits of the flags
-ENCRYPTED, SIZES_BEHIND, UTF8 = 0x2041, 0x8, 0x800
+ENCRYPTED, HAS_DATA_DESCRIPTOR, UTF8 = 0x2041, 0x8, 0x800
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class ZipEntry:
     """One row of the table of contents; sizes and offset in bytes, `mode` as of Unix (0: unknown)."""
 
     name: bytes
     flags: int
     method: int
     crc: int
-    compressed: int
+    compressed_size: int
     size: int
     mode: int
     offset: int
 
     @property
-    def text(self) -> str:
+    def decoded_name(self) -> str:
         """The name as text; without the flag for UTF-8 it is UTF-8 if it can be, else code page 437."""
         try:
             return self.name.decode()
@@ -50,13 +54,15 @@ class Entry:
             return self.name.decode("cp437")
 
 
-def read_contents(file: BufferedReader, most: int) -> tuple[list[Entry], int]:
+def read_central_directory(file: BufferedReader, max_entries: int) -> tuple[list[ZipEntry], int]:
     """The table of contents, and where it begins. Raises Flaw when it has more than `most` rows or is none."""
     count, size, offset = _read_end(file)
-    if count > most:
-        raise Flaw(CONTENTS(f"found {count} members, expected at most {most}"))
-    if size > most * _LONGEST_ROW:
-        raise Flaw(CONTENTS(f"found a table of contents of {size} bytes, expected at most {most * _LONGEST_ROW}"))
+    if count > max_entries:
+        raise FatalFinding(CENTRAL_DIRECTORY(f"found {count} members, expected at most {max_entries}"))
+    if size > max_entries * _MAX_HEADER_SIZE:
+        raise FatalFinding(
+            CENTRAL_DIRECTORY(f"found a table of contents of {size} bytes, expected at most {max_entries * _MAX_HEADER_SIZE}")
+        )
     file.seek(offset)
     table = file.read(size)
     entries, place = [], 0
@@ -64,85 +70,97 @@ def read_contents(file: BufferedReader, most: int) -> tuple[list[Entry], int]:
         entry, place = _read_entry(table, place)
         entries.append(entry)
     if place != size:
-        raise Flaw(CONTENTS(f"the table of contents has {size - place} bytes more than its {count} members need"))
+        raise FatalFinding(
+            CENTRAL_DIRECTORY(f"the table of contents has {size - place} bytes more than its {count} members need")
+        )
     return entries, offset
 
 
 def _read_end(file: BufferedReader) -> tuple[int, int, int]:
     """(members, size, offset) of the table of contents, from the record at the very end of the file."""
     length = file.seek(0, os.SEEK_END)
-    file.seek(max(0, length - _END.size - _LONGEST_COMMENT))
+    file.seek(max(0, length - _END_RECORD.size - _MAX_COMMENT_SIZE))
     tail = file.read()
     place = tail.rfind(_END_MAGIC)
-    if place < 0 or len(tail) - place < _END.size:
-        raise Flaw(NO_ZIP("is no FMU: File is not a zip file, or its end is missing"))
-    _, disk, contents_disk, here, count, size, offset, comment = _END.unpack_from(tail, place)
-    surplus = len(tail) - place - _END.size - comment
-    if surplus or _encloses(tail, place):
-        raise Flaw(TRAILING(f"found {abs(surplus)} bytes behind the end of the archive or a second end, expected neither"))
+    if place < 0 or len(tail) - place < _END_RECORD.size:
+        raise FatalFinding(NO_ZIP("is no FMU: File is not a zip file, or its end is missing"))
+    _, disk, contents_disk, here, count, size, offset, comment = _END_RECORD.unpack_from(tail, place)
+    surplus = len(tail) - place - _END_RECORD.size - comment
+    if surplus or _is_in_comment(tail, place):
+        raise FatalFinding(
+            TRAILING(f"found {abs(surplus)} bytes behind the end of the archive or a second end, expected neither")
+        )
     if (disk, contents_disk) != (0, 0) or here != count:
-        raise Flaw(CONTENTS("is one part of an archive in several parts"))
-    end = length - _END.size - comment
+        raise FatalFinding(CENTRAL_DIRECTORY("is one part of an archive in several parts"))
+    end = length - _END_RECORD.size - comment
     if offset + size != end:
-        raise Flaw(CONTENTS(f"the table of contents should end at byte {end}, found {offset + size} (cut, or data in front?)"))
+        raise FatalFinding(
+            CENTRAL_DIRECTORY(f"the table of contents should end at byte {end}, found {offset + size} (cut, or data in front?)")
+        )
     return count, size, offset
 
 
-def _encloses(tail: bytes, place: int) -> bool:
+def _is_in_comment(tail: bytes, place: int) -> bool:
     """Whether an earlier end record takes the last one for its comment."""
     earlier = tail.find(_END_MAGIC)
     while earlier != place:
-        if len(tail) - earlier >= _END.size and earlier + _END.size + _END.unpack_from(tail, earlier)[-1] == len(tail):
+        if len(tail) - earlier >= _END_RECORD.size and earlier + _END_RECORD.size + _END_RECORD.unpack_from(tail, earlier)[
+            -1
+        ] == len(tail):
             return True
         earlier = tail.find(_END_MAGIC, earlier + 1)
     return False
 
 
-def _read_entry(table: bytes, place: int) -> tuple[Entry, int]:
-    if len(table) - place < _ENTRY.size or not table.startswith(_ENTRY_MAGIC, place):
-        raise Flaw(CONTENTS(f"the table of contents is damaged at its byte {place}"))
-    _, _, _, flags, method, _, _, crc, compressed, size, n, m, k, _, _, attributes, offset = _ENTRY.unpack_from(table, place)
-    name_at = place + _ENTRY.size
+def _read_entry(table: bytes, place: int) -> tuple[ZipEntry, int]:
+    if len(table) - place < _DIRECTORY_HEADER.size or not table.startswith(_ENTRY_MAGIC, place):
+        raise FatalFinding(CENTRAL_DIRECTORY(f"the table of contents is damaged at its byte {place}"))
+    _, _, _, flags, method, _, _, crc, compressed, size, n, m, k, _, _, attributes, offset = _DIRECTORY_HEADER.unpack_from(
+        table, place
+    )
+    name_at = place + _DIRECTORY_HEADER.size
     end = name_at + n + m + k
     if end > len(table):
-        raise Flaw(CONTENTS(f"the table of contents is damaged at its byte {place}"))
+        raise FatalFinding(CENTRAL_DIRECTORY(f"the table of contents is damaged at its byte {place}"))
     name = table[name_at : name_at + n]
-    size, compressed, offset = _wide(table[name_at + n : name_at + n + m], size, compressed, offset)
-    return Entry(name, flags, method, crc, compressed, size, attributes >> 16, offset), end
+    size, compressed, offset = _apply_zip64(table[name_at + n : name_at + n + m], size, compressed, offset)
+    return ZipEntry(name, flags, method, crc, compressed, size, attributes >> 16, offset), end
 
 
-def _wide(extra: bytes, *values: int) -> tuple[int, ...]:
+def _apply_zip64(extra: bytes, *values: int) -> tuple[int, ...]:
     """The values, with those that did not fit into 32 bits taken from the ZIP64 field (APPNOTE 4.5.3)."""
     place = 0
-    while _IN_EXTRA in values and place + 4 <= len(extra):
+    while _ZIP64_MARKER in values and place + 4 <= len(extra):
         kind, length = struct.unpack_from("<2H", extra, place)
         if kind == 1:
             count = (len(extra[place + 4 : place + 4 + length])) // 8
             wide = iter(struct.unpack_from(f"<{count}Q", extra, place + 4))
-            return tuple(next(wide, value) if value == _IN_EXTRA else value for value in values)
+            return tuple(next(wide, value) if value == _ZIP64_MARKER else value for value in values)
         place += 4 + length
     return values
 
 
-def locate(file: BufferedReader, entry: Entry, end: int) -> int:
+def find_data_offset(file: BufferedReader, entry: ZipEntry, end: int) -> int:
     """Where the data of a member begin, before `end`. Raises Flaw when its own header contradicts the table of contents."""
     file.seek(min(entry.offset, end))
-    head = file.read(_LOCAL.size)
-    if len(head) < _LOCAL.size or not head.startswith(_LOCAL_MAGIC):
-        raise Flaw(HEADER(f"found no member at byte {entry.offset}", entry.text))
-    _, _, flags, method, _, _, crc, compressed, size, n, m = _LOCAL.unpack(head)
+    head = file.read(_LOCAL_HEADER.size)
+    if len(head) < _LOCAL_HEADER.size or not head.startswith(_LOCAL_MAGIC):
+        raise FatalFinding(HEADER(f"found no member at byte {entry.offset}", entry.decoded_name))
+    _, _, flags, method, _, _, crc, compressed, size, n, m = _LOCAL_HEADER.unpack(head)
     name, extra = file.read(n), file.read(m)
-    size, compressed = _wide(extra, size, compressed)
+    size, compressed = _apply_zip64(extra, size, compressed)
     pairs = {
         "name": (name, entry.name),
         "encryption": (flags & ENCRYPTED, entry.flags & ENCRYPTED),
         "method": (method, entry.method),
         "CRC": (crc, entry.crc),
-        "compressed size": (compressed, entry.compressed),
+        "compressed size": (compressed, entry.compressed_size),
         "size": (size, entry.size),
     }
     for label, (own, listed) in pairs.items():
-        comes_later = own == 0 and flags & SIZES_BEHIND and label in ("CRC", "compressed size", "size")
+        comes_later = own == 0 and flags & HAS_DATA_DESCRIPTOR and label in ("CRC", "compressed size", "size")
         if own != listed and not comes_later:
-            raise Flaw(HEADER(f"its own header has {label} {own!r}, the table of contents has {listed!r}", entry.text))
-    return entry.offset + _LOCAL.size + n + m
+            raise FatalFinding(
+                HEADER(f"its own header has {label} {own!r}, the table of contents has {listed!r}", entry.decoded_name)
+            )
+    return entry.offset + _LOCAL_HEADER.size + n + m

@@ -9,57 +9,77 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..model import flat_model
-from ..model.flat_model import Place, refuse
+from ..model.flat_model import SourceLocation, raise_model_error
 from .builtins import BUILTINS
-from .c_values import Text, Value, add_up, call, choose, common, infix, mapped, number, offset, prefix, scalar, stored
-from .subscripts import Subscripts
+from .c_values import (
+    CExpression,
+    CValue,
+    c_call,
+    c_literal,
+    common_type,
+    conditional,
+    infix,
+    linear_index,
+    map_elements,
+    prefix,
+    scalar_value,
+    sum_terms,
+    variable_value,
+)
+from .subscripts import SubscriptLowering
 
 _ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply"}
 _COMPARISONS = {"<": "<", "<=": "<=", ">": ">", ">=": ">=", "==": "==", "<>": "!="}
 
 
-class Expressions(Subscripts):
+class ExpressionLowering(SubscriptLowering):
     """Lowers expressions."""
 
-    def _literal(self, node: flat_model.Literal) -> Value:
+    def _literal(self, node: flat_model.Literal) -> CValue:
         if node.type == "String":
-            refuse("texts can only stand in assert()", None)
+            raise_model_error("texts can only stand in assert()", None)
         if node.type == "Integer" and not -(2**31) <= node.value < 2**31:  # type: ignore[operator]
-            refuse(f"the Integer {node.value} does not fit into 32 bits; write a Real", None)
-        return scalar(node.type, number(node.value, node.type), simple=True)  # type: ignore[arg-type]
+            raise_model_error(f"the Integer {node.value} does not fit into 32 bits; write a Real", None)
+        return scalar_value(node.type, c_literal(node.value, node.type), simple=True)  # type: ignore[arg-type]
 
-    def _name(self, node: flat_model.Name) -> Value:
+    def _name(self, node: flat_model.Name) -> CValue:
         if node.name not in self.scope:
-            refuse(f"unknown name {node.name}", node.where)
+            raise_model_error(f"unknown name {node.name}", node.where)
         return self.scope[node.name]
 
-    def _array(self, node: flat_model.Array) -> Value:
+    def _array(self, node: flat_model.Array) -> CValue:
         parts = [self.lower(element) for element in node.elements]
         if len({part.shape for part in parts}) != 1:
-            refuse("an array with rows of different shapes", None)
-        kind, inner = common([part.type for part in parts]), parts[0].size
-        simple = all(part.simple for part in parts)
-        return Value(
-            kind, (len(parts), *parts[0].shape), lambda k: parts[int(k) // inner].at(int(k) % inner), loops=False, simple=simple
+            raise_model_error("an array with rows of different shapes", None)
+        kind, inner = common_type([part.type for part in parts]), parts[0].size
+        simple = all(part.reusable for part in parts)
+        return CValue(
+            kind,
+            (len(parts), *parts[0].shape),
+            lambda k: parts[int(k) // inner].element(int(k) % inner),
+            indexable_in_loop=False,
+            reusable=simple,
         )
 
-    def _range(self, node: flat_model.Range) -> Value:
+    def _range(self, node: flat_model.Range) -> CValue:
         numbers = self.static_range(node)
-        return Value("Integer", (len(numbers),), lambda k: number(numbers[int(k)], "Integer"), loops=False, simple=True)
+        return CValue(
+            "Integer", (len(numbers),), lambda k: c_literal(numbers[int(k)], "Integer"), indexable_in_loop=False, reusable=True
+        )
 
     # operators
 
-    def _unary(self, node: flat_model.Unary) -> Value:
+    def _unary(self, node: flat_model.Unary) -> CValue:
         operand = self.lower(node.operand)
         if node.operator == "not":
-            return mapped(operand, "Boolean", lambda text: prefix("!", text))
+            return map_elements(operand, "Boolean", lambda text: prefix("!", text))
         if isinstance(node.operand, flat_model.Literal):
-            return scalar(operand.type, number(-node.operand.value, operand.type), simple=True)  # type: ignore[operator]
+            return scalar_value(operand.type, c_literal(-node.operand.value, operand.type), simple=True)  # type: ignore[operator]
         if operand.type == "Integer":
-            return mapped(operand, "Integer", lambda text: call("subtract", "m", "0", text))
-        return mapped(operand, "Real", lambda text: prefix("-", text))
+            return map_elements(operand, "Integer", lambda text: c_call("subtract", "m", "0", text))
+        return map_elements(operand, "Real", lambda text: prefix("-", text))
 
-    def _binary(self, node: flat_model.Binary) -> Value:
+    def _binary(self, node: flat_model.Binary) -> CValue:
         operator = node.operator
         if operator in ("and", "or"):
             return self._logical(node)
@@ -67,96 +87,114 @@ class Expressions(Subscripts):
         if operator == "*" and left.shape and right.shape:
             return self._matrix_product(left, right, node.where)
         if operator in _COMPARISONS:
-            return self._zip(left, right, "Boolean", lambda a, b: infix(_COMPARISONS[operator], a, b), node.where)
+            return self._lower_elementwise(left, right, "Boolean", lambda a, b: infix(_COMPARISONS[operator], a, b), node.where)
         operator = operator.removeprefix(".")
-        kind = "Real" if operator in ("/", "^") else common([left.type, right.type])
-        return self._zip(left, right, kind, self._arithmetic(operator, kind, left, node), node.where)
+        kind = "Real" if operator in ("/", "^") else common_type([left.type, right.type])
+        return self._lower_elementwise(left, right, kind, self._arithmetic(operator, kind, left, node), node.where)
 
-    def _arithmetic(self, operator: str, kind: str, left: Value, node: flat_model.Binary) -> Callable[[Text, Text], Text]:
+    def _arithmetic(
+        self, operator: str, kind: str, left: CValue, node: flat_model.Binary
+    ) -> Callable[[CExpression, CExpression], CExpression]:
         if operator == "^":
             if node.right == flat_model.Literal(2, "Integer"):
-                return lambda a, _: call("square", a)
-            return lambda a, b: call("pow", a, b)
+                return lambda a, _: c_call("square", a)
+            return lambda a, b: c_call("pow", a, b)
         if kind == "Integer":
-            return lambda a, b: call(_ARITHMETIC[operator], "m", a, b)
+            return lambda a, b: c_call(_ARITHMETIC[operator], "m", a, b)
         if operator == "/" and left.type == "Integer":
-            return lambda a, b: infix("/", Text(a.code + ".0") if a.code.isdigit() else prefix("(double)", a), b)
+            return lambda a, b: infix("/", CExpression(a.code + ".0") if a.code.isdigit() else prefix("(double)", a), b)
         return lambda a, b: infix(operator, a, b)
 
-    def _logical(self, node: flat_model.Binary) -> Value:
+    def _logical(self, node: flat_model.Binary) -> CValue:
         left = self.scalar_of(node.left)
-        with self.block() as lines:
+        with self.collect_lines() as lines:
             right = self.scalar_of(node.right)
         if not lines:
-            return scalar("Boolean", infix("&&" if node.operator == "and" else "||", left, right))
-        result = self.temporary("Boolean", ())
-        self.out += [f"{result.text.code} = {left.code};"]
-        self.out += [f"if ({'' if node.operator == 'and' else '!'}{result.text.code}) {{", *lines]
-        self.out += [f"    {result.text.code} = {right.code};", "}"]
+            return scalar_value("Boolean", infix("&&" if node.operator == "and" else "||", left, right))
+        result = self.new_temporary("Boolean", ())
+        self.lines += [f"{result.text.code} = {left.code};"]
+        self.lines += [f"if ({'' if node.operator == 'and' else '!'}{result.text.code}) {{", *lines]
+        self.lines += [f"    {result.text.code} = {right.code};", "}"]
         return result
 
-    def _zip(self, left: Value, right: Value, kind: str, combine: Callable[[Text, Text], Text], where: Place | None) -> Value:
+    def _lower_elementwise(
+        self,
+        left: CValue,
+        right: CValue,
+        kind: str,
+        combine: Callable[[CExpression, CExpression], CExpression],
+        where: SourceLocation | None,
+    ) -> CValue:
         if left.shape and right.shape and left.shape != right.shape:
-            refuse(f"arrays of different sizes {list(left.shape)} and {list(right.shape)}", where)
+            raise_model_error(f"arrays of different sizes {list(left.shape)} and {list(right.shape)}", where)
         if bool(left.shape) != bool(right.shape):
-            left, right = (self.held(left), right) if right.shape else (left, self.held(right))
-        return Value(
-            kind, left.shape or right.shape, lambda k: combine(left.at(k), right.at(k)), loops=left.loops and right.loops
+            left, right = (self.evaluated_once(left), right) if right.shape else (left, self.evaluated_once(right))
+        return CValue(
+            kind,
+            left.shape or right.shape,
+            lambda k: combine(left.element(k), right.element(k)),
+            indexable_in_loop=left.indexable_in_loop and right.indexable_in_loop,
         )
 
-    def _matrix_product(self, left: Value, right: Value, where: Place | None) -> Value:
+    def _matrix_product(self, left: CValue, right: CValue, where: SourceLocation | None) -> CValue:
         inner = left.shape[-1]
         if inner != right.shape[0]:
-            refuse(f"product of arrays of sizes {list(left.shape)} and {list(right.shape)}", where)
-        left, right = self.held(left), self.held(right)
+            raise_model_error(f"product of arrays of sizes {list(left.shape)} and {list(right.shape)}", where)
+        left, right = self.evaluated_once(left), self.evaluated_once(right)
         columns = right.size // inner
-        kind = common([left.type, right.type])
+        kind = common_type([left.type, right.type])
 
-        def element(k: int | str) -> Text:
+        def element(k: int | str) -> CExpression:
             row, column = (k, 0) if columns == 1 else divmod(int(k), columns)
-            pairs = ((left.at(offset([(inner, row), (1, j)])), right.at(columns * j + column)) for j in range(inner))
-            return add_up(kind, [infix("*", a, b) if kind == "Real" else call("multiply", "m", a, b) for a, b in pairs])
+            pairs = (
+                (left.element(linear_index([(inner, row), (1, j)])), right.element(columns * j + column)) for j in range(inner)
+            )
+            return sum_terms(kind, [infix("*", a, b) if kind == "Real" else c_call("multiply", "m", a, b) for a, b in pairs])
 
-        return Value(kind, (*left.shape[:-1], *right.shape[1:]), element, loops=columns == 1 and left.loops)
+        return CValue(
+            kind, (*left.shape[:-1], *right.shape[1:]), element, indexable_in_loop=columns == 1 and left.indexable_in_loop
+        )
 
-    def _if(self, node: flat_model.If) -> Value:
+    def _if(self, node: flat_model.If) -> CValue:
         (condition, yes), rest = node.branches[0], node.branches[1:]
         test = self.scalar_of(condition)
-        with self.block() as yes_lines:
+        with self.collect_lines() as yes_lines:
             first = self.lower(yes)
-        with self.block() as no_lines:
+        with self.collect_lines() as no_lines:
             second = self.lower(flat_model.If(rest, node.otherwise) if rest else node.otherwise)
-        kind = common([first.type, second.type])
+        kind = common_type([first.type, second.type])
         if not (yes_lines or no_lines or first.shape):
-            return scalar(kind, choose(test, first.text, second.text))
-        result = self.temporary(kind, first.shape)
+            return scalar_value(kind, conditional(test, first.text, second.text))
+        result = self.new_temporary(kind, first.shape)
         for opening, lines, value in ((f"if ({test.code}) {{", yes_lines, first), ("} else {", no_lines, second)):
-            with self.block() as copying:
-                self.copy(result, value)
-            self.out += [opening, *lines, *copying]
-        self.out.append("}")
+            with self.collect_lines() as copying:
+                self.copy_elements(result, value)
+            self.lines += [opening, *lines, *copying]
+        self.lines.append("}")
         return result
 
     # functions
 
-    def _builtin(self, node: flat_model.Builtin) -> Value:
+    def _builtin(self, node: flat_model.Builtin) -> CValue:
         if node.name not in BUILTINS:
-            refuse(f"{node.name}() is not supported here", node.where)
+            raise_model_error(f"{node.name}() is not supported here", node.where)
         return BUILTINS[node.name](self, node)
 
-    def _call(self, node: flat_model.Call) -> Value:
-        return self.invoke(node)[0]
+    def _call(self, node: flat_model.Call) -> CValue:
+        return self.lower_call(node)[0]
 
-    def invoke(self, node: flat_model.Call, target: str | None = None) -> tuple[Value, ...]:
+    def lower_call(self, node: flat_model.Call, target: str | None = None) -> tuple[CValue, ...]:
         """Calls a function; its array results go to temporaries, or the first one to the C array `target`."""
         arguments = [self.lower(argument) for argument in node.arguments]
-        function = self.unit.function(node, tuple(argument.shape for argument in arguments))
+        function = self.translation_unit.function_instance(node, tuple(argument.shape for argument in arguments))
         passed = ["m"] * function.takes_model
         for argument, wanted in zip(arguments, function.inputs, strict=True):
-            passed.append(self.array(argument, wanted.type) if argument.shape else argument.text.code)
-        if function.returns:
-            return (scalar(function.outputs[0].type, call(function.name, *passed)),)
-        results = tuple(stored(o.type, o.shape, target) if target else self.temporary(o.type, o.shape) for o in function.outputs)
+            passed.append(self.as_c_array(argument, wanted.type) if argument.shape else argument.text.code)
+        if function.returns_scalar:
+            return (scalar_value(function.outputs[0].type, c_call(function.name, *passed)),)
+        results = tuple(
+            variable_value(o.type, o.shape, target) if target else self.new_temporary(o.type, o.shape) for o in function.outputs
+        )
         passed += [result.pointer or "&" + result.text.code for result in results]
-        self.out.append(call(function.name, *passed).code + ";")
+        self.lines.append(c_call(function.name, *passed).code + ";")
         return results

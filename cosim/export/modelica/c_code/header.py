@@ -6,18 +6,18 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from ..causality.matching import is_input
-from ..causality.parameter_roles import Roles
-from ..causality.schedule import Plan
-from ..model.flat_model import Model, Variable, derivative
-from .c_values import C_TYPES, Value, identifier, stored
+from ..causality.parameter_roles import ParameterRoles
+from ..causality.schedule import Schedule
+from ..model.flat_model import Model, Variable, derivative_name
+from .c_values import C_TYPES, CValue, c_identifier, variable_value
 
 
-def members(model: Model) -> dict[str, str]:
+def struct_members(model: Model) -> dict[str, str]:
     """The member of the struct for each variable: its name as a C identifier, made unique."""
     result: dict[str, str] = {}
     taken = {"clock", "held", "failure"}
     for name in model.variables:
-        member = identifier(name)
+        member = c_identifier(name)
         while member in taken:
             member += "_"
         result[name] = member
@@ -25,23 +25,23 @@ def members(model: Model) -> dict[str, str]:
     return result
 
 
-def member(variable: Variable, name: str) -> Value:
+def struct_member(variable: Variable, name: str) -> CValue:
     """The C variable or array of this name for a variable."""
-    return stored(variable.type, variable.shape, name)
+    return variable_value(variable.type, variable.shape, name)
 
 
 @dataclass(frozen=True)
-class Header:
+class HeaderWriter:
     """Writes model.h."""
 
     model: Model
-    plan: Plan
-    roles: Roles
+    plan: Schedule
+    roles: ParameterRoles
     sources: Sequence[str]
 
     def text(self) -> str:
         lines = [
-            f"/* {comment(f'{self.model.name}: {self.model.description}'.rstrip(': '))}",
+            f"/* {escape_comment(f'{self.model.name}: {self.model.description}'.rstrip(': '))}",
             f" * Made by cosim from {', '.join(self.sources)}; change those instead. */",
             "#ifndef MODEL_H",
             "#define MODEL_H",
@@ -70,7 +70,7 @@ class Header:
         return "\n".join(lines) + "\n"
 
     def _states(self) -> list[str]:
-        count = sum(member(self.model.variables[name], name).size for name in self.model.states)
+        count = sum(struct_member(self.model.variables[name], name).size for name in self.model.states)
         return [f"enum {{ STATES = {count} }};", ""] if count else []
 
     def _struct(self) -> Iterator[str]:
@@ -84,30 +84,30 @@ class Header:
             "derivatives of the states": lambda v: v.name in rates,
             "inner variables": lambda v: True,
         }
-        names, left = members(self.model), list(self.model.variables.values())
-        rates = set(map(derivative, self.model.states))
+        names, left = struct_members(self.model), list(self.model.variables.values())
+        rates = set(map(derivative_name, self.model.states))
         for title, belongs in sections.items():
             chosen = [variable for variable in left if belongs(variable)]
             left = [variable for variable in left if variable not in chosen]
             yield from [f"/* {title} */"] * bool(chosen)
-            yield from (_declared(variable, names[variable.name]) + _note(variable) for variable in chosen)
+            yield from (_member_declaration(variable, names[variable.name]) + _member_comment(variable) for variable in chosen)
         yield "/* bookkeeping */"
         yield from [f"Clock clock[{len(self.plan.clocks)}];"] * bool(self.plan.clocks)
-        yield from [f"bool held[{self.plan.watches}];"] * bool(self.plan.watches)
+        yield from [f"bool held[{self.plan.edge_detector_count}];"] * bool(self.plan.edge_detector_count)
         yield "int32_t failure;"
 
 
-def _declared(variable: Variable, name: str) -> str:
-    size = f"[{member(variable, name).size}]" if variable.shape else ""
+def _member_declaration(variable: Variable, name: str) -> str:
+    size = f"[{struct_member(variable, name).size}]" if variable.shape else ""
     return f"{C_TYPES[variable.type]} {name}{size};"
 
 
-def _note(variable: Variable) -> str:
+def _member_comment(variable: Variable) -> str:
     parts = [variable.description, f"[{variable.unit}]" if variable.unit else ""]
-    text = comment(" ".join(filter(None, parts)))
+    text = escape_comment(" ".join(filter(None, parts)))
     return f" /* {text} */" if text else ""
 
 
-def comment(text: str) -> str:
+def escape_comment(text: str) -> str:
     """Text that cannot end a C comment, on one line."""
     return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())

@@ -9,12 +9,12 @@ from collections.abc import Iterable, Iterator
 _WIDTH = 118
 
 
-def definition(head: str, body: Iterable[str]) -> str:
+def function_definition(head: str, body: Iterable[str]) -> str:
     """A C function from its head and the unindented lines of its body."""
-    return "\n".join([head, "{", *wrapped(body), "}"])
+    return "\n".join([head, "{", *wrap_lines(body), "}"])
 
 
-def wrapped(lines: Iterable[str]) -> Iterator[str]:
+def wrap_lines(lines: Iterable[str]) -> Iterator[str]:
     """The lines indented by one level; those that are too long go on in the next one."""
     for line in lines:
         indent = " " * (8 + len(line) - len(line.lstrip()))
@@ -23,6 +23,6 @@ def wrapped(lines: Iterable[str]) -> Iterator[str]:
         ) or [""]
 
 
-def mentions(name: str, lines: Iterable[str]) -> bool:
+def uses_variable(name: str, lines: Iterable[str]) -> bool:
     """Whether a C variable of this name (not a member) occurs."""
     return any(re.search(rf"(?<![\w>.]){re.escape(name)}\b", line) for line in lines)

@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from ..model import flat_model
-from ..model.flat_model import Body, Expression, Statement, refuse
-from ..model.traversal import names, reads, targets
-from .c_values import Text, Value, identifier, scalar
-from .expressions import Expressions
+from ..model.flat_model import Body, Expression, Statement, raise_model_error
+from ..model.traversal import assigned_references, read_references, variable_names
+from .c_values import CExpression, CValue, c_identifier, scalar_value
+from .expressions import ExpressionLowering
 
-_LONG = 90
+_MAX_CONDITIONAL_LENGTH = 90
 
 
 @dataclass
-class Statements(Expressions):
+class StatementLowering(ExpressionLowering):
     """Lowers statements; assignments go to the names of the scope. `initial`: for the initialization, not for an event."""
 
     initial: bool = False
@@ -29,125 +29,127 @@ class Statements(Expressions):
     def _assign(self, node: flat_model.Assign) -> None:
         self.store(self.lower(node.target), node.value, node.target)
 
-    def store(self, target: Value, value: Expression, reference: Expression) -> None:
+    def store(self, target: CValue, value: Expression, reference: Expression) -> None:
         """Writes an expression to a target; `reference` names it, to see whether the expression reads what it overwrites."""
-        if isinstance(value, flat_model.If) and (target.shape or self._is_long(target, value)):
-            self._choice(target, value, reference)
+        if isinstance(value, flat_model.If) and (target.shape or self._needs_if_statement(target, value)):
+            self._lower_choice(target, value, reference)
         elif (
             isinstance(value, flat_model.Call)
             and target.pointer
-            and not _read(value) & names(reference)
-            and self._fits(value, target)
+            and not _variables_read(value) & variable_names(reference)
+            and self._can_return_into(value, target)
         ):
-            self.invoke(value, target.pointer)
+            self.lower_call(value, target.pointer)
         else:
             self._store_value(target, value, reference)
 
-    def _store_value(self, target: Value, value: Expression, reference: Expression) -> None:
+    def _store_value(self, target: CValue, value: Expression, reference: Expression) -> None:
         lowered = self.lower(value)
         if lowered.shape not in ((), target.shape):
-            refuse(f"sizes differ: {list(target.shape)} := {list(lowered.shape)}", getattr(reference, "where", None))
+            raise_model_error(f"sizes differ: {list(target.shape)} := {list(lowered.shape)}", getattr(reference, "where", None))
         if lowered.shape != target.shape:
-            lowered = replace(self.held(lowered), shape=target.shape)
-        if target.shape and _read(value) & names(reference):
-            lowered = self.held(replace(lowered, simple=False))
-        self.copy(target, lowered)
+            lowered = replace(self.evaluated_once(lowered), shape=target.shape)
+        if target.shape and _variables_read(value) & variable_names(reference):
+            lowered = self.evaluated_once(replace(lowered, reusable=False))
+        self.copy_elements(target, lowered)
 
-    def _fits(self, value: flat_model.Call, target: Value) -> bool:
+    def _can_return_into(self, value: flat_model.Call, target: CValue) -> bool:
         """Whether a function can write its result straight to the target."""
-        outputs = self.unit.function(value, tuple(map(self.shape, value.arguments))).outputs
+        outputs = self.translation_unit.function_instance(value, tuple(map(self.shape_of, value.arguments))).outputs
         return [(output.type, output.shape) for output in outputs] == [(target.type, target.shape)]
 
-    def _is_long(self, target: Value, value: flat_model.If) -> bool:
+    def _needs_if_statement(self, target: CValue, value: flat_model.If) -> bool:
         if len(value.branches) > 1:
             return True
-        with self.block() as lines:
+        with self.collect_lines() as lines:
             text = self.lower(value).text
-        return bool(lines) or len(target.text.code) + len(text.code) > _LONG
+        return bool(lines) or len(target.text.code) + len(text.code) > _MAX_CONDITIONAL_LENGTH
 
-    def _choice(self, target: Value, value: flat_model.If, reference: Expression) -> None:
+    def _lower_choice(self, target: CValue, value: flat_model.If, reference: Expression) -> None:
         """`if` instead of `? :`; an `else if` whose condition needs statements of its own is nested."""
         (condition, first), rest = value.branches[0], value.branches[1:]
-        self.out.append(f"if ({self.scalar_of(condition).code}) {{")
-        with self.block() as yes:
+        self.lines.append(f"if ({self.scalar_of(condition).code}) {{")
+        with self.collect_lines() as yes:
             self.store(target, first, reference)
-        with self.block() as no:
+        with self.collect_lines() as no:
             if rest:
-                self._choice(target, flat_model.If(rest, value.otherwise), reference)
+                self._lower_choice(target, flat_model.If(rest, value.otherwise), reference)
             else:
                 self.store(target, value.otherwise, reference)
-        self._close(yes, no)
+        self._close_if(yes, no)
 
-    def _close(self, yes: list[str], no: list[str]) -> None:
+    def _close_if(self, yes: list[str], no: list[str]) -> None:
         """The branches of an `if` that is open; `else { if ... }` becomes `else if` where that is all there is."""
-        self.out += yes
+        self.lines += yes
         if no and _is_one_if(no):
-            self.out += ["} else " + no[0].strip(), *(line[4:] for line in no[1:])]
+            self.lines += ["} else " + no[0].strip(), *(line[4:] for line in no[1:])]
         elif no:
-            self.out += ["} else {", *no, "}"]
+            self.lines += ["} else {", *no, "}"]
         else:
-            self.out.append("}")
+            self.lines.append("}")
 
     def _ifstatement(self, node: flat_model.IfStatement) -> None:
         (condition, body), rest = node.branches[0], node.branches[1:]
-        self.out.append(f"if ({self.scalar_of(condition).code}) {{")
-        with self.block() as yes:
+        self.lines.append(f"if ({self.scalar_of(condition).code}) {{")
+        with self.collect_lines() as yes:
             self.body(body)
-        with self.block() as no:
+        with self.collect_lines() as no:
             if rest:
                 self._ifstatement(flat_model.IfStatement(rest, node.otherwise, node.where))
             else:
                 self.body(node.otherwise)
-        self._close(yes, no)
+        self._close_if(yes, no)
 
     def _for(self, node: flat_model.For) -> None:
         start, stop = self.scalar_of(node.range.start), self.scalar_of(node.range.stop)
         step = self.static_integer(node.range.step) if node.range.step else 1
         if not step:
-            refuse("the step of a for-loop must be a constant other than 0", node.where)
-        if not stop.code.lstrip("-").isdigit() and _read(node.range.stop) & {flat_model.base_name(t) for t in targets(node.body)}:
-            stop = self.held(scalar("Integer", stop)).text
-        index = identifier(node.index)
+            raise_model_error("the step of a for-loop must be a constant other than 0", node.where)
+        if not stop.code.lstrip("-").isdigit() and _variables_read(node.range.stop) & {
+            flat_model.referenced_variable(t) for t in assigned_references(node.body)
+        }:
+            stop = self.evaluated_once(scalar_value("Integer", stop)).text
+        index = c_identifier(node.index)
         first, last = self.static_integer(node.range.start), self.static_integer(node.range.stop)
         bounds = None if first is None or last is None else (min(first, last), max(first, last))
-        self.out.append(
+        self.lines.append(
             f"for (int32_t {index} = {start.code}; {index} {'<=' if step > 0 else '>='} {stop.code}; {index} += {step}) {{"
         )
         hidden = self.scope.get(node.index)
-        self.scope[node.index] = replace(scalar("Integer", Text(index), simple=True), bounds=bounds)
-        with self.block() as lines:
+        self.scope[node.index] = replace(scalar_value("Integer", CExpression(index), simple=True), bounds=bounds)
+        with self.collect_lines() as lines:
             self.body(node.body)
         if hidden is None:
             del self.scope[node.index]
         else:
             self.scope[node.index] = hidden
-        self.out += [*lines, "}"]
+        self.lines += [*lines, "}"]
 
     def _assert(self, node: flat_model.Assert) -> None:
         condition = self.scalar_of(node.condition)
-        failure = self.unit.failure(node.message, node.where)
-        self.out.append(f"if (!{condition.within(13)}) fail(m, {failure});")
+        failure = self.translation_unit.failure_code(node.message, node.where)
+        self.lines.append(f"if (!{condition.parenthesized(13)}) fail(m, {failure});")
 
     def _multiassign(self, node: flat_model.MultiAssign) -> None:
-        for target, result in zip(node.targets, self.invoke(node.call), strict=False):
-            self.copy(self.lower(target), result)
+        for target, result in zip(node.targets, self.lower_call(node.call), strict=False):
+            self.copy_elements(self.lower(target), result)
 
-    def _watch(self, node: flat_model.Watch) -> None:
+    def _edgedetector(self, node: flat_model.EdgeDetector) -> None:
         """Sets the flag of a condition that has become true since the last event."""
         condition = self.scalar_of(node.condition).code
         if self.initial:
-            self.out.append(f"m->held[{node.index}] = {condition};")
+            self.lines.append(f"m->held[{node.index}] = {condition};")
             return
-        self.out += [
+        self.lines += [
             f"const bool holds_{node.index} = {condition};",
             f"risen[{node.index}] = holds_{node.index} && !m->held[{node.index}];",
             f"m->held[{node.index}] = holds_{node.index};",
         ]
 
 
-def _read(node: Expression) -> set[str]:
+def _variables_read(node: Expression) -> set[str]:
     """The variables whose present value an expression reads."""
-    return {flat_model.base_name(reference) for reference in reads(node)}
+    return {flat_model.referenced_variable(reference) for reference in read_references(node)}
 
 
 def _is_one_if(lines: list[str]) -> bool:

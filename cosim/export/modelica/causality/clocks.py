@@ -7,8 +7,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..model.flat_model import Array, Binary, Body, Builtin, Expression, IfStatement, Literal, Model, Place, Watch, When, refuse
-from ..model.traversal import MEMORY, has_builtin
+from ..model.flat_model import (
+    Array,
+    Binary,
+    Body,
+    Builtin,
+    EdgeDetector,
+    Expression,
+    IfStatement,
+    Literal,
+    Model,
+    SourceLocation,
+    When,
+    raise_model_error,
+)
+from ..model.traversal import PRE_OPERATORS, has_builtin
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,61 +30,63 @@ class Clock:
 
     start: Expression
     period: Expression
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
-def risen(index: int) -> Builtin:
+def edge_flag(index: int) -> Builtin:
     return Builtin("risen", (Literal(index, "Integer"),))
 
 
-def due(index: int) -> Builtin:
+def tick_flag(index: int) -> Builtin:
     return Builtin("due", (Literal(index, "Integer"),))
 
 
-class Triggers:
+class WhenConditions:
     """Numbers the clocks and watched conditions of a model; equal ones share a number."""
 
     def __init__(self, model: Model):
         self._model = model
         self.clocks: list[Clock] = []
-        self.watches: list[Watch] = []
+        self.edge_detectors: list[EdgeDetector] = []
 
     def at_event(self, when: When) -> Body:
         """The when-clause as seen in an event; branches that only initial() activates are left out."""
         flagged = [(self._flags(condition, when.where), body) for condition, body in when.branches]
-        branches = tuple((_any(flags), body) for flags, body in flagged if flags)
+        branches = tuple((_disjunction(flags), body) for flags, body in flagged if flags)
         return (IfStatement(branches, (), when.where),) if branches else ()
 
     def at_initialization(self, when: When) -> Body:
         """What of the when-clause is active in the initialization: the first branch with initial() in its condition."""
         return next((body for condition, body in when.branches if Builtin("initial", ()) in _alternatives(condition)), ())
 
-    def _flags(self, condition: Expression, where: Place | None) -> list[Builtin]:
+    def _flags(self, condition: Expression, where: SourceLocation | None) -> list[Builtin]:
         alternatives = [c for c in _alternatives(condition) if c != Builtin("initial", ())]
         return [self._flag(alternative, where) for alternative in alternatives]
 
-    def _flag(self, condition: Expression, where: Place | None) -> Builtin:
+    def _flag(self, condition: Expression, where: SourceLocation | None) -> Builtin:
         if isinstance(condition, Builtin) and condition.name == "sample":
-            return due(_number(self.clocks, self._clock(condition, where)))
+            return tick_flag(_index_of(self.clocks, self._clock(condition, where)))
         if has_builtin(condition, "sample", "initial"):
-            refuse("sample() must stand alone in a when-condition; put further conditions into an if inside", where)
-        if has_builtin(condition, *MEMORY):
-            refuse(
+            raise_model_error("sample() must stand alone in a when-condition; put further conditions into an if inside", where)
+        if has_builtin(condition, *PRE_OPERATORS):
+            raise_model_error(
                 "pre(), edge() and change() in a when-condition are not supported: a when-clause reacts to edges anyway", where
             )
-        return risen(_number(self.watches, Watch(len(self.watches), condition, where)))
+        return edge_flag(_index_of(self.edge_detectors, EdgeDetector(len(self.edge_detectors), condition, where)))
 
-    def _clock(self, sample: Builtin, where: Place | None) -> Clock:
+    def _clock(self, sample: Builtin, where: SourceLocation | None) -> Clock:
         if len(sample.arguments) != 2:
-            refuse("sample() needs a start and a period", where)
-        start, period = map(_real, sample.arguments)
+            raise_model_error("sample() needs a start and a period", where)
+        start, period = map(_to_real, sample.arguments)
         return Clock(start, period, where)
 
 
-def _number(items: list, item: Clock | Watch) -> int:
+def _index_of(items: list, item: Clock | EdgeDetector) -> int:
     """The place of an item in the list, where it is put when it is new; a Watch is compared by its condition alone."""
     same = [
-        k for k, other in enumerate(items) if other == item or (isinstance(item, Watch) and other.condition == item.condition)
+        k
+        for k, other in enumerate(items)
+        if other == item or (isinstance(item, EdgeDetector) and other.condition == item.condition)
     ]
     if not same:
         items.append(item)
@@ -82,12 +97,12 @@ def _alternatives(condition: Expression) -> tuple[Expression, ...]:
     return condition.elements if isinstance(condition, Array) else (condition,)
 
 
-def _any(flags: list[Builtin]) -> Expression:
+def _disjunction(flags: list[Builtin]) -> Expression:
     result: Expression = flags[0]
     for flag in flags[1:]:
         result = Binary("or", result, flag)
     return result
 
 
-def _real(expression: Expression) -> Expression:
+def _to_real(expression: Expression) -> Expression:
     return Literal(float(expression.value), "Real") if isinstance(expression, Literal) else expression

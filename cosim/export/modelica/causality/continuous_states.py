@@ -6,55 +6,67 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from ..model.flat_model import Builtin, Expression, Index, Model, Name, Variable, base_name, derivative, refuse
+from ..model.flat_model import (
+    Builtin,
+    Expression,
+    Index,
+    Model,
+    Name,
+    Variable,
+    derivative_name,
+    raise_model_error,
+    referenced_variable,
+)
 from ..model.traversal import rewrite, walk
 from .matching import is_input
 
 _SECTIONS = ("equations", "whens", "algorithms", "asserts", "initial_equations", "initial_algorithms")
 
 
-def with_states(model: Model) -> Model:
+def introduce_derivatives(model: Model) -> Model:
     """The same model with `states`, and with their derivatives as variables instead of der().
 
     Raises InputError for the derivative of anything but a continuous Real variable.
     """
-    found = dict(_derivatives(model))
+    found = dict(_der_calls(model))
     for name, call in found.items():
-        _check(model, name, call)
+        _check_state(model, name, call)
     states = tuple(name for name in model.variables if name in found)
     return replace(
         model,
-        variables={**model.variables, **{derivative(name): _rate(model.variables[name]) for name in states}},
+        variables={**model.variables, **{derivative_name(name): _derivative_variable(model.variables[name]) for name in states}},
         states=states,
-        **{section: rewrite(getattr(model, section), _renamed) for section in _SECTIONS},
+        **{section: rewrite(getattr(model, section), _replace_der) for section in _SECTIONS},
     )
 
 
-def _derivatives(model: Model) -> Iterator[tuple[str, Builtin]]:
+def _der_calls(model: Model) -> Iterator[tuple[str, Builtin]]:
     """Every variable under der(), with the call."""
     for item in walk(tuple(getattr(model, section) for section in _SECTIONS)):
         if isinstance(item, Builtin) and item.name == "der":
-            yield base_name(_reference(item)), item
+            yield referenced_variable(_der_argument(item)), item
 
 
-def _reference(call: Builtin) -> Name | Index:
+def _der_argument(call: Builtin) -> Name | Index:
     (argument,) = call.arguments
     if isinstance(argument, Name) or (isinstance(argument, Index) and isinstance(argument.base, Name)):
         return argument
-    refuse("der() of an expression is not supported; give the expression a variable with an equation der(x) = ...", call.where)
+    raise_model_error(
+        "der() of an expression is not supported; give the expression a variable with an equation der(x) = ...", call.where
+    )
 
 
-def _check(model: Model, name: str, call: Builtin) -> None:
+def _check_state(model: Model, name: str, call: Builtin) -> None:
     variable = model.variables.get(name)
     if variable is None or variable.type != "Real" or variable.variability != "continuous" or is_input(variable):
-        refuse(f"der({name}): {name} is not a continuous Real variable of the model", call.where)
+        raise_model_error(f"der({name}): {name} is not a continuous Real variable of the model", call.where)
 
 
-def _rate(state: Variable) -> Variable:
+def _derivative_variable(state: Variable) -> Variable:
     """The declaration of the derivative of a state."""
     return replace(
         state,
-        name=derivative(state.name),
+        name=derivative_name(state.name),
         causality="local",
         start=None,
         binding=None,
@@ -67,9 +79,9 @@ def _rate(state: Variable) -> Variable:
     )
 
 
-def _renamed(node: Any) -> Expression | Any:
+def _replace_der(node: Any) -> Expression | Any:
     if not (isinstance(node, Builtin) and node.name == "der"):
         return node
-    reference = _reference(node)
-    name = Name(derivative(base_name(reference)), node.where)
+    reference = _der_argument(node)
+    name = Name(derivative_name(referenced_variable(reference)), node.where)
     return replace(reference, base=name) if isinstance(reference, Index) else name

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ..model.flat_model import Body, IfStatement, Place, Statement, owner, refuse
+from ..model.flat_model import Body, IfStatement, SourceLocation, Statement, owning_component, raise_model_error
 from ..model.traversal import has_builtin
-from .matching import Key
+from .matching import ScalarKey
 
 
 @dataclass(eq=False)
@@ -14,36 +14,36 @@ class Node:
     """Statements that stay together."""
 
     statements: Body
-    reads: set[Key]
-    writes: set[Key]
+    reads: set[ScalarKey]
+    writes: set[ScalarKey]
 
     @property
-    def where(self) -> Place | None:
+    def where(self) -> SourceLocation | None:
         return self.statements[0].where
 
 
-def in_order(nodes: list[Node]) -> list[Node]:
+def sort_topologically(nodes: list[Node]) -> list[Node]:
     """Every node after those that define what it reads; else in the given order, but when-clauses kept together."""
-    definer: dict[Key, Node] = {}
+    definer: dict[ScalarKey, Node] = {}
     for node in nodes:
         for key in sorted(node.writes):
             if key in definer:
-                refuse(f"{key[0]} is defined twice, first at {definer[key].where}", node.where)
+                raise_model_error(f"{key[0]} is defined twice, first at {definer[key].where}", node.where)
             definer[key] = node
     needs = {node: {definer[key] for key in node.reads if key in definer} for node in nodes}
     left, done, order = list(nodes), set[Node](), list[Node]()
     while left:
         ready = [node for node in left if needs[node] <= done]
         if not ready:
-            _refuse_loop(left, needs)
-        node = min(ready, key=lambda n: _distance(order[-1], n)) if order else ready[0]
+            _raise_algebraic_loop(left, needs)
+        node = min(ready, key=lambda n: _placement_cost(order[-1], n)) if order else ready[0]
         order.append(node)
         done.add(node)
         left.remove(node)
     return order
 
 
-def needed(order: list[Node], wanted: set[Key]) -> list[Node]:
+def required_nodes(order: list[Node], wanted: set[ScalarKey]) -> list[Node]:
     """Of nodes in order, those without which the wanted values cannot be computed."""
     kept, open_keys = list[Node](), set(wanted)
     for node in reversed(order):
@@ -53,7 +53,7 @@ def needed(order: list[Node], wanted: set[Key]) -> list[Node]:
     return kept[::-1]
 
 
-def merged(nodes: list[Node]) -> Body:
+def merge_statements(nodes: list[Node]) -> Body:
     """All statements; neighbours under the same flags share one `if`."""
     result: list[Statement] = []
     for node in nodes:
@@ -66,24 +66,24 @@ def merged(nodes: list[Node]) -> Body:
     return tuple(result)
 
 
-def _distance(last: Node, node: Node) -> int:
+def _placement_cost(last: Node, node: Node) -> int:
     """How little a node fits behind the last one; the order of equals is that in which they were given."""
     if _mergeable(last.statements, node.statements):
         return 0
-    return 1 if _owner(last) == _owner(node) else 2
+    return 1 if _owning_component(last) == _owning_component(node) else 2
 
 
-def _owner(node: Node) -> str:
-    return owner(min(node.writes, default=("", 0))[0])
+def _owning_component(node: Node) -> str:
+    return owning_component(min(node.writes, default=("", 0))[0])
 
 
-def _refuse_loop(left: list[Node], needs: dict[Node, set[Node]]) -> None:
+def _raise_algebraic_loop(left: list[Node], needs: dict[Node, set[Node]]) -> None:
     chain = [left[0]]
     while chain[-1] not in chain[:-1]:
         chain.append(next(node for node in left if node in needs[chain[-1]]))
     loop = chain[chain.index(chain[-1]) :]
-    steps = " -> ".join(f"{min(node.writes)[0]} ({node.where.short if node.where else '?'})" for node in reversed(loop))
-    refuse(f"algebraic loop: {steps}; break it with pre()", loop[0].where)
+    steps = " -> ".join(f"{min(node.writes)[0]} ({node.where.file_and_line if node.where else '?'})" for node in reversed(loop))
+    raise_model_error(f"algebraic loop: {steps}; break it with pre()", loop[0].where)
 
 
 def _mergeable(first: Body, second: Body) -> bool:

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 
 from ....core.errors import ComponentError
-from ..model.arithmetic import Failure, divide
-from ..model.evaluate import Evaluator, typed
-from ..model.flat_model import Model, derivative
+from ..model.arithmetic import EvaluationError, divide
+from ..model.evaluate import Evaluator, convert_to_type
+from ..model.flat_model import Model, derivative_name
 from .matching import is_input
-from .parameter_roles import roles
-from .schedule import finite, memory, plan, start_value
+from .parameter_roles import classify_parameters
+from .schedule import build_schedule, finite_variables, pre_variables, start_value
 
-_TOLERANCE = 1e-6
-_LONGEST_STEP = 0.005
+_TICK_TOLERANCE = 1e-6
+_MAX_STEP_SIZE = 0.005
 
 
 class Interpreter:
@@ -30,67 +30,72 @@ class Interpreter:
 
     def __init__(self, model: Model):
         self.model = model
-        self.plan = plan(model)
-        self.roles = roles(model, self.plan)
-        self._remembered = {"step": memory(model, self.plan.event), "initialize": memory(model, self.plan.initialization)}
-        self._finite = finite(model, self.plan)
+        self.schedule = build_schedule(model)
+        self.parameter_roles = classify_parameters(model, self.schedule)
+        self._pre_variables = {
+            "step": pre_variables(model, self.schedule.event),
+            "initialize": pre_variables(model, self.schedule.initialization),
+        }
+        self._finite_variables = finite_variables(model, self.schedule)
         self.values: dict[str, Any] = {}
         self.evaluate = Evaluator(model.functions, self.values)
         for variable in model.variables.values():
-            self.values[variable.name] = typed(1 if variable.type == "Enumeration" else 0, variable.type, variable.shape)
-        for name in (*self.roles.settable, *self.roles.fixed):
-            self._give(name, self._declared(name))
-        self._dependent()
-        self._start(inputs=True)
+            self.values[variable.name] = convert_to_type(
+                1 if variable.type == "Enumeration" else 0, variable.type, variable.shape
+            )
+        for name in (*self.parameter_roles.settable, *self.parameter_roles.fixed):
+            self._assign(name, self._declared_value(name))
+        self._update_dependent_parameters()
+        self._apply_start_values(inputs=True)
 
     def set(self, name: str, value: Any) -> None:
         """Set a parameter or an input, arrays whole; parameters that depend on it follow."""
-        self._give(name, value)
+        self._assign(name, value)
         if self.model.variables[name].variability == "parameter":
-            self._dependent()
+            self._update_dependent_parameters()
 
     def get(self, name: str) -> Any:
         return deepcopy(self.values[name])
 
     def initialize(self, time: float = 0.0) -> None:
         """Start values, the first ticks of the clocks, and the equations at the start time."""
-        self._start(inputs=False)
+        self._apply_start_values(inputs=False)
         self.clocks = []
-        for clock in self.plan.clocks:
+        for clock in self.schedule.clocks:
             start, period = self.evaluate(clock.start), self.evaluate(clock.period)
             if not period > 0:
                 raise ComponentError(self.model.name, "initialize", "the period of sample() must be positive", time)
-            self.clocks.append([start, period, max(0, math.ceil(divide(time - start, period) - _TOLERANCE))])
-        self._compute("initialize", time)
-        self.evaluate.flags.clear()
+            self.clocks.append([start, period, max(0, math.ceil(divide(time - start, period) - _TICK_TOLERANCE))])
+        self._evaluate_event("initialize", time)
+        self.evaluate.event_flags.clear()
 
     def step(self, time: float, step_size: float) -> None:
         """All ticks t with time <= t < time + step_size; with states or without any clock, the equations at time + step_size."""
-        end, reached = time + step_size, self._ticks(time, time + step_size)
+        end, reached = time + step_size, self._run_ticks(time, time + step_size)
         if self.model.states or not self.clocks:
             self._integrate(reached, end)
-            self.evaluate.flags.update({("due", k): False for k in range(len(self.clocks))})
-            self._compute("step", end)
+            self.evaluate.event_flags.update({("due", k): False for k in range(len(self.clocks))})
+            self._evaluate_event("step", end)
 
-    def _ticks(self, time: float, end: float) -> float:
+    def _run_ticks(self, time: float, end: float) -> float:
         """All ticks in time <= t < end; returns the time that the states have reached."""
         reached = time
         while self.clocks:
             ticks = [start + count * period for start, period, count in self.clocks]
             now = min(ticks)
-            if not now < end - _TOLERANCE * min(period for _, period, _ in self.clocks):
+            if not now < end - _TICK_TOLERANCE * min(period for _, period, _ in self.clocks):
                 break
             reached = self._integrate(reached, now)
             for k, (clock, tick) in enumerate(zip(self.clocks, ticks, strict=True)):
-                self.evaluate.flags["due", k] = tick <= now + _TOLERANCE * clock[1]
-            self._compute("step", now)
+                self.evaluate.event_flags["due", k] = tick <= now + _TICK_TOLERANCE * clock[1]
+            self._evaluate_event("step", now)
             for k, clock in enumerate(self.clocks):
-                clock[2] += self.evaluate.flags["due", k]
+                clock[2] += self.evaluate.event_flags["due", k]
         return reached
 
     def _integrate(self, start: float, end: float) -> float:
         """The states from one time to another in equal steps of at most 5 ms; returns the time reached."""
-        count = math.ceil((end - start) / _LONGEST_STEP - 1e-9) if self.model.states else 0
+        count = math.ceil((end - start) / _MAX_STEP_SIZE - 1e-9) if self.model.states else 0
         if count <= 0:
             return start
         h = (end - start) / count
@@ -100,61 +105,61 @@ class Interpreter:
 
     def _runge_kutta(self, time: float, h: float) -> None:
         """One step of the classical method of order 4."""
-        start = self._states()
-        k1 = self._slopes(time)
-        k2 = self._slopes(time + h / 2, [x + h / 2 * k for x, k in zip(start, k1, strict=True)])
-        k3 = self._slopes(time + h / 2, [x + h / 2 * k for x, k in zip(start, k2, strict=True)])
-        k4 = self._slopes(time + h, [x + h * k for x, k in zip(start, k3, strict=True)])
+        start = self._state_values()
+        k1 = self._evaluate_derivatives(time)
+        k2 = self._evaluate_derivatives(time + h / 2, [x + h / 2 * k for x, k in zip(start, k1, strict=True)])
+        k3 = self._evaluate_derivatives(time + h / 2, [x + h / 2 * k for x, k in zip(start, k2, strict=True)])
+        k4 = self._evaluate_derivatives(time + h, [x + h * k for x, k in zip(start, k3, strict=True)])
         for name, x, a, b, c, d in zip(self.model.states, start, k1, k2, k3, k4, strict=True):
-            self._give(name, x + h / 6 * (a + 2 * b + 2 * c + d))
+            self._assign(name, x + h / 6 * (a + 2 * b + 2 * c + d))
 
-    def _states(self) -> list[Any]:
+    def _state_values(self) -> list[Any]:
         return [self.get(name) for name in self.model.states]
 
-    def _slopes(self, time: float, states: Sequence[Any] | None = None) -> list[Any]:
+    def _evaluate_derivatives(self, time: float, states: Sequence[Any] | None = None) -> list[Any]:
         """The derivatives at a time, for the given states or the present ones."""
         for name, value in zip(self.model.states, states or (), strict=False):
-            self._give(name, value)
+            self._assign(name, value)
         self.values["time"] = time
-        with self._reported("step", time), np.errstate(all="ignore"):
-            self.evaluate.run(self.plan.derivatives)
-        return [self.get(derivative(name)) for name in self.model.states]
+        with self._as_component_error("step", time), np.errstate(all="ignore"):
+            self.evaluate.execute(self.schedule.derivatives)
+        return [self.get(derivative_name(name)) for name in self.model.states]
 
-    def _declared(self, name: str) -> Any:
+    def _declared_value(self, name: str) -> Any:
         binding = self.model.variables[name].binding
         return self.evaluate(binding if binding is not None else start_value(self.model, name))
 
-    def _give(self, name: str, value: Any) -> None:
+    def _assign(self, name: str, value: Any) -> None:
         variable = self.model.variables[name]
-        self.values[name] = typed(value, variable.type, variable.shape)
+        self.values[name] = convert_to_type(value, variable.type, variable.shape)
 
-    def _dependent(self) -> None:
-        for name in self.roles.dependent:
-            self._give(name, self._declared(name))
+    def _update_dependent_parameters(self) -> None:
+        for name in self.parameter_roles.dependent:
+            self._assign(name, self._declared_value(name))
 
-    def _start(self, inputs: bool) -> None:
+    def _apply_start_values(self, inputs: bool) -> None:
         for variable in self.model.variables.values():
             if variable.variability not in ("parameter", "constant") and (inputs or not is_input(variable)):
-                self._give(variable.name, self.evaluate(start_value(self.model, variable.name)))
+                self._assign(variable.name, self.evaluate(start_value(self.model, variable.name)))
 
-    def _compute(self, function: str, time: float) -> None:
+    def _evaluate_event(self, function: str, time: float) -> None:
         """One event, or the initialization."""
-        body = self.plan.event if function == "step" else self.plan.initialization
+        body = self.schedule.event if function == "step" else self.schedule.initialization
         self.values["time"] = time
-        self.evaluate.memory = {name: deepcopy(self.values[name]) for name in self._remembered[function]}
-        with self._reported(function, time):
-            self.evaluate.run(body)
+        self.evaluate.pre_values = {name: deepcopy(self.values[name]) for name in self._pre_variables[function]}
+        with self._as_component_error(function, time):
+            self.evaluate.execute(body)
             if function == "step":
                 self._check_finite()
 
     @contextmanager
-    def _reported(self, function: str, time: float) -> Iterator[None]:
+    def _as_component_error(self, function: str, time: float) -> Iterator[None]:
         try:
             yield
-        except Failure as failure:
+        except EvaluationError as failure:
             raise ComponentError(self.model.name, function, str(failure), time) from None
 
     def _check_finite(self) -> None:
-        for name in self._finite:
+        for name in self._finite_variables:
             if not np.all(np.isfinite(self.values[name])):
-                raise Failure(f"{name} is not a finite number")
+                raise EvaluationError(f"{name} is not a finite number")

@@ -7,14 +7,14 @@ from typing import Any
 
 from ..model.evaluate import Evaluator
 from ..model.flat_model import Literal, Model, Name, Variable
-from ..model.traversal import names, rewrite
+from ..model.traversal import rewrite, variable_names
 
 
 def inline_constants(model: Model) -> Model:
     """The same model without its scalar constants."""
     constants = {v.name: v for v in model.variables.values() if v.variability == "constant" and not v.shape}
     known: dict[str, Literal] = {}
-    while ready := [v for v in constants.values() if v.name not in known and names(v.binding) <= set(known)]:
+    while ready := [v for v in constants.values() if v.name not in known and variable_names(v.binding) <= set(known)]:
         values = {name: literal.value for name, literal in known.items()}
         known |= {v.name: Literal(Evaluator(model.functions, values)(v.binding or Literal(0, v.type)), v.type) for v in ready}
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..model import flat_model
-from ..model.flat_model import Expression, Place, refuse
-from .rumoca import Sources
+from ..model.flat_model import Expression, SourceLocation, raise_model_error
+from .rumoca import ModelicaSources
 
 Json = Mapping[str, Any]
 
@@ -18,26 +18,26 @@ _OPERATORS = {
     "AddElem": ".+", "SubElem": ".-", "MulElem": ".*", "DivElem": "./", "ExpElem": ".^",
     "Lt": "<", "Le": "<=", "Gt": ">", "Ge": ">=", "Eq": "==", "Neq": "<>", "And": "and", "Or": "or",
 }  # fmt: skip
-_REFUSED_BUILTINS = {
+_UNSUPPORTED_BUILTINS = {
     "delay": "delay() is not supported; keep old values in an array",
     "terminal": "terminal() is not supported: the end of a simulation is not known to an FMU",
     "terminate": "terminate() is not supported; use assert()",
 }
 _INTEGER_OPERATORS = {"+": operator.add, "-": operator.sub, "*": operator.mul}
-_SPELLING = {"noevent": "noEvent", "outerproduct": "outerProduct"}
+_MODELICA_SPELLING = {"noevent": "noEvent", "outerproduct": "outerProduct"}
 
 
-def only(node: Json) -> tuple[str, Any]:
+def split_tagged(node: Json) -> tuple[str, Any]:
     """The kind and the payload of a node `{kind: payload}`."""
     ((kind, payload),) = node.items()
     return kind, payload
 
 
-def _computed(node: Expression) -> Expression:
+def _fold_constants(node: Expression) -> Expression:
     """An Integer in place of sums and products of Integers, such as the subscripts of an unrolled loop have."""
     if not (isinstance(node, flat_model.Binary) and node.operator in _INTEGER_OPERATORS):
         return node
-    left, right = _computed(node.left), _computed(node.right)
+    left, right = _fold_constants(node.left), _fold_constants(node.right)
     if isinstance(left, flat_model.Literal) and isinstance(right, flat_model.Literal) and left.type == right.type == "Integer":
         return flat_model.Literal(_INTEGER_OPERATORS[node.operator](left.value, right.value), "Integer")
     return node
@@ -48,88 +48,100 @@ class ExpressionReader:
     """`json` is the whole document: names and functions are looked up in it."""
 
     json: Json
-    sources: Sources
+    sources: ModelicaSources
 
-    def place(self, node: Json) -> Place | None:
-        return self.sources.place(node.get("span") or node.get("source_span"))
+    def locate(self, node: Json) -> SourceLocation | None:
+        return self.sources.locate(node.get("span") or node.get("source_span"))
 
     def _type(self, canonical: int) -> str:
         predefined = {number: name.capitalize() for name, number in self.json["predefined_types"].items()}
         return predefined.get(canonical, "Enumeration")
 
     def _optional(self, node: Json | None) -> Expression | None:
-        return None if node is None else self.expression(node)
+        return None if node is None else self.read_expression(node)
 
-    def expression(self, node: Json) -> Expression:
-        kind, payload = only(node)
+    def read_expression(self, node: Json) -> Expression:
+        kind, payload = split_tagged(node)
         readers: Mapping[str, Callable[[Json], Expression]] = {
             "Literal": self._literal,
             "VarRef": self._reference,
-            "Index": lambda n: flat_model.Index(self.expression(n["base"]), self._subscripts(n["subscripts"]), self.place(n)),
+            "Index": lambda n: flat_model.Index(
+                self.read_expression(n["base"]), self._subscripts(n["subscripts"]), self.locate(n)
+            ),
             "Unary": self._unary,
             "Binary": self._binary,
             "If": self._if,
-            "Array": lambda n: flat_model.Array(tuple(map(self.expression, n["elements"]))),
+            "Array": lambda n: flat_model.Array(tuple(map(self.read_expression, n["elements"]))),
             "Range": lambda n: flat_model.Range(
-                self.expression(n["start"]), self._optional(n["step"]), self.expression(n["end"])
+                self.read_expression(n["start"]), self._optional(n["step"]), self.read_expression(n["end"])
             ),
             "BuiltinCall": self._builtin,
             "FunctionCall": self._call,
         }
         if kind not in readers:
-            refuse(f"the expression {kind} is not supported", self.place(payload))
+            raise_model_error(f"the expression {kind} is not supported", self.locate(payload))
         return readers[kind](payload)
 
     def _literal(self, node: Json) -> flat_model.Literal:
-        kind, value = only(node["value"])
+        kind, value = split_tagged(node["value"])
         return flat_model.Literal(value, kind)
 
     def _reference(self, node: Json) -> Expression:
-        name, where = node["name"]["name"], self.place(node)
+        name, where = node["name"]["name"], self.locate(node)
         if (ordinal := self.json["enum_literal_ordinals"].get(name)) is not None:
             return flat_model.Literal(ordinal, "Enumeration")
         base = flat_model.Name(name, where)
         return flat_model.Index(base, self._subscripts(node["subscripts"]), where) if node["subscripts"] else base
 
     def _subscripts(self, nodes: list[Json]) -> tuple[Expression | flat_model.Colon, ...]:
-        return tuple(self._subscript(*only(node)) for node in nodes)
+        return tuple(self._subscript(*split_tagged(node)) for node in nodes)
 
     def _subscript(self, kind: str, node: Json) -> Expression | flat_model.Colon:
         if kind == "Colon":
             return flat_model.Colon()
-        return flat_model.Literal(node["value"], "Integer") if kind == "Index" else _computed(self.expression(node["expr"]))
+        return (
+            flat_model.Literal(node["value"], "Integer")
+            if kind == "Index"
+            else _fold_constants(self.read_expression(node["expr"]))
+        )
 
     def _unary(self, node: Json) -> Expression:
-        operand = self.expression(node["rhs"])
+        operand = self.read_expression(node["rhs"])
         if node["op"] == "Plus":
             return operand
         if node["op"] not in ("Minus", "Not"):
-            refuse(f"the operator {node['op']} is not supported", self.place(node))
+            raise_model_error(f"the operator {node['op']} is not supported", self.locate(node))
         return flat_model.Unary("-" if node["op"] == "Minus" else "not", operand)
 
     def _binary(self, node: Json) -> flat_model.Binary:
-        operator = _OPERATORS.get(node["op"]) or refuse(f"the operator {node['op']} is not supported", self.place(node))
-        return flat_model.Binary(operator, self.expression(node["lhs"]), self.expression(node["rhs"]), self.place(node))
+        operator = _OPERATORS.get(node["op"]) or raise_model_error(
+            f"the operator {node['op']} is not supported", self.locate(node)
+        )
+        return flat_model.Binary(
+            operator, self.read_expression(node["lhs"]), self.read_expression(node["rhs"]), self.locate(node)
+        )
 
     def _if(self, node: Json) -> flat_model.If:
-        branches = tuple((self.expression(condition), self.expression(value)) for condition, value in node["branches"])
-        return flat_model.If(branches, self.expression(node["else_branch"]))
+        branches = tuple((self.read_expression(condition), self.read_expression(value)) for condition, value in node["branches"])
+        return flat_model.If(branches, self.read_expression(node["else_branch"]))
 
     def _builtin(self, node: Json) -> flat_model.Builtin:
         name = node["function"].lower()
-        if name in _REFUSED_BUILTINS:
-            refuse(_REFUSED_BUILTINS[name], self.place(node))
-        return flat_model.Builtin(_SPELLING.get(name, name), tuple(map(self.expression, node["args"])), self.place(node))
+        if name in _UNSUPPORTED_BUILTINS:
+            raise_model_error(_UNSUPPORTED_BUILTINS[name], self.locate(node))
+        return flat_model.Builtin(
+            _MODELICA_SPELLING.get(name, name), tuple(map(self.read_expression, node["args"])), self.locate(node)
+        )
 
     def _call(self, node: Json) -> flat_model.Call:
         if node["is_constructor"]:
-            refuse("a record constructor is not supported; assign the fields", self.place(node))
-        return self._function_call(node["name"], node["args"], self.place(node))
+            raise_model_error("a record constructor is not supported; assign the fields", self.locate(node))
+        return self._function_call(node["name"], node["args"], self.locate(node))
 
-    def _function_call(self, reference: Json, arguments: list[Json], where: Place | None) -> flat_model.Call:
+    def _function_call(self, reference: Json, arguments: list[Json], where: SourceLocation | None) -> flat_model.Call:
         """A call; rumoca knows functions by name and would silently take another package's function of the same short name."""
         name = reference["name"]
-        function = self.json["functions"].get(name) or refuse(f"unknown function {name}", where)
+        function = self.json["functions"].get(name) or raise_model_error(f"unknown function {name}", where)
         if reference["component_ref"]["parts"][-1]["def_id"] != function["def_id"]:
-            refuse(f'the model uses several functions named "{name}"; give them different names', where)
-        return flat_model.Call(name, tuple(map(self.expression, arguments)), where)
+            raise_model_error(f'the model uses several functions named "{name}"; give them different names', where)
+        return flat_model.Call(name, tuple(map(self.read_expression, arguments)), where)

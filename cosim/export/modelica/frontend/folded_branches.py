@@ -13,16 +13,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..model.flat_model import Place, refuse
-from .rumoca import Sources
+from ..model.flat_model import SourceLocation, raise_model_error
+from .rumoca import ModelicaSources
 
 _TOKEN = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])*\'|[A-Za-z_]\w*|\d[\w.]*|\S', re.DOTALL)
 _SECTIONS = {"algorithm", "equation", "public", "protected", "initial", "external"}
-_ENDS = {"end", "else", "elseif", "elsewhen"} | _SECTIONS
+_BODY_TERMINATORS = {"end", "else", "elseif", "elsewhen"} | _SECTIONS
 
 
 @dataclass(frozen=True)
-class _If:
+class _IfEquation:
     """An if-equation inside a when-clause: byte range of it and of the when, and the identifiers in its conditions."""
 
     start: int
@@ -31,7 +31,7 @@ class _If:
     identifiers: frozenset[str]
 
 
-def check_folding(json: Mapping[str, Any], sources: Sources) -> None:
+def check_folded_branches(json: Mapping[str, Any], sources: ModelicaSources) -> None:
     """Raises InputError at the first if-equation on a settable parameter that is missing from the flat model."""
     settable = {name.rpartition(".")[2] for name in json["variables"] if _is_settable(json, name)}
     for file, found in _equations_by_file(json, sources).items():
@@ -39,9 +39,9 @@ def check_folding(json: Mapping[str, Any], sources: Sources) -> None:
         for statement, depth in _Scanner(text.decode("latin-1")).if_equations():
             names = ", ".join(sorted(statement.identifiers & settable))
             if names and _is_folded(statement, depth, found):
-                where = Place(file, text.count(b"\n", 0, statement.start) + 1)
+                where = SourceLocation(file, text.count(b"\n", 0, statement.start) + 1)
                 remedy = "write an if-expression or an algorithm"
-                refuse(f"the front end would decide this if-equation by the default of {names}; {remedy}", where)
+                raise_model_error(f"the front end would decide this if-equation by the default of {names}; {remedy}", where)
 
 
 def _is_settable(json: Mapping[str, Any], name: str) -> bool:
@@ -49,30 +49,30 @@ def _is_settable(json: Mapping[str, Any], name: str) -> bool:
     return isinstance(variability, dict) and "Parameter" in variability and not json["variable_final_flags"].get(name)
 
 
-def _is_folded(statement: _If, depth: int, found: list[tuple[int, int]]) -> bool:
+def _is_folded(statement: _IfEquation, depth: int, found: list[tuple[int, int]]) -> bool:
     """Whether equations of the statement have lost an `if` around them, or all are gone though their when-clause is there."""
     inside = [level for start, level in found if statement.start <= start < statement.end]
     used = any(statement.when[0] <= start < statement.when[1] for start, _ in found)
     return used and (not inside or min(inside) < depth)
 
 
-def _equations_by_file(json: Mapping[str, Any], sources: Sources) -> dict[Path, list[tuple[int, int]]]:
+def _equations_by_file(json: Mapping[str, Any], sources: ModelicaSources) -> dict[Path, list[tuple[int, int]]]:
     """Byte offset and depth of `if` of every equation in the when-clauses of the flat model."""
     result: dict[Path, list[tuple[int, int]]] = {}
     for chain in json["when_chains"]:
         for block in (chain["first"], *chain["else_when"]):
-            for span, depth in _equations(block["equations"], 0):
-                if place := sources.place(span):
+            for span, depth in _equation_spans(block["equations"], 0):
+                if place := sources.locate(span):
                     result.setdefault(place.path, []).append((span["start"], depth))
     return result
 
 
-def _equations(nodes: list[Mapping[str, Any]], depth: int) -> Iterator[tuple[Mapping[str, int], int]]:
+def _equation_spans(nodes: list[Mapping[str, Any]], depth: int) -> Iterator[tuple[Mapping[str, int], int]]:
     for node in nodes:
         ((kind, payload),) = node.items()
         if kind == "Conditional":
             for body in (*(body for _, body in payload["branches"]), payload["else_branch"] or []):
-                yield from _equations(body, depth + 1)
+                yield from _equation_spans(body, depth + 1)
         elif kind == "Assert":
             ((_, condition),) = payload["condition"].items()
             yield condition["span"], depth
@@ -88,9 +88,9 @@ class _Scanner:
         self._tokens = [m[0] for m in matches] + ["end"]
         self._offsets = [m.start() for m in matches] + [len(text)]
         self._next = 0
-        self._found: list[tuple[_If, int]] = []
+        self._found: list[tuple[_IfEquation, int]] = []
 
-    def if_equations(self) -> list[tuple[_If, int]]:
+    def if_equations(self) -> list[tuple[_IfEquation, int]]:
         """All if-equations in when-clauses, each with its depth: 1 for those directly in the when-clause."""
         while self._next < len(self._tokens) - 1:
             self._next += 1
@@ -100,7 +100,7 @@ class _Scanner:
 
     def _body(self, depth: int, when: int | None) -> None:
         """Equations up to the word that ends them; `when` is the place of the when-clause around them in the result."""
-        while (word := self._tokens[self._next]) not in _ENDS:
+        while (word := self._tokens[self._next]) not in _BODY_TERMINATORS:
             if word == "if":
                 self._if(depth, when)
             elif word in ("when", "for"):
@@ -118,7 +118,7 @@ class _Scanner:
         self._skip(";")
         if word == "when":
             span = (self._offsets[first], self._offsets[self._next - 1])
-            self._found[begin:] = [(_If(s.start, s.end, span, s.identifiers), d) for s, d in self._found[begin:]]
+            self._found[begin:] = [(_IfEquation(s.start, s.end, span, s.identifiers), d) for s, d in self._found[begin:]]
 
     def _if(self, depth: int, when: int | None) -> None:
         first, identifiers = self._next, set[str]()
@@ -133,7 +133,7 @@ class _Scanner:
         self._skip(";")
         if when is not None:
             span = (self._offsets[first], self._offsets[self._next - 1])
-            self._found.append((_If(*span, span, frozenset(identifiers)), depth + 1))
+            self._found.append((_IfEquation(*span, span, frozenset(identifiers)), depth + 1))
 
     def _condition(self) -> None:
         """Past the `then` of a condition; those of if-expressions inside do not count."""

@@ -17,7 +17,7 @@ from ....core.errors import InputError, Problem
 from .rumoca import find_packages, model_name
 
 _ERROR = re.compile(r"^(?:\[(?P<file>[^\]]+?):(?P<line>\d+):\d+-\d+:\d+:\w+\] )?Error: (?P<what>.+)$", re.MULTILINE)
-_PATIENCE = 1800.0
+_TIMEOUT = 1800.0
 
 
 def export_with_omc(path: Path, target: Path, model: str | None = None) -> None:
@@ -35,10 +35,10 @@ def export_with_omc(path: Path, target: Path, model: str | None = None) -> None:
     with TemporaryDirectory() as folder:
         script = Path(folder) / "export.mos"
         script.write_text(_script(path, model), encoding="utf-8")
-        log = _run(compiler, script)
+        log = _run_omc(compiler, script)
         made = next(Path(folder).glob("*.fmu"), None)
         if made is None:
-            raise InputError(_problems(log, path))
+            raise InputError(_parse_errors(log, path))
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.move(made, target)
 
@@ -54,7 +54,7 @@ def _script(path: Path, model: str | None) -> str:
     return "\n".join([*loads, build, "print(getErrorString());"]) + "\n"
 
 
-def _run(compiler: str, script: Path) -> str:
+def _run_omc(compiler: str, script: Path) -> str:
     """All that omc prints."""
     command = [compiler, script.name]
     try:
@@ -64,15 +64,15 @@ def _run(compiler: str, script: Path) -> str:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            timeout=_PATIENCE,
+            timeout=_TIMEOUT,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise InputError(f"OpenModelica was not ready after {_PATIENCE:.0f} s") from None
+        raise InputError(f"OpenModelica was not ready after {_TIMEOUT:.0f} s") from None
     return done.stdout
 
 
-def _problems(log: str, path: Path) -> list[Problem]:
+def _parse_errors(log: str, path: Path) -> list[Problem]:
     """The errors in what omc printed, else all of it."""
     found = [Problem(e["what"], f"{e['file']}:{e['line']}" if e["file"] else str(path)) for e in _ERROR.finditer(log)]
     return found or [Problem(f"OpenModelica has made no FMU: {log.strip() or 'it printed nothing'}", str(path))]

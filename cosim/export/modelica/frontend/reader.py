@@ -6,53 +6,57 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..model import flat_model
-from ..model.flat_model import Body, Expression, Place, Statement, refuse
-from .expression_reader import Json, only
+from ..model.flat_model import Body, Expression, SourceLocation, Statement, raise_model_error
+from .expression_reader import Json, split_tagged
 from .statement_reader import StatementReader
-from .unrolling import rolled_up
+from .unrolling import unroll_equations
 
 
-class Reader(StatementReader):
+class ModelReader(StatementReader):
     """Reads one flat model; `json` is the whole document."""
 
-    def model(self, name: str) -> flat_model.Model:
+    def read_model(self, name: str) -> flat_model.Model:
         self._check_document()
         names = self.json["variables"]
         return flat_model.Model(
             name=name,
             description=self.json["model_description"] or "",
-            variables={key: self.variable(key) for key in names},
+            variables={key: self.read_variable(key) for key in names},
             equations=(*self._unrolled_equations(), *self._declaration_equations()),
-            whens=tuple(self.when_chain(chain) for chain in self.json["when_chains"]),
-            algorithms=tuple(self.body(algorithm["statements"]) for algorithm in self.json["algorithms"]),
+            whens=tuple(self.read_when_chain(chain) for chain in self.json["when_chains"]),
+            algorithms=tuple(self.read_body(algorithm["statements"]) for algorithm in self.json["algorithms"]),
             asserts=tuple(self._assert(node) for node in self.json["assert_equations"]),
-            initial_equations=self.equations("initial_equations"),
-            initial_algorithms=tuple(self.body(algorithm["statements"]) for algorithm in self.json["initial_algorithms"]),
-            functions={key: self.function(node) for key, node in self.json["functions"].items() if not node["is_constructor"]},
+            initial_equations=self.read_equations("initial_equations"),
+            initial_algorithms=tuple(self.read_body(algorithm["statements"]) for algorithm in self.json["initial_algorithms"]),
+            functions={
+                key: self.read_function(node) for key, node in self.json["functions"].items() if not node["is_constructor"]
+            },
             enumerations=self._enumerations(),
             structural=tuple(
-                flat_model.Structural(node["kind"], tuple(map(self._first_known, node["references"])), self.place(node))
+                flat_model.StructuralParameters(
+                    node["kind"], tuple(map(self._resolve_name, node["references"])), self.locate(node)
+                )
                 for node in self.json.get("parameter_branch_selections", ())
             ),
         )
 
     def _check_document(self) -> None:
         if self.json["is_partial"]:
-            refuse("the model is partial", None)
+            raise_model_error("the model is partial", None)
         for kind in ("initial_assert_equations", "definite_roots", "branches", "optional_edges", "potential_roots"):
             if self.json.get(kind):
-                refuse(f"{kind.replace('_', ' ')} are not supported", None)
+                raise_model_error(f"{kind.replace('_', ' ')} are not supported", None)
 
-        if next(rolled_up(self.json, "initial_structured_equations"), None):
-            refuse("a for-equation among the initial equations was not unrolled by the front end", None)
+        if next(unroll_equations(self.json, "initial_structured_equations"), None):
+            raise_model_error("a for-equation among the initial equations was not unrolled by the front end", None)
 
-    def _first_known(self, candidates: list[str]) -> str:
+    def _resolve_name(self, candidates: list[str]) -> str:
         """Of the names by which a parameter may be meant, from the inside out, the one that exists."""
         return next((name for name in candidates if name in self.json["variables"]), candidates[0])
 
     # variables
 
-    def variable(self, name: str) -> flat_model.Variable:
+    def read_variable(self, name: str) -> flat_model.Variable:
         node = self.json["variables"][name]
         type_name = self.json["variable_type_names"][name]
         kind = self._type(self.json["effective_types"][str(node["type_id"])]["canonical_type"])
@@ -73,19 +77,19 @@ class Reader(StatementReader):
             minimum=self._optional(node["min"]),
             maximum=self._optional(node["max"]),
             enumeration=type_name if kind == "Enumeration" else "",
-            where=self.place(node),
+            where=self.locate(node),
         )
 
     def _variability(self, node: Json) -> Any:
         kind = node["variability"]
-        word = (kind if isinstance(kind, str) else only(kind)[0]).lower()
+        word = (kind if isinstance(kind, str) else split_tagged(kind)[0]).lower()
         if word == "empty":
             return "discrete" if node["is_discrete_type"] else "continuous"
         return word
 
     def _causality(self, node: Json) -> Any:
         kind = node["causality"]
-        word = (kind if isinstance(kind, str) else only(kind)[0]).lower()
+        word = (kind if isinstance(kind, str) else split_tagged(kind)[0]).lower()
         return "local" if word == "empty" else word
 
     def _is_top_level(self, name: str) -> bool:
@@ -97,11 +101,11 @@ class Reader(StatementReader):
     def _text(self, node: Any) -> str:
         if node is None or isinstance(node, str):
             return node or ""
-        literal = self.expression(node)
+        literal = self.read_expression(node)
         return (
             str(literal.value)
             if isinstance(literal, flat_model.Literal)
-            else refuse("a text literal is expected", self.place(node))
+            else raise_model_error("a text literal is expected", self.locate(node))
         )
 
     def _enumerations(self) -> dict[str, tuple[str, ...]]:
@@ -114,32 +118,36 @@ class Reader(StatementReader):
 
     # equations
 
-    def equations(self, section: str) -> tuple[flat_model.Equation, ...]:
+    def read_equations(self, section: str) -> tuple[flat_model.Equation, ...]:
         return tuple(pair for node in self.json[section] for pair in self._equation(node))
 
     def _unrolled_equations(self) -> Iterator[flat_model.Equation]:
         """The equations with the for-equations that the front end has left rolled up."""
-        true = dict(rolled_up(self.json, "structured_equations"))
+        true = dict(unroll_equations(self.json, "structured_equations"))
         for place, node in enumerate(self.json["equations"]):
             written = self._equation({**node, "residual": true.get(place, node["residual"])})
             if [e.left for e in written] != [e.left for e in self._equation(node)]:
-                refuse("this for-equation was not unrolled by the front end; write its equations one by one", self.place(node))
+                raise_model_error(
+                    "this for-equation was not unrolled by the front end; write its equations one by one", self.locate(node)
+                )
             yield from written
 
     def _equation(self, node: Json) -> list[flat_model.Equation]:
-        kind, residual = only(node["residual"])
+        kind, residual = split_tagged(node["residual"])
         if kind != "Binary" or residual["op"] != "Sub":
-            refuse("an equation that is not of the form a = b", self.place(node))
-        left, right, where = self.expression(residual["lhs"]), self.expression(residual["rhs"]), self.place(node)
-        return [flat_model.Equation(a, b, where) for a, b in self._fields(left, right)]
+            raise_model_error("an equation that is not of the form a = b", self.locate(node))
+        left, right, where = self.read_expression(residual["lhs"]), self.read_expression(residual["rhs"]), self.locate(node)
+        return [flat_model.Equation(a, b, where) for a, b in self._split_records(left, right)]
 
-    def _fields(self, left: Expression, right: Expression) -> list[tuple[Expression, Expression]]:
+    def _split_records(self, left: Expression, right: Expression) -> list[tuple[Expression, Expression]]:
         """The pairs of fields when two records are equated, else the pair itself."""
         records = self.json["record_instances"]
         if not (isinstance(left, flat_model.Name) and left.name in records):
             return [(left, right)]
         if not (isinstance(right, flat_model.Name) and right.name in records):
-            refuse("a record can only be equated with a record variable; write one equation for each field", left.where)
+            raise_model_error(
+                "a record can only be equated with a record variable; write one equation for each field", left.where
+            )
         names = [name for name in self.json["variables"] if name.startswith(left.name + ".")]
         return [
             (flat_model.Name(n, left.where), flat_model.Name(right.name + n.removeprefix(left.name), right.where)) for n in names
@@ -147,42 +155,42 @@ class Reader(StatementReader):
 
     def _declaration_equations(self) -> list[flat_model.Equation]:
         """`Real y = 2*u;` of a variable that is no parameter."""
-        variables = [self.variable(name) for name in self.json["variables"]]
+        variables = [self.read_variable(name) for name in self.json["variables"]]
         return [
             flat_model.Equation(flat_model.Name(v.name, v.where), v.binding, v.where)
             for v in variables
             if v.binding is not None and v.variability not in ("constant", "parameter")
         ]
 
-    def when_chain(self, chain: Json) -> flat_model.When:
+    def read_when_chain(self, chain: Json) -> flat_model.When:
         blocks = [chain["first"], *chain["else_when"]]
-        branches = tuple((self.expression(block["condition"]), self._when_body(block["equations"])) for block in blocks)
-        return flat_model.When(branches, self.place(chain))
+        branches = tuple((self.read_expression(block["condition"]), self._when_body(block["equations"])) for block in blocks)
+        return flat_model.When(branches, self.locate(chain))
 
     def _when_body(self, nodes: list[Json]) -> Body:
-        return tuple(self._when_equation(*only(node)) for node in nodes)
+        return tuple(self._when_equation(*split_tagged(node)) for node in nodes)
 
     def _when_equation(self, kind: str, node: Json) -> Statement:
         if kind == "Assign":
-            where = self.place(node)
-            return flat_model.Assign(self._target_text(node["target"], where), self.expression(node["value"]), where)
+            where = self.locate(node)
+            return flat_model.Assign(self._parse_target(node["target"], where), self.read_expression(node["value"]), where)
         if kind == "Reinit":
-            where = self.place(node)
-            return flat_model.Assign(self._target_text(node["state"], where), self.expression(node["value"]), where)
+            where = self.locate(node)
+            return flat_model.Assign(self._parse_target(node["state"], where), self.read_expression(node["value"]), where)
         if kind == "Conditional":
-            branches = tuple((self.expression(condition), self._when_body(body)) for condition, body in node["branches"])
-            return flat_model.IfStatement(branches, self._when_body(node["else_branch"] or []), self.place(node))
+            branches = tuple((self.read_expression(condition), self._when_body(body)) for condition, body in node["branches"])
+            return flat_model.IfStatement(branches, self._when_body(node["else_branch"] or []), self.locate(node))
         if kind == "Assert":
             return self._assert(node)
-        refuse(f"{kind} in a when-equation is not supported", self.place(node))
+        raise_model_error(f"{kind} in a when-equation is not supported", self.locate(node))
 
-    def _target_text(self, target: str, where: Place | None) -> flat_model.Name | flat_model.Index:
+    def _parse_target(self, target: str, where: SourceLocation | None) -> flat_model.Name | flat_model.Index:
         """A target of a when-equation comes as text: a name, perhaps with constant subscripts."""
         if target in self.json["variables"]:
             return flat_model.Name(target, where)
         base, bracket, subscripts = target.rpartition("[")
         if not bracket or base not in self.json["variables"]:
-            refuse(f'cannot assign "{target}" in a when-equation; write one equation for each variable', where)
+            raise_model_error(f'cannot assign "{target}" in a when-equation; write one equation for each variable', where)
         numbers = subscripts.rstrip("]").split(",")
         return flat_model.Index(
             flat_model.Name(base, where), tuple(flat_model.Literal(int(k), "Integer") for k in numbers), where

@@ -14,77 +14,79 @@ from pathlib import Path
 from typing import Any
 
 from ....core.errors import InputError, Problem
-from ..model.flat_model import Place
+from ..model.flat_model import SourceLocation
 
 RUMOCA_VERSION = "0.10.2"
 _WITHIN = re.compile(r"^\s*within\s+([\w.]+)\s*;", re.MULTILINE)
 _QUOTED = re.compile(r"'([\w.]+)'")
-_ENDING = re.compile(r"\[(?P<file>[^\[\]]+):(?P<line>\d+):\d+\]$")
+_LOCATION_SUFFIX = re.compile(r"\[(?P<file>[^\[\]]+):(?P<line>\d+):\d+\]$")
 _PANIC = re.compile(
     r'detail: "(?P<what>[^"]+)", span: Span \{ source: SourceId\((?P<source>\d+)\), start: BytePos\((?P<start>\d+)\)'
 )
-_SYNTAX = re.compile(r"×\s*(?P<what>.+?)\n.*?\[[^\]]*:(?P<line>\d+):\d+\]", re.DOTALL)
+_SYNTAX_ERROR = re.compile(r"×\s*(?P<what>.+?)\n.*?\[[^\]]*:(?P<line>\d+):\d+\]", re.DOTALL)
 
 
 @dataclass(frozen=True)
-class Sources:
+class ModelicaSources:
     """The Modelica files that were given to the front end, and how its spans (file hash, byte offset) map to lines."""
 
     files: Sequence[Path]
     _by_hash: Mapping[int, Path]
 
     @classmethod
-    def of(cls, files: Sequence[Path]) -> Sources:
+    def from_files(cls, files: Sequence[Path]) -> ModelicaSources:
         """The model's own file comes first."""
-        own = {_fnv1a(_alias(file)): file for file in files[:1]}
+        own = {_fnv1a(_display_name(file)): file for file in files[:1]}
         return cls(files, own | {_fnv1a(str(file)): file for file in files})
 
-    def named(self, name: str) -> Path | None:
+    def find(self, name: str) -> Path | None:
         """The file of this name, as the front end writes it."""
         return self._by_hash.get(_fnv1a(name))
 
-    def place(self, span: Mapping[str, int] | None) -> Place | None:
+    def locate(self, span: Mapping[str, int] | None) -> SourceLocation | None:
         """The line at which a span starts; None for what the front end made itself."""
         path = self._by_hash.get(span["source"]) if span else None
         if span is None or path is None:
             return None
-        return Place(path, path.read_bytes().count(b"\n", 0, span["start"]) + 1)
+        return SourceLocation(path, path.read_bytes().count(b"\n", 0, span["start"]) + 1)
 
 
-def flatten(path: Path, model: str | None) -> tuple[dict[str, Any], Sources]:
+def flatten_model(path: Path, model: str | None) -> tuple[dict[str, Any], ModelicaSources]:
     """The flat model `model` (default: the file's stem) of the file as rumoca's JSON, and its sources.
 
     Raises InputError for syntax errors, unknown names and everything else that the front end refuses.
     """
     path = path.resolve()
-    rumoca = _rumoca()
+    rumoca = _import_rumoca()
     if not path.is_file():
         raise InputError(Problem("no such Modelica file", str(path)))
     text = path.read_text(encoding="utf-8")
     packages = find_packages(path, text)
-    sources = Sources.of([path, *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path)])
+    sources = ModelicaSources.from_files(
+        [path, *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path)]
+    )
     _check_syntax(rumoca, sources.files)
     name = model_name(path, text, model)
     session = rumoca.Session(roots=[str(package) for package in packages])
     try:
-        compiled = session.load(str(path), model=name) if _WITHIN.search(text) else _load_alone(session, path, text, name)
+        compiled = session.load(str(path), model=name) if _WITHIN.search(text) else _load_text(session, path, text, name)
         return json.loads(compiled.to_json("flat")), sources
     except (KeyboardInterrupt, SystemExit):
         raise
     except BaseException as error:  # rumoca's panics are not Exceptions
-        raise InputError(_explain(error, name, path, sources)) from error
+        raise InputError(_to_problems(error, name, path, sources)) from error
 
 
-def _load_alone(session: Any, path: Path, text: str, name: str) -> Any:
+def _load_text(session: Any, path: Path, text: str, name: str) -> Any:
     """Loads the text under a name that lies in no folder: rumoca reads all siblings of an existing file."""
-    return session.loads(text, model=name, filename=_alias(path))
+    return session.loads(text, model=name, filename=_display_name(path))
 
 
-def _alias(path: Path) -> str:
+def _display_name(path: Path) -> str:
     return f"<{path.name}>"
 
 
-def _rumoca() -> Any:
+def _import_rumoca() -> Any:
     try:
         import rumoca
     except ImportError as error:
@@ -117,34 +119,34 @@ def _check_syntax(rumoca: Any, files: Sequence[Path]) -> None:
     for file in files:
         for found in rumoca.validate_source(file.read_text(encoding="utf-8"), filename=str(file)):
             if found.rule == "syntax-error":
-                detail = _SYNTAX.search(found.message)
+                detail = _SYNTAX_ERROR.search(found.message)
                 line = int(detail["line"]) if detail else found.line
                 problems.append(Problem(detail["what"] if detail else found.message, f"{file}:{line}"))
     if problems:
         raise InputError(problems)
 
 
-def _explain(error: BaseException, name: str, path: Path, sources: Sources) -> list[Problem]:
+def _to_problems(error: BaseException, name: str, path: Path, sources: ModelicaSources) -> list[Problem]:
     """One problem per line of the front end's message that says something."""
     if panic := _PANIC.search(str(error)):
-        return [Problem(panic["what"], str(sources.place({key: int(panic[key]) for key in ("source", "start")}) or path))]
+        return [Problem(panic["what"], str(sources.locate({key: int(panic[key]) for key in ("source", "start")}) or path))]
     lines = [line.rpartition("[Resolve]:")[2].strip(" -") for line in str(error).splitlines()]
     reasons = [line for line in dict.fromkeys(lines) if line and not line.startswith("Related failures")]
     specific = [line for line in reasons if " could not be compiled: " not in line] or reasons
     if not specific or not isinstance(error, Exception):
         specific = [f"the Modelica front end failed on the model {name}: {' '.join(lines) or type(error).__name__}"]
-    return [_located(reason, path, sources) for reason in specific]
+    return [_locate_problem(reason, path, sources) for reason in specific]
 
 
-def _located(reason: str, path: Path, sources: Sources) -> Problem:
+def _locate_problem(reason: str, path: Path, sources: ModelicaSources) -> Problem:
     """A reason with the place that it ends with or, since most have none, with the line that holds the name it quotes."""
-    if ending := _ENDING.search(reason):
-        where = Place(sources.named(ending["file"]) or path, int(ending["line"]))
+    if ending := _LOCATION_SUFFIX.search(reason):
+        where = SourceLocation(sources.find(ending["file"]) or path, int(ending["line"]))
         return Problem(reason[: ending.start()].rstrip(), str(where))
-    return Problem(reason, str(_mention(reason, sources) or path))
+    return Problem(reason, str(_find_quoted_name(reason, sources) or path))
 
 
-def _mention(reason: str, sources: Sources) -> Place | None:
+def _find_quoted_name(reason: str, sources: ModelicaSources) -> SourceLocation | None:
     """The first line that holds the name which the message quotes: rumoca's own messages carry no place."""
     quoted = _QUOTED.search(reason)
     if quoted is None:
@@ -153,7 +155,7 @@ def _mention(reason: str, sources: Sources) -> Place | None:
     for file in sources.files:
         for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
             if word.search(line):
-                return Place(file, number)
+                return SourceLocation(file, number)
     return None
 
 

@@ -14,46 +14,49 @@ from typing import Any
 
 import numpy as np
 
-from .flat_model import Place
+from .flat_model import SourceLocation
 
 _INT32 = range(-(2**31), 2**31)
 
 
-class Failure(Exception):
+class EvaluationError(Exception):
     """A model has failed; the text is the reason."""
 
-    def __init__(self, reason: str, where: Place | None = None):
-        super().__init__(f"{reason} ({where.short})" if where else reason)
+    def __init__(self, reason: str, where: SourceLocation | None = None):
+        super().__init__(f"{reason} ({where.file_and_line})" if where else reason)
 
 
-def each(function: Callable[..., Any], *arguments: Any) -> Any:
+def elementwise(function: Callable[..., Any], *arguments: Any) -> Any:
     """The function of scalars, or element by element of arrays."""
     if not any(isinstance(a, np.ndarray) for a in arguments):
         return function(*arguments)
     arrays = np.broadcast_arrays(*arguments)
-    results = [function(*(plain(x) for x in elements)) for elements in zip(*(a.flat for a in arrays), strict=True)]
+    results = [function(*(to_python_scalar(x) for x in elements)) for elements in zip(*(a.flat for a in arrays), strict=True)]
     return np.array(results).reshape(arrays[0].shape)
 
 
-def plain(value: Any) -> Any:
+def to_python_scalar(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def checked(value: float | int) -> float | int:
+def check_int32(value: float | int) -> float | int:
     if isinstance(value, int) and value not in _INT32:
-        raise Failure("Integer overflow")
+        raise EvaluationError("Integer overflow")
     return value
 
 
 def matrix_product(left: np.ndarray, right: np.ndarray) -> Any:
     """Sums from left to right, as in the C: numpy's own product may add in another order."""
     rows, columns = left.reshape(-1, left.shape[-1]), right.reshape(right.shape[0], -1)
-    sums = [[_sum([checked(plain(a) * plain(b)) for a, b in zip(r, c, strict=True)]) for c in columns.T] for r in rows]
-    return plain(np.array(sums).reshape((*left.shape[:-1], *right.shape[1:]))[()])
+    sums = [
+        [_sum([check_int32(to_python_scalar(a) * to_python_scalar(b)) for a, b in zip(r, c, strict=True)]) for c in columns.T]
+        for r in rows
+    ]
+    return to_python_scalar(np.array(sums).reshape((*left.shape[:-1], *right.shape[1:]))[()])
 
 
 def _sum(values: Any) -> Any:
-    return reduce(lambda a, b: checked(a + b), map(plain, np.asarray(values).flat)) if np.size(values) else 0
+    return reduce(lambda a, b: check_int32(a + b), map(to_python_scalar, np.asarray(values).flat)) if np.size(values) else 0
 
 
 def divide(a: float, b: float) -> float:
@@ -64,7 +67,7 @@ def divide(a: float, b: float) -> float:
         return float(np.float64(a) / np.float64(b))
 
 
-def _ieee(function: Callable[..., float], at_pole: float = math.nan) -> Callable[..., float]:
+def _with_ieee_results(function: Callable[..., float], at_pole: float = math.nan) -> Callable[..., float]:
     """A function of the C library; Python's errors become NaN, infinity or the value at the pole."""
 
     def wrapped(*arguments: float) -> float:
@@ -78,21 +81,21 @@ def _ieee(function: Callable[..., float], at_pole: float = math.nan) -> Callable
     return wrapped
 
 
-def _whole(x: float) -> int:
+def _floor_to_int32(x: float) -> int:
     if not math.isfinite(x) or math.floor(x) not in _INT32:
-        raise Failure("Integer overflow")
+        raise EvaluationError("Integer overflow")
     return math.floor(x)
 
 
-def _integers(real: Callable[[float, float], float], whole: Callable[[int, int], int]) -> Callable[[Any, Any], Any]:
+def _real_or_integer(real: Callable[[float, float], float], whole: Callable[[int, int], int]) -> Callable[[Any, Any], Any]:
     """A function with one meaning for Real and one for Integer, where division by zero is a failure."""
 
     def wrapped(a: Any, b: Any) -> Any:
         if isinstance(a, float) or isinstance(b, float):
             return real(a, b)
         if b == 0:
-            raise Failure("division by zero in div(), mod() or rem()")
-        return checked(whole(a, b))
+            raise EvaluationError("division by zero in div(), mod() or rem()")
+        return check_int32(whole(a, b))
 
     return wrapped
 
@@ -102,17 +105,17 @@ def _quotient(a: int, b: int) -> int:
     return abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
 
 
-def _smaller(*arguments: Any) -> Any:
-    return reduce(lambda a, b: a if a < b else b, _elements(arguments))
+def _minimum(*arguments: Any) -> Any:
+    return reduce(lambda a, b: a if a < b else b, _flat_elements(arguments))
 
 
-def _larger(*arguments: Any) -> Any:
-    return reduce(lambda a, b: a if a > b else b, _elements(arguments))
+def _maximum(*arguments: Any) -> Any:
+    return reduce(lambda a, b: a if a > b else b, _flat_elements(arguments))
 
 
-def _elements(arguments: tuple[Any, ...]) -> list[Any]:
+def _flat_elements(arguments: tuple[Any, ...]) -> list[Any]:
     """All elements, as Real where one of them is."""
-    elements = [plain(x) for argument in arguments for x in np.asarray(argument).flat]
+    elements = [to_python_scalar(x) for argument in arguments for x in np.asarray(argument).flat]
     return [float(x) for x in elements] if any(isinstance(x, float) for x in elements) else elements
 
 
@@ -125,11 +128,11 @@ def _size(array: Any, dimension: int | None = None) -> Any:
 
 
 OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
-    "+": lambda a, b: checked(a + b),
-    "-": lambda a, b: checked(a - b),
-    "*": lambda a, b: checked(a * b),
+    "+": lambda a, b: check_int32(a + b),
+    "-": lambda a, b: check_int32(a - b),
+    "*": lambda a, b: check_int32(a * b),
     "/": divide,
-    "^": lambda a, b: _ieee(math.pow, math.inf)(a, b),
+    "^": lambda a, b: _with_ieee_results(math.pow, math.inf)(a, b),
     "<": operator.lt,
     "<=": operator.le,
     ">": operator.gt,
@@ -138,29 +141,29 @@ OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
     "<>": operator.ne,
 }
 _FUNCTIONS = (math.sin, math.cos, math.tan, math.asin, math.acos, math.atan, math.sinh, math.cosh, math.tanh, math.exp, math.sqrt)
-_LIBRARY = {function.__name__: _ieee(function) for function in _FUNCTIONS}
-_LIBRARY |= {function.__name__: _ieee(function, -math.inf) for function in (math.log, math.log10)}
-_LIBRARY |= {"floor": lambda x: float(np.floor(x)), "ceil": lambda x: float(np.ceil(x))}
+_MATH_FUNCTIONS = {function.__name__: _with_ieee_results(function) for function in _FUNCTIONS}
+_MATH_FUNCTIONS |= {function.__name__: _with_ieee_results(function, -math.inf) for function in (math.log, math.log10)}
+_MATH_FUNCTIONS |= {"floor": lambda x: float(np.floor(x)), "ceil": lambda x: float(np.ceil(x))}
 BUILTINS: Mapping[str, Callable[..., Any]] = {
-    **{name: lambda x, f=f: each(f, x) for name, f in _LIBRARY.items()},  # type: ignore[misc]
-    "abs": lambda x: each(lambda y: checked(abs(y)), x),
+    **{name: lambda x, f=f: elementwise(f, x) for name, f in _MATH_FUNCTIONS.items()},  # type: ignore[misc]
+    "abs": lambda x: elementwise(lambda y: check_int32(abs(y)), x),
     "atan2": math.atan2,
     "cat": lambda _, *arrays: np.concatenate(arrays),
     "cross": _cross,
-    "div": _integers(lambda a, b: float(np.trunc(divide(a, b))), _quotient),
+    "div": _real_or_integer(lambda a, b: float(np.trunc(divide(a, b))), _quotient),
     "fill": lambda value, *sizes: np.full(sizes, value),
     "homotopy": lambda actual, _: actual,
     "identity": lambda n: np.eye(n, dtype=np.int64),
-    "integer": lambda x: each(lambda y: _whole(y) if isinstance(y, float) else y, x),
-    "max": _larger,
-    "min": _smaller,
-    "mod": _integers(lambda a, b: a - float(np.floor(divide(a, b))) * b, operator.mod),
+    "integer": lambda x: elementwise(lambda y: _floor_to_int32(y) if isinstance(y, float) else y, x),
+    "max": _maximum,
+    "min": _minimum,
+    "mod": _real_or_integer(lambda a, b: a - float(np.floor(divide(a, b))) * b, operator.mod),
     "ndims": np.ndim,
     "noEvent": lambda x: x,
     "ones": lambda *sizes: np.ones(sizes, np.int64),
-    "product": lambda x: reduce(lambda a, b: checked(a * b), _elements((x,))),
-    "rem": _integers(lambda a, b: a - float(np.trunc(divide(a, b))) * b, lambda a, b: a - b * _quotient(a, b)),
-    "sign": lambda x: each(lambda y: (y > 0) - (y < 0), x),
+    "product": lambda x: reduce(lambda a, b: check_int32(a * b), _flat_elements((x,))),
+    "rem": _real_or_integer(lambda a, b: a - float(np.trunc(divide(a, b))) * b, lambda a, b: a - b * _quotient(a, b)),
+    "sign": lambda x: elementwise(lambda y: (y > 0) - (y < 0), x),
     "size": _size,
     "sum": _sum,
     "transpose": np.transpose,

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from . import flat_model
-from .arithmetic import BUILTINS, OPERATORS, Failure, checked, each, matrix_product, plain
-from .flat_model import Body, Expression, Function, Local
+from .arithmetic import BUILTINS, OPERATORS, EvaluationError, check_int32, elementwise, matrix_product, to_python_scalar
+from .flat_model import Body, Expression, Function, FunctionVariable
 
 DTYPES = {"Real": np.float64, "Integer": np.int64, "Enumeration": np.int64, "Boolean": np.bool_}
 
 
-def typed(value: Any, kind: str, shape: tuple[int, ...]) -> Any:
+def convert_to_type(value: Any, kind: str, shape: tuple[int, ...]) -> Any:
     """The value as a variable of this type and shape holds it: a Python scalar or a numpy array of its own."""
     if shape:
         return np.array(np.broadcast_to(np.asarray(value, DTYPES[kind]), shape))
@@ -30,13 +30,13 @@ class Evaluator:
 
     functions: Mapping[str, Function]
     values: MutableMapping[str, Any]
-    memory: MutableMapping[str, Any] = field(default_factory=dict)
-    flags: dict[tuple[str, int], bool] = field(default_factory=dict)
-    held: dict[int, bool] = field(default_factory=dict)
+    pre_values: MutableMapping[str, Any] = field(default_factory=dict)
+    event_flags: dict[tuple[str, int], bool] = field(default_factory=dict)
+    previous_conditions: dict[int, bool] = field(default_factory=dict)
 
     # statements
 
-    def run(self, body: Body) -> None:
+    def execute(self, body: Body) -> None:
         for statement in body:
             getattr(self, f"_{type(statement).__name__.lower()}")(statement)
 
@@ -44,39 +44,39 @@ class Evaluator:
         self._store(node.target, self(node.value))
 
     def _store(self, target: flat_model.Name | flat_model.Index, value: Any) -> None:
-        name = flat_model.base_name(target)
+        name = flat_model.referenced_variable(target)
         old = self.values[name]
         if isinstance(target, flat_model.Index):
-            old[self._places(target, old.shape)] = value
+            old[self._indices(target, old.shape)] = value
         elif isinstance(old, np.ndarray):
             old[...] = value
         else:
             self.values[name] = type(old)(value)
 
     def _multiassign(self, node: flat_model.MultiAssign) -> None:
-        for target, value in zip(node.targets, self._invoke(node.call), strict=False):
+        for target, value in zip(node.targets, self._call_function(node.call), strict=False):
             self._store(target, value)
 
     def _ifstatement(self, node: flat_model.IfStatement) -> None:
-        self.run(next((body for condition, body in node.branches if self(condition)), node.otherwise))
+        self.execute(next((body for condition, body in node.branches if self(condition)), node.otherwise))
 
     def _for(self, node: flat_model.For) -> None:
         hidden = self.values.get(node.index)
         for index in self._range(node.range):
             self.values[node.index] = int(index)
-            self.run(node.body)
+            self.execute(node.body)
         self.values.pop(node.index, None)
         if hidden is not None:
             self.values[node.index] = hidden
 
     def _assert(self, node: flat_model.Assert) -> None:
         if not self(node.condition):
-            raise Failure(node.message, node.where)
+            raise EvaluationError(node.message, node.where)
 
-    def _watch(self, node: flat_model.Watch) -> None:
+    def _edgedetector(self, node: flat_model.EdgeDetector) -> None:
         holds = bool(self(node.condition))
-        self.flags["risen", node.index] = holds and not self.held.get(node.index, True)
-        self.held[node.index] = holds
+        self.event_flags["risen", node.index] = holds and not self.previous_conditions.get(node.index, True)
+        self.previous_conditions[node.index] = holds
 
     # expressions
 
@@ -101,7 +101,7 @@ class Evaluator:
 
     def _unary(self, node: flat_model.Unary) -> Any:
         value = self(node.operand)
-        return each(operator.not_, value) if node.operator == "not" else each(lambda x: checked(-x), value)
+        return elementwise(operator.not_, value) if node.operator == "not" else elementwise(lambda x: check_int32(-x), value)
 
     def _binary(self, node: flat_model.Binary) -> Any:
         if node.operator == "and":
@@ -112,53 +112,53 @@ class Evaluator:
         if node.operator == "*" and isinstance(left, np.ndarray) and isinstance(right, np.ndarray):
             return matrix_product(left, right)
         if node.operator == "^" and node.right == flat_model.Literal(2, "Integer"):
-            return each(lambda x: float(x) * float(x), left)
-        return each(OPERATORS[node.operator.removeprefix(".")], left, right)
+            return elementwise(lambda x: float(x) * float(x), left)
+        return elementwise(OPERATORS[node.operator.removeprefix(".")], left, right)
 
     def _index(self, node: flat_model.Index) -> Any:
         base = self(node.base)
-        return plain(base[self._places(node, base.shape)])
+        return to_python_scalar(base[self._indices(node, base.shape)])
 
-    def _places(self, node: flat_model.Index, shape: tuple[int, ...]) -> tuple[Any, ...]:
-        return tuple(self._place(s, n, node) for s, n in zip(node.subscripts, shape, strict=False))
+    def _indices(self, node: flat_model.Index, shape: tuple[int, ...]) -> tuple[Any, ...]:
+        return tuple(self._index_of(s, n, node) for s, n in zip(node.subscripts, shape, strict=False))
 
-    def _place(self, subscript: Expression | flat_model.Colon, size: int, node: flat_model.Index) -> Any:
+    def _index_of(self, subscript: Expression | flat_model.Colon, size: int, node: flat_model.Index) -> Any:
         if isinstance(subscript, flat_model.Colon):
             return slice(None)
         index = self(subscript)
         if not all(1 <= k <= size for k in np.atleast_1d(index)):
             label = node.base.name if isinstance(node.base, flat_model.Name) else "array"
-            raise Failure(f"{label}: subscript outside 1..{size}", node.where)
+            raise EvaluationError(f"{label}: subscript outside 1..{size}", node.where)
         return index - 1
 
     def _call(self, node: flat_model.Call) -> Any:
-        return self._invoke(node)[0]
+        return self._call_function(node)[0]
 
-    def _invoke(self, node: flat_model.Call) -> list[Any]:
+    def _call_function(self, node: flat_model.Call) -> list[Any]:
         function, arguments = self.functions[node.function], [self(argument) for argument in node.arguments]
         inside = Evaluator(self.functions, {})
         for local, value in zip(function.inputs, arguments, strict=True):
-            inside.values[local.name] = typed(value, local.type, np.shape(value))
+            inside.values[local.name] = convert_to_type(value, local.type, np.shape(value))
         for local in (*function.outputs, *function.locals):
             inside._declare(local)
-        inside.run(function.body)
+        inside.execute(function.body)
         return [inside.values[local.name] for local in function.outputs]
 
-    def _declare(self, local: Local) -> None:
+    def _declare(self, local: FunctionVariable) -> None:
         shape = tuple(int(self(d)) for d in local.dimensions if d is not None)
-        self.values[local.name] = typed(self(local.default) if local.default is not None else 0, local.type, shape)
+        self.values[local.name] = convert_to_type(self(local.default) if local.default is not None else 0, local.type, shape)
 
     def _builtin(self, node: flat_model.Builtin) -> Any:
         if node.name in ("due", "risen"):
-            return self.flags[node.name, node.arguments[0].value]  # type: ignore[union-attr, index]
+            return self.event_flags[node.name, node.arguments[0].value]  # type: ignore[union-attr, index]
         if node.name in ("pre", "edge", "change"):
-            return self._remembered(node)
+            return self._evaluate_pre(node)
         if node.name == "smooth":
             return self(node.arguments[1])
         return BUILTINS[node.name](*map(self, node.arguments))
 
-    def _remembered(self, node: flat_model.Builtin) -> Any:
-        before = Evaluator(self.functions, ChainMap(self.memory, self.values))(node.arguments[0])
+    def _evaluate_pre(self, node: flat_model.Builtin) -> Any:
+        before = Evaluator(self.functions, ChainMap(self.pre_values, self.values))(node.arguments[0])
         if node.name == "pre":
             return before
         now = self(node.arguments[0])

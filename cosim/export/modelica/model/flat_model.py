@@ -15,7 +15,7 @@ from typing import NamedTuple, NoReturn, TypeAlias
 from ....core.errors import InputError, Problem
 
 
-class Place(NamedTuple):
+class SourceLocation(NamedTuple):
     """A line of a Modelica file."""
 
     path: Path
@@ -25,18 +25,18 @@ class Place(NamedTuple):
         return f"{self.path}:{self.line}"
 
     @property
-    def short(self) -> str:
+    def file_and_line(self) -> str:
         """Without the folder: the same on every machine."""
         return f"{self.path.name}:{self.line}"
 
 
-def refuse(message: str, where: Place | None) -> NoReturn:
+def raise_model_error(message: str, where: SourceLocation | None) -> NoReturn:
     """Say what cannot be translated, and where it stands."""
     raise InputError(Problem(message, str(where or "")))
 
 
 Expression: TypeAlias = "Literal | Name | Index | Unary | Binary | If | Array | Range | Builtin | Call"
-Statement: TypeAlias = "Assign | MultiAssign | IfStatement | For | Assert | When | Watch"
+Statement: TypeAlias = "Assign | MultiAssign | IfStatement | For | Assert | When | EdgeDetector"
 Body: TypeAlias = "tuple[Statement, ...]"
 
 
@@ -51,7 +51,7 @@ class Name:
     """A variable, a local of a function, a loop index, or `time`."""
 
     name: str
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
 class Colon(NamedTuple):
@@ -62,7 +62,7 @@ class Colon(NamedTuple):
 class Index:
     base: Expression
     subscripts: tuple[Expression | Colon, ...]
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ class Binary:
     operator: str
     left: Expression
     right: Expression
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,7 @@ class Builtin:
 
     name: str
     arguments: tuple[Expression, ...]
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,19 +114,19 @@ class Call:
 
     function: str
     arguments: tuple[Expression, ...]
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
 class Assign:
     target: Name | Index
     value: Expression
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
     @property
     def name(self) -> str:
         """The variable that is assigned, or of which a part is assigned."""
-        return base_name(self.target)
+        return referenced_variable(self.target)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,14 +135,14 @@ class MultiAssign:
 
     targets: tuple[Name | Index, ...]
     call: Call
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
 class IfStatement:
     branches: tuple[tuple[Expression, Body], ...]
     otherwise: Body
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,14 +150,14 @@ class For:
     index: str
     range: Range
     body: Body
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
 class Assert:
     condition: Expression
     message: str
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,16 +165,16 @@ class When:
     """`when ... elsewhen ... end when`, of an algorithm or of an equation section (then its body is unordered)."""
 
     branches: tuple[tuple[Expression, Body], ...]
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
-class Watch:
+class EdgeDetector:
     """Made by the sorter: compares a condition with its value at the last event and sets the flag risen(index)."""
 
     index: int
     condition: Expression
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,43 +197,43 @@ class Variable:
     minimum: Expression | None
     maximum: Expression | None
     enumeration: str
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
 class Equation:
     left: Expression
     right: Expression
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
-class Local:
+class FunctionVariable:
     """An input, output or protected variable of a function; a dimension is None where the argument decides (`:`)."""
 
     name: str
     type: str
     dimensions: tuple[Expression | None, ...]
     default: Expression | None
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
 class Function:
     name: str
-    inputs: tuple[Local, ...]
-    outputs: tuple[Local, ...]
-    locals: tuple[Local, ...]
+    inputs: tuple[FunctionVariable, ...]
+    outputs: tuple[FunctionVariable, ...]
+    locals: tuple[FunctionVariable, ...]
     body: Body
-    where: Place | None = field(default=None, compare=False)
+    where: SourceLocation | None = field(default=None, compare=False)
 
 
-class Structural(NamedTuple):
+class StructuralParameters(NamedTuple):
     """Parameters whose default the front end has used to choose array sizes, loop ranges or equations."""
 
     purpose: str
     parameters: tuple[str, ...]
-    where: Place | None
+    where: SourceLocation | None
 
 
 @dataclass(frozen=True)
@@ -254,11 +254,11 @@ class Model:
     initial_algorithms: tuple[Body, ...]
     functions: Mapping[str, Function]
     enumerations: Mapping[str, tuple[str, ...]]
-    structural: tuple[Structural, ...]
+    structural: tuple[StructuralParameters, ...]
     states: tuple[str, ...] = ()
 
 
-def base_name(target: Expression) -> str:
+def referenced_variable(target: Expression) -> str:
     """The variable behind a reference such as `q` or `q[i]`."""
     while isinstance(target, Index):
         target = target.base
@@ -267,11 +267,11 @@ def base_name(target: Expression) -> str:
     return target.name
 
 
-def derivative(state: str) -> str:
+def derivative_name(state: str) -> str:
     """The name of the variable that holds the derivative of a state."""
     return f"der({state})"
 
 
-def owner(name: str) -> str:
+def owning_component(name: str) -> str:
     """The component that a variable belongs to; "" for the model's own."""
     return name.removeprefix("der(").rpartition(".")[0]

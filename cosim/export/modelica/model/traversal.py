@@ -6,15 +6,15 @@ from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from .flat_model import Assign, Builtin, Colon, Expression, Index, Literal, MultiAssign, Name, Place, base_name
+from .flat_model import Assign, Builtin, Colon, Expression, Index, Literal, MultiAssign, Name, SourceLocation, referenced_variable
 
 #: operators on the value before the present event
-MEMORY = ("pre", "edge", "change")
+PRE_OPERATORS = ("pre", "edge", "change")
 
 
 def walk(node: Any) -> Iterator[Any]:
     """The node and everything below it, in order of writing."""
-    if isinstance(node, tuple) and not isinstance(node, Place | Colon):
+    if isinstance(node, tuple) and not isinstance(node, SourceLocation | Colon):
         for item in node:
             yield from walk(item)
     elif is_dataclass(node):
@@ -25,47 +25,47 @@ def walk(node: Any) -> Iterator[Any]:
 
 def rewrite(node: Any, change: Callable[[Any], Any]) -> Any:
     """The tree with `change` applied to each of its nodes, from the leaves to the root."""
-    if isinstance(node, tuple) and not isinstance(node, Place | Colon):
+    if isinstance(node, tuple) and not isinstance(node, SourceLocation | Colon):
         return tuple(rewrite(item, change) for item in node)
     if not is_dataclass(node) or isinstance(node, type):
         return node
     return change(replace(node, **{field.name: rewrite(getattr(node, field.name), change) for field in fields(node)}))
 
 
-def reads(node: Any) -> Iterator[Name | Index]:
+def read_references(node: Any) -> Iterator[Name | Index]:
     """The references whose present value is read: not the targets of assignments, and not what stands under pre()."""
     if isinstance(node, Assign):
-        yield from _subscript_reads(node.target)
-        yield from reads(node.value)
+        yield from _references_in_subscripts(node.target)
+        yield from read_references(node.value)
     elif isinstance(node, MultiAssign):
         for target in node.targets:
-            yield from _subscript_reads(target)
-        yield from reads(node.call)
+            yield from _references_in_subscripts(target)
+        yield from read_references(node.call)
     elif isinstance(node, Name) or (isinstance(node, Index) and _is_constant(node)):
         yield node
-    elif isinstance(node, tuple) and not isinstance(node, Place | Colon):
+    elif isinstance(node, tuple) and not isinstance(node, SourceLocation | Colon):
         for item in node:
-            yield from reads(item)
+            yield from read_references(item)
     elif is_dataclass(node) and not (isinstance(node, Builtin) and node.name == "pre"):
         for field in fields(node):
-            yield from reads(getattr(node, field.name))
+            yield from read_references(getattr(node, field.name))
 
 
-def _subscript_reads(target: Name | Index) -> Iterator[Name | Index]:
+def _references_in_subscripts(target: Name | Index) -> Iterator[Name | Index]:
     if isinstance(target, Index):
-        yield from reads(target.subscripts)
+        yield from read_references(target.subscripts)
 
 
 def _is_constant(node: Index) -> bool:
     return isinstance(node.base, Name) and all(isinstance(s, Literal) for s in node.subscripts)
 
 
-def names(node: Any) -> set[str]:
+def variable_names(node: Any) -> set[str]:
     """Every variable that occurs below a node."""
     return {item.name for item in walk(node) if isinstance(item, Name)}
 
 
-def targets(node: Any) -> Iterator[Name | Index]:
+def assigned_references(node: Any) -> Iterator[Name | Index]:
     """What the statements below a node assign."""
     for item in walk(node):
         if isinstance(item, Assign):
@@ -74,11 +74,11 @@ def targets(node: Any) -> Iterator[Name | Index]:
             yield from item.targets
 
 
-def remembered(node: Any) -> Iterator[tuple[str, Builtin]]:
+def pre_references(node: Any) -> Iterator[tuple[str, Builtin]]:
     """The variables under pre(), edge() and change(), each with the call."""
     for item in walk(node):
-        if isinstance(item, Builtin) and item.name in MEMORY:
-            yield base_name(item.arguments[0]), item
+        if isinstance(item, Builtin) and item.name in PRE_OPERATORS:
+            yield referenced_variable(item.arguments[0]), item
 
 
 def has_builtin(node: Expression, *builtins: str) -> bool:

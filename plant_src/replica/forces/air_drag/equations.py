@@ -6,16 +6,16 @@ import casadi as ca
 
 from cosim.export.fmu.block import Block
 
-from ....vehicles.common.interface import scalar, vector
+from ....vehicles.common.interface import scalar_variable, vector_variables
 from ....vehicles.strider import parameters as p
-from ..model import VESSEL, force_model, load, parameter, planar_velocity
+from ..model import VESSEL_INPUTS, force_model, load_outputs, planar_velocity, tunable_parameter
 
 VARIABLES = (
-    *VESSEL,
-    *vector("water", "xy", "N", "hydrodynamic force, vessel body frame, at the centre of mass", "input"),
-    scalar("water.n", "N.m", "hydrodynamic moment about z"),
-    parameter("coefficient", p.AIR_DRAG, "kg/m", "drag per square of the velocity, along and across"),
-    *load("load of water and air"),
+    *VESSEL_INPUTS,
+    *vector_variables("water", "xy", "N", "hydrodynamic force, vessel body frame, at the centre of mass", "input"),
+    scalar_variable("water.n", "N.m", "hydrodynamic moment about z"),
+    tunable_parameter("coefficient", p.AIR_DRAG, "kg/m", "drag per square of the velocity, along and across"),
+    *load_outputs("load of water and air"),
 )
 
 

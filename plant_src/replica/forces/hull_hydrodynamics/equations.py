@@ -7,16 +7,16 @@ import casadi as ca
 from cosim.export.fmu.block import Block
 
 from ....vehicles.strider import parameters as p
-from ..model import VESSEL, force_model, load, parameter, planar_velocity
+from ..model import VESSEL_INPUTS, force_model, load_outputs, planar_velocity, tunable_parameter
 
 VARIABLES = (
-    *VESSEL,
-    parameter("hulls", float(p.HULLS), "1", "number of hulls; 1: as the paper's equations read"),
-    parameter("Y_v", p.Y_V, "kg/s", "side force of one hull per sway velocity"),
-    parameter("Y_r", p.Y_R, "kg.m/s", "side force of one hull per yaw rate"),
-    parameter("N_v", p.N_V, "kg.m/s", "yaw moment of one hull per sway velocity"),
-    parameter("N_r", p.N_R, "kg.m2/s", "yaw moment of one hull per yaw rate"),
-    *load("hydrodynamic load"),
+    *VESSEL_INPUTS,
+    tunable_parameter("hulls", float(p.HULL_COUNT), "1", "number of hulls; 1: as the paper's equations read"),
+    tunable_parameter("Y_v", p.Y_V, "kg/s", "side force of one hull per sway velocity"),
+    tunable_parameter("Y_r", p.Y_R, "kg.m/s", "side force of one hull per yaw rate"),
+    tunable_parameter("N_v", p.N_V, "kg.m/s", "yaw moment of one hull per sway velocity"),
+    tunable_parameter("N_r", p.N_R, "kg.m2/s", "yaw moment of one hull per yaw rate"),
+    *load_outputs("hydrodynamic load"),
 )
 
 

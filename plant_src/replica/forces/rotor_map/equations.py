@@ -5,21 +5,23 @@ from __future__ import annotations
 import casadi as ca
 
 from cosim.core.component import Variable
-from cosim.core.units import parse
+from cosim.core.units import parse_unit
 from cosim.export.fmu.block import Block
 
 from ....vehicles.ar_drone.parameters import THRUST_COEFFICIENT, TORQUE_COEFFICIENT
-from ..model import force_model, parameter
+from ..model import force_model, tunable_parameter
 
 MAX_SPEED = 5000 * 0.10471976  # rad/s; the factor from 1/min is rounded as published
 
 VARIABLES = (
-    Variable("throttle", causality="input", start=(0.0,) * 4, unit=parse("%"), shape=(4,), description="acts within 0 to 100"),
-    parameter("thrust_coefficient", THRUST_COEFFICIENT, "N.s2/rad2", "CT"),
-    parameter("torque_coefficient", TORQUE_COEFFICIENT, "N.m.s2/rad2", "CD"),
-    parameter("max_speed", MAX_SPEED, "rad/s", "rotor speed at full throttle"),
-    Variable("thrust", causality="output", unit=parse("N"), shape=(4,), description="along the body's up"),
-    Variable("torque", causality="output", unit=parse("N.m"), shape=(4,), description="of the propeller"),
+    Variable(
+        "throttle", causality="input", start=(0.0,) * 4, unit=parse_unit("%"), shape=(4,), description="acts within 0 to 100"
+    ),
+    tunable_parameter("thrust_coefficient", THRUST_COEFFICIENT, "N.s2/rad2", "CT"),
+    tunable_parameter("torque_coefficient", TORQUE_COEFFICIENT, "N.m.s2/rad2", "CD"),
+    tunable_parameter("max_speed", MAX_SPEED, "rad/s", "rotor speed at full throttle"),
+    Variable("thrust", causality="output", unit=parse_unit("N"), shape=(4,), description="along the body's up"),
+    Variable("torque", causality="output", unit=parse_unit("N.m"), shape=(4,), description="of the propeller"),
 )
 
 

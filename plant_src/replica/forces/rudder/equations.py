@@ -12,20 +12,20 @@ import casadi as ca
 
 from cosim.export.fmu.block import Block
 
-from ....vehicles.common.interface import scalar, vector
+from ....vehicles.common.interface import scalar_variable, vector_variables
 from ....vehicles.strider import parameters as p
-from ..model import VESSEL, force_model, parameter, planar_velocity
+from ..model import VESSEL_INPUTS, force_model, planar_velocity, tunable_parameter
 
 VARIABLES = (
-    *VESSEL,
-    scalar("rudder_angle", "rad", "deflection; positive: trailing edge and bow to starboard"),
-    parameter("inflow_sign", 1.0, "1", "sign of the yaw rate in the inflow angle: 1 as published, -1 physical"),
-    parameter("arm", p.RUDDER_ARM, "m", "distance of the rudder from the centre of mass"),
-    parameter("area", p.RUDDER_AREA, "m2", "area of the blade"),
-    parameter("max_lift_coefficient", p.RUDDER_MAX_LIFT_COEFFICIENT, "1", "at and beyond the stall angle"),
-    parameter("stall_angle", p.STALL_ANGLE, "rad", "angle of attack from which on the lift no longer grows"),
-    parameter("density", p.WATER_DENSITY, "kg/m3", "of the water"),
-    *vector("force", "xy", "N", "vessel body frame, at the rudder"),
+    *VESSEL_INPUTS,
+    scalar_variable("rudder_angle", "rad", "deflection; positive: trailing edge and bow to starboard"),
+    tunable_parameter("inflow_sign", 1.0, "1", "sign of the yaw rate in the inflow angle: 1 as published, -1 physical"),
+    tunable_parameter("arm", p.RUDDER_ARM, "m", "distance of the rudder from the centre of mass"),
+    tunable_parameter("area", p.RUDDER_AREA, "m2", "area of the blade"),
+    tunable_parameter("max_lift_coefficient", p.RUDDER_MAX_LIFT_COEFFICIENT, "1", "at and beyond the stall angle"),
+    tunable_parameter("stall_angle", p.STALL_ANGLE, "rad", "angle of attack from which on the lift no longer grows"),
+    tunable_parameter("density", p.WATER_DENSITY, "kg/m3", "of the water"),
+    *vector_variables("force", "xy", "N", "vessel body frame, at the rudder"),
 )
 
 

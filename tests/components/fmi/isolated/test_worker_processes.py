@@ -16,24 +16,33 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from helpers import end, run, system
+from helpers import endpoint, make_system, run_system
 
-from cosim.components.fmi import FmuFile, Isolation, instantiate
-from cosim.components.fmi.isolated.pipes import DONE, LOOKS, TURN, Vigil, decode, encode, read_line, write
-from cosim.components.fmi.isolated.process import Lost, Process
-from cosim.components.fmi.isolated.shared_memory import Block
+from cosim.components.fmi import FmuFile, Isolation, create_component
+from cosim.components.fmi.isolated.pipes import (
+    SPIN_COUNT,
+    STEP_COMMAND,
+    STEP_DONE,
+    SpinningPoller,
+    decode_line,
+    encode_line,
+    read_line,
+    write_line,
+)
+from cosim.components.fmi.isolated.process import WorkerLost, WorkerProcess
+from cosim.components.fmi.isolated.shared_memory import SharedMemoryBlock
 from cosim.core.component import Ports, Variable
-from cosim.core.time_grid import exact
+from cosim.core.time_grid import exact_fraction
 from cosim.engine.run_loop import Settings, simulate
-from cosim.process.journal import CHANGES
+from cosim.process.journal import CHANGE_COUNT
 
 DESCRIPTORS = Path("/proc/self/fd")
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 
 
-def block(values: int = 1) -> Block:
+def block(values: int = 1) -> SharedMemoryBlock:
     variables = [Variable(f"x{i}") for i in range(values)]
-    return Block(Ports(variables, {np.dtype(np.float64): np.zeros(values)}), Ports([], {}))
+    return SharedMemoryBlock(Ports(variables, {np.dtype(np.float64): np.zeros(values)}), Ports([], {}))
 
 
 @pytest.fixture
@@ -41,13 +50,13 @@ def worker():
     """Starts processes that answer each command with the outcome of a function."""
     started = []
 
-    def start(answer: Callable[[bytes], bytes], shared: Block | None = None) -> Process:
+    def start(answer: Callable[[bytes], bytes], shared: SharedMemoryBlock | None = None) -> WorkerProcess:
         def serve(commands: int, answers: int) -> None:
-            vigil = Vigil([commands])
+            vigil = SpinningPoller([commands])
             while line := read_line(commands, vigil):
-                write(answers, answer(line))
+                write_line(answers, answer(line))
 
-        started.append(Process("w", (shared or block()).journal, serve))
+        started.append(WorkerProcess("w", (shared or block()).journal, serve))
         return started[-1]
 
     yield start
@@ -70,11 +79,11 @@ def test_lines_come_back_whole_however_long_they_are(worker):
     echo = worker(lambda line: line)
     for size in (0, 1, 70_000, 1_000_000):
         message = ["x" * size, 0.1, float("inf"), 2**63, b"\x00\xff", None, "\N{SNOWMAN}\n"]
-        assert decode(echo.request(encode(message), 5.0)) == message
+        assert decode_line(echo.request(encode_line(message), 5.0)) == message
 
 
 def test_an_empty_line_comes_back(worker):
-    assert worker(lambda line: line).request(TURN, 5.0) == DONE
+    assert worker(lambda line: line).request(STEP_COMMAND, 5.0) == STEP_DONE
 
 
 def test_who_waits_in_vain_sleeps_at_once_and_ever_longer(monkeypatch):
@@ -84,26 +93,26 @@ def test_who_waits_in_vain_sleeps_at_once_and_ever_longer(monkeypatch):
     counted = SimpleNamespace(register=poll.register, unregister=poll.unregister)
     counted.poll = lambda milliseconds: (looks.append(milliseconds == 0), poll.poll(min(milliseconds, 1)))[1]
     monkeypatch.setattr(select, "poll", lambda: counted)
-    vigil = Vigil([reader])
+    vigil = SpinningPoller([reader])
 
     def looked() -> int:
         looks.clear()
         vigil.wait(60_000)
         return sum(looks)
 
-    assert [looked() for _ in range(8)] == [LOOKS, 0, LOOKS, 0, 0, LOOKS, 0, 0]
-    os.write(writer, TURN)
+    assert [looked() for _ in range(8)] == [SPIN_COUNT, 0, SPIN_COUNT, 0, 0, SPIN_COUNT, 0, 0]
+    os.write(writer, STEP_COMMAND)
     assert [looked() for _ in range(5)] == [0, 0, 1, 1, 1]
     os.read(reader, 1)
-    assert [looked() for _ in range(4)] == [LOOKS, 0, LOOKS, 0]
+    assert [looked() for _ in range(4)] == [SPIN_COUNT, 0, SPIN_COUNT, 0]
     os.close(writer)
     os.close(reader)
 
 
 def test_a_process_that_does_not_answer_is_found_at_its_deadline(worker):
     began = time.monotonic()
-    with pytest.raises(Lost, match=r"did not return within 0\.2 s"):
-        worker(lambda line: time.sleep(60)).request(TURN, 0.2)
+    with pytest.raises(WorkerLost, match=r"did not return within 0\.2 s"):
+        worker(lambda line: time.sleep(60)).request(STEP_COMMAND, 0.2)
     assert 0.2 < time.monotonic() - began < 0.7
 
 
@@ -113,31 +122,31 @@ def test_the_deadline_holds_for_each_call_that_the_journal_tells_of(worker):
     def ten_calls(line: bytes) -> bytes:
         for _ in range(10):
             time.sleep(0.1)
-            shared.journal[CHANGES] += 1
+            shared.journal[CHANGE_COUNT] += 1
         return line
 
-    assert worker(ten_calls, shared).request(TURN, 0.5) == DONE
+    assert worker(ten_calls, shared).request(STEP_COMMAND, 0.5) == STEP_DONE
 
 
 def test_the_exit_code_of_a_process_is_told(worker):
     process = worker(lambda line: os._exit(3))
-    with pytest.raises(Lost, match="it ended the process with exit code 3"):
-        process.request(TURN, 5.0)
-    with pytest.raises(Lost):
-        process.request(TURN, 5.0)
+    with pytest.raises(WorkerLost, match="it ended the process with exit code 3"):
+        process.request(STEP_COMMAND, 5.0)
+    with pytest.raises(WorkerLost):
+        process.request(STEP_COMMAND, 5.0)
 
 
 def test_a_process_that_ended_between_two_commands_is_missed(children, worker):
     process = worker(lambda line: line)
     (child,) = children()
     os.kill(int(child), signal.SIGKILL)
-    with pytest.raises(Lost, match="signal 9"):
-        process.request(TURN, 5.0)
+    with pytest.raises(WorkerLost, match="signal 9"):
+        process.request(STEP_COMMAND, 5.0)
 
 
 def test_what_a_process_prints_is_passed_on_up_to_a_limit(worker, capfd):
     process = worker(lambda line: os.write(1, b"x" * 1_000_000) and line)
-    assert process.request(TURN, 5.0) == DONE
+    assert process.request(STEP_COMMAND, 5.0) == STEP_DONE
     process.end()
     assert capfd.readouterr().err.count("x") == 1 << 16
 
@@ -147,7 +156,7 @@ def test_python_code_prints_as_c_code_does(worker, capfd, monkeypatch, tmp_path)
     with (tmp_path / "stream").open("w") as stream:
         monkeypatch.setattr("sys.stdout", stream)
         process = worker(lambda line: print("hello") or line)
-        assert process.request(TURN, 5.0) == DONE
+        assert process.request(STEP_COMMAND, 5.0) == STEP_DONE
     process.end()
     assert capfd.readouterr().err == "hello\n"
 
@@ -157,7 +166,7 @@ def test_an_interrupt_reaches_the_importer_while_it_waits(worker):
     before = signal.signal(signal.SIGALRM, signal.default_int_handler)
     signal.setitimer(signal.ITIMER_REAL, 0.1)
     with pytest.raises(KeyboardInterrupt):
-        process.request(TURN, 30.0)
+        process.request(STEP_COMMAND, 30.0)
     signal.signal(signal.SIGALRM, before)
 
 
@@ -168,11 +177,11 @@ def test_a_worker_can_change_its_own_block_only(worker):
     other[:4] = b"mine"
 
     def scribble(line: bytes) -> bytes:
-        own.keep_others_out()
+        own.unshare_other_memory()
         mirror[0], other[:4] = 2.5, b"evil"
         return line
 
-    assert worker(scribble, own).request(TURN, 5.0) == DONE
+    assert worker(scribble, own).request(STEP_COMMAND, 5.0) == STEP_DONE
     assert (mirror[0], other[:4]) == (2.5, b"mine")
 
 
@@ -180,10 +189,10 @@ def test_a_worker_inherits_no_descriptors(worker):
     """But its own pipes, the standard ones, and the folder that it reads to find out."""
 
     def look(line: bytes) -> bytes:
-        return encode([os.readlink(path) if path.exists() else "" for path in DESCRIPTORS.iterdir() if int(path.name) > 2])  # noqa: PTH115
+        return encode_line([os.readlink(path) if path.exists() else "" for path in DESCRIPTORS.iterdir() if int(path.name) > 2])  # noqa: PTH115
 
     with tempfile.TemporaryFile() as secret:
-        opened = decode(worker(look).request(b"[]\n", 5.0))
+        opened = decode_line(worker(look).request(b"[]\n", 5.0))
         assert secret.fileno() > 2
     assert {path.partition(":")[0] for path in opened} <= {"pipe", ""}
     assert len(opened) <= 3
@@ -191,17 +200,19 @@ def test_a_worker_inherits_no_descriptors(worker):
 
 def lags(probe: Path, *names: str) -> dict[str, object]:
     file = FmuFile(probe)
-    return {name: instantiate(file, name, isolation=Isolation()) for name in names}
+    return {name: create_component(file, name, isolation=Isolation()) for name in names}
 
 
 def test_many_runs_leave_nothing_behind(children, probe, tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    run(system(lags(probe, "a")), "1/100")  # imports
+    run_system(make_system(lags(probe, "a")), "1/100")  # imports
     descriptors = sorted(DESCRIPTORS.iterdir())
     for fail_time in (1e9, 0.025):
         for _ in range(5):
-            built = system(lags(probe, "a", "b"), "a.y > b.u", start_values={"a": {"fail_time": fail_time}})
-            outcome = simulate(built, Settings(exact(0), exact("1/10"), exact("1/100"), {"b.y": end("b.y")}))
+            built = make_system(lags(probe, "a", "b"), "a.y > b.u", start_values={"a": {"fail_time": fail_time}})
+            outcome = simulate(
+                built, Settings(exact_fraction(0), exact_fraction("1/10"), exact_fraction("1/100"), {"b.y": endpoint("b.y")})
+            )
             assert (outcome.failure is None) == (fail_time == 1e9)
     assert sorted(DESCRIPTORS.iterdir()) == descriptors
     assert (list(tmp_path.iterdir()), children()) == ([], [])

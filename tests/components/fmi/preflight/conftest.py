@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from fmu_corpus import contents
+from fmu_corpus import read_members
 
 
 @pytest.fixture(scope="session")
 def good(probes: dict[int, Path]) -> dict[int, dict[str, bytes]]:
     """Members of the hand-written FMUs, by FMI version."""
-    return {version: contents(path) for version, path in probes.items()}
+    return {version: read_members(path) for version, path in probes.items()}

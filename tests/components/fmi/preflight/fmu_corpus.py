@@ -15,11 +15,11 @@ import pytest
 
 from cosim.components.fmi import FmuFile
 from cosim.components.fmi.preflight import Finding
-from cosim.components.fmi.preflight.validation import validate
+from cosim.components.fmi.preflight.validation import validate_fmu
 from cosim.core.errors import InputError
 
 
-def contents(fmu: Path) -> dict[str, bytes]:
+def read_members(fmu: Path) -> dict[str, bytes]:
     with ZipFile(fmu) as archive:
         return {name: archive.read(name) for name in archive.namelist()}
 
@@ -33,7 +33,7 @@ class Member:
     deflated: bool = True
     local: Mapping[str, Any] = field(default_factory=dict)
     central: Mapping[str, Any] = field(default_factory=dict)
-    behind: bytes = b""
+    trailing_bytes: bytes = b""
     #: None: has a place of its own; otherwise where its header is said to be
     offset: int | None = None
 
@@ -85,14 +85,14 @@ class Member:
         return struct.pack("<4s6H3L5H2L", b"PK\1\2", *numbers, *lengths, f["mode"] << 16, offset) + f["name"] + f["extra"]
 
 
-def pack(members: Iterable[Member], comment: bytes = b"", count: int | None = None, front: bytes = b"") -> bytes:
+def pack_archive(members: Iterable[Member], comment: bytes = b"", count: int | None = None, front: bytes = b"") -> bytes:
     """An archive as bytes."""
     body, table, number = bytearray(front), bytearray(), 0
     for member in members:
         table += member.central_header(len(body) if member.offset is None else member.offset)
         number += 1
         if member.offset is None:
-            body += member.local_header() + member.data + member.behind
+            body += member.local_header() + member.data + member.trailing_bytes
     number = number if count is None else count
     end = struct.pack("<4s4H2LH", b"PK\5\6", 0, 0, number, number, len(table), len(body), len(comment))
     return bytes(body + table + end + comment)
@@ -102,16 +102,16 @@ def members(files: Mapping[str, bytes]) -> list[Member]:
     return [Member(name, content) for name, content in files.items()]
 
 
-def changed(member: Member, **headers: Any) -> Member:
+def with_headers(member: Member, **headers: Any) -> Member:
     """The member with the same fields changed in both of its headers."""
     return replace(member, local=headers, central=headers)
 
 
-def found(path: Path) -> list[Finding]:
-    return list(validate(path))
+def find_problems(path: Path) -> list[Finding]:
+    return list(validate_fmu(path))
 
 
-def refusal(path: Path) -> str:
+def refusal_message(path: Path) -> str:
     """What cosim says when the FMU is to be run; every line names the file."""
     file = FmuFile(path)
     with pytest.raises(InputError) as error:
@@ -126,7 +126,7 @@ def refusal(path: Path) -> str:
 def with_description(text: str, files: Mapping[str, bytes], folder: Path) -> Path:
     """The FMU with another modelDescription.xml."""
     path = folder / "bad.fmu"
-    path.write_bytes(pack(members({**files, "modelDescription.xml": text.encode()})))
+    path.write_bytes(pack_archive(members({**files, "modelDescription.xml": text.encode()})))
     return path
 
 

@@ -9,27 +9,27 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from fmu_corpus import Member, changed, found, members, pack, refusal
+from fmu_corpus import Member, find_problems, members, pack_archive, refusal_message, with_headers
 
 from cosim.components.fmi import FmuFile
-from cosim.components.fmi.preflight import Limits
+from cosim.components.fmi.preflight import PreflightLimits
 from cosim.core.errors import InputError
 
 EXTRA = Member("resources/data.txt", b"data " * 50)
 
 
 def with_member(name, **more):
-    return lambda good: pack([*good, Member(name, b"evil", **more)])
+    return lambda good: pack_archive([*good, Member(name, b"evil", **more)])
 
 
 def with_extra(change):
     """The good FMU with one more member, after a change to it."""
-    return lambda good: pack([*good, change(EXTRA)])
+    return lambda good: pack_archive([*good, change(EXTRA)])
 
 
 def overlapping(good):
     """Two names for the same bytes."""
-    return pack([*good, replace(good[0], name="resources/again", offset=0, central={"name": b"resources/again"})])
+    return pack_archive([*good, replace(good[0], name="resources/again", offset=0, central={"name": b"resources/again"})])
 
 
 def nested(good):
@@ -37,13 +37,13 @@ def nested(good):
     inner = Member("resources/inner", b"inside")
     outer = Member("resources/outer", inner.local_header() + inner.data, deflated=False)
     place = sum(len(m.local_header() + m.data) for m in good) + len(outer.local_header())
-    return pack([*good, outer, replace(inner, offset=place)])
+    return pack_archive([*good, outer, replace(inner, offset=place)])
 
 
 def two_ends(good):
     """The comment of an archive holds a second archive with another description."""
-    hidden = pack([Member("modelDescription.xml", b"<other/>")])
-    return pack(good, comment=hidden)
+    hidden = pack_archive([Member("modelDescription.xml", b"<other/>")])
+    return pack_archive(good, comment=hidden)
 
 
 NAMES = {
@@ -68,35 +68,35 @@ NAMES = {
     "below a file": ("modelDescription.xml/evil", "archive.collision", "which is a file"),
 }
 HEADERS = {
-    "symbolic link": (with_extra(lambda m: changed(m, mode=0o120777)), "archive.kind", "is a symbolic link"),
-    "device": (with_extra(lambda m: changed(m, mode=0o060644)), "archive.kind", "of kind b"),
-    "pipe": (with_extra(lambda m: changed(m, mode=0o010644)), "archive.kind", "of kind p"),
+    "symbolic link": (with_extra(lambda m: with_headers(m, mode=0o120777)), "archive.kind", "is a symbolic link"),
+    "device": (with_extra(lambda m: with_headers(m, mode=0o060644)), "archive.kind", "of kind b"),
+    "pipe": (with_extra(lambda m: with_headers(m, mode=0o010644)), "archive.kind", "of kind p"),
     "folder with content": (with_member("resources/x/"), "archive.kind", "is a folder with 4 bytes"),
-    "encrypted": (with_extra(lambda m: changed(m, flags=0x801)), "archive.encryption", "is encrypted"),
-    "strongly encrypted": (with_extra(lambda m: changed(m, flags=0x841)), "archive.encryption", "is encrypted"),
-    "LZMA": (with_extra(lambda m: changed(m, method=14)), "archive.compression", "method 14, expected 0 (stored) or 8"),
+    "encrypted": (with_extra(lambda m: with_headers(m, flags=0x801)), "archive.encryption", "is encrypted"),
+    "strongly encrypted": (with_extra(lambda m: with_headers(m, flags=0x841)), "archive.encryption", "is encrypted"),
+    "LZMA": (with_extra(lambda m: with_headers(m, method=14)), "archive.compression", "method 14, expected 0 (stored) or 8"),
     "other name": (with_extra(lambda m: replace(m, local={"name": b"resources/evil"})), "archive.header", "has name"),
     "other size": (with_extra(lambda m: replace(m, local={"size": 1})), "archive.header", "has size 1"),
     "other method": (with_extra(lambda m: replace(m, local={"method": 0})), "archive.header", "has method 0"),
     "other CRC": (with_extra(lambda m: replace(m, local={"crc": 5})), "archive.header", "has CRC 5"),
-    "no header": (lambda good: pack([*good, replace(EXTRA, offset=7)]), "archive.header", "found no member at byte 7"),
-    "offset beyond": (lambda good: pack([*good, replace(EXTRA, offset=2**32 - 2)]), "archive.header", "found no member"),
+    "no header": (lambda good: pack_archive([*good, replace(EXTRA, offset=7)]), "archive.header", "found no member at byte 7"),
+    "offset beyond": (lambda good: pack_archive([*good, replace(EXTRA, offset=2**32 - 2)]), "archive.header", "found no member"),
     "same bytes": (overlapping, "archive.header", "has name"),
-    "same header": (lambda good: pack([*good, replace(good[0], offset=0)]), "archive.overlap", "shares its bytes"),
+    "same header": (lambda good: pack_archive([*good, replace(good[0], offset=0)]), "archive.overlap", "shares its bytes"),
     "nested": (nested, "archive.overlap", "shares its bytes"),
-    "longer than the archive": (with_extra(lambda m: changed(m, compressed=10**6)), "archive.overlap", "shares its bytes"),
+    "longer than the archive": (with_extra(lambda m: with_headers(m, compressed=10**6)), "archive.overlap", "shares its bytes"),
 }
 DATA = {
-    "wrong CRC": (with_extra(lambda m: changed(m, crc=5)), "archive.data", "found CRC"),
-    "too short": (with_extra(lambda m: changed(m, size=999)), "archive.data", "found 250 bytes, expected 999"),
-    "too long": (with_extra(lambda m: changed(m, size=9)), "archive.data", "found more bytes, expected 9"),
+    "wrong CRC": (with_extra(lambda m: with_headers(m, crc=5)), "archive.data", "found CRC"),
+    "too short": (with_extra(lambda m: with_headers(m, size=999)), "archive.data", "found 250 bytes, expected 999"),
+    "too long": (with_extra(lambda m: with_headers(m, size=9)), "archive.data", "found more bytes, expected 9"),
     "no deflate stream": (
         with_extra(lambda m: replace(m, deflated=False, local={"method": 8}, central={"method": 8})),
         "archive.data",
         "damaged",
     ),
     "stored size": (
-        with_extra(lambda m: changed(replace(m, deflated=False), size=9)),
+        with_extra(lambda m: with_headers(replace(m, deflated=False), size=9)),
         "archive.size",
         "stored in 250 bytes but has 9",
     ),
@@ -104,24 +104,32 @@ DATA = {
 STRUCTURE = {
     "empty file": (lambda good: b"", "archive.zip", "is no FMU: File is not a zip file"),
     "text": (lambda good: b"hello" * 100, "archive.zip", "is no FMU: File is not a zip file"),
-    "no members": (lambda good: pack([]), "archive.description", "no item named 'modelDescription.xml'"),
-    "cut in half": (lambda good: pack(good)[: len(pack(good)) // 2], "archive.zip", "its end is missing"),
-    "cut at the end": (lambda good: pack(good)[:-1], "archive.zip", "its end is missing"),
-    "cut at the front": (lambda good: pack(good)[100:], "archive.contents", "should end at byte"),
-    "data in front": (lambda good: b"#!/bin/sh\n" + pack(good), "archive.contents", "should end at byte"),
-    "data behind": (lambda good: pack(good) + b"more", "archive.trailing-data", "found 4 bytes behind the end"),
+    "no members": (lambda good: pack_archive([]), "archive.description", "no item named 'modelDescription.xml'"),
+    "cut in half": (lambda good: pack_archive(good)[: len(pack_archive(good)) // 2], "archive.zip", "its end is missing"),
+    "cut at the end": (lambda good: pack_archive(good)[:-1], "archive.zip", "its end is missing"),
+    "cut at the front": (lambda good: pack_archive(good)[100:], "archive.contents", "should end at byte"),
+    "data in front": (lambda good: b"#!/bin/sh\n" + pack_archive(good), "archive.contents", "should end at byte"),
+    "data behind": (lambda good: pack_archive(good) + b"more", "archive.trailing-data", "found 4 bytes behind the end"),
     "two ends": (two_ends, "archive.trailing-data", "a second end"),
-    "several disks": (lambda good: pack(good)[:-18] + b"\1\0\1\0" + pack(good)[-14:], "archive.contents", "several parts"),
-    "too many listed": (lambda good: pack(good, count=99), "archive.contents", "damaged"),
-    "too few listed": (lambda good: pack(good, count=1), "archive.contents", "bytes more than its 1 members need"),
+    "several disks": (
+        lambda good: pack_archive(good)[:-18] + b"\1\0\1\0" + pack_archive(good)[-14:],
+        "archive.contents",
+        "several parts",
+    ),
+    "too many listed": (lambda good: pack_archive(good, count=99), "archive.contents", "damaged"),
+    "too few listed": (lambda good: pack_archive(good, count=1), "archive.contents", "bytes more than its 1 members need"),
     "10001 members": (
-        lambda good: pack([*good, *(Member(f"resources/{i}") for i in range(10_000))]),
+        lambda good: pack_archive([*good, *(Member(f"resources/{i}") for i in range(10_000))]),
         "archive.contents",
         "found 10002",
     ),
-    "a gigabyte": (with_extra(lambda m: changed(m, size=2**30, compressed=10**7)), "archive.size", "expected at most 1073741824"),
+    "a gigabyte": (
+        with_extra(lambda m: with_headers(m, size=2**30, compressed=10**7)),
+        "archive.size",
+        "expected at most 1073741824",
+    ),
     "a bomb": (
-        lambda good: pack([*good, Member("resources/zeros", bytes(1 << 25))]),
+        lambda good: pack_archive([*good, Member("resources/zeros", bytes(1 << 25))]),
         "archive.size",
         "expected at most 200 times",
     ),
@@ -138,8 +146,8 @@ def test_bad_archives_are_refused(case, good, tmp_path, monkeypatch):
     path.write_bytes(build(members(good[2])))
     monkeypatch.setattr(tempfile, "tempdir", str(inside))
     begin = time.process_time()
-    assert words in refusal(path)
-    assert (rule, True) in [(f.rule.name, words in f.message) for f in found(path)]
+    assert words in refusal_message(path)
+    assert (rule, True) in [(f.rule.name, words in f.message) for f in find_problems(path)]
     assert time.process_time() - begin < 1
     assert list(inside.iterdir()) == []
     assert sorted(tmp_path.iterdir()) == [path, inside]
@@ -147,7 +155,7 @@ def test_bad_archives_are_refused(case, good, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_a_good_fmu_has_no_findings(version, probes):
-    assert found(probes[version]) == []
+    assert find_problems(probes[version]) == []
 
 
 @pytest.mark.parametrize(
@@ -157,8 +165,8 @@ def test_a_good_fmu_has_no_findings(version, probes):
         Member("resources/größe.txt", b"x"),
         Member("resources/größe.txt".encode("cp437"), b"x", local={"flags": 0}, central={"flags": 0}),
         Member("resources/stored", b"x", deflated=False),
-        changed(EXTRA, mode=0),
-        changed(EXTRA, mode=0o100755),
+        with_headers(EXTRA, mode=0),
+        with_headers(EXTRA, mode=0o100755),
         replace(EXTRA, local={"flags": 0x808, "crc": 0, "compressed": 0, "size": 0}, central={"flags": 0x808}, behind=bytes(16)),
         replace(
             EXTRA,
@@ -173,8 +181,8 @@ def test_a_good_fmu_has_no_findings(version, probes):
 )
 def test_what_common_tools_write_is_accepted(harmless, good, tmp_path):
     path = tmp_path / "good.fmu"
-    path.write_bytes(pack([*members(good[2]), harmless]))
-    assert found(path) == []
+    path.write_bytes(pack_archive([*members(good[2]), harmless]))
+    assert find_problems(path) == []
     file = FmuFile(path)
     folder = file.acquire()
     assert (folder / harmless.name if isinstance(harmless.name, str) else folder / harmless.name.decode("cp437")).exists()
@@ -184,8 +192,8 @@ def test_what_common_tools_write_is_accepted(harmless, good, tmp_path):
 @pytest.mark.parametrize("front", [b"x" * 100], ids=["hidden bytes"])
 def test_bytes_of_no_member_are_a_warning(front, good, tmp_path):
     path = tmp_path / "gap.fmu"
-    path.write_bytes(pack(members(good[2]), front=front))
-    assert [(f.rule.name, f.rule.severity) for f in found(path)] == [("archive.gap", "warning")]
+    path.write_bytes(pack_archive(members(good[2]), front=front))
+    assert [(f.rule.name, f.rule.severity) for f in find_problems(path)] == [("archive.gap", "warning")]
     assert FmuFile(path).description.model_name == "Probe"
 
 
@@ -207,85 +215,85 @@ def special_files(folder):
 def test_what_is_no_regular_file_is_refused_without_waiting(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name, words in special_files(tmp_path).items():
-        assert words in refusal(Path(name))
+        assert words in refusal_message(Path(name))
         with pytest.raises(InputError):
             _ = FmuFile(Path(name)).sha256
 
 
 def test_a_link_to_a_good_file_is_good(probes, tmp_path):
     (tmp_path / "link.fmu").symlink_to(probes[2])
-    assert found(tmp_path / "link.fmu") == []
+    assert find_problems(tmp_path / "link.fmu") == []
 
 
 @pytest.mark.parametrize(
     ("limits", "words"),
     [
-        (Limits(members=1), "found 2 members, expected at most 1"),
-        (Limits(expanded=1000), "bytes, expected at most 1000"),
-        (Limits(ratio=2, ratio_from=1000), "expected at most 2 times as many"),
-        (Limits(library=1000), "the library has .* bytes, expected at most 1000"),
-        (Limits(xml=100), "bytes, expected at most 100"),
-        (Limits(xml_tags=5), "tags, expected at most 5"),
+        (PreflightLimits(max_members=1), "found 2 members, expected at most 1"),
+        (PreflightLimits(max_expanded_size=1000), "bytes, expected at most 1000"),
+        (PreflightLimits(max_ratio=2, ratio_threshold=1000), "expected at most 2 times as many"),
+        (PreflightLimits(max_library_size=1000), "the library has .* bytes, expected at most 1000"),
+        (PreflightLimits(max_xml_size=100), "bytes, expected at most 100"),
+        (PreflightLimits(max_xml_tags=5), "tags, expected at most 5"),
     ],
 )
 def test_limits_are_the_callers(limits, words, good, tmp_path):
     path = tmp_path / "good.fmu"
-    path.write_bytes(pack(members(good[2])))
+    path.write_bytes(pack_archive(members(good[2])))
     with pytest.raises(InputError, match=words):
-        FmuFile(path, limits).check_platform()
+        FmuFile(path, limits).check_binary()
 
 
 def test_a_member_that_lies_about_its_size_costs_no_memory(good, tmp_path):
     path = tmp_path / "bomb.fmu"
-    path.write_bytes(pack([*members(good[2]), changed(Member("resources/zeros", bytes(1 << 25)), size=1000)]))
+    path.write_bytes(pack_archive([*members(good[2]), with_headers(Member("resources/zeros", bytes(1 << 25)), size=1000)]))
     tracemalloc.start()
-    assert "found more bytes, expected 1000" in refusal(path)
+    assert "found more bytes, expected 1000" in refusal_message(path)
     assert tracemalloc.get_traced_memory()[1] < 2**22
     tracemalloc.stop()
 
 
 def test_a_huge_table_of_contents_is_not_read(good, tmp_path):
     path = tmp_path / "bad.fmu"
-    path.write_bytes(pack([*members(good[2]), changed(EXTRA, extra=bytes(60_000))]))
+    path.write_bytes(pack_archive([*members(good[2]), with_headers(EXTRA, extra=bytes(60_000))]))
     with pytest.raises(InputError, match=r"found a table of contents of 60[0-9]+ bytes, expected at most 12288"):
-        _ = FmuFile(path, Limits(members=3)).description
+        _ = FmuFile(path, PreflightLimits(max_members=3)).description
 
 
 def test_of_very_many_problems_the_first_ones_are_told(good, tmp_path):
     path = tmp_path / "bad.fmu"
-    path.write_bytes(pack([*members(good[2]), *(Member(f"../{i}") for i in range(5000))]))
-    lines = refusal(path).splitlines()
+    path.write_bytes(pack_archive([*members(good[2]), *(Member(f"../{i}") for i in range(5000))]))
+    lines = refusal_message(path).splitlines()
     assert len(lines) == 101
     assert lines[-1].endswith("and 4900 more errors")
 
 
 def test_deep_folders_cost_little(good, tmp_path):
     path = tmp_path / "deep.fmu"
-    path.write_bytes(pack([*members(good[2]), *(Member("a/" * 500 + str(i), deflated=False) for i in range(9000))]))
+    path.write_bytes(pack_archive([*members(good[2]), *(Member("a/" * 500 + str(i), deflated=False) for i in range(9000))]))
     begin = time.process_time()
-    assert "lies 500 folders deep" in refusal(path)
+    assert "lies 500 folders deep" in refusal_message(path)
     assert time.process_time() - begin < 2
 
 
 def test_all_problems_of_an_archive_are_told_at_once(good, tmp_path):
     path = tmp_path / "bad.fmu"
-    path.write_bytes(pack([*members(good[2]), Member("../a"), Member("/b"), changed(EXTRA, mode=0o120777)]))
-    assert len(refusal(path).splitlines()) == 3
+    path.write_bytes(pack_archive([*members(good[2]), Member("../a"), Member("/b"), with_headers(EXTRA, mode=0o120777)]))
+    assert len(refusal_message(path).splitlines()) == 3
 
 
 def test_an_fmu_that_changes_after_its_examination_is_refused(probes, good, tmp_path):
     path = tmp_path / "changing.fmu"
     path.write_bytes(probes[2].read_bytes())
     file = FmuFile(path)
-    file.check_platform()
-    path.write_bytes(pack([*members(good[2]), Member("resources/new", b"x")]))
+    file.check_binary()
+    path.write_bytes(pack_archive([*members(good[2]), Member("resources/new", b"x")]))
     with pytest.raises(InputError, match="was changed after it had been examined"):
         file.acquire()
 
 
 def test_extraction_writes_exactly_the_members(good, tmp_path):
     path = tmp_path / "good.fmu"
-    path.write_bytes(pack([*members(good[2]), EXTRA]))
+    path.write_bytes(pack_archive([*members(good[2]), EXTRA]))
     file = FmuFile(path)
     folder = file.acquire()
     written = {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}

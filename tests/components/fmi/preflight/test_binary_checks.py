@@ -9,12 +9,12 @@ import fmpy
 import pytest
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
-from fmu_corpus import found, members, pack, refusal
+from fmu_corpus import find_problems, members, pack_archive, refusal_message
 
 from cosim.components.fmi import FmuFile
 from cosim.components.fmi.preflight import elf
-from cosim.components.fmi.preflight.binary import REQUIRED
-from cosim.components.fmi.preflight.platform import Machine, this_machine
+from cosim.components.fmi.preflight.binary import REQUIRED_FUNCTIONS
+from cosim.components.fmi.preflight.platform import FmuPlatform, current_platform
 from cosim.core import resources
 from cosim.export.fmu.compiler import find_compiler
 
@@ -89,7 +89,7 @@ def fmu(good, tmp_path):
     def make(library, name=LIBRARY):
         path = tmp_path / "bad.fmu"
         files = {"modelDescription.xml": good[2]["modelDescription.xml"], name: library}
-        path.write_bytes(pack(members(files)))
+        path.write_bytes(pack_archive(members(files)))
         return path
 
     return make
@@ -99,27 +99,27 @@ def fmu(good, tmp_path):
 def test_damaged_and_foreign_libraries_are_refused(case, good, fmu):
     change, words = DAMAGED[case]
     path = fmu(change(good[2][LIBRARY]))
-    assert f'"{path}": {LIBRARY}: the library cannot be loaded: it ' in refusal(path)
-    assert [(f.rule.name, words in f.message) for f in found(path)] == [("binary.format", True)]
+    assert f'"{path}": {LIBRARY}: the library cannot be loaded: it ' in refusal_message(path)
+    assert [(f.rule.name, words in f.message) for f in find_problems(path)] == [("binary.format", True)]
 
 
 @pytest.mark.parametrize("share", [0.02, 0.1, 0.3, 0.6, 0.9])
 def test_a_cut_library_never_reaches_the_loader(share, good, fmu):
     library = good[2][LIBRARY]
-    findings = found(fmu(library[: int(share * len(library))]))
+    findings = find_problems(fmu(library[: int(share * len(library))]))
     assert {f.rule.name for f in findings} <= {"binary.format", "binary.functions"}
     assert findings or share == 0.9
 
 
 def test_a_missing_function_is_named(good, fmu):
     path = fmu(renamed(good[2][LIBRARY]))
-    assert "the library does not export fmi2DoStep [binary.functions" in refusal(path)
+    assert "the library does not export fmi2DoStep [binary.functions" in refusal_message(path)
 
 
 def test_many_missing_functions_are_counted(fmu, tmp_path):
-    text = refusal(fmu(compiled(tmp_path, "empty", "int unrelated(void) { return 0; }\n").read_bytes()))
+    text = refusal_message(fmu(compiled(tmp_path, "empty", "int unrelated(void) { return 0; }\n").read_bytes()))
     assert "does not export fmi2CancelStep, " in text
-    assert f"and {len(REQUIRED[2]) - 5} more" in text
+    assert f"and {len(REQUIRED_FUNCTIONS[2]) - 5} more" in text
 
 
 def test_hidden_and_undefined_functions_do_not_count(tmp_path):
@@ -128,7 +128,7 @@ def test_hidden_and_undefined_functions_do_not_count(tmp_path):
     )
     for style in ("gnu", "sysv", "both"):
         library = compiled(tmp_path, style, source + "int *e(void){return &d;}", f"-Wl,--hash-style={style}")
-        assert {"a", "b", "c", "d", "e"} & elf.read_library(library.read_bytes(), this_machine().architecture).exports == {
+        assert {"a", "b", "c", "d", "e"} & elf.read_library(library.read_bytes(), current_platform().architecture).exports == {
             "c",
             "e",
         }
@@ -139,57 +139,57 @@ def test_exports_are_those_that_the_linkers_tools_see(path):
     """`nm` of binutils is the reference; it comes with every C compiler."""
     file = FmuFile(path)
     folder = file.acquire()
-    (library,) = (folder / "binaries").glob(f"*linux*/{file.description.identifier}.so")
+    (library,) = (folder / "binaries").glob(f"*linux*/{file.description.model_identifier}.so")
     listed = subprocess.run(
         [shutil.which("nm"), "-D", "--defined-only", library], capture_output=True, text=True, check=True
     ).stdout
     names = {row.split()[-1].partition("@")[0] for row in listed.splitlines()}
-    assert elf.read_library(library.read_bytes(), this_machine().architecture).exports == names
+    assert elf.read_library(library.read_bytes(), current_platform().architecture).exports == names
     file.release()
 
 
 @pytest.mark.parametrize(("version", "slave", "prefix"), [(2, FMU2Slave, "fmi2"), (3, FMU3Slave, "fmi3")])
 def test_the_required_functions_are_those_that_are_bound(version, slave, prefix):
-    assert {name for name in dir(slave) if name.startswith(prefix)} == REQUIRED[version]
+    assert {name for name in dir(slave) if name.startswith(prefix)} == REQUIRED_FUNCTIONS[version]
 
 
 def test_a_missing_dependency_is_a_warning(good, fmu, tmp_path):
     compiled(tmp_path, "libnowhere", "int other(void) { return 1; }\n")
     user = compiled(tmp_path, "user", "extern int other(void); int use(void) { return other(); }\n", f"-L{tmp_path}", "-lnowhere")
-    findings = found(fmu(user.read_bytes()))
+    findings = find_problems(fmu(user.read_bytes()))
     assert [(f.rule.name, f.rule.severity) for f in findings] == [("binary.functions", "error"), ("binary.needed", "warning")]
     assert "needs the library libnowhere.so, which this machine does not seem to have" in findings[1].message
 
 
 def test_another_platform_is_told_with_what_is_there(fmu):
     path = fmu(b"MZ", "binaries/win64/probe.dll")
-    this = this_machine()
-    assert f"has no binary for {this.tuple_name} ({this.name}); it has: win64" in refusal(path)
+    this = current_platform()
+    assert f"has no binary for {this.platform_tuple} ({this.fmi2_platform}); it has: win64" in refusal_message(path)
     assert FmuFile(path).description.platforms == ["win64"]
 
 
 def test_sources_alone_are_no_binary(fmu):
-    assert "it has: c-code" in refusal(fmu(b"int x;", "sources/model.c"))
+    assert "it has: c-code" in refusal_message(fmu(b"int x;", "sources/model.c"))
 
 
 def test_the_library_bears_the_name_of_the_model(good, fmu):
     path = fmu(good[2][LIBRARY], LIBRARY.replace("probe", "other"))
     words = f"the library cannot be loaded: {LIBRARY} does not exist; there is: {LIBRARY.replace('probe', 'other')}"
-    assert words in refusal(path)
+    assert words in refusal_message(path)
 
 
 def test_this_machine_is_called_as_fmpy_calls_it():
-    assert (this_machine().name, this_machine().tuple_name) == (fmpy.platform, fmpy.platform_tuple)
-    assert this_machine().suffix == fmpy.sharedLibraryExtension
+    assert (current_platform().fmi2_platform, current_platform().platform_tuple) == (fmpy.platform, fmpy.platform_tuple)
+    assert current_platform().suffix == fmpy.sharedLibraryExtension
 
 
 @pytest.mark.parametrize(
     ("machine", "names"),
     [
-        (Machine("windows", "x86_64", ".dll"), ("win64", "x86_64-windows")),
-        (Machine("windows", "x86", ".dll"), ("win32", "x86-windows")),
-        (Machine("darwin", "aarch64", ".dylib"), ("darwin64", "aarch64-darwin")),
-        (Machine("linux", "x86", ".so"), ("linux32", "x86-linux")),
+        (FmuPlatform("windows", "x86_64", ".dll"), ("win64", "x86_64-windows")),
+        (FmuPlatform("windows", "x86", ".dll"), ("win32", "x86-windows")),
+        (FmuPlatform("darwin", "aarch64", ".dylib"), ("darwin64", "aarch64-darwin")),
+        (FmuPlatform("linux", "x86", ".so"), ("linux32", "x86-linux")),
     ],
 )
 def test_other_machines_have_the_names_of_the_standard(machine, names):

@@ -1,7 +1,7 @@
 """One wrong thing in a good model description: found by its rule, at its line, and refused."""
 
 import pytest
-from fmu_corpus import found, refusal, with_change, with_description
+from fmu_corpus import find_problems, refusal_message, with_change, with_description
 
 #: FMI version, text of the good description, what stands there instead, rule, line, words
 ERRORS = {
@@ -317,14 +317,14 @@ ERRORS = {
 def test_errors_are_refused(name, good, tmp_path):
     version, old, new, rule, line, words = ERRORS[name]
     path = with_change(old, new, good[version], tmp_path)
-    text = refusal(path)
+    text = refusal_message(path)
     (told,) = [row for row in text.splitlines() if words in row]
     assert told.startswith(f'"{path}": modelDescription.xml:{line}: ')
     assert f" [{rule}, FMI " in told or f" [{rule}, limits]" in told
-    assert (rule, "error", line) in [(f.rule.name, f.rule.severity, f.line) for f in found(path)]
+    assert (rule, "error", line) in [(f.rule.name, f.rule.severity, f.line) for f in find_problems(path)]
 
 
 def test_all_problems_are_told_at_once(good, tmp_path):
     text = good[2]["modelDescription.xml"].decode()
     text = text.replace('guid="probe"', "").replace('<Real start="0"', '<Real start="NaN"').replace('name="y" ', 'name="u" ')
-    assert len(refusal(with_description(text, good[2], tmp_path)).splitlines()) == 3
+    assert len(refusal_message(with_description(text, good[2], tmp_path)).splitlines()) == 3

@@ -4,7 +4,7 @@ import math
 
 import pytest
 from fmpy import read_model_description
-from fmu_corpus import members, pack
+from fmu_corpus import members, pack_archive
 
 from cosim.components.fmi import FmuFile
 from cosim.core import resources
@@ -29,13 +29,17 @@ def numbers(theirs):
 
 def check_like_fmpy(path):
     ours, theirs = FmuFile(path).description, read_model_description(path)
-    assert (ours.fmi_version, ours.model_name, ours.token) == (theirs.fmiVersion, theirs.modelName, theirs.instantiationToken)
+    assert (ours.fmi_version, ours.model_name, ours.instantiation_token) == (
+        theirs.fmiVersion,
+        theirs.modelName,
+        theirs.instantiationToken,
+    )
     assert (ours.description, ours.generation_tool) == (theirs.description or "", theirs.generationTool or "")
-    assert ours.identifier == theirs.coSimulation.modelIdentifier
+    assert ours.model_identifier == theirs.coSimulation.modelIdentifier
     assert ours.has_state == theirs.coSimulation.canGetAndSetFMUstate
-    assert ours.only_once_per_process == theirs.coSimulation.canBeInstantiatedOnlyOncePerProcess
+    assert ours.once_per_process == theirs.coSimulation.canBeInstantiatedOnlyOncePerProcess
     assert ours.needs_execution_tool == theirs.coSimulation.needsExecutionTool
-    assert sorted(ours.references.items()) == sorted((v.name, v.valueReference) for v in theirs.modelVariables)
+    assert sorted(ours.value_references.items()) == sorted((v.name, v.valueReference) for v in theirs.modelVariables)
     mine = {variable.name: variable for variable in ours.variables}
     assert len(mine) == len(theirs.modelVariables)
     for other in theirs.modelVariables:
@@ -93,16 +97,20 @@ FMI3 = """<?xml version="1.0"?>
 
 def test_what_only_fmi3_has(tmp_path):
     path = tmp_path / "m.fmu"
-    path.write_bytes(pack(members({"modelDescription.xml": FMI3.encode()})))
+    path.write_bytes(pack_archive(members({"modelDescription.xml": FMI3.encode()})))
     description = FmuFile(path).description
     found = {variable.name: variable for variable in description.variables}
     assert (found["a"].shape, found["a"].start) == ((2, 3), (1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
     assert (found["speed"].unit.factor, found["speed"].minimum, found["speed"].maximum) == (0.2777777777777778, 0.0, 300.0)
-    assert (found["turn"].unit.factor, found["turn"].relative, found["speed"].relative) == (math.pi / 180, True, False)
+    assert (found["turn"].unit.factor, found["turn"].relative_quantity, found["speed"].relative_quantity) == (
+        math.pi / 180,
+        True,
+        False,
+    )
     assert found["gauge"].unit is None  # nothing says what it is
     assert found["mode"].items == (("off", -1), ("on", 4))
     assert (found["v"].description, found["speed"].description, found["v"].start) == ("short", "a speed", 50.0)
-    assert description.references["v"] == description.references["speed"] == 2
+    assert description.value_references["v"] == description.value_references["speed"] == 2
     assert (found["b"].start, found["i"].start, found["n"].variability) == ("00ff", -128, "fixed")
     assert (description.default_experiment.start_time, float(description.default_experiment.stop_time)) == (1, 2.5)
-    assert description.only_once_per_process and not description.has_state
+    assert description.once_per_process and not description.has_state

@@ -1,7 +1,7 @@
 """What breaks the standard without harm to a run is told by its rule, at its line, and not refused."""
 
 import pytest
-from fmu_corpus import found, with_change, with_description
+from fmu_corpus import find_problems, with_change, with_description
 
 from cosim.components.fmi import FmuFile
 
@@ -188,10 +188,10 @@ WARNINGS = {
 def test_warnings_are_told_but_do_not_keep_from_running(name, good, tmp_path):
     version, old, new, rule, line, words = WARNINGS[name]
     path = with_change(old, new, good[version], tmp_path)
-    findings = found(path)
+    findings = find_problems(path)
     assert {f.rule.severity for f in findings} == {"warning"}
     assert [(f.rule.name, f.line) for f in findings if words in f.message] == [(rule, line)]
-    FmuFile(path).check_platform()
+    FmuFile(path).check_binary()
 
 
 def structured(name, good, folder):
@@ -201,9 +201,9 @@ def structured(name, good, folder):
 
 @pytest.mark.parametrize("name", ["a", "a.b[1,2].c", "der(a.b)", "der(a,2)", "'any thing (1)'.x", "_1"])
 def test_structured_names_are_recognized(name, good, tmp_path):
-    assert found(structured(name, good, tmp_path)) == []
+    assert find_problems(structured(name, good, tmp_path)) == []
 
 
 @pytest.mark.parametrize("name", ["a..b", "1a", "a[", "a[1", "a b", "der(a", "a.", "'a"])
 def test_other_names_break_the_convention(name, good, tmp_path):
-    assert [f.rule.name for f in found(structured(name, good, tmp_path))] == ["variable.convention"]
+    assert [f.rule.name for f in find_problems(structured(name, good, tmp_path))] == ["variable.convention"]

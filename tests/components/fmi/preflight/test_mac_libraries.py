@@ -6,13 +6,13 @@ from pathlib import Path
 
 import fmpy
 import pytest
-from fmu_corpus import members, pack
+from fmu_corpus import members, pack_archive
 
-from cosim.components.fmi.preflight import LIMITS, examine, macho, open_file
+from cosim.components.fmi.preflight import DEFAULT_LIMITS, examine, macho, open_regular_file
 from cosim.components.fmi.preflight.archive import Archive
-from cosim.components.fmi.preflight.binary import REQUIRED, check_binary
-from cosim.components.fmi.preflight.library import Damaged
-from cosim.components.fmi.preflight.platform import Machine
+from cosim.components.fmi.preflight.binary import REQUIRED_FUNCTIONS, check_binary
+from cosim.components.fmi.preflight.library import InvalidLibrary
+from cosim.components.fmi.preflight.platform import FmuPlatform
 
 FMPY = Path(fmpy.__file__).parent
 MACHINES = {"aarch64": "x86_64", "x86_64": "aarch64"}
@@ -65,13 +65,13 @@ def both():
 
 def test_a_real_library_exports_what_fmi_demands(library, architecture):
     exports = macho.read_library(library, architecture).exports
-    assert REQUIRED[2] | REQUIRED[3] <= exports
+    assert REQUIRED_FUNCTIONS[2] | REQUIRED_FUNCTIONS[3] <= exports
 
 
 def test_symbols_and_tree_of_exports_say_the_same(library, architecture):
     """Two tables of one library, made by the linker for different readers."""
-    symbols = macho.read_library(without_commands(library, macho._TREES), architecture).exports
-    tree = macho.read_library(without_commands(library, {macho._SYMBOLS}), architecture).exports
+    symbols = macho.read_library(without_commands(library, macho._EXPORT_TRIE_COMMANDS), architecture).exports
+    tree = macho.read_library(without_commands(library, {macho._LC_SYMTAB}), architecture).exports
     assert symbols == tree == macho.read_library(library, architecture).exports
 
 
@@ -82,8 +82,8 @@ def test_of_a_universal_library_the_right_part_is_read(library, architecture):
 
 
 def test_a_missing_function_is_named(library, architecture):
-    changed = without_commands(library, macho._TREES).replace(b"_fmi2DoStep\0", b"_fmi2DoSteq\0")
-    assert REQUIRED[2] - macho.read_library(changed, architecture).exports == {"fmi2DoStep"}
+    changed = without_commands(library, macho._EXPORT_TRIE_COMMANDS).replace(b"_fmi2DoStep\0", b"_fmi2DoSteq\0")
+    assert REQUIRED_FUNCTIONS[2] - macho.read_library(changed, architecture).exports == {"fmi2DoStep"}
 
 
 DAMAGED = {
@@ -107,25 +107,25 @@ DAMAGED = {
 @pytest.mark.parametrize("case", DAMAGED)
 def test_damaged_libraries_are_told(case, library, architecture):
     change, words = DAMAGED[case]
-    with pytest.raises(Damaged, match=words):
+    with pytest.raises(InvalidLibrary, match=words):
         macho.read_library(change(library), architecture)
 
 
 def test_another_architecture_is_told(library, architecture):
     other = MACHINES[architecture]
-    with pytest.raises(Damaged, match=f"is made for {architecture}; this machine is {other}"):
+    with pytest.raises(InvalidLibrary, match=f"is made for {architecture}; this machine is {other}"):
         macho.read_library(library, other)
 
 
 @pytest.mark.parametrize("content", [b"\xcf\xfa\xed\xfe", None], ids=["damaged", "good"])
 def test_an_fmu_is_examined_for_a_mac(content, good, tmp_path, library, architecture):
     """By what is in the library, not by its name."""
-    machine = Machine("darwin", architecture, ".dylib")
+    machine = FmuPlatform("darwin", architecture, ".dylib")
     files = {"modelDescription.xml": good[2]["modelDescription.xml"], "binaries/darwin64/probe.dylib": content or library}
     path = tmp_path / "mac.fmu"
-    path.write_bytes(pack(members(files)))
-    with open_file(path) as file:
-        findings = list(check_binary(Archive(file, LIMITS), examine(path).model, machine, LIMITS))
+    path.write_bytes(pack_archive(members(files)))
+    with open_regular_file(path) as file:
+        findings = list(check_binary(Archive(file, DEFAULT_LIMITS), examine(path).model, machine, DEFAULT_LIMITS))
     assert [finding.rule.name for finding in findings] == (["binary.format"] if content else [])
 
 
@@ -138,7 +138,7 @@ def test_mutants_are_read_or_damaged(library, architecture):
             content[draw.randrange(4096)] = draw.randrange(256)
         try:
             outcomes.add(type(macho.read_library(bytes(content), architecture)))
-        except Damaged as damage:
+        except InvalidLibrary as damage:
             assert str(damage).startswith(("is ", "has "))
-            outcomes.add(Damaged)
+            outcomes.add(InvalidLibrary)
     assert len(outcomes) == 2

@@ -4,13 +4,13 @@ import random
 import time
 
 import pytest
-from fmu_corpus import Member, contents, members, pack
+from fmu_corpus import Member, members, pack_archive, read_members
 
 from cosim.components.fmi import FmuFile
 from cosim.components.fmi.preflight import elf
-from cosim.components.fmi.preflight.library import Damaged, Library
-from cosim.components.fmi.preflight.platform import this_machine
-from cosim.components.fmi.preflight.validation import validate
+from cosim.components.fmi.preflight.library import InvalidLibrary, SharedLibrary
+from cosim.components.fmi.preflight.platform import current_platform
+from cosim.components.fmi.preflight.validation import validate_fmu
 from cosim.core import resources
 from cosim.core.errors import InputError
 
@@ -66,7 +66,7 @@ def outcome(path):
     except InputError as error:
         assert str(error)
         result = "refused"
-    errors = [finding for finding in validate(path) if finding.rule.severity == "error"]
+    errors = [finding for finding in validate_fmu(path) if finding.rule.severity == "error"]
     assert bool(errors) == (result == "refused"), errors
     assert time.process_time() - begin < 2
     return result
@@ -76,7 +76,7 @@ def outcome(path):
 @pytest.mark.parametrize("version", [2, 3])
 def test_mutated_archives(version, count, good, tmp_path):
     draw = dice(version)
-    archive = pack(members(good[version] | {"resources/data.txt": b"data" * 100}))
+    archive = pack_archive(members(good[version] | {"resources/data.txt": b"data" * 100}))
     path = tmp_path / "mutant.fmu"
     results = []
     for _ in range(count):
@@ -94,7 +94,7 @@ def test_mutated_descriptions(version, count, good, tmp_path):
     results = []
     for _ in range(count):
         xml = mutant(good[version]["modelDescription.xml"], draw)
-        path.write_bytes(pack([Member("modelDescription.xml", xml), *others]))
+        path.write_bytes(pack_archive([Member("modelDescription.xml", xml), *others]))
         results.append(outcome(path))
     assert set(results) == {"accepted", "refused"}
 
@@ -115,7 +115,7 @@ def test_mutated_attributes(version, count, good, tmp_path):
         changed = list(pieces)
         for _ in range(draw.randint(1, 3)):
             changed[draw.randrange(3, len(pieces) // 2) * 2 + 1] = draw.choice(values)
-        path.write_bytes(pack([Member("modelDescription.xml", b'"'.join(changed)), *others]))
+        path.write_bytes(pack_archive([Member("modelDescription.xml", b'"'.join(changed)), *others]))
         results.append(outcome(path))
     assert set(results) == {"accepted", "refused"}
 
@@ -124,7 +124,7 @@ def test_mutated_attributes(version, count, good, tmp_path):
 @pytest.mark.parametrize("name", ["fmus/strider.fmu", "fmus/python/vtol.fmu"])
 def test_mutated_libraries(name, count):
     draw = dice(name)
-    files = contents(resources.root() / name)
+    files = read_members(resources.root() / name)
     library = next(content for member, content in files.items() if member.endswith(".so"))
     results = set()
     for _ in range(count):
@@ -132,9 +132,9 @@ def test_mutated_libraries(name, count):
         content = mutant(library[:8192], draw) + library[8192:] if draw.random() < 0.8 else mutant(library, draw)
         begin = time.process_time()
         try:
-            results.add(type(elf.read_library(content, this_machine().architecture)))
-        except Damaged as damage:
+            results.add(type(elf.read_library(content, current_platform().architecture)))
+        except InvalidLibrary as damage:
             assert str(damage).startswith(("is ", "has "))
             results.add(type(damage))
         assert time.process_time() - begin < 2
-    assert results == {Library, Damaged}
+    assert results == {SharedLibrary, InvalidLibrary}

@@ -1,7 +1,7 @@
 """Descriptions in the style of widespread exporters: their habits are no reason to refuse them."""
 
 import pytest
-from fmu_corpus import found, members, pack
+from fmu_corpus import find_problems, members, pack_archive
 
 from cosim.components.fmi import FmuFile
 
@@ -69,7 +69,7 @@ HABITS = {
 @pytest.mark.parametrize("habit", HABITS)
 def test_habits_of_exporters_are_no_errors(habit, good, tmp_path):
     path = tmp_path / "foreign.fmu"
-    path.write_bytes(pack(members(good[2] | {"modelDescription.xml": HABITS[habit]})))
-    FmuFile(path).check_platform()
+    path.write_bytes(pack_archive(members(good[2] | {"modelDescription.xml": HABITS[habit]})))
+    FmuFile(path).check_binary()
     assert FmuFile(path).description.variables
-    assert {finding.rule.severity for finding in found(path)} <= {"warning"}
+    assert {finding.rule.severity for finding in find_problems(path)} <= {"warning"}

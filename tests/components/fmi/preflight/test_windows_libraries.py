@@ -4,22 +4,22 @@ import random
 import struct
 
 import pytest
-from fmu_corpus import contents
+from fmu_corpus import read_members
 
-from cosim.components.fmi.preflight import LIMITS, examine, open_file, pe
+from cosim.components.fmi.preflight import DEFAULT_LIMITS, examine, open_regular_file, pe
 from cosim.components.fmi.preflight.archive import Archive
-from cosim.components.fmi.preflight.binary import REQUIRED, check_binary
-from cosim.components.fmi.preflight.library import Damaged
-from cosim.components.fmi.preflight.platform import Machine
+from cosim.components.fmi.preflight.binary import REQUIRED_FUNCTIONS, check_binary
+from cosim.components.fmi.preflight.library import InvalidLibrary
+from cosim.components.fmi.preflight.platform import FmuPlatform
 from cosim.core import resources
 
 FMU = resources.root() / "fmus/python/vtol.fmu"
-WINDOWS = Machine("windows", "x86_64", ".dll")
+WINDOWS = FmuPlatform("windows", "x86_64", ".dll")
 
 
 @pytest.fixture(scope="module")
 def library():
-    return contents(FMU)["binaries/win64/Vtol.dll"]
+    return read_members(FMU)["binaries/win64/Vtol.dll"]
 
 
 def patched(content, offset, form, value):
@@ -29,17 +29,17 @@ def patched(content, offset, form, value):
 
 
 def test_a_real_library_exports_what_fmi_demands(library):
-    assert REQUIRED[2] <= pe.read_library(library, "x86_64").exports
+    assert REQUIRED_FUNCTIONS[2] <= pe.read_library(library, "x86_64").exports
 
 
 def test_an_fmu_is_good_for_windows():
-    with open_file(FMU) as file:
-        assert list(check_binary(Archive(file, LIMITS), examine(FMU).model, WINDOWS, LIMITS)) == []
+    with open_regular_file(FMU) as file:
+        assert list(check_binary(Archive(file, DEFAULT_LIMITS), examine(FMU).model, WINDOWS, DEFAULT_LIMITS)) == []
 
 
 def test_a_missing_function_is_named(library):
     exports = pe.read_library(library.replace(b"fmi2DoStep\0", b"fmi2DoSteq\0"), "x86_64").exports
-    assert REQUIRED[2] - exports == {"fmi2DoStep"}
+    assert REQUIRED_FUNCTIONS[2] - exports == {"fmi2DoStep"}
 
 
 def header(library):
@@ -63,7 +63,7 @@ DAMAGED = {
 @pytest.mark.parametrize("case", DAMAGED)
 def test_damaged_libraries_are_told(case, library):
     change, words = DAMAGED[case]
-    with pytest.raises(Damaged, match=words):
+    with pytest.raises(InvalidLibrary, match=words):
         pe.read_library(change(library), "x86_64")
 
 
@@ -80,6 +80,6 @@ def test_mutants_are_read_or_damaged(library):
             content[draw.randrange(1024)] = draw.randrange(256)
         try:
             outcomes.add(type(pe.read_library(bytes(content), "x86_64")))
-        except Damaged:
-            outcomes.add(Damaged)
+        except InvalidLibrary:
+            outcomes.add(InvalidLibrary)
     assert len(outcomes) == 2

@@ -7,11 +7,11 @@ import time
 from contextlib import contextmanager
 
 import pytest
-from fmu_corpus import found, members, pack, refusal
+from fmu_corpus import find_problems, members, pack_archive, refusal_message
 
 from cosim.components.fmi import FmuFile
 from cosim.core.errors import InputError
-from cosim.export.fmu.validation import validate
+from cosim.export.fmu.validation import validate_description
 
 HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
 LAUGHS = "".join(f'<!ENTITY l{i + 1} "{f"&l{i};" * 10}">' for i in range(9))
@@ -90,13 +90,13 @@ def test_bad_xml_is_refused(case, good, tmp_path):
     change, rule, words = CASES[case]
     path = tmp_path / "bad.fmu"
     xml = change(good[2]["modelDescription.xml"])
-    path.write_bytes(pack(members(good[2] | {"modelDescription.xml": xml})))
+    path.write_bytes(pack_archive(members(good[2] | {"modelDescription.xml": xml})))
     begin = time.process_time()
-    text = refusal(path)
+    text = refusal_message(path)
     assert time.process_time() - begin < 1
     assert f'"{path}": modelDescription.xml' in text
     assert words in text
-    assert found(path)[0].rule.name == rule
+    assert find_problems(path)[0].rule.name == rule
 
 
 @pytest.mark.parametrize(
@@ -116,8 +116,8 @@ def test_nobody_is_called(prolog, good, tmp_path):
     with listener() as (port, visits):
         xml = with_prolog(prolog.format(port=port))(good[2]["modelDescription.xml"])
         xml = xml.replace(b" modelName", schema.format(port=port).encode() + b" modelName")
-        path.write_bytes(pack(members(good[2] | {"modelDescription.xml": xml})))
-        found(path)
+        path.write_bytes(pack_archive(members(good[2] | {"modelDescription.xml": xml})))
+        find_problems(path)
         assert visits == []
 
 
@@ -125,9 +125,9 @@ def test_nobody_is_called(prolog, good, tmp_path):
 def test_the_other_xml_files_are_as_safe(member, good, tmp_path):
     path = tmp_path / "bad.fmu"
     xml = b'<!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]><fmiBuildDescription>&e;</fmiBuildDescription>'
-    path.write_bytes(pack(members(good[3] | {member: xml})))
-    (finding,) = found(path)
-    assert (finding.rule.name, finding.place) == ("xml.doctype", f"{member}:1")
+    path.write_bytes(pack_archive(members(good[3] | {member: xml})))
+    (finding,) = find_problems(path)
+    assert (finding.rule.name, finding.location) == ("xml.doctype", f"{member}:1")
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "iso-8859-1", "windows-1252", "us-ascii"])
@@ -135,7 +135,7 @@ def test_clear_encodings_are_read(encoding, good, tmp_path):
     path = tmp_path / "good.fmu"
     text = good[2]["modelDescription.xml"].decode().replace("UTF-8", encoding.removesuffix("-sig"))
     text = text.replace("a lag", "a lag" if encoding == "us-ascii" else "ein Glätter")
-    path.write_bytes(pack(members(good[2] | {"modelDescription.xml": text.encode(encoding)})))
+    path.write_bytes(pack_archive(members(good[2] | {"modelDescription.xml": text.encode(encoding)})))
     description = FmuFile(path).description
     assert description.description.startswith("a lag" if encoding == "us-ascii" else "ein Glätter")
     assert len(description.variables) == 13
@@ -154,17 +154,17 @@ def test_clear_encodings_are_read(encoding, good, tmp_path):
 )
 def test_large_xml_costs_little(xml, good, tmp_path):
     path = tmp_path / "large.fmu"
-    path.write_bytes(pack(members(good[2] | {"modelDescription.xml": xml(good[2]["modelDescription.xml"])})))
+    path.write_bytes(pack_archive(members(good[2] | {"modelDescription.xml": xml(good[2]["modelDescription.xml"])})))
     begin = time.process_time()
-    found(path)
+    find_problems(path)
     assert time.process_time() - begin < 2
 
 
 def test_very_many_tags_are_refused_before_they_are_parsed(good, tmp_path):
     path = tmp_path / "large.fmu"
     xml = good[2]["modelDescription.xml"] + b"<a/>" * 500_001
-    path.write_bytes(pack(members(good[2] | {"modelDescription.xml": xml})))
-    assert "tags, expected at most 500000" in refusal(path)
+    path.write_bytes(pack_archive(members(good[2] | {"modelDescription.xml": xml})))
+    assert "tags, expected at most 500000" in refusal_message(path)
 
 
 @pytest.mark.parametrize("case", [case for case, (_, rule, _) in CASES.items() if rule.startswith("xml.")])
@@ -172,5 +172,5 @@ def test_what_is_to_be_exported_is_refused_as_well(case, good, tmp_path):
     """A description that came with C or Python sources never reaches FMPy's reader, which knows no caution."""
     change, rule, words = CASES[case]
     with pytest.raises(InputError, match=re.escape(rule)) as error:
-        validate(change(good[2]["modelDescription.xml"]), tmp_path / "modelDescription.xml")
+        validate_description(change(good[2]["modelDescription.xml"]), tmp_path / "modelDescription.xml")
     assert words in str(error.value)
