@@ -44,7 +44,7 @@ def test_scenarios_with_expectations_are_tests(folder):
 
 def test_what_is_not_met_is_said_without_a_traceback(folder):
     scenario(folder, "low", checks=[{"kpi": "y.value", "min": 4.0}])
-    scenario(folder, "broken", block="Broken", checks=[{"kpi": "y.value", "min": 4.0}])
+    scenario(folder, "broken", block="FailingBlock", checks=[{"kpi": "y.value", "min": 4.0}])
     done = run_pytest(folder)
     assert done.returncode == 1
     assert "y.value is 3, expected min 4.0" in done.stdout

@@ -278,10 +278,10 @@ class Executor(ABC):
         widest, seconds = 1, self._step_durations()
         for place, joint in self._parallel_steps.items():
             (together,) = joint.calls[0].arguments
-            together.decide(seconds, available_processors())
-            if together.lanes:
+            together.partition(seconds, available_processors())
+            if together.partitions:
                 self._phase_steps[place] = [joint, *(turn for turn in self._phase_steps[place] if not releases_gil(turn))]
-            widest = max(widest, len(together.lanes))
+            widest = max(widest, len(together.partitions))
         if widest > 1:
             self._thread_pool = ThreadPool(widest - 1, lambda turns: run_due(turns, self.completed_steps))
         self._prepare()

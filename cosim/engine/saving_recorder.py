@@ -58,7 +58,7 @@ def write_header(folder: Path, executor: Executor) -> None:
     ]
     header = {
         **grid.integer_coefficients,
-        "every": recorder.every,
+        "steps_per_row": recorder.every,
         "row_size": dtype.itemsize,
         "columns": columns,
         "calls": executor.call_names,

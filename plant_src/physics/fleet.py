@@ -95,7 +95,7 @@ class Fleet:
     def _update_near_vehicles(self) -> None:
         """Let Bullet take part for those that are near something."""
         if INVALID_STATE in self._alarms:
-            raise InvalidStateError(self.bodies[self._alarms.tolist().index(INVALID_STATE)].fault())
+            raise InvalidStateError(self.bodies[self._alarms.tolist().index(INVALID_STATE)].describe_invalid_state())
         self._near_vehicles_outdated = False
         if not any(self._alarms) and self.clearance.is_valid():
             return

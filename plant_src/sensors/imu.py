@@ -45,7 +45,7 @@ class Imu(SignalComponent):
     """
 
     random_number_count = 12
-    state_attributes = ("_step", "_last", "_biases")
+    state_attributes = ("_step", "_last_inputs", "_biases")
 
     def __init__(self, instance_name: str, seed: int = 0, device: str = "bmi088"):
         reader = JsonReader()

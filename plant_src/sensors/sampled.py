@@ -21,7 +21,7 @@ class SampledSensor(SignalComponent):
     Sample 0 is there from the start. The last real output is the `time` (s) at which the sample that is shown was taken.
     """
 
-    state_attributes: tuple[str, ...] = ("_number", "_taken", "_pending")
+    state_attributes: tuple[str, ...] = ("_number", "_sample_time", "_pending")
 
     def measure(self, number: int, elapsed: float) -> Measurement:
         """Real outputs (without `time`) and flags of sample `number`, `elapsed` (s) after the last sample (0: the first one).

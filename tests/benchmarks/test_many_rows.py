@@ -18,14 +18,14 @@ PROGRAM = """
 import resource, sys, time
 from fractions import Fraction
 from pathlib import Path
-from cosim.components.fmi import FmuFile, instantiate
+from cosim.components.fmi import FmuFile, create_component
 from cosim.results.csv_files import write_csv
 from cosim.results.parquet_files import write_parquet
 from cosim.engine.run_loop import Settings, simulate
 from cosim.core.system import Endpoint, System
 steps, step = int(sys.argv[2]) - 1, Fraction(1, 100)
 outputs = {f"a.y{k}": Endpoint("a", f"y{k}") for k in range(1, int(sys.argv[3]) + 1)}
-system = System({"a": instantiate(FmuFile(Path(sys.argv[1])), "a")}, (), (("a",),))
+system = System({"a": create_component(FmuFile(Path(sys.argv[1])), "a")}, (), (("a",),))
 run = simulate(system, Settings(Fraction(0), steps * step, step, outputs))
 print(run.loop_seconds)
 for name, write in (("csv", write_csv), ("parquet", write_parquet)):

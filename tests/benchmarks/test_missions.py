@@ -49,7 +49,7 @@ def test_demo1_against_the_bare_calls_of_pybullet(monkeypatch):
     """The floor is Bullet taking part in every step; the second row holds the calls that are still made."""
     made = record_calls(lambda: cosim.load("demo1_box"))
     (clearance,) = (module for name, module in sys.modules.items() if name.endswith(".plant_src.clearance"))
-    monkeypatch.setattr(clearance, "NEAR", 1e9)
+    monkeypatch.setattr(clearance, "NEAR_DISTANCE", 1e9)
     everywhere = record_calls(lambda: cosim.load("demo1_box"))
     monkeypatch.undo()
     print_heading("demo1_box, 40 s")

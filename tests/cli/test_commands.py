@@ -95,7 +95,7 @@ def test_a_reader_that_goes_away_ends_the_output_but_not_the_run(tmp_path, isola
 
 
 def test_a_failing_component_ends_with_one_and_keeps_the_rows(tmp_path):
-    done = cosim("run", scenario(tmp_path, "Broken"), cwd=tmp_path)
+    done = cosim("run", scenario(tmp_path, "FailingBlock"), cwd=tmp_path)
     assert done.returncode == 1
     assert "INFO a: about to fail" in done.stderr
     assert "a: do_step failed at t = 2 s: ValueError: tilt beyond limit" in done.stderr

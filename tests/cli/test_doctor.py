@@ -100,7 +100,7 @@ def test_the_cache_is_where_the_environment_puts_it(tmp_path):
 def test_in_a_sandbox_it_says_so():
     """What holds for the process is tried out in a process for which it holds."""
     imports = "from cosim.process.sandbox import *; from cosim.cli import main"
-    enter = "enter(Settings(readable=interpreter_folders(), open_files=77))"
+    enter = "enter_sandbox(SandboxSettings(readable=interpreter_folders(), open_files=77))"
     words = [sys.executable, "-c", f"{imports}; {enter}; main(['doctor', '--json'])"]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     found = {finding["name"]: finding["found"] for finding in json.loads(done.stdout)}

@@ -125,7 +125,7 @@ def test_random_systems_with_foreign_fmus_of_all_types(seed, probes):
 @pytest.mark.parametrize("seed", range(4))
 def test_random_systems_with_fmus_on_threads(seed, kind, probes, monkeypatch):
     crews = []
-    monkeypatch.setattr("cosim.engine.executor.Crew", lambda *arguments: crews.append(ThreadPool(*arguments)) or crews[-1])
+    monkeypatch.setattr("cosim.engine.executor.ThreadPool", lambda *arguments: crews.append(ThreadPool(*arguments)) or crews[-1])
 
     def build(parallel):
         files = [FmuFile(path) for path in probes.values()]
@@ -194,8 +194,8 @@ def test_values_that_nobody_reads_may_be_anything(kind):
 
 @pytest.mark.parametrize("kind", EXECUTORS)
 def test_many_rows_do_not_fit_into_one_chunk(kind, monkeypatch):
-    monkeypatch.setattr("cosim.process.run_files.row_store.CHUNK", 1000)
-    monkeypatch.setattr("cosim.process.run_files.row_store.LARGE", 0)
+    monkeypatch.setattr("cosim.process.run_files.row_store.CHUNK_BYTES", 1000)
+    monkeypatch.setattr("cosim.process.run_files.row_store.MAX_MEMORY_BYTES", 0)
     count = FakeComponent([Variable("y", causality="output")], lambda v, t, h: v.update(y=v["y"] + 1), start={"y": 0.0})
     outcome = simulate(
         System({"a": count}, (), (("a",),)),

@@ -76,7 +76,7 @@ class Oracle:
         self.seeds = {name: i for i, name in enumerate(units)}
         self.y = {name: [self.seeds[name] + 0.1 * j for j in range(len(units[name]))] for name in units}
         self.u = {name: [0.0] * len(units[name]) for name in units}
-        self.waiting = {c: [self.y[c.source.component][int(c.source.slot[1:])]] * c.delay for c in system.connections}
+        self.waiting = {c: [self.y[c.source.component][int(c.source.scalar[1:])]] * c.delay for c in system.connections}
 
     def rows(self):
         rows = [{name: list(values) for name, values in self.y.items()}]
@@ -102,7 +102,7 @@ class Oracle:
 
     def read(self, connection):
         source, target = connection.source.component, connection.target.component
-        i, j = int(connection.source.slot[1:]), int(connection.target.slot[1:])
+        i, j = int(connection.source.scalar[1:]), int(connection.target.scalar[1:])
         queue = self.waiting[connection]
         queue.append(self.y[source][i])
         value, one, other = queue.pop(0), UNITS[self.units[source][i]], UNITS[self.units[target][j]]

@@ -24,7 +24,7 @@ def long(tmp_path_factory):
 
 @pytest.fixture(autouse=True)
 def two_processors(monkeypatch):
-    monkeypatch.setattr("cosim.engine.executor.processors", lambda: 2)
+    monkeypatch.setattr("cosim.engine.executor.available_processors", lambda: 2)
 
 
 def flown(files, parallel, wires="", stop="0.3", events=(), start_values=None):

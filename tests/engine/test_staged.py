@@ -109,8 +109,8 @@ def test_units_are_converted_on_the_way():
 
 
 def test_a_difference_has_no_offset():
-    source = FakeComponent(outputs("y", unit=parse_unit("degC"), relative=True), lambda values, t, h: None, start={"y": 1.5})
-    sink = FakeComponent([*inputs("u", unit=parse_unit("K"), relative=True), *outputs("y")], lambda v, t, h: v.update(y=v["u"]))
+    source = FakeComponent(outputs("y", unit=parse_unit("degC"), relative_quantity=True), lambda values, t, h: None, start={"y": 1.5})
+    sink = FakeComponent([*inputs("u", unit=parse_unit("K"), relative_quantity=True), *outputs("y")], lambda v, t, h: v.update(y=v["u"]))
     assert run_system(make_system({"a": source, "b": sink}, "a.y > b.u"), 1, 1, ["b.y"]).columns["b.y"][-1] == 1.5
 
 

@@ -151,7 +151,7 @@ def exponential(tmp_path: Path) -> Compiled:
         lambda x, u, c: u / c[1],
         parameter("mass", 6.0),
         parameter("damping", 2.0),
-        constants=lambda p: ca.vertcat(p[0], p[0] / p[1], p[1]),
+        derived_parameters=lambda p: ca.vertcat(p[0], p[0] / p[1], p[1]),
     )
     return Compiled(as_block(model_), tmp_path)
 

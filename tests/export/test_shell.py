@@ -22,8 +22,8 @@ def test_the_fmu_validates_without_problems(fmu):
     assert validate_fmu(str(fmu)) == []
 
 
-def test_outputs_are_those_of_the_equations(start):
-    instance = start().initialize(gain=3.0, repeat=2, weights=[1.0, -2.0, 0.5], **{X: 0.25})
+def test_outputs_are_those_of_the_equations(instantiate_sample):
+    instance = instantiate_sample().initialize(gain=3.0, repeat=2, weights=[1.0, -2.0, 0.5], **{X: 0.25})
     random = np.random.default_rng(7)
     integral = 6.0 * 0.25
     for k in range(300):
@@ -38,8 +38,8 @@ def test_outputs_are_those_of_the_equations(start):
     assert instance.get("steps") == 300
 
 
-def test_in_initialization_mode_outputs_follow_what_was_set(start):
-    instance = start()
+def test_in_initialization_mode_outputs_follow_what_was_set(instantiate_sample):
+    instance = instantiate_sample()
     instance.enter()
     instance.set(X, 1.0)
     assert instance.get("outputs")[0] == 4.0
@@ -48,19 +48,19 @@ def test_in_initialization_mode_outputs_follow_what_was_set(start):
     assert instance.get("outputs")[0] == 20.0
 
 
-def test_leaving_initialization_mode_computes_outputs_nobody_asked_for_before(start):
-    assert start().initialize(**{X: 2.0}).get("outputs")[0] == 8.0
+def test_leaving_initialization_mode_computes_outputs_nobody_asked_for_before(instantiate_sample):
+    assert instantiate_sample().initialize(**{X: 2.0}).get("outputs")[0] == 8.0
 
 
-def test_the_start_time_reaches_the_model(start):
-    instance = start().initialize(start=12.5)
+def test_the_start_time_reaches_the_model(instantiate_sample):
+    instance = instantiate_sample().initialize(start=12.5)
     assert instance.get("clock") == 12.5
     instance.step(12.5)
     assert instance.get("clock") == 12.51
 
 
-def test_dependent_parameters_follow_in_every_phase(start):
-    instance = start()
+def test_dependent_parameters_follow_in_every_phase(instantiate_sample):
+    instance = instantiate_sample()
     instance.set("gain", 3.0)
     assert instance.get("doubled_gain") == 6.0
     instance.enter()
@@ -71,8 +71,8 @@ def test_dependent_parameters_follow_in_every_phase(start):
     assert instance.get("doubled_gain") == 10.0
 
 
-def test_enumerations_and_booleans_are_typed(start):
-    instance = start().initialize(mode=1, limit=1.0, **{X: 1.0})
+def test_enumerations_and_booleans_are_typed(instantiate_sample):
+    instance = instantiate_sample().initialize(mode=1, limit=1.0, **{X: 1.0})
     assert instance.get("active_mode") == 1
     assert bool(instance.get("saturated")) is True
     instance.set("enabled", False)
@@ -89,118 +89,118 @@ def refused(instance, message):
     assert message in instance.messages[0]
 
 
-def test_a_fixed_parameter_cannot_be_set_while_stepping(start):
-    instance = start().initialize()
+def test_a_fixed_parameter_cannot_be_set_while_stepping(instantiate_sample):
+    instance = instantiate_sample().initialize()
     with refused(instance, "limit is a fixed parameter and cannot be set while stepping"):
         instance.set("limit", 5.0)
 
 
-def test_an_output_cannot_be_set(start):
-    instance = start()
+def test_an_output_cannot_be_set(instantiate_sample):
+    instance = instantiate_sample()
     with refused(instance, "steps is neither parameter nor input"):
         instance.set("steps", 3)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_values_that_are_not_finite_are_refused(start, value):
-    instance = start().initialize()
+def test_values_that_are_not_finite_are_refused(instantiate_sample, value):
+    instance = instantiate_sample().initialize()
     with refused(instance, f"{X}: found {value}, expected a finite value"):
         instance.set(X, value)
 
 
 @pytest.mark.parametrize("value", [0, 4])
-def test_an_enumeration_takes_only_its_literals(start, value):
-    instance = start()
+def test_an_enumeration_takes_only_its_literals(instantiate_sample, value):
+    instance = instantiate_sample()
     with refused(instance, f"mode: found {value}, expected 1 to 3"):
         instance.set("mode", value)
 
 
-def test_reading_as_another_type_is_refused(start):
-    instance = start()
+def test_reading_as_another_type_is_refused(instantiate_sample):
+    instance = instantiate_sample()
     with refused(instance, "is of type Boolean"):
         (instance.fmu.getReal if instance.version == 2 else instance.fmu.getFloat64)(instance._address("enabled")[1])
 
 
-def test_an_unknown_value_reference_is_refused(start):
-    instance = start()
+def test_an_unknown_value_reference_is_refused(instantiate_sample):
+    instance = instantiate_sample()
     with refused(instance, "found value reference 999, expected less than"):
         (instance.fmu.getReal if instance.version == 2 else instance.fmu.getFloat64)([999])
 
 
 @pytest.mark.parametrize("version", [3], indirect=True)
 @pytest.mark.parametrize("count", [2, 4])
-def test_an_array_is_set_as_a_whole(start, count):
-    instance = start()
+def test_an_array_is_set_as_a_whole(instantiate_sample, count):
+    instance = instantiate_sample()
     with refused(instance, f"found {count} values, expected"):
         instance.set("weights", [1.0] * count)
 
 
-def test_a_step_needs_initialization(start):
-    instance = start()
+def test_a_step_needs_initialization(instantiate_sample):
+    instance = instantiate_sample()
     with refused(instance, "DoStep: not allowed after instantiation"):
         instance.step(0.0)
 
 
-def test_initialization_mode_is_entered_once(start):
-    instance = start().initialize()
+def test_initialization_mode_is_entered_once(instantiate_sample):
+    instance = instantiate_sample().initialize()
     with refused(instance, "not allowed while stepping"):
         instance.enter()
 
 
-def test_nothing_is_set_after_termination(start):
-    instance = start().initialize()
+def test_nothing_is_set_after_termination(instantiate_sample):
+    instance = instantiate_sample().initialize()
     instance.fmu.terminate()
     with refused(instance, "not allowed after termination"):
         instance.set(X, 1.0)
 
 
 @pytest.mark.parametrize("time", [0.02, 0.0, math.nan])
-def test_a_step_starts_where_the_last_one_ended(start, time):
-    instance = start().initialize()
+def test_a_step_starts_where_the_last_one_ended(instantiate_sample, time):
+    instance = instantiate_sample().initialize()
     instance.step(0.0)
     with refused(instance, "expected 0.01"):
         instance.step(time)
 
 
 @pytest.mark.parametrize("step_size", [0.0, -0.01, math.nan, math.inf])
-def test_a_step_size_is_positive(start, step_size):
-    instance = start().initialize()
+def test_a_step_size_is_positive(instantiate_sample, step_size):
+    instance = instantiate_sample().initialize()
     with refused(instance, "expected a positive one"):
         instance.step(0.0, step_size)
 
 
-def test_a_step_does_not_pass_the_stop_time(start):
-    instance = start().initialize(stop=0.015)
+def test_a_step_does_not_pass_the_stop_time(instantiate_sample):
+    instance = instantiate_sample().initialize(stop=0.015)
     instance.step(0.0)
     with refused(instance, "passes the stop time 0.015"):
         instance.step(0.01)
 
 
-def test_communication_points_may_be_rounded(start):
-    instance = start().initialize(start=1e6, stop=1e6 + 30)
+def test_communication_points_may_be_rounded(instantiate_sample):
+    instance = instantiate_sample().initialize(start=1e6, stop=1e6 + 30)
     for k in range(3000):
         instance.step(1e6 + k * 0.01)
     assert instance.get("steps") == 3000
 
 
-def test_a_failing_model_ends_the_step_with_its_reason(start):
-    instance = start().initialize()
+def test_a_failing_model_ends_the_step_with_its_reason(instantiate_sample):
+    instance = instantiate_sample().initialize()
     instance.set("mode", 3)
     reason = "mode is FAIL (100 %% ##sure)" if instance.version == 2 else "mode is FAIL (100 % #sure)"
     with refused(instance, f"DoStep: assertion: {reason}"):
         instance.step(0.0)
 
 
-def test_a_model_that_fails_to_initialize_says_why(start):
-    instance = start()
+def test_a_model_that_fails_to_initialize_says_why(instantiate_sample):
+    instance = instantiate_sample()
     instance.set("limit", 0.0)
     instance.enter()
     with refused(instance, "limit must be positive"):
         instance.fmu.exitInitializationMode()
 
 
-def test_after_an_error_only_a_saved_state_or_a_reset_helps(start):
-    instance = start().initialize(**{X: 1.0})
+def test_after_an_error_only_a_saved_state_or_a_reset_helps(instantiate_sample):
+    instance = instantiate_sample().initialize(**{X: 1.0})
     state = instance.save()
     with refused(instance, "found time 5"):
         instance.step(5.0)
@@ -219,64 +219,64 @@ def trajectory(instance, first, count):
     for k in range(first, first + count):
         instance.set(X, random.normal())
         instance.step(k * 0.01)
-        seen.append(instance.everything())
+        seen.append(instance.all_values())
     return seen
 
 
-def test_rollback_is_exact_and_repeatable(start):
-    instance = start().initialize()
+def test_rollback_is_exact_and_repeatable(instantiate_sample):
+    instance = instantiate_sample().initialize()
     trajectory(instance, 0, 20)
     state = instance.save()
-    before = instance.everything()
+    before = instance.all_values()
     onwards = trajectory(instance, 20, 30)
     for _ in range(2):
         instance.restore(state)
-        assert instance.everything() == before
+        assert instance.all_values() == before
         assert trajectory(instance, 20, 30) == onwards
 
 
-def test_a_serialized_state_moves_to_another_instance(start):
-    one, other = start().initialize(gain=4.0), start()
+def test_a_serialized_state_moves_to_another_instance(instantiate_sample):
+    one, other = instantiate_sample().initialize(gain=4.0), instantiate_sample()
     trajectory(one, 0, 20)
     content = one.serialize(one.save())
     other.restore(other.deserialize(content))
-    assert other.everything() == one.everything()
+    assert other.all_values() == one.all_values()
     assert trajectory(other, 20, 30) == trajectory(one, 20, 30)
     assert content == one.serialize(one.deserialize(content))
 
 
 @pytest.mark.parametrize(("change", "message"), [(lambda c: c[:-1], "bytes, expected"), (lambda c: b"?" + c[1:], "another FMU")])
-def test_a_foreign_serialized_state_is_refused(start, change, message):
-    instance = start().initialize()
+def test_a_foreign_serialized_state_is_refused(instantiate_sample, change, message):
+    instance = instantiate_sample().initialize()
     content = instance.serialize(instance.save())
     with refused(instance, message):
         instance.deserialize(change(content))
 
 
-def test_reset_gives_a_new_instance(start):
-    used, fresh = start().initialize(gain=9.0), start()
+def test_reset_gives_a_new_instance(instantiate_sample):
+    used, fresh = instantiate_sample().initialize(gain=9.0), instantiate_sample()
     trajectory(used, 0, 10)
     used.fmu.reset()
     assert used.serialize(used.save()) == fresh.serialize(fresh.save())
     assert trajectory(used.initialize(), 0, 10) == trajectory(fresh.initialize(), 0, 10)
 
 
-def test_instances_are_independent(start):
-    one, other = start().initialize(), start().initialize()
+def test_instances_are_independent(instantiate_sample):
+    one, other = instantiate_sample().initialize(), instantiate_sample().initialize()
     trajectory(one, 0, 10)
     assert other.get("steps") == 0
 
 
-def test_a_wrong_token_is_refused(start):
+def test_a_wrong_token_is_refused(instantiate_sample):
     messages = []
     with pytest.raises(Exception, match="instantiate"):
-        start(guid="{wrong}", messages=messages)
+        instantiate_sample(guid="{wrong}", messages=messages)
     assert len(messages) == 1
     assert "found token {wrong}, expected {" in messages[0]
 
 
-def test_what_is_not_offered_is_refused(start):
-    instance = start()
+def test_what_is_not_offered_is_refused(instantiate_sample):
+    instance = instantiate_sample()
     if instance.version == 2:
         with refused(instance, "fmi2CancelStep: steps are not asynchronous"):
             instance.fmu.cancelStep()
@@ -286,8 +286,8 @@ def test_what_is_not_offered_is_refused(start):
             instance.fmu.enterEventMode()
 
 
-def test_only_the_standard_and_marked_functions_are_exported(start):
-    library = start().fmu.dll
+def test_only_the_standard_and_marked_functions_are_exported(instantiate_sample):
+    library = instantiate_sample().fmu.dll
     library.twice.restype, library.twice.argtypes = ctypes.c_double, [ctypes.c_double]
     assert library.twice(1.5) == 3.0
     with pytest.raises(AttributeError, match="model_step"):

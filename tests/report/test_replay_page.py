@@ -17,10 +17,10 @@ BODIES = ("plant.uav", "plant.usv")
 
 
 @pytest.fixture(scope="module")
-def shared(visit, flight, tmp_path_factory):
+def shared(open_page, flight_result, tmp_path_factory):
     file = tmp_path_factory.mktemp("replay") / "replay.html"
-    write_replay([flight], file)
-    return visit(file)
+    write_replay([flight_result], file)
+    return open_page(file)
 
 
 @pytest.fixture
@@ -36,17 +36,17 @@ def column(result, name, time):
     return float(np.interp(time, result.time, result[name]))
 
 
-def test_bodies_are_where_they_were(opened, flight):
+def test_bodies_are_where_they_were(opened, flight_result):
     for time in (0.0, 3.21, 9.999, 14.505, 16.0):
         opened.seek(time)
         for number, body in enumerate(BODIES):
             position, orientation = opened.body(number)
-            assert position == pytest.approx([column(flight, f"{body}.position.{axis}", time) for axis in "xyz"], abs=2e-5)
-            recorded = [column(flight, f"{body}.orientation.{part}", time) for part in "wxyz"]
+            assert position == pytest.approx([column(flight_result, f"{body}.position.{axis}", time) for axis in "xyz"], abs=2e-5)
+            recorded = [column(flight_result, f"{body}.orientation.{part}", time) for part in "wxyz"]
             assert abs(np.dot(orientation, recorded)) == pytest.approx(1.0, abs=1e-5)
 
 
-def test_the_scrubber_the_keys_and_the_plots_move_time(opened, flight):
+def test_the_scrubber_the_keys_and_the_plots_move_time(opened, flight_result):
     box = opened.page.locator(".scrubber").bounding_box()
     opened.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     assert opened.time == pytest.approx(8.0, abs=0.1)
@@ -57,7 +57,7 @@ def test_the_scrubber_the_keys_and_the_plots_move_time(opened, flight):
     over.click(position={"x": over.bounding_box()["width"] / 4, "y": 20})
     assert opened.time == pytest.approx(4.0, abs=0.1)
     assert opened.page.locator(".clock b").inner_text() == f"{opened.time:.2f}"
-    altitude = flight["plant.uav.position.z"][np.searchsorted(flight.time, opened.time, side="right") - 1]
+    altitude = flight_result["plant.uav.position.z"][np.searchsorted(flight_result.time, opened.time, side="right") - 1]
     assert opened.page.locator(".plot b").first.inner_text() == f"{altitude:.4g} m"
 
 
@@ -89,12 +89,12 @@ def test_cameras_look_at_what_they_promise(opened):
     assert opened(f"{camera}.getWorldDirection({camera}.position.clone()).z") < -0.999
 
 
-def test_trails_end_at_the_bodies_and_keep_to_their_paths(opened, flight):
+def test_trails_end_at_the_bodies_and_keep_to_their_paths(opened, flight_result):
     for number, body in enumerate(BODIES):
         trail = f"cosimReplay.view.actors[{number}].trail"
         drawn = np.array(opened(f"{trail}.points.map((point) => point.toArray())"))
         assert 10 < len(drawn) < 300
-        recorded = np.column_stack([flight[f"{body}.position.{axis}"] for axis in "xyz"])
+        recorded = np.column_stack([flight_result[f"{body}.position.{axis}"] for axis in "xyz"])
         assert np.linalg.norm(recorded - nearest(drawn, recorded), axis=1).max() < 0.005
         lengths = []
         for time in (4.0, 4.1, 8.0, 16.0):
@@ -143,16 +143,16 @@ ENVIRONMENT = {"seed": 5, "waves": {"spectrum": "jonswap", "significant_height":
 
 
 @pytest.fixture(scope="module")
-def compared(visit, flight, tmp_path_factory):
+def compared(open_page, flight_result, tmp_path_factory):
     """The flight as if on a rough sea, and over it the same one metre higher."""
-    scenario = deepcopy(flight.metadata["scenario"])
+    scenario = deepcopy(flight_result.metadata["scenario"])
     scenario["components"]["plant"]["arguments"]["environment"] = ENVIRONMENT
-    rough = replace(flight, metadata={**flight.metadata, "scenario": scenario})
-    moved = {**flight.recording.columns, "plant.uav.position.z": flight["plant.uav.position.z"] + 1.0}
-    higher = replace(flight, recording=replace(flight.recording, columns=moved))
+    rough = replace(flight_result, metadata={**flight_result.metadata, "scenario": scenario})
+    moved = {**flight_result.recording.columns, "plant.uav.position.z": flight_result["plant.uav.position.z"] + 1.0}
+    higher = replace(flight_result, recording=replace(flight_result.recording, columns=moved))
     file = tmp_path_factory.mktemp("compared") / "two.html"
     write_replay([rough, higher], file)
-    return visit(file)
+    return open_page(file)
 
 
 def test_a_second_run_is_laid_over_the_first(compared):
@@ -179,11 +179,11 @@ NUMBERS = {
 }
 
 
-def test_numbers_at_an_axis_have_their_digits_and_room(visit, tmp_path):
+def test_numbers_at_an_axis_have_their_digits_and_room(open_page, tmp_path):
     time = np.linspace(0, 5, 101)
     columns = {name: low + (high - low) * np.sin(time) ** 2 for name, (low, high, _) in NUMBERS.items()}
     write_replay([Result(Recording(time, columns, {}), metadata={"name": "numbers"})], tmp_path / "numbers.html")
-    opened = visit(tmp_path / "numbers.html")
+    opened = open_page(tmp_path / "numbers.html")
     for name, (_, _, texts) in NUMBERS.items():
         opened(f"cosimReplay.plots.add(['{name}'])")
         chart = "cosimReplay.plots.list.at(-1).chart"
@@ -193,27 +193,27 @@ def test_numbers_at_an_axis_have_their_digits_and_room(visit, tmp_path):
         assert opened(f"{chart}.axes[1]._size") > max(widths) + 5
 
 
-def test_the_diagram_of_one_component_is_as_large_as_its_texts(visit, flight, tmp_path):
+def test_the_diagram_of_one_component_is_as_large_as_its_texts(open_page, flight_result, tmp_path):
     box = {"name": "alone", "origin": "alone.fmu", "inputs": 0, "outputs": 1, "period": None}
     system = {"components": [box], "stages": [["alone"]], "connections": []}
-    write_report(replace(flight, metadata={"name": "alone", "system": system}), [], {}, tmp_path / "report.html")
-    rectangle = visit(tmp_path / "report.html").page.locator(".diagram .box").bounding_box()
+    write_report(replace(flight_result, metadata={"name": "alone", "system": system}), [], {}, tmp_path / "report.html")
+    rectangle = open_page(tmp_path / "report.html").page.locator(".diagram .box").bounding_box()
     assert rectangle["width"] == pytest.approx(WIDTH, abs=2)
 
 
-def test_the_report_shows_what_a_stranger_wrote_as_text(visit, flight, tmp_path):
+def test_the_report_shows_what_a_stranger_wrote_as_text(open_page, flight_result, tmp_path):
     evil = "</script><script>window.caught = true</script><img src=x onerror='window.caught = true'>"
-    result = replace(flight, metadata={"scenario": {"description": evil}, "name": evil, "warnings": [evil]})
+    result = replace(flight_result, metadata={"scenario": {"description": evil}, "name": evil, "warnings": [evil]})
     write_report(result, [], {}, tmp_path / "report.html")
-    opened = visit(tmp_path / "report.html")
+    opened = open_page(tmp_path / "report.html")
     assert opened("window.caught === undefined")
     assert opened.page.locator("h1").inner_text() == evil
     assert opened.page.locator(".warnings li").inner_text() == evil
 
 
-def test_a_result_without_a_scene_has_its_signals_still(visit, flight, tmp_path):
-    write_replay([replace(flight, metadata={"name": "numbers"})], tmp_path / "numbers.html")
-    opened = visit(tmp_path / "numbers.html")
+def test_a_result_without_a_scene_has_its_signals_still(open_page, flight_result, tmp_path):
+    write_replay([replace(flight_result, metadata={"name": "numbers"})], tmp_path / "numbers.html")
+    opened = open_page(tmp_path / "numbers.html")
     assert opened.page.locator("canvas[aria-label='3-D replay']").count() == 0
     assert opened.page.locator(".plot").count() == 6
     opened.page.locator(".add input").fill("plant.usv.position.*")

@@ -9,10 +9,10 @@ AT_REST = "!cosimReplay.view.stale && cosimReplay.view.renderer.getPixelRatio() 
 
 
 @pytest.fixture(scope="module")
-def opened(visit, flight, tmp_path_factory):
+def opened(open_page, flight_result, tmp_path_factory):
     file = tmp_path_factory.mktemp("quality") / "replay.html"
-    write_replay([flight], file)
-    return visit(file)
+    write_replay([flight_result], file)
+    return open_page(file)
 
 
 def rungs(opened, software, frames):

@@ -93,8 +93,8 @@ def test_a_replay_of_two_runs_is_written_beside_the_first(directory):
     assert [one["name"] for one in json.loads(data)["runs"]] == ["demo1_box", "demo1_box"]
 
 
-def test_checks_that_are_not_met_are_said_first(flight, tmp_path):
-    write_run(flight, tmp_path)
+def test_checks_that_are_not_met_are_said_first(flight_result, tmp_path):
+    write_run(flight_result, tmp_path)
     assert invoke(report, tmp_path).exit_code == 0
     texts = Reader((tmp_path / "report.html").read_text()).texts
     assert texts[1] == "✗ 4 of 5 checks passed"

@@ -62,6 +62,6 @@ def test_a_long_run_is_thinned_and_keeps_its_peaks():
 
 
 def test_many_signals_make_do_with_fewer_rows(monkeypatch):
-    monkeypatch.setattr(samples, "MOST_VALUES", 1000)
+    monkeypatch.setattr(samples, "MAX_VALUES", 1000)
     packed = samples.pack_run(result(**{f"s{i}": np.arange(400.0) + i for i in range(9)}))
     assert packed["rows"] * len(packed["columns"]) <= 1100

@@ -27,12 +27,12 @@ def test_every_shipped_scenario_has_vehicles_to_show(file):
     assert json.loads(json.dumps(found)) is not None
 
 
-def test_signals_of_the_scene_are_recorded(flight):
-    found = build_scene(flight.metadata)
+def test_signals_of_the_scene_are_recorded(flight_result):
+    found = build_scene(flight_result.metadata)
     for body in found["bodies"]:
-        assert all(name in flight for name in (*body["position"], *body["orientation"]))
-    assert all(span["signal"] in flight for span in found["spans"])
-    assert all(any(flight.signals(pattern) for pattern in patterns) for patterns in found["plots"])
+        assert all(name in flight_result for name in (*body["position"], *body["orientation"]))
+    assert all(span["signal"] in flight_result for span in found["spans"])
+    assert all(any(flight_result.signals(pattern) for pattern in patterns) for patterns in found["plots"])
 
 
 def test_waypoints_and_platforms_of_demo_1():

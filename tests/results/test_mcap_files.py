@@ -159,7 +159,7 @@ def test_runs_that_start_before_zero_are_shifted(tmp_path):
 
 
 def test_pieces_fit_together(tmp_path, monkeypatch):
-    monkeypatch.setattr(mcap_files, "ROWS_AT_A_TIME", 10)
+    monkeypatch.setattr(mcap_files, "ROWS_PER_CHUNK", 10)
     write_mcap(recording(), tmp_path / "r.mcap")
     assert [values["mode"]["value"] for _, _, values in json_messages(tmp_path / "r.mcap", "/signals/uav")] == list(range(ROWS))
 

@@ -40,7 +40,7 @@ def test_units_stand_in_the_schema(tmp_path):
 
 
 def test_rows_are_written_group_by_group(tmp_path, monkeypatch):
-    monkeypatch.setattr(parquet_files, "ROWS_AT_A_TIME", 100)
+    monkeypatch.setattr(parquet_files, "ROWS_PER_GROUP", 100)
     write_parquet(recording(1050), tmp_path / "r.parquet")
     file = parquet.ParquetFile(tmp_path / "r.parquet")
     assert file.num_row_groups == 11

@@ -24,10 +24,12 @@ def ring(folder, probe, size):
 
 def test_one_file_is_extracted_and_loaded_once(tmp_path, probe, monkeypatch):
     extracted, loaded = [], []
-    extract, open_library = cosim.components.fmi.file.extract, cosim.components.fmi.instance.FmuInstance._open
+    extract, open_library = cosim.components.fmi.file.extract, cosim.components.fmi.instance.FmuInstance._load_library
     monkeypatch.setattr(cosim.components.fmi.file, "extract", lambda *args: extracted.append(args) or extract(*args))
     monkeypatch.setattr(
-        cosim.components.fmi.instance.FmuInstance, "_open", lambda self, *args: loaded.append(args) or open_library(self, *args)
+        cosim.components.fmi.instance.FmuInstance,
+        "_load_library",
+        lambda self, *args: loaded.append(args) or open_library(self, *args),
     )
     result = cosim.run(ring(tmp_path, probe, 20))
     assert (len(extracted), len(loaded)) == (1, 1)

@@ -8,7 +8,7 @@ from cosim.core.errors import ComponentError
 
 OWN = """
 from cosim.core.component import Component, StepResult, Variable
-from cosim.core.units import parse
+from cosim.core.units import parse_unit
 
 
 class Own(Component):
@@ -17,7 +17,7 @@ class Own(Component):
 
     def __init__(self, instance_name):
         self.variables = [
-            Variable("u", causality="input", start=1.0, unit=parse("N")),
+            Variable("u", causality="input", start=1.0, unit=parse_unit("N")),
             Variable("y", causality="output", variability="continuous"),
         ]
         self.u = 1.0
@@ -65,7 +65,7 @@ def test_a_sound_one_runs_with_what_it_does_not_need_left_out(folder, own):
         ("def get_outputs", "def outputs_of", 'it does not define "get_outputs"'),
         ("has_state = False", "has_state = True", 'it does not define "get_state"'),
         ("do_step(self, time, step_size)", "do_step(self, time)", '"do_step" does not take the arguments (time, step_size)'),
-        ('parse("N")', '"N"', "variable \"u\": unit is 'N', expected a cosim.core.units.Unit, such as parse('N')"),
+        ('parse_unit("N")', '"N"', "variable \"u\": unit is 'N', expected a cosim.core.units.Unit, such as parse('N')"),
         ('"output", v', '"outptu", v', 'variable "y": causality is "outptu"; did you mean "output"?'),
         ('"continuous"', '"continous"', 'variable "y": variability is "continous"; did you mean "continuous"?'),
         ('Variable("y", ', 'Variable("u", ', 'variable "u" stands there 2 times'),

@@ -198,7 +198,7 @@ def test_json_pointers_change_anything(folder):
 def test_a_component_that_fails_keeps_its_rows(folder):
     import pytest
 
-    file = folder.scenario({"a": folder.block("Broken")})
+    file = folder.scenario({"a": folder.block("FailingBlock")})
     with pytest.raises(cosim.ComponentError) as failure:
         cosim.run(file)
     assert str(failure.value).startswith("a: do_step failed at t = 2 s: ValueError: tilt beyond limit (blocks.py:")
@@ -209,4 +209,4 @@ def test_a_class_that_panics_has_failed(folder):
     import pytest
 
     with pytest.raises(cosim.ComponentError, match="a: do_step failed at t = 0 s: BaseException: index out of bounds"):
-        cosim.run(folder.scenario({"a": folder.block("Panicking")}))
+        cosim.run(folder.scenario({"a": folder.block("BaseExceptionBlock")}))

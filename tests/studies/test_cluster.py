@@ -31,8 +31,8 @@ def two_workers(tmp_path_factory):
 
 def test_a_cluster_makes_the_same_bytes_from_files_that_it_was_sent(lag, two_workers):
     sweep = lag.write(factors=FACTORS)
-    local = lag.call("sweep", sweep, "--output-dir", "local")
-    away = lag.call("sweep", sweep, "--scheduler", two_workers.address, "--output-dir", "cluster")
+    local = lag.run_command("sweep", sweep, "--output-dir", "local")
+    away = lag.run_command("sweep", sweep, "--scheduler", two_workers.address, "--output-dir", "cluster")
     assert (local.code, away.code) == (1, 1), away.err
     for name in ("table.csv", "aggregates.csv", "success.csv"):
         assert (lag.folder / "local" / name).read_bytes() == (lag.folder / "cluster" / name).read_bytes(), name
@@ -42,7 +42,7 @@ def test_a_cluster_makes_the_same_bytes_from_files_that_it_was_sent(lag, two_wor
 
 def test_what_cannot_be_set_is_refused_before_anything_runs(lag, two_workers):
     sweep = lag.write(factors=[{"name": "T", "set": "lag.Tau", "values": [1.0]}])
-    done = lag.call("sweep", sweep, "--scheduler", two_workers.address)
+    done = lag.run_command("sweep", sweep, "--scheduler", two_workers.address)
     assert done.code == 2
     assert "$.factors[0].set" in done.err
     assert 'component "lag" has no variable "Tau"' in done.err
@@ -53,14 +53,14 @@ def test_absolute_paths_are_refused(make_lag, two_workers):
     lag = make_lag()
     place = {"/components/lag/fmu": str(lag.folder / "lag.fmu")}
     sweep = lag.write(factors=[{"name": "fmu", "levels": {"here": place}}])
-    done = lag.call("sweep", sweep, "--scheduler", two_workers.address)
+    done = lag.run_command("sweep", sweep, "--scheduler", two_workers.address)
     assert done.code == 2
     assert "cannot be shipped to a cluster" in done.err
 
 
 def test_where_no_scheduler_is_nothing_is_run(lag, monkeypatch):
-    monkeypatch.setattr("cosim.studies.cluster._PATIENCE", 1.0)
-    done = lag.call("sweep", lag.write(factors=FACTORS), "--scheduler", "tcp://127.0.0.1:9")
+    monkeypatch.setattr("cosim.studies.cluster._CONNECT_TIMEOUT", 1.0)
+    done = lag.run_command("sweep", lag.write(factors=FACTORS), "--scheduler", "tcp://127.0.0.1:9")
     assert done.code == 2
     assert 'no Dask scheduler answers at "tcp://127.0.0.1:9"' in done.err
 
@@ -72,7 +72,7 @@ def test_a_worker_with_another_cosim_is_refused(lag, tmp_path):
         file.write('\n__version__ = "0.0.9"\n')
     with running_cluster(tmp_path, workers=0) as made:
         made.workers.append(made.start_worker(PYTHONPATH=str(tmp_path / "other")))
-        done = lag.call("sweep", lag.write(factors=FACTORS), "--scheduler", made.address)
+        done = lag.run_command("sweep", lag.write(factors=FACTORS), "--scheduler", made.address)
     assert done.code == 2
     assert "has cosim 0.0.9 (" in done.err
     assert f"expected {cosim.__version__} (" in done.err
@@ -80,7 +80,7 @@ def test_a_worker_with_another_cosim_is_refused(lag, tmp_path):
 
 def begin(lag, made: DaskCluster):
     """A sweep on a cluster, with some runs finished."""
-    process = lag.start("sweep", lag.write(**SLOW), "--scheduler", made.address)
+    process = lag.start_command("sweep", lag.write(**SLOW), "--scheduler", made.address)
     end = time.monotonic() + 60
     while len(lag.records()) < 3:
         assert process.poll() is None and time.monotonic() < end, (made.folder / "log").read_text()
@@ -116,6 +116,6 @@ def test_after_the_scheduler_was_killed_another_one_finishes_the_sweep(lag, tmp_
         before = lag.records()
         assert 3 <= len(before) < 30
     with running_cluster(tmp_path / "second") as made:
-        assert lag.call("sweep", "sweep.json", "--scheduler", made.address).code == 0
+        assert lag.run_command("sweep", "sweep.json", "--scheduler", made.address).code == 0
     assert lag.records()[: len(before)] == before
     assert len({record["key"] for record in lag.records()}) == len(lag.records()) == 30

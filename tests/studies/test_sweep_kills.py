@@ -24,7 +24,7 @@ SWEEP = {
 @pytest.fixture
 def going(lag):
     """The sweep, going on, with a run finished."""
-    process = lag.start("sweep", lag.write(**SWEEP), "--workers", 2)
+    process = lag.start_command("sweep", lag.write(**SWEEP), "--workers", 2)
     wait_until(lambda: lag.records())
     yield process
     process.kill()
@@ -40,7 +40,7 @@ def wait_until(condition, seconds=60.0):
 
 def assert_completed(lag):
     """Go on with a sweep that was ended: it is whole, and nothing was made twice."""
-    done = lag.call("sweep", "sweep.json", "--workers", 2)
+    done = lag.run_command("sweep", "sweep.json", "--workers", 2)
     keys = [record["key"] for record in lag.records()]
     assert (done.code, len(keys), len(set(keys))) == (0, RUNS, RUNS), done.err
     assert len({row["end.value"] for row in lag.table()}) == RUNS

@@ -38,7 +38,7 @@ def test_100_000_runs_take_less_than_300_megabytes(lag):
         for number, job in enumerate(Sweep.from_file(sweep).jobs()):
             if number < RUNS - LAST:
                 ledger.add(Record(job.key, {"end.value": 0.8 + 1e-6 * number}, seconds=0.0123))
-    process = lag.start("sweep", sweep, "--workers", 2)
+    process = lag.start_command("sweep", sweep, "--workers", 2)
     most = 0
     while process.poll() is None:
         most = max(most, proportional_kilobytes([process.pid, *descendants(process.pid)]))

@@ -138,7 +138,7 @@ def test_what_cannot_be_set_is_found_before_anything_runs(lag):
     """Three levels are wrong in three ways."""
     wrong = [{"name": "T", "set": "lag.Tau", "values": [1.0]}, {"name": "y", "set": "lag.y_start", "values": [1.0, "high"]}]
     levels = {"one": {"/components/lga/fmu": "x.fmu"}, "two": {}}
-    done = lag.call("sweep", lag.write(factors=[*wrong, {"name": "l", "levels": levels}]))
+    done = lag.run_command("sweep", lag.write(factors=[*wrong, {"name": "l", "levels": levels}]))
     lines = done.err.splitlines()
     assert (done.code, len(lines)) == (2, 3), done.err
     for words in (
@@ -155,7 +155,7 @@ def test_what_a_pointer_sets_wrongly_has_its_place_in_the_sweep_file(lag):
     levels = {"good": {"/components/lag/fmu": "lag.fmu"}, "bad": {"/components/lag/fmu": "lga.fmu"}}
     factors = [{"name": "fmu", "levels": levels}, {"name": "step", "set": "/step_size", "values": [0.01, -1]}]
     common = {"/record": {"signals": ["lag.y", "lag.yy"]}}
-    lines = lag.call("sweep", lag.write(factors=factors, settings=common)).err.splitlines()
+    lines = lag.run_command("sweep", lag.write(factors=factors, settings=common)).err.splitlines()
     places = {line.split(": ")[1].partition(", in ")[0] for line in lines if line.startswith(str(lag.folder / "sweep.json"))}
     assert len(lines) == 3, lines
     assert places == {
@@ -167,7 +167,7 @@ def test_what_a_pointer_sets_wrongly_has_its_place_in_the_sweep_file(lag):
 
 def test_criteria_about_kpis_that_do_not_exist_end_the_sweep_at_its_first_runs(lag):
     factors = [{"name": "y", "set": "lag.y_start", "values": list(range(50))}]
-    done = lag.call("sweep", lag.write(factors=factors, success=[{"kpi": "end.valeu", "max": 1.0}]))
+    done = lag.run_command("sweep", lag.write(factors=factors, success=[{"kpi": "end.valeu", "max": 1.0}]))
     assert done.code == 2
     assert 'no such KPI; did you mean "end.value"?' in done.err
     assert len(lag.records()) < 50
@@ -175,7 +175,7 @@ def test_criteria_about_kpis_that_do_not_exist_end_the_sweep_at_its_first_runs(l
 
 def test_a_factor_is_not_called_like_a_kpi(lag):
     """Which KPIs there are is known after a run."""
-    done = lag.call("sweep", lag.write(factors=[{"name": "end.value", "set": "lag.y_start", "values": [1, 2]}]))
+    done = lag.run_command("sweep", lag.write(factors=[{"name": "end.value", "set": "lag.y_start", "values": [1, 2]}]))
     assert done.code == 2
     assert '$.factors[0].name: expected a name other than that of the KPI "end.value"' in done.err
 
@@ -183,7 +183,7 @@ def test_a_factor_is_not_called_like_a_kpi(lag):
 def test_so_they_do_when_all_runs_are_there(lag):
     factors = [{"name": "y", "set": "lag.y_start", "values": [1, 2]}]
     for _ in range(2):
-        assert lag.call("sweep", lag.write(factors=factors, success=[{"kpi": "end.valeu", "max": 1.0}])).code == 2
+        assert lag.run_command("sweep", lag.write(factors=factors, success=[{"kpi": "end.valeu", "max": 1.0}])).code == 2
     assert len(lag.records()) == 2
 
 
@@ -191,7 +191,7 @@ def test_a_file_that_cannot_be_imported_is_named(lag):
     (lag.folder / "broken.py").write_text("import no_such_module\n\ndef f(result):\n    return {}\n")
     kpis = [{"name": "k", "python": "broken.py:f"}]
     factors = [{"name": "y", "set": "lag.y_start", "values": [1.0]}]
-    lag.call("sweep", lag.write(factors=factors, settings={"/kpis": kpis}))
+    lag.run_command("sweep", lag.write(factors=factors, settings={"/kpis": kpis}))
     assert "No module named 'no_such_module'" in lag.table()[0]["failure"]
 
 
@@ -202,8 +202,8 @@ def test_a_component_that_ends_the_process_as_it_is_imported_fails_its_own_runs(
     content["components"]["deadly"] = {"python": "deadly.py:Component"}
     (lag.folder / "lag.json").write_text(json.dumps(content))
     good = {"/components/deadly": {"fmu": "lag.fmu"}}
-    lag.call("sweep", lag.write(factors=[{"name": "level", "levels": {"good": good}}]))
-    assert [row["status"] for row in lag.table()] == ["ok"], lag.done
+    lag.run_command("sweep", lag.write(factors=[{"name": "level", "levels": {"good": good}}]))
+    assert [row["status"] for row in lag.table()] == ["ok"], lag.last_result
 
 
 def test_schemas_are_printed():

@@ -24,13 +24,13 @@ def crashing(make_lag):
     lag = make_lag()
     levels = {f"run {run}": level(run) for run in range(RUNS)}
     sweep = lag.write(factors=[{"name": "level", "levels": levels}], success=[{"kpi": "end.value", "min": 1.0}])
-    lag.call("sweep", sweep, "--workers", 2, "--parquet")
+    lag.run_command("sweep", sweep, "--workers", 2, "--parquet")
     return lag
 
 
 def test_exactly_the_crashing_runs_are_lost(crashing):
     failed = [int(row["run"]) for row in crashing.table() if row["status"] == "failed"]
-    assert (crashing.done.code, failed) == (1, sorted(CRASHES)), crashing.done.err
+    assert (crashing.last_result.code, failed) == (1, sorted(CRASHES)), crashing.last_result.err
 
 
 def test_every_other_run_has_its_own_result(crashing):
@@ -41,7 +41,7 @@ def test_every_other_run_has_its_own_result(crashing):
 def test_the_signal_is_named_in_the_table_and_on_the_terminal(crashing):
     cause = "lag: fmi2DoStep failed at t = 0.05 s: the process was ended by signal 6 (SIGABRT, aborted)"
     assert crashing.table()[23]["failure"] == cause
-    assert f"1 failed, the first is run 23: {cause}" in crashing.done.err
+    assert f"1 failed, the first is run 23: {cause}" in crashing.last_result.err
 
 
 def test_a_failure_comes_with_the_command_that_shows_it_again(crashing):
@@ -67,16 +67,16 @@ def test_parquet_holds_the_same_table(crashing):
 
 
 def test_one_worker_makes_the_same_bytes(crashing):
-    crashing.call("sweep", "sweep.json", "--workers", 1, "--output-dir", "serial")
+    crashing.run_command("sweep", "sweep.json", "--workers", 1, "--output-dir", "serial")
     for name in ("table.csv", "aggregates.csv", "success.csv"):
         assert (crashing.folder / "serial" / name).read_bytes() == (crashing.folder / "runs/sweep" / name).read_bytes(), name
 
 
 def test_what_is_done_is_not_done_again_and_what_is_new_is_added(lag):
     few = {"name": "T", "set": "lag.T", "values": [0.5, 1.0]}
-    lag.call("sweep", lag.write(factors=[few]))
+    lag.run_command("sweep", lag.write(factors=[few]))
     before = lag.records()
-    done = lag.call("sweep", lag.write(factors=[few | {"values": [0.25, 0.5, 1.0]}]))
+    done = lag.run_command("sweep", lag.write(factors=[few | {"values": [0.25, 0.5, 1.0]}]))
     assert lag.records()[:2] == before
     assert len(lag.records()) == 3
     assert "3 of 3 runs, 1 made now" in done.out
@@ -85,7 +85,7 @@ def test_what_is_done_is_not_done_again_and_what_is_new_is_added(lag):
 def test_a_run_that_several_points_have_is_said_to_be_one(lag):
     factors = [{"name": "y", "set": "lag.y_start", "range": {"min": 1, "max": 2}, "integer": True}]
     content = {"factors": factors, "design": {"kind": "sobol", "runs": 8}, "success": [{"kpi": "end.value", "max": 1.5}]}
-    done = lag.call("sweep", lag.write(**content))
+    done = lag.run_command("sweep", lag.write(**content))
     assert "2 of 8 runs are distinct; intervals are those of so many" in done.out
     assert "2 of the 8 runs are distinct" in (lag.folder / "runs/sweep/sweep.html").read_text()
     overall = lag.table(file="success.csv")[0]
@@ -98,7 +98,7 @@ def test_a_run_without_a_kpi_of_the_criteria_is_no_success(lag):
         "def own(result):\n    y = result['lag.y'][-1]\n    return {'low' if y < 1 else 'high': y}\n"
     )
     content = {"settings": {"/kpis": [{"name": "own", "python": "own.py:own"}]}, "success": [{"kpi": "own.low", "max": 1.0}]}
-    done = lag.call("sweep", lag.write(factors=[{"name": "y", "set": "lag.y_start", "values": [3, 1, 4]}], **content))
+    done = lag.run_command("sweep", lag.write(factors=[{"name": "y", "set": "lag.y_start", "values": [3, 1, 4]}], **content))
     assert done.code == 0, done.err
     assert [(row["passed"], bool(row["own.low"])) for row in lag.table()] == [("0", False), ("1", True), ("0", False)]
 
@@ -107,21 +107,21 @@ def test_tables_and_maps_of_an_earlier_call_do_not_stay(lag):
     pytest.importorskip("pyarrow")
     factors = [{"name": name, "set": f"lag.{name}", "values": [1, 2]} for name in ("T", "y_start")]
     maps = [{"x": "T", "y": "y_start"}, {"x": "y_start", "y": "T"}]
-    lag.call("sweep", lag.write(factors=factors, maps=maps), "--parquet")
+    lag.run_command("sweep", lag.write(factors=factors, maps=maps), "--parquet")
     folder = lag.folder / "runs/sweep"
     (folder / "success_map_of_mine.png").write_bytes(b"")
-    lag.call("sweep", lag.write(factors=factors, maps=maps[:1]))
+    lag.run_command("sweep", lag.write(factors=factors, maps=maps[:1]))
     found = {path.name for path in folder.iterdir() if path.suffix in (".png", ".svg", ".parquet")}
     assert found == {"success_map.png", "success_map.svg", "success_map_of_mine.png"}
 
 
 def test_damaged_records_are_counted_and_made_again(lag):
     file = lag.write(factors=[{"name": "y", "set": "lag.y_start", "values": [1, 2, 3]}])
-    lag.call("sweep", file)
+    lag.run_command("sweep", file)
     journal = lag.folder / "runs/sweep/journal.jsonl"
     lines = journal.read_bytes().splitlines(keepends=True)
     journal.write_bytes(lines[0] + b"\0" * 10 + lines[1][10:] + lines[2])
-    done = lag.call("sweep", file)
+    done = lag.run_command("sweep", file)
     assert "unreadable lines in runs/sweep/journal.jsonl, whose runs are made again: 1" in done.err
     assert "3 of 3 runs, 1 made now" in done.out
 
@@ -129,10 +129,10 @@ def test_damaged_records_are_counted_and_made_again(lag):
 @pytest.mark.long
 def test_another_scenario_makes_other_runs(lag):
     sweep = lag.write(factors=[{"name": "T", "set": "lag.T", "values": [0.5]}])
-    lag.call("sweep", sweep)
+    lag.run_command("sweep", sweep)
     content = json.loads((lag.folder / "lag.json").read_text())
     (lag.folder / "lag.json").write_text(json.dumps(content | {"stop_time": 0.2}))
-    lag.call("sweep", sweep)
+    lag.run_command("sweep", sweep)
     assert [float(row["end.value"]) for row in lag.table()] == [lag_output(20)]
 
 
@@ -140,13 +140,13 @@ def test_another_scenario_makes_other_runs(lag):
 def test_failures_are_kept_until_they_are_to_be_tried_again(lag):
     sweep = lag.write(factors=[{"name": "fault", "set": "lag.fault", "values": ["", SEGV_ORDER]}])
     for words, made in (((), 2), ((), 2), (("--retry-failed",), 3)):
-        assert lag.call("sweep", sweep, *words).code == 1
+        assert lag.run_command("sweep", sweep, *words).code == 1
         assert len(lag.records()) == made
 
 
 def test_a_run_that_takes_too_long_is_ended_and_the_others_are_not(lag):
     levels = {"good": {}, "slow": {"lag.fault": "DoStep 6 sleep"}, "well": {"lag.T": 1.0}}
-    lag.call("sweep", lag.write(factors=[{"name": "level", "levels": levels}], deadline=1.0))
+    lag.run_command("sweep", lag.write(factors=[{"name": "level", "levels": levels}], deadline=1.0))
     assert [row["failure"] for row in lag.table()] == ["", "the run did not end within 1 s", ""]
 
 
@@ -154,7 +154,7 @@ def test_statistics_are_told_apart_by_the_levels_of_each_factor(lag):
     """y ends at 0.8^10 y_start for T = 0.05: below 0.2 for a start of 1 only."""
     starts = {"name": "start", "set": "lag.y_start", "values": [1.0, 3.0]}
     times = {"name": "T", "set": "lag.T", "range": {"min": 0.05, "max": 0.5, "count": 2, "scale": "log"}}
-    lag.call("sweep", lag.write(factors=[starts, times], success=[{"kpi": "end.value", "max": 0.2}]))
+    lag.run_command("sweep", lag.write(factors=[starts, times], success=[{"kpi": "end.value", "max": 0.2}]))
     rates = {(row["start"], row["T"]): float(row["rate"]) for row in lag.table(file="success.csv")}
     assert rates == {("", ""): 0.25, ("1.0", ""): 0.5, ("3.0", ""): 0.0, ("", "0.05"): 0.5, ("", "0.5"): 0.0}
     means = {(row["start"], row["T"]): float(row["mean"]) for row in lag.table(file="aggregates.csv")}
@@ -162,5 +162,5 @@ def test_statistics_are_told_apart_by_the_levels_of_each_factor(lag):
 
 
 def test_a_pointer_changes_what_is_run(lag):
-    lag.call("sweep", lag.write(factors=[{"name": "stop", "set": "/stop_time", "values": [0.1, 0.3]}]))
+    lag.run_command("sweep", lag.write(factors=[{"name": "stop", "set": "/stop_time", "values": [0.1, 0.3]}]))
     assert [float(row["end.value"]) for row in lag.table()] == [lag_output(10), lag_output(30)]

@@ -32,7 +32,7 @@ class HereAndNow:
     def check(self, job):
         return []
 
-    def results(self, jobs):
+    def run_jobs(self, jobs):
         for job in jobs:
             self.runs += 1
             yield Record(job.key, dict(cosim.run(self.scenario, job.settings).kpis))
@@ -151,14 +151,14 @@ def test_a_kpi_that_few_runs_lack_has_no_value_there(lag):
 
 def test_an_interrupt_in_the_first_generation_leaves_earlier_files_alone(lag, monkeypatch):
     file = lag.write("tune", parameters=[PARAMETER], minimize="end.value", method=SEARCH | {"evaluations": 3})
-    assert lag.call("tune", file).code == 0
+    assert lag.run_command("tune", file).code == 0
     before = lag.table("runs/tune", "trials.csv")
 
     def interrupted(*_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Tuning, "run", interrupted)
-    assert lag.call("tune", file).code == 130
+    assert lag.run_command("tune", file).code == 130
     assert lag.table("runs/tune", "trials.csv") == before
 
 
@@ -171,7 +171,7 @@ def test_the_command_prints_how_to_run_the_best_and_says_when_all_crash(lag):
         cases=[{}, {"lag.fault": SEGV_ORDER}],
         method=SEARCH | {"evaluations": 3},
     )
-    done = lag.call("tune", "tune.json")
+    done = lag.run_command("tune", "tune.json")
     assert done.code == 1
     assert "a run failed at every point, the first time: lag: fmi2DoStep failed" in done.err
     trials = lag.table("runs/tune", "trials.csv")
@@ -181,5 +181,7 @@ def test_the_command_prints_how_to_run_the_best_and_says_when_all_crash(lag):
 
 def test_the_command_says_when_no_point_has_a_value(lag):
     with_kpis(lag, '{"y": nan}')
-    done = lag.call("tune", lag.write("tune", parameters=[PARAMETER], minimize="own.y", method=SEARCH | {"evaluations": 3}))
+    done = lag.run_command(
+        "tune", lag.write("tune", parameters=[PARAMETER], minimize="own.y", method=SEARCH | {"evaluations": 3})
+    )
     assert (done.code, done.err) == (3, "the value of own.y is nan at every point\n")

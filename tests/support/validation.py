@@ -145,7 +145,7 @@ def sort_key(record: dict[str, Any]) -> tuple[str, int, str]:
 def table_row(record: dict[str, Any]) -> list[str]:
     file, _, test = record["test"].partition("::")
     return [
-        f"{record['what']} [{record['case']}]" if record["case"] else record["what"],
+        f"{record['quantity']} [{record['case']}]" if record["case"] else record["quantity"],
         record["unit"],
         *(f"{record[name]:.6g}" if record["expected"] else "" for name in ("expected", "found")),
         format_deviation(record["deviation"]) + (" rel." if record["limit"].endswith("rel.") else ""),

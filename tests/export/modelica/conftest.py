@@ -144,14 +144,14 @@ def write_model(tmp_path: Path) -> Callable[[str], Path]:
 
 
 @pytest.fixture
-def compile_both(tmp_path: Path, write: Callable[[str], Path]) -> Callable[..., CompiledAndInterpreted]:
+def compile_both(tmp_path: Path, write_model: Callable[[str], Path]) -> Callable[..., CompiledAndInterpreted]:
     """Both forms of a model from its text, or from a file."""
 
     if shutil.which("gcc") is None:
         pytest.skip("needs gcc")
 
     def open_model(source: str | Path, model: str | None = None) -> CompiledAndInterpreted:
-        path = write(source) if isinstance(source, str) else source
+        path = write_model(source) if isinstance(source, str) else source
         folder = tmp_path / "c" / path.stem
         folder.mkdir(parents=True)
         return CompiledAndInterpreted(CompiledBlock(load_block(path, model), folder), load_interpreter(path, model))

@@ -16,9 +16,9 @@ TICKS = 500
 
 
 @pytest.mark.parametrize("path", CONTROLLERS, ids=lambda path: path.stem)
-def test_shipped_controllers_agree_with_the_interpreter(twins, path):
+def test_shipped_controllers_agree_with_the_interpreter(compile_both, path):
     """100 ticks with default parameters, then 500 with other ones."""
-    model = twins(path)
+    model = compile_both(path)
     model.initialize()
     assert len(list(model.run(100))) == 100
     rng = np.random.default_rng(1)
@@ -124,8 +124,8 @@ class Pid:
         return min(self.limit, max(-self.limit, wanted))
 
 
-def test_a_cascade_of_pid_controllers_against_numpy(twins):
-    model = twins(PID)
+def test_a_cascade_of_pid_controllers_against_numpy(compile_both):
+    model = compile_both(PID)
     gains, v_max, nd = [1.3, 0.4, 2.2], 1.7, 33.0
     model.set(gain=gains, vMax=v_max)
     model.set(x__speed__nd=nd, y__speed__nd=nd, z__speed__nd=nd)
@@ -182,8 +182,8 @@ end Guidance;"""
 
 
 @pytest.mark.parametrize("repeat", [False, True])
-def test_waypoint_guidance_against_numpy(twins, repeat):
-    model = twins(GUIDANCE)
+def test_waypoint_guidance_against_numpy(compile_both, repeat):
+    model = compile_both(GUIDANCE)
     rng = np.random.default_rng(3)
     wx, wy = rng.uniform(-2, 2, 8), rng.uniform(-2, 2, 8)
     model.set(wx=wx, wy=wy, count=6, radius=0.8, repeat=repeat)

@@ -43,8 +43,8 @@ def folder(tmp_path: Path) -> Path:
     return root
 
 
-def test_a_model_uses_packages_beside_it_and_ships_their_sources(folder, twins):
-    model = twins(folder / "Top.mo")
+def test_a_model_uses_packages_beside_it_and_ships_their_sources(folder, compile_both):
+    model = compile_both(folder / "Top.mo")
     assert sorted(model.c.block.resources) == ["Lib/Double.mo", "Lib/package.mo", "Top.mo"]
     model.set(u=1.5)
     model.initialize()
@@ -64,8 +64,10 @@ def test_a_member_of_a_package_is_loaded_as_such(folder):
     assert (block.identifier, sorted(block.resources)) == ("Double", ["Lib/Double.mo", "Lib/package.mo"])
 
 
-def test_one_of_several_models_of_a_file(write):
-    path = write("model A\n  output Real y;\nequation\n  y = 1;\nend A;\nmodel B\n  output Real z;\nequation\n  z = 2;\nend B;")
+def test_one_of_several_models_of_a_file(write_model):
+    path = write_model(
+        "model A\n  output Real y;\nequation\n  y = 1;\nend A;\nmodel B\n  output Real z;\nequation\n  z = 2;\nend B;"
+    )
     assert [v.name for v in load_block(path, "A").variables] == ["y"]
     assert [v.name for v in load_block(path).variables] == ["z"]
 
@@ -92,8 +94,8 @@ def test_a_model_is_not_confused_with_a_member_of_the_same_name(folder):
         load_block(folder / "Double.mo")
 
 
-def test_a_panic_of_the_front_end_is_an_input_error(write):
-    path = write("""model M
+def test_a_panic_of_the_front_end_is_an_input_error(write_model):
+    path = write_model("""model M
   input Real w[3];
   output Real y;
 equation
@@ -105,7 +107,7 @@ end M;""")
         load_block(path)
 
 
-def test_a_missing_model_and_a_missing_file(folder, write):
+def test_a_missing_model_and_a_missing_file(folder, write_model):
     with pytest.raises(InputError, match="no such Modelica file"):
         load_block(folder / "Nothing.mo")
     with pytest.raises(InputError, match=r"Top.mo: .*Other"):
@@ -118,8 +120,8 @@ def test_another_version_of_the_front_end_is_refused(folder, monkeypatch):
         load_block(folder / "Top.mo")
 
 
-def test_a_place_that_the_front_end_knows_is_kept(write):
-    path = write("""package P
+def test_a_place_that_the_front_end_knows_is_kept(write_model):
+    path = write_model("""package P
   constant Integer n = 3;
 end P;
 model M

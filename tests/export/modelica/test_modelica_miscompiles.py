@@ -10,8 +10,8 @@ from cosim.export.modelica import load_block
 TICKS = 500
 
 
-def test_a_discrete_equation_uses_the_condition_of_the_same_tick(twins):
-    model = twins("""model M
+def test_a_discrete_equation_uses_the_condition_of_the_same_tick(compile_both):
+    model = compile_both("""model M
   input Real x;
   output Boolean b(start = false, fixed = true);
   output Integer k(start = 0, fixed = true);
@@ -28,8 +28,8 @@ end M;""")
         assert model.get("k") == count
 
 
-def test_b_a_parameter_in_the_condition_of_an_if_expression_is_not_folded(twins):
-    model = twins("""model M
+def test_b_a_parameter_in_the_condition_of_an_if_expression_is_not_folded(compile_both):
+    model = compile_both("""model M
   parameter Boolean hold = false;
   parameter Real level = 1;
   input Real x;
@@ -76,9 +76,9 @@ end M;"""
         'y = x; if hold then assert(x < 1, "large"); end if;',
     ],
 )
-def test_b_an_if_equation_that_the_front_end_decides_by_a_default_is_refused(write, equations):
+def test_b_an_if_equation_that_the_front_end_decides_by_a_default_is_refused(write_model, equations):
     with pytest.raises(InputError, match=r"M.mo:7: the front end would decide this if-equation by the default of hold"):
-        load_block(write(FOLDED.format(equations)))
+        load_block(write_model(FOLDED.format(equations)))
 
 
 @pytest.mark.parametrize(
@@ -88,21 +88,21 @@ def test_b_an_if_equation_that_the_front_end_decides_by_a_default_is_refused(wri
         "if x > (if x > 2 then 1 else 0) then y = if hold then 1 else 2; else y = x; end if; // if hold then",
     ],
 )
-def test_b_other_if_equations_on_parameters_are_not_refused(write, equations):
-    assert load_block(write(FOLDED.format(equations))).identifier == "M"
+def test_b_other_if_equations_on_parameters_are_not_refused(write_model, equations):
+    assert load_block(write_model(FOLDED.format(equations))).identifier == "M"
 
 
-def test_b_an_if_equation_on_a_constant_may_be_decided(twins):
+def test_b_an_if_equation_on_a_constant_may_be_decided(compile_both):
     text = FOLDED.replace("parameter Boolean hold = false", "constant Boolean hold = true")
-    model = twins(text.format("if hold then y = 2*x; else y = x; end if;"))
+    model = compile_both(text.format("if hold then y = 2*x; else y = x; end if;"))
     model.set(x=3.0)
     model.initialize()
     model.step(0.0)
     assert model.get("y") == 6.0
 
 
-def test_c_the_last_of_two_assignments_counts(twins):
-    model = twins("""model M
+def test_c_the_last_of_two_assignments_counts(compile_both):
+    model = compile_both("""model M
   input Real x;
   output Integer k(start = 0, fixed = true);
   output Boolean b(start = false, fixed = true);
@@ -122,8 +122,8 @@ end M;""")
         assert (model.get("k"), model.get("b")) == (12 if inputs["x"] > 0 else 11, inputs["x"] > 0)
 
 
-def test_declared_limits_are_described_and_do_not_saturate(twins):
-    model = twins("""model M
+def test_declared_limits_are_described_and_do_not_saturate(compile_both):
+    model = compile_both("""model M
   parameter Real gain(min = 0, max = 1) = 0.5;
   input Real x(min = -1, max = 1);
   output Real y(min = -2, max = 2);
@@ -140,8 +140,8 @@ end M;""")
     assert (described.minimum, described.maximum) == (-2.0, 2.0)
 
 
-def test_functions_of_the_same_short_name_are_refused_because_the_front_end_confuses_them(write):
-    path = write("""package A
+def test_functions_of_the_same_short_name_are_refused_because_the_front_end_confuses_them(write_model):
+    path = write_model("""package A
   function f
     input Real x;
     output Real y;

@@ -45,8 +45,8 @@ equation
 end M;"""
 
 
-def test_only_owned_parameters_can_be_set(write):
-    shown = {v.name: v.causality for v in load_block(write(OWNERS)).variables}
+def test_only_owned_parameters_can_be_set(write_model):
+    shown = {v.name: v.causality for v in load_block(write_model(OWNERS)).variables}
     parameters = {name for name, causality in shown.items() if causality == "parameter"}
     assert parameters == {"base", "n", "A", "b.k", "c.k", "many[2].k"}
     calculated = {name for name, causality in shown.items() if causality == "calculatedParameter"}
@@ -55,8 +55,8 @@ def test_only_owned_parameters_can_be_set(write):
     assert not [name for name in shown if "hidden" in name or "table" in name]
 
 
-def test_dependent_parameters_follow_their_owner(twins):
-    model = twins(OWNERS)
+def test_dependent_parameters_follow_their_owner(compile_both):
+    model = compile_both(OWNERS)
     model.set(base=10.0, b__k=0.5)
     model.compare(0)
     assert [model.get(n) for n in ("twice", "a.k2", "a.limit", "b.k2", "many[1].k2", "c.k2")] == [
@@ -73,8 +73,8 @@ def test_dependent_parameters_follow_their_owner(twins):
     assert model.get("y") == sum(k * 2 + 2 * k + k + 1 + 25 for k in gains) + 20 + 2 + 100
 
 
-def test_parameters_take_effect_between_steps(twins):
-    model = twins(OWNERS)
+def test_parameters_take_effect_between_steps(compile_both):
+    model = compile_both(OWNERS)
     model.initialize()
     model.step(0.0)
     before = model.get("y")
@@ -83,8 +83,8 @@ def test_parameters_take_effect_between_steps(twins):
     assert model.get("y") == before + 2 * (3 * 1.0) + 2.0
 
 
-def test_descriptions_units_limits_and_starts(write):
-    block = load_block(write(OWNERS))
+def test_descriptions_units_limits_and_starts(write_model):
+    block = load_block(write_model(OWNERS))
     variables = {v.name: v for v in block.variables}
     assert (block.identifier, block.description, block.step_size) == ("M", "a model of owners", 0.01)
     base, gain, matrix, n = variables["base"], variables["c.k"], variables["A"], variables["n"]
@@ -95,8 +95,8 @@ def test_descriptions_units_limits_and_starts(write):
     assert (variables["u"].variability, variables["y"].variability) == ("continuous", "discrete")
 
 
-def test_start_values_of_states_may_depend_on_parameters(twins):
-    model = twins("""model M
+def test_start_values_of_states_may_depend_on_parameters(compile_both):
+    model = compile_both("""model M
   parameter Real x0 = 2;
   input Real u;
   output Real x(start = 3*x0, fixed = true);
@@ -115,8 +115,8 @@ end M;""")
     assert (model.get("x"), list(model.get("q"))) == (16.0, [6.0, 2.0])
 
 
-def test_large_parameter_lists(twins):
-    model = twins("""model M
+def test_large_parameter_lists(compile_both):
+    model = compile_both("""model M
   constant Integer capacity = 32;
   parameter Integer count(min = 1) = 3;
   parameter Real wx[capacity] = cat(1, {1, 2, 10/3}, fill(0, capacity - 3));
@@ -139,8 +139,8 @@ end M;""")
         assert model.get("y") == expected
 
 
-def test_constants_may_size_arrays_slices_and_loops(twins):
-    model = twins("""model M
+def test_constants_may_size_arrays_slices_and_loops(compile_both):
+    model = compile_both("""model M
   constant Integer half = 2;
   constant Integer full = 2*half;
   constant Real table[full] = {1, 2, 3, 4};
@@ -161,8 +161,8 @@ end M;""")
         assert model.get("s") == inputs["u"] + 2 * inputs["u"] + (inputs["u"] + inputs["u"] + inputs["u"] + inputs["u"])
 
 
-def test_members_are_unique_and_no_words_of_c(twins):
-    model = twins("""model M
+def test_members_are_unique_and_no_words_of_c(compile_both):
+    model = compile_both("""model M
   block B
     input Real int;
     output Real c;
@@ -189,7 +189,7 @@ end M;""")
     assert (model.get("m"), model.get("clock")) == (6.0, 1.0)
 
 
-def test_the_same_source_gives_the_same_c(write):
-    path = write(OWNERS)
+def test_the_same_source_gives_the_same_c(write_model):
+    path = write_model(OWNERS)
     assert load_block(path).files == load_block(path).files
     assert str(path.parent) not in "".join(load_block(path).files.values())

@@ -90,9 +90,9 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_refused(write, case):
+def test_refused(write_model, case):
     declarations, equations, message = CASES[case]
-    path = write(f"""model M
+    path = write_model(f"""model M
   input Real u;
   output Real y;
   Real unused;
@@ -116,8 +116,8 @@ end M;""")
         ("edge(b)", "in a when-condition are not supported"),
     ],
 )
-def test_refused_when_conditions(write, when, message):
-    path = write(f"""model M
+def test_refused_when_conditions(write_model, when, message):
+    path = write_model(f"""model M
   input Real u;
   output Real y;
   Boolean b;
@@ -131,8 +131,8 @@ end M;""")
         load_block(path)
 
 
-def test_a_recursive_function_is_refused(write):
-    path = write("""model M
+def test_a_recursive_function_is_refused(write_model):
+    path = write_model("""model M
   function f
     input Real x;
     output Real y;
@@ -148,11 +148,11 @@ end M;""")
         load_block(path)
 
 
-def test_a_for_equation_that_does_not_fit_its_placeholders_is_refused(write):
+def test_a_for_equation_that_does_not_fit_its_placeholders_is_refused(write_model):
     from cosim.export.modelica.frontend.reader import ModelReader
     from cosim.export.modelica.frontend.rumoca import flatten_model
 
-    path = write("""model M
+    path = write_model("""model M
   output Real x[4];
 equation
   for i in 1:3 loop

@@ -18,8 +18,8 @@ def run(model, ticks=TICKS, **parameters):
     yield from model.run(ticks)
 
 
-def test_matrix_times_vector(twins):
-    model = twins("""model M
+def test_matrix_times_vector(compile_both):
+    model = compile_both("""model M
   parameter Real A[2, 3] = {{1, 2, 3}, {4, 5, 6}};
   input Real x[3];
   output Real y[2];
@@ -40,8 +40,8 @@ end M;""")
         assert list(model.get("v")) == [1 * a[0, j] + 2 * a[1, j] + 2 * x[j] for j in range(3)]
 
 
-def test_matrix_products_transpose_and_slices(twins):
-    model = twins("""model M
+def test_matrix_products_transpose_and_slices(compile_both):
+    model = compile_both("""model M
   input Real A[2, 3];
   output Real P[2, 2];
   output Real row[3];
@@ -63,8 +63,8 @@ end M;""")
         assert list(model.get("part")) == list(a[0, 1:])
 
 
-def test_array_functions(twins):
-    model = twins("""model M
+def test_array_functions(compile_both):
+    model = compile_both("""model M
   input Real x[4];
   input Integer k[3];
   output Real y[6];
@@ -87,8 +87,8 @@ end M;""")
         )
 
 
-def test_dynamic_subscripts_read_and_write(twins):
-    model = twins("""model M
+def test_dynamic_subscripts_read_and_write(compile_both):
+    model = compile_both("""model M
   input Integer k(min = 1, max = 4);
   input Real x;
   output Real q[4](each start = 0, each fixed = true);
@@ -107,8 +107,8 @@ end M;""")
         assert model.get("y") == q[4 - k] + q[k - 1]
 
 
-def test_two_dynamic_subscripts(twins):
-    model = twins("""model M
+def test_two_dynamic_subscripts(compile_both):
+    model = compile_both("""model M
   input Integer i(min = 1, max = 2);
   input Integer j(min = 1, max = 3);
   parameter Real A[2, 3] = {{1, 2, 3}, {4, 5, 6}};
@@ -122,8 +122,8 @@ end M;""")
         assert model.get("y") == 3 * inputs["i"] + inputs["j"] - 3
 
 
-def test_a_subscript_out_of_range_is_a_failure_that_names_variable_and_line(twins):
-    model = twins("""model M
+def test_a_subscript_out_of_range_is_a_failure_that_names_variable_and_line(compile_both):
+    model = compile_both("""model M
   input Integer k;
   parameter Real wx[3] = {1, 2, 3};
   output Real y;
@@ -139,8 +139,8 @@ end M;""")
         model.python.step(0.0, 0.01)
 
 
-def test_a_subscript_is_only_checked_where_it_is_evaluated(twins):
-    model = twins("""model M
+def test_a_subscript_is_only_checked_where_it_is_evaluated(compile_both):
+    model = compile_both("""model M
   input Integer k;
   parameter Real wx[3] = {1, 2, 3};
   output Real y;
@@ -156,8 +156,8 @@ end M;""")
         assert (model.get("y"), model.get("b")) == (inputs["k"] if inside else -1, inside and inputs["k"] > 1.5)
 
 
-def test_functions_with_arrays_loops_locals_and_size(twins):
-    model = twins("""package P
+def test_functions_with_arrays_loops_locals_and_size(compile_both):
+    model = compile_both("""package P
   function weighted "sum of w[i]*i up to k"
     input Real w[:];
     input Integer k = 2;
@@ -216,8 +216,8 @@ end M;""")
         assert list(model.get("e")) == list(2 * (2 * b) + b)
 
 
-def test_enumerations_as_state_input_and_parameter(twins):
-    model = twins("""type Mode = enumeration(idle, climb, hold);
+def test_enumerations_as_state_input_and_parameter(compile_both):
+    model = compile_both("""type Mode = enumeration(idle, climb, hold);
 model M
   parameter Mode first = Mode.climb;
   input Mode wanted;
@@ -237,8 +237,8 @@ end M;""")
         assert (model.get("mode"), model.get("number")) == (mode, mode)
 
 
-def test_elementary_functions(twins):
-    model = twins("""model M
+def test_elementary_functions(compile_both):
+    model = compile_both("""model M
   input Real x;
   input Real y;
   output Real e[12];
@@ -256,8 +256,8 @@ end M;""")
         assert list(model.get("e")) == expected
 
 
-def test_rounding_and_remainders(twins):
-    model = twins("""model M
+def test_rounding_and_remainders(compile_both):
+    model = compile_both("""model M
   input Real x;
   input Integer k;
   output Real r[6];
@@ -276,8 +276,8 @@ end M;""")
         assert list(model.get("n")) == [math.floor(x), k % 3, int(math.fmod(k, 3)), int(k / 3), k % -3, abs(k)]
 
 
-def test_grouping_and_precedence_are_those_of_modelica(twins):
-    model = twins("""model M
+def test_grouping_and_precedence_are_those_of_modelica(compile_both):
+    model = compile_both("""model M
   input Real a;
   input Real b;
   input Real c;
@@ -297,8 +297,8 @@ end M;""")
         assert list(model.get("l")) == [p or (q and not p), (p or q) and not p, (a < b) == (b < c), (not (p and q)) != p]
 
 
-def test_integer_quotients_are_real(twins):
-    model = twins("""model M
+def test_integer_quotients_are_real(compile_both):
+    model = compile_both("""model M
   input Integer k(min = 1);
   output Real y;
 equation
@@ -310,8 +310,8 @@ end M;""")
         assert model.get("y") == 10 / 3 + 1 / inputs["k"] + inputs["k"] / 4
 
 
-def test_continuous_equations_are_sorted_across_components(twins):
-    model = twins("""model M
+def test_continuous_equations_are_sorted_across_components(compile_both):
+    model = compile_both("""model M
   block Gain
     parameter Real k = 1;
     input Real u;
@@ -346,8 +346,8 @@ end M;""")
         held = 3 * inputs["u"]
 
 
-def test_unrolled_for_equations_may_build_on_each_other(twins):
-    model = twins("""model M
+def test_unrolled_for_equations_may_build_on_each_other(compile_both):
+    model = compile_both("""model M
   input Real u;
   output Real y[4];
 equation
@@ -364,8 +364,8 @@ end M;""")
         assert list(model.get("y")) == [u, u * u, u * u * u, u * u * u + 1]
 
 
-def test_algorithms_keep_order_and_hold_what_they_do_not_assign(twins):
-    model = twins(
+def test_algorithms_keep_order_and_hold_what_they_do_not_assign(compile_both):
+    model = compile_both(
         """model M
   input Real u;
   output Real total(start = 1, fixed = true);
@@ -393,8 +393,8 @@ end M;"""
         assert (model.get("total"), model.get("hits"), list(model.get("q"))) == (total, hits, q)
 
 
-def test_loops_assign_elements(twins):
-    model = twins("""model M
+def test_loops_assign_elements(compile_both):
+    model = compile_both("""model M
   input Real u[8];
   output Real y[8](each start = 0, each fixed = true);
 algorithm
@@ -408,8 +408,8 @@ end M;""")
         assert list(model.get("y")) == list(inputs["u"][::-1] * np.arange(1, 9))
 
 
-def test_pre_edge_and_change_see_the_tick_before(twins):
-    model = twins("""model M
+def test_pre_edge_and_change_see_the_tick_before(compile_both):
+    model = compile_both("""model M
   input Real u;
   Real twice;
   output Real before;
@@ -435,8 +435,8 @@ end M;""")
         before, was = 2 * inputs["u"], armed
 
 
-def test_when_on_a_condition_acts_once_as_it_becomes_true(twins):
-    model = twins("""model M
+def test_when_on_a_condition_acts_once_as_it_becomes_true(compile_both):
+    model = compile_both("""model M
   input Real u;
   output Integer rises(start = 0, fixed = true);
   output Real ticks(start = 0, fixed = true);
@@ -459,8 +459,8 @@ end M;""")
         assert (model.get("rises"), model.get("high")) == (rises, high)
 
 
-def test_elsewhen_acts_where_no_earlier_branch_does(twins):
-    model = twins("""model M
+def test_elsewhen_acts_where_no_earlier_branch_does(compile_both):
+    model = compile_both("""model M
   input Real u;
   output Real y(start = 0, fixed = true);
   output Real z(start = 0, fixed = true);
@@ -489,7 +489,7 @@ end M;""")
         assert (model.get("y"), model.get("z")) == (y, z)
 
 
-def test_a_when_clause_may_name_a_clock_and_a_condition(twins):
+def test_a_when_clause_may_name_a_clock_and_a_condition(compile_both):
     text = """model M
   input Real u;
   output Integer n(start = 0, fixed = true);
@@ -502,11 +502,11 @@ equation
     k = pre(k) + 1;
   end when;
 end M;"""
-    single = twins(text.format("0.02"))
+    single = compile_both(text.format("0.02"))
     single.initialize()
     single.step(0.0, 0.1)
     assert (single.get("n"), single.get("k")) == (5, 5)
-    double = twins(text.format("0.01").replace("M;", "N;").replace("model M", "model N"))
+    double = compile_both(text.format("0.01").replace("M;", "N;").replace("model M", "model N"))
     double.set(u=0.0)
     double.initialize()
     n, was = 0, 0.0
@@ -516,8 +516,8 @@ end M;"""
         assert (double.get("n"), double.get("k")) == (n, tick + 1)
 
 
-def test_a_clause_for_the_initialization_only(twins):
-    model = twins("""model M
+def test_a_clause_for_the_initialization_only(compile_both):
+    model = compile_both("""model M
   parameter Integer n0 = 3;
   output Integer n(start = 0, fixed = true);
   output Integer k(start = 0, fixed = true);
@@ -537,8 +537,8 @@ end M;""")
     assert (model.get("n"), model.get("k")) == (4, 8)
 
 
-def test_array_valued_choices_and_functions_inside_expressions(twins):
-    model = twins("""package P
+def test_array_valued_choices_and_functions_inside_expressions(compile_both):
+    model = compile_both("""package P
   function turned
     input Real v[2];
     output Real w[2];
@@ -567,8 +567,8 @@ end M;""")
         assert model.get("c") == ((turned.sum() > 0) if b else (-(2 * u[1]) + 2 * u[0] > 1))
 
 
-def test_arrays_of_one_element_and_columns_of_one(twins):
-    model = twins("""model M
+def test_arrays_of_one_element_and_columns_of_one(compile_both):
+    model = compile_both("""model M
   input Real a[1];
   input Real B[2, 1];
   output Real y;
@@ -584,8 +584,8 @@ end M;""")
         assert list(model.get("c")) == list(i["B"][:, 0] + [1, 2])
 
 
-def test_nested_branches_keep_their_statements_together(twins):
-    model = twins("""model M
+def test_nested_branches_keep_their_statements_together(compile_both):
+    model = compile_both("""model M
   input Real u;
   input Integer k;
   output Real y(start = 0, fixed = true);
@@ -624,8 +624,8 @@ end M;""")
         assert (model.get("y"), model.get("z")) == (y, z)
 
 
-def test_records_flatten_to_dotted_names(twins):
-    model = twins("""record Vector
+def test_records_flatten_to_dotted_names(compile_both):
+    model = compile_both("""record Vector
   Real x(unit = "m");
   Real y(unit = "m");
 end Vector;
@@ -662,8 +662,8 @@ end M;""")
         assert model.get("scaled.y") == (0 if i["vehicle.touching"] else i["vehicle.position.y"])
 
 
-def test_if_equations_outside_when(twins):
-    model = twins("""model M
+def test_if_equations_outside_when(compile_both):
+    model = compile_both("""model M
   input Real u;
   output Real y;
   output Real z;
@@ -686,8 +686,8 @@ end M;""")
         assert (model.get("y"), model.get("z")) == ((1, 2) if u > 1 else (3 * u, 3) if u < -1 else (u, 0))
 
 
-def test_if_equations_on_parameters_outside_when(twins):
-    model = twins("""model M
+def test_if_equations_on_parameters_outside_when(compile_both):
+    model = compile_both("""model M
   parameter Boolean p = true;
   input Real u;
   output Real y;
@@ -707,8 +707,8 @@ end M;""")
         assert (model.get("y"), model.get("z")) == (2 * inputs["u"], 2)
 
 
-def test_a_violated_assertion_stops_with_its_message(twins):
-    model = twins("""model M
+def test_a_violated_assertion_stops_with_its_message(compile_both):
+    model = compile_both("""model M
   input Real u;
   output Real y;
 equation
@@ -736,8 +736,8 @@ end M;""")
         pytest.param({"k": 2**31 - 1, "x": -1.0}, "Integer overflow", id="the first failure counts"),
     ],
 )
-def test_arithmetic_that_has_no_result_is_a_failure(twins, inputs, reason):
-    model = twins("""model M
+def test_arithmetic_that_has_no_result_is_a_failure(compile_both, inputs, reason):
+    model = compile_both("""model M
   input Integer k;
   parameter Integer d = 1;
   input Real x;
@@ -756,8 +756,8 @@ end M;""")
         model.python.step(0.0, 0.01)
 
 
-def test_initial_equations_initial_algorithms_and_initial(twins):
-    model = twins("""model M
+def test_initial_equations_initial_algorithms_and_initial(compile_both):
+    model = compile_both("""model M
   parameter Real x0 = 2;
   parameter Integer n0 = 3;
   input Real u;
@@ -787,8 +787,8 @@ end M;""")
     assert [model.get(name) for name in ("x", "n", "seen", "starting")] == [12.0, 8, 1.5, False]
 
 
-def test_initialization_can_be_repeated(twins):
-    model = twins("""model M
+def test_initialization_can_be_repeated(compile_both):
+    model = compile_both("""model M
   input Real u;
   output Real x(start = 4, fixed = true);
   output Real y;
@@ -807,8 +807,8 @@ end M;""")
     assert model.get("x") == 4.0
 
 
-def test_an_algorithm_without_when_is_computed_at_every_event(twins):
-    model = twins("""model M
+def test_an_algorithm_without_when_is_computed_at_every_event(compile_both):
+    model = compile_both("""model M
   input Real u;
   output Real y;
 algorithm

@@ -87,8 +87,8 @@ def state(model):
     return np.array([model.get("angle"), model.get("rate")])
 
 
-def test_exponential_decay_is_exact_to_its_last_digits(twins):
-    model = twins("""model Decay
+def test_exponential_decay_is_exact_to_its_last_digits(compile_both):
+    model = compile_both("""model Decay
   output Real x(start = 1, fixed = true);
 equation
   der(x) = -x;
@@ -99,8 +99,8 @@ end Decay;""")
         assert model.get("x") == pytest.approx(math.exp(-(k + 1) * 0.01), abs=1e-11)
 
 
-def test_the_method_has_order_four(twins):
-    model = twins(PENDULUM)
+def test_the_method_has_order_four(compile_both):
+    model = compile_both(PENDULUM)
     errors = []
     for h in (0.0025, 0.00125, 0.000625):
         model.initialize()
@@ -112,8 +112,8 @@ def test_the_method_has_order_four(twins):
 
 
 @pytest.mark.parametrize(("step_size", "count"), [(0.002, 1), (0.005, 1), (0.0051, 2), (0.01, 2), (0.033, 7)])
-def test_steps_are_split_into_equal_parts_of_at_most_five_milliseconds(twins, step_size, count):
-    model = twins(PENDULUM)
+def test_steps_are_split_into_equal_parts_of_at_most_five_milliseconds(compile_both, step_size, count):
+    model = compile_both(PENDULUM)
     model.initialize()
     model.step(0.0, step_size)
     x, h = np.array([2.0, 0.0]), step_size / count
@@ -125,8 +125,8 @@ def test_steps_are_split_into_equal_parts_of_at_most_five_milliseconds(twins, st
     assert state(model) == pytest.approx(x, rel=1e-14)
 
 
-def test_inputs_are_held_over_a_step_and_outputs_belong_to_its_end(twins):
-    model = twins(PENDULUM)
+def test_inputs_are_held_over_a_step_and_outputs_belong_to_its_end(compile_both):
+    model = compile_both(PENDULUM)
     model.initialize()
     x = np.array([2.0, 0.0])
     for k, inputs in model.run(50, seed=1):
@@ -136,8 +136,8 @@ def test_inputs_are_held_over_a_step_and_outputs_belong_to_its_end(twins):
     assert model.get("energy") == pytest.approx(rate**2 / 2 + 400 * (1 - math.cos(angle)), rel=1e-14)
 
 
-def test_time_is_that_of_each_stage(twins):
-    model = twins("""model M
+def test_time_is_that_of_each_stage(compile_both):
+    model = compile_both("""model M
   output Real x(start = 0, fixed = true);
 equation
   der(x) = 4*time^3;
@@ -147,8 +147,8 @@ end M;""")
     assert model.get("x") == pytest.approx(2**4 - 1, rel=1e-14)  # Simpson's rule is exact for cubics
 
 
-def test_c_and_python_agree_to_the_bit_in_a_mixed_model(twins):
-    model = twins(PLANT)
+def test_c_and_python_agree_to_the_bit_in_a_mixed_model(compile_both):
+    model = compile_both(PLANT)
     parameters = [v for v in model.c.block.variables if v.causality == "parameter"]
     for seed in range(4):
         if seed:
@@ -159,8 +159,8 @@ def test_c_and_python_agree_to_the_bit_in_a_mixed_model(twins):
     assert (model.get("ticks"), model.get("crossings")) > (30, 0)
 
 
-def test_components_and_arrays_of_states_follow_their_closed_form(twins):
-    model = twins(PLANT)
+def test_components_and_arrays_of_states_follow_their_closed_form(compile_both):
+    model = compile_both(PLANT)
     model.initialize()
     model.set(u=1.0)
     for k in range(100):
@@ -170,8 +170,8 @@ def test_components_and_arrays_of_states_follow_their_closed_form(twins):
     assert model.get("last") == pytest.approx(expected, abs=1e-9)
 
 
-def test_derivatives_may_stand_where_textbooks_write_them(twins):
-    model = twins("""model Forms
+def test_derivatives_may_stand_where_textbooks_write_them(compile_both):
+    model = compile_both("""model Forms
   type Angle = Real(unit = "rad");
   record Motion
     Real position(start = 1);
@@ -204,8 +204,8 @@ end Forms;""")
     assert model.get("slope") == pytest.approx(-2 * math.exp(-1), abs=1e-9)
 
 
-def test_sampled_values_choose_the_derivative_until_the_end_of_a_step(twins):
-    model = twins("""model M
+def test_sampled_values_choose_the_derivative_until_the_end_of_a_step(compile_both):
+    model = compile_both("""model M
   Boolean fast(start = false, fixed = true);
   output Real x(start = 0, fixed = true);
 equation
@@ -222,8 +222,8 @@ end M;""")
     assert values == pytest.approx([0.02, 0.04, 0.05, 0.06], abs=1e-12)
 
 
-def test_for_equations_give_every_state_its_own_equation(twins):
-    model = twins("""model Chain
+def test_for_equations_give_every_state_its_own_equation(compile_both):
+    model = compile_both("""model Chain
   constant Integer n = 4;
   output Real chain[n](start = {1, 0, 0, 0});
   output Real grid[5, 3](each start = 1);
@@ -249,8 +249,8 @@ end Chain;""")
     assert model.get("grid") == pytest.approx(np.exp(rates), abs=1e-9)
 
 
-def test_an_initial_equation_sets_a_state_from_a_parameter(twins):
-    model = twins(PLANT)
+def test_an_initial_equation_sets_a_state_from_a_parameter(compile_both):
+    model = compile_both(PLANT)
     model.set(w=5.0)
     model.initialize()
     assert model.python.get("s") == 2.5
@@ -258,8 +258,8 @@ def test_an_initial_equation_sets_a_state_from_a_parameter(twins):
 
 
 @pytest.mark.parametrize("ticks_per_step", [1, 2, 5])
-def test_ticks_act_where_they_lie_inside_a_step(twins, ticks_per_step):
-    model = twins(SAMPLED_LOOP)
+def test_ticks_act_where_they_lie_inside_a_step(compile_both, ticks_per_step):
+    model = compile_both(SAMPLED_LOOP)
     model.initialize()
     decay, speed, force = math.exp(-0.5 * 0.01), 0.0, 0.0
     for k in range(100 // ticks_per_step):
@@ -270,8 +270,8 @@ def test_ticks_act_where_they_lie_inside_a_step(twins, ticks_per_step):
         assert (model.get("speed"), model.get("force")) == pytest.approx((speed, force), abs=1e-11)
 
 
-def test_two_rates_beside_a_state(twins):
-    model = twins("""model M
+def test_two_rates_beside_a_state(compile_both):
+    model = compile_both("""model M
   output Real x(start = 0, fixed = true);
   output Real fast(start = 0, fixed = true);
   output Real slow(start = 0, fixed = true);
@@ -295,8 +295,8 @@ end M;""")
             assert (model.get("x"), model.get("fast"), model.get("slow")) == pytest.approx((x, fast, slow), rel=1e-12)
 
 
-def test_a_clock_that_drives_nothing_does_not_disturb(twins):
-    model = twins("""model M
+def test_a_clock_that_drives_nothing_does_not_disturb(compile_both):
+    model = compile_both("""model M
   output Real x(start = 1, fixed = true);
 equation
   der(x) = -x;
@@ -309,8 +309,8 @@ end M;""")
     assert model.get("x") == pytest.approx(math.exp(-1), abs=1e-10)
 
 
-def test_steps_shorter_than_the_period_meet_the_same_ticks(twins):
-    model = twins(SAMPLED_LOOP)
+def test_steps_shorter_than_the_period_meet_the_same_ticks(compile_both):
+    model = compile_both(SAMPLED_LOOP)
     results = []
     for h in (0.0025, 0.01):
         model.initialize()
@@ -320,8 +320,8 @@ def test_steps_shorter_than_the_period_meet_the_same_ticks(twins):
     assert results[0] == pytest.approx(results[1], abs=1e-11)
 
 
-def test_reinit_acts_at_the_ends_of_steps(twins):
-    model = twins("""model Ball
+def test_reinit_acts_at_the_ends_of_steps(compile_both):
+    model = compile_both("""model Ball
   parameter Real e = 0.8;
   output Real h(start = 1, fixed = true);
   output Real v(start = 0, fixed = true);
@@ -343,24 +343,24 @@ end Ball;""")
     assert -0.1 < model.get("h") < 1
 
 
-def test_outputs_of_a_model_with_states_are_continuous(twins):
-    variables = twins(PLANT).c.variables
+def test_outputs_of_a_model_with_states_are_continuous(compile_both):
+    variables = compile_both(PLANT).c.variables
     assert [variables[name].variability for name in ("q", "a", "ticks")] == ["continuous", "continuous", "discrete"]
     assert not any(name.startswith("der(") for name in variables)
 
 
-def test_only_models_with_states_carry_the_integrator(write):
-    sampled = write("""model M
+def test_only_models_with_states_carry_the_integrator(write_model):
+    sampled = write_model("""model M
   output Real y;
 equation
   y = time;
 end M;""")
     assert "runge_kutta.h" not in load_block(sampled).files
-    assert "runge_kutta.h" in load_block(write(PENDULUM)).files
+    assert "runge_kutta.h" in load_block(write_model(PENDULUM)).files
 
 
-def test_a_state_that_escapes_is_a_failure(twins):
-    model = twins("""model M
+def test_a_state_that_escapes_is_a_failure(compile_both):
+    model = compile_both("""model M
   input Real u;
   Real x(start = 1, fixed = true);
   output Real y;
@@ -374,8 +374,8 @@ end M;""")
         model.python.step(0.0, 0.1)
 
 
-def test_a_failure_in_a_stage_names_its_reason(twins):
-    model = twins("""model M
+def test_a_failure_in_a_stage_names_its_reason(compile_both):
+    model = compile_both("""model M
   parameter Integer n = 0;
   output Real x(start = 0, fixed = true);
   Integer k;

@@ -21,16 +21,16 @@ equation
 end Counter;"""
 
 
-def test_one_tick_per_step_and_no_drift_over_100_seconds(twins):
-    model = twins(COUNTER)
+def test_one_tick_per_step_and_no_drift_over_100_seconds(compile_both):
+    model = compile_both(COUNTER)
     model.initialize()
     for k in range(10_000):
         assert model.c.step(k * 0.01, 0.01) is None
         assert (model.get("n"), model.get("t")) == (k + 1, k * 0.01)
 
 
-def test_a_long_step_runs_all_its_ticks_with_held_inputs(twins):
-    model = twins(COUNTER)
+def test_a_long_step_runs_all_its_ticks_with_held_inputs(compile_both):
+    model = compile_both(COUNTER)
     model.initialize()
     model.set(u=2.0)
     model.step(0.0, 0.05)
@@ -39,8 +39,8 @@ def test_a_long_step_runs_all_its_ticks_with_held_inputs(twins):
     assert (model.get("n"), model.get("t")) == (10, 0.09)
 
 
-def test_steps_shorter_than_the_period_run_a_tick_where_it_lies(twins):
-    model = twins(COUNTER)
+def test_steps_shorter_than_the_period_run_a_tick_where_it_lies(compile_both):
+    model = compile_both(COUNTER)
     model.initialize()
     counts = []
     for k in range(8):
@@ -50,8 +50,8 @@ def test_steps_shorter_than_the_period_run_a_tick_where_it_lies(twins):
 
 
 @pytest.mark.parametrize(("start", "first"), [(3.0, 3.0), (0.005, 0.01), (7.28, 7.28), (-0.025, 0.0)])
-def test_the_first_tick_is_the_first_one_not_before_the_start_time(twins, start, first):
-    model = twins(COUNTER)
+def test_the_first_tick_is_the_first_one_not_before_the_start_time(compile_both, start, first):
+    model = compile_both(COUNTER)
     model.initialize(start)
     k = 0
     while model.get("n") == 0:
@@ -60,8 +60,8 @@ def test_the_first_tick_is_the_first_one_not_before_the_start_time(twins, start,
     assert model.get("t") == pytest.approx(first, abs=1e-12)
 
 
-def test_a_period_that_is_a_parameter_counts_from_the_initialization_on(twins):
-    model = twins(COUNTER)
+def test_a_period_that_is_a_parameter_counts_from_the_initialization_on(compile_both):
+    model = compile_both(COUNTER)
     assert model.c.variables["Ts"].variability == "fixed"
     model.set(Ts=0.02)
     model.initialize()
@@ -70,23 +70,23 @@ def test_a_period_that_is_a_parameter_counts_from_the_initialization_on(twins):
     assert model.c.block.step_size == 0.01
 
 
-def test_a_period_that_is_not_positive_is_a_failure(twins):
-    model = twins(COUNTER)
+def test_a_period_that_is_not_positive_is_a_failure(compile_both):
+    model = compile_both(COUNTER)
     model.set(Ts=0.0)
     assert model.c.initialize() == "the period of sample() must be positive"
     with pytest.raises(ComponentError, match=r"the period of sample\(\) must be positive"):
         model.python.initialize()
 
 
-def test_an_offset_delays_the_first_tick(twins):
-    model = twins(COUNTER.replace("sample(0, Ts)", "sample(0.03, Ts)"))
+def test_an_offset_delays_the_first_tick(compile_both):
+    model = compile_both(COUNTER.replace("sample(0, Ts)", "sample(0.03, Ts)"))
     model.initialize()
     model.step(0.0, 0.05)
     assert (model.get("n"), model.get("t")) == (2, 0.04)
 
 
-def test_two_rates_tick_together_where_they_meet(twins):
-    model = twins("""model M
+def test_two_rates_tick_together_where_they_meet(compile_both):
+    model = compile_both("""model M
   input Real u;
   output Integer fast(start = 0, fixed = true);
   output Integer slow(start = 0, fixed = true);
@@ -110,8 +110,8 @@ end M;""")
         assert [model.get(name) for name in ("fast", "slow", "seen", "held")] == [k + 1, k // 3 + 1, k // 3 + 1, held]
 
 
-def test_a_long_step_keeps_the_order_of_two_rates(twins):
-    model = twins("""model M
+def test_a_long_step_keeps_the_order_of_two_rates(compile_both):
+    model = compile_both("""model M
   output Integer a(start = 0, fixed = true);
   output Integer b(start = 0, fixed = true);
 equation
@@ -127,8 +127,8 @@ end M;""")
     assert model.get("a") == 12345
 
 
-def test_a_model_without_a_clock_is_computed_at_the_end_of_the_step(twins):
-    model = twins("""model M
+def test_a_model_without_a_clock_is_computed_at_the_end_of_the_step(compile_both):
+    model = compile_both("""model M
   parameter Real k = 2;
   input Real u;
   output Real y;
@@ -145,8 +145,8 @@ end M;""")
     assert model.get("y") == 17.5
 
 
-def test_a_failure_is_over_with_the_next_step(twins):
-    model = twins(COUNTER.replace("    t = time;", '    t = time;\n    assert(u < 1, "too large");'))
+def test_a_failure_is_over_with_the_next_step(compile_both):
+    model = compile_both(COUNTER.replace("    t = time;", '    t = time;\n    assert(u < 1, "too large");'))
     model.initialize()
     model.set(u=5.0)
     assert model.c.step(0.0, 0.01) == "too large (Counter.mo:11)"

@@ -27,8 +27,8 @@ def omc(tmp_path, monkeypatch):
     return install
 
 
-def test_the_command_loads_packages_and_file_and_builds_a_co_simulation_fmu(omc, write, tmp_path):
-    path = write(MODEL)
+def test_the_command_loads_packages_and_file_and_builds_a_co_simulation_fmu(omc, write_model, tmp_path):
+    path = write_model(MODEL)
     (tmp_path / "Library").mkdir()
     (tmp_path / "Library" / "package.mo").write_text("package Library\nend Library;\n")
     asked = omc(f'cp "$1" "{tmp_path}/asked.mos"; echo archive > M.fmu')
@@ -54,8 +54,8 @@ def test_a_member_of_a_package_is_loaded_with_its_package(omc, tmp_path):
     assert lines[1].startswith("buildModelFMU(Library.M, ")
 
 
-def test_errors_are_told_with_file_and_line(omc, write, tmp_path):
-    path = write(MODEL)
+def test_errors_are_told_with_file_and_line(omc, write_model, tmp_path):
+    path = write_model(MODEL)
     omc(f'echo "true"; echo "[{path}:4:3-4:13:writable] Error: Variable y not found in scope M."; echo "Error: no code"; exit 1')
     with pytest.raises(InputError) as refused:
         export_with_omc(path, tmp_path / "m.fmu")
@@ -63,17 +63,17 @@ def test_errors_are_told_with_file_and_line(omc, write, tmp_path):
     assert not (tmp_path / "m.fmu").exists()
 
 
-def test_silence_is_an_error_too(omc, write, tmp_path):
-    path = write(MODEL)
+def test_silence_is_an_error_too(omc, write_model, tmp_path):
+    path = write_model(MODEL)
     omc("exit 0")
     with pytest.raises(InputError, match="OpenModelica has made no FMU: it printed nothing"):
         export_with_omc(path, tmp_path / "m.fmu")
 
 
-def test_without_omc_the_error_says_what_is_missing(write, tmp_path, monkeypatch):
+def test_without_omc_the_error_says_what_is_missing(write_model, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(InputError, match='there is no "omc" on PATH'):
-        export_with_omc(write(MODEL), tmp_path / "m.fmu")
+        export_with_omc(write_model(MODEL), tmp_path / "m.fmu")
 
 
 def test_a_missing_file_is_refused(omc, tmp_path):

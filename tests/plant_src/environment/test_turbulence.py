@@ -101,7 +101,7 @@ def test_turbulence_has_drydens_spectrum(gusts, axis, transverse, measured: Meas
     length = turbulence_scale_lengths(6.096)[transverse and axis == 2]
     frequency, density = welch(values[axis], 1 / GRID_STEP, nperseg=8192)
     omega = 2 * math.pi * frequency
-    expected = dryden(omega, turbulence.deviations[axis], length, 5.0, transverse)
+    expected = dryden(omega, turbulence.intensities[axis], length, 5.0, transverse)
     for low, high in ((0.15, 0.6), (0.6, 2.5), (2.5, 10.0), (10.0, 40.0)):
         band = (omega > low) & (omega < high)
         found, wanted, case = (density[band] / (2 * math.pi)).mean(), expected[band].mean(), "uvw"[axis]

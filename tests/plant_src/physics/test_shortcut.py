@@ -37,7 +37,7 @@ def rows(trial: WorldHarness, steps: int) -> np.ndarray:
 
 @pytest.fixture
 def always_bullet(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(clearance, "NEAR", EVERYWHERE)
+    monkeypatch.setattr(clearance, "NEAR_DISTANCE", EVERYWHERE)
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def no_bullet(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_flight_is_the_same_bit_for_bit_and_landing_within_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
     shortcut = rows(trial := landing(), 200)
     assert trial["uav.contact.vessel"]
-    monkeypatch.setattr(clearance, "NEAR", EVERYWHERE)
+    monkeypatch.setattr(clearance, "NEAR_DISTANCE", EVERYWHERE)
     bullet = rows(landing(), 200)
     assert np.array_equal(shortcut[:51], bullet[:51])  # flight and approach
     assert np.abs(shortcut - bullet).max() < 1e-6
@@ -118,7 +118,7 @@ def flown(near: float | None, monkeypatch: pytest.MonkeyPatch) -> Result:
     assembly = cosim.load("demo1_box")
     if near is not None:
         world = assembly.system.components["plant"]
-        monkeypatch.setattr(sys.modules[type(world._fleet.clearance).__module__], "NEAR", near)
+        monkeypatch.setattr(sys.modules[type(world._fleet.clearance).__module__], "NEAR_DISTANCE", near)
     return cosim.api.execute(assembly)
 
 

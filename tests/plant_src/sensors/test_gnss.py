@@ -17,7 +17,7 @@ def moving(trial, steps):
     rows = []
     for _ in range(steps):
         now = (trial.steps + 1) * 0.01
-        trial.feed(vehicle__position=(now, 0, 0)).step()
+        trial.set_inputs(vehicle__position=(now, 0, 0)).step()
         rows.append((now, trial["position.x"], trial["time"]))
     return np.array(rows)
 

@@ -137,7 +137,7 @@ def drive(tracker, seconds, speed=1.0, latency=0.1, marker=None):
         if marker is not None:
             sight = max(0, n - 5)
             inputs |= {"marker__position": np.add((speed * sight * STEP, 2.0, 0.3), marker), "marker__time": sight * STEP}
-        tracker.feed(**inputs)
+        tracker.set_inputs(**inputs)
         tracker.step()
     return tracker
 

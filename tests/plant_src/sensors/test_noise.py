@@ -53,7 +53,7 @@ def test_gauss_markov_keeps_its_standard_deviation_whatever_the_step():
 
 
 def test_other_processes_and_hash_seeds_draw_the_same():
-    code = "from plant_src.sensors.noise import Noise; print(Noise(2, 'imu', 'uav.imu', 3)[777])"
+    code = "from plant_src.sensors.noise import CounterBasedNoise; print(CounterBasedNoise(2, 'imu', 'uav.imu', 3)[777])"
     found = {
         subprocess.run(
             [sys.executable, "-c", code], env={"PYTHONHASHSEED": seed}, capture_output=True, check=True, text=True

@@ -35,7 +35,7 @@ def box(corner_low, corner_high):
 
 def changed(trial, empty):
     """Pixels (n, 2), right and down, in which two pictures differ."""
-    rows, columns = np.nonzero((trial.component.picture() != empty.component.picture()).any(axis=2))
+    rows, columns = np.nonzero((trial.component.render() != empty.component.render()).any(axis=2))
     return np.stack([columns, rows], axis=1)
 
 
@@ -64,9 +64,9 @@ def test_it_sees_another_vehicle_but_not_its_carrier(camera):
 
 
 def test_level_ahead_the_horizon_is_in_the_middle(camera):
-    picture = camera(parameters={"tilt": np.pi / 2}).component.picture().astype(float)
+    picture = camera(parameters={"tilt": np.pi / 2}).component.render().astype(float)
     jump = np.abs(np.diff(picture.mean(axis=(1, 2))))
-    water = camera().component.picture().reshape(-1, 3).mean(axis=0)
+    water = camera().component.render().reshape(-1, 3).mean(axis=0)
     assert (picture[-1].mean(axis=0) - water)[0] == pytest.approx(0, abs=12)
     assert jump[HEIGHT // 2 - 12 : HEIGHT // 2 + 2].max() == jump.max()
 
@@ -80,7 +80,7 @@ def test_files_are_written_at_the_rate(camera, tmp_path):
 
 
 def test_the_same_pose_gives_the_same_picture(camera):
-    pictures = [camera(vehicles={"uav": "ar_drone", "usv": "strider"}).component.picture().tobytes() for _ in range(2)]
+    pictures = [camera(vehicles={"uav": "ar_drone", "usv": "strider"}).component.render().tobytes() for _ in range(2)]
     assert pictures[0] == pictures[1]
 
 

@@ -36,8 +36,8 @@ def test_water_below_a_tilted_vehicle(sensor, measured):
 
 def test_a_platform_in_between(sensor):
     trial = sensor(platforms=TABLE)
-    assert trial.feed(vehicle__position=(11.9, 1.9, 2.0)).step()["distance"] == pytest.approx(1.5, abs=1e-6)
-    assert trial.feed(vehicle__position=(12.1, 1.9, 2.0)).step()["distance"] == pytest.approx(2.0, abs=1e-6)
+    assert trial.set_inputs(vehicle__position=(11.9, 1.9, 2.0)).step()["distance"] == pytest.approx(1.5, abs=1e-6)
+    assert trial.set_inputs(vehicle__position=(12.1, 1.9, 2.0)).step()["distance"] == pytest.approx(2.0, abs=1e-6)
 
 
 def test_the_mounting_turns_with_the_vehicle(sensor):
@@ -66,15 +66,15 @@ def test_the_deck_of_a_heeling_vessel_where_it_is(sensor, measured):
 def test_the_deck_moves_on_and_leaves_the_water(sensor):
     trial = sensor(vessels={"usv": "strider"}, inputs={"vehicle__position": (0, 0, 2.0), "usv__deck__position": (0, 0, 0.27)})
     assert trial["distance"] == pytest.approx(2.0 - 0.27, abs=1e-6)
-    trial.feed(usv__deck__position=((DECK_X[0] - DECK_X[1]) / 2 - 0.01, 0, 0.27)).step()
+    trial.set_inputs(usv__deck__position=((DECK_X[0] - DECK_X[1]) / 2 - 0.01, 0, 0.27)).step()
     assert trial["distance"] == pytest.approx(2.0, abs=1e-6)
 
 
 def test_out_of_reach_is_told_as_the_largest_distance_and_not_valid(sensor):
     trial = sensor(inputs={"vehicle__position": (0, 0, 12.5)})
     assert (trial["distance"], trial["valid"]) == (12.0, False)
-    assert trial.feed(vehicle__position=(0, 0, 0.05)).step()["valid"] is False
-    assert trial.feed(vehicle__position=(0, 0, 11.9)).step()["valid"] is True
+    assert trial.set_inputs(vehicle__position=(0, 0, 0.05)).step()["valid"] is False
+    assert trial.set_inputs(vehicle__position=(0, 0, 11.9)).step()["valid"] is True
 
 
 def test_without_water_the_beam_goes_on(sensor):

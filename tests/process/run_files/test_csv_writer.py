@@ -88,18 +88,18 @@ def test_lines_have_the_format_of_results(table, tmp_path):
 
 
 def test_the_file_is_whole_at_every_moment_even_when_an_update_is_interrupted(table, tmp_path, monkeypatch):
-    monkeypatch.setattr("cosim.process.run_files.csv_writer.FIRST", 0.0)
-    monkeypatch.setattr("cosim.process.run_files.csv_writer.EVERY", 0.0)
+    monkeypatch.setattr("cosim.process.run_files.csv_writer.FIRST_UPDATE_DELAY", 0.0)
+    monkeypatch.setattr("cosim.process.run_files.csv_writer.UPDATE_INTERVAL", 0.0)
     journal = running(table, tmp_path)
     csv, next_lines = LiveCsvWriter(journal), CsvLineReader.read_lines
     csv.update()
     for n, rows in enumerate((1, 2, 600, 601, 1100, ROWS_COUNT)):
         journal[ROW_COUNT] = rows
         if n % 2:
-            monkeypatch.setattr(CsvLineReader, "next", lambda self, *more: next_lines(self, *more) and interrupt())
+            monkeypatch.setattr(CsvLineReader, "read_lines", lambda self, *more: next_lines(self, *more) and interrupt())
             with pytest.raises(KeyboardInterrupt):
                 csv.update()
-            monkeypatch.setattr(CsvLineReader, "next", next_lines)
+            monkeypatch.setattr(CsvLineReader, "read_lines", next_lines)
         csv.update()
         assert (tmp_path / "result.csv").read_bytes() == expected(table, tmp_path, rows)
 

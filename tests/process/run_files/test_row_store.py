@@ -24,7 +24,7 @@ def recorded(every=1, **more):
 
 @pytest.fixture
 def small_chunks(monkeypatch):
-    for name, value in (("CHUNK", 1000), ("PIECE", 7), ("LARGE", 0)):
+    for name, value in (("CHUNK_BYTES", 1000), ("BATCH_VALUES", 7), ("MAX_MEMORY_BYTES", 0)):
         monkeypatch.setattr(f"cosim.process.run_files.row_store.{name}", value)
 
 

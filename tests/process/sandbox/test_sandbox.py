@@ -34,13 +34,13 @@ needs_bubblewrap = pytest.mark.skipif(not AVAILABLE.bubblewrap, reason="no bubbl
 WORKER = """
 import json, os, socket, subprocess, sys
 from pathlib import Path
-from cosim.process.sandbox import Settings, active, enter, interpreter_folders
+from cosim.process.sandbox import SandboxSettings, enter_sandbox, interpreter_folders, probe_restrictions
 settings = json.loads(sys.argv[1])
 for kind in ("readable", "writable"):
     settings[kind] = tuple(Path(p) for p in settings.get(kind, ()))
 if settings.pop("interpreter", True):
     settings["readable"] += interpreter_folders()
-enter(Settings(**settings))
+enter_sandbox(SandboxSettings(**settings))
 try:
     outcome = eval(sys.argv[2])
 except BaseException as error:
@@ -171,7 +171,7 @@ class TestLimits:
 
     def test_a_free_process_claims_nothing(self):
         free = subprocess.run(
-            [sys.executable, "-c", "from cosim.process.sandbox import active; print(active())"],
+            [sys.executable, "-c", "from cosim.process.sandbox import probe_restrictions; print(probe_restrictions())"],
             capture_output=True,
             text=True,
             check=True,
@@ -187,8 +187,8 @@ os.kill(os.getpid(), 9)
 """
 CHILD = """
 import os, time
-from cosim.process.sandbox import Settings, enter
-enter(Settings(confine="never", parent=os.getppid()))
+from cosim.process.sandbox import SandboxSettings, enter_sandbox
+enter_sandbox(SandboxSettings(confine="never", parent=os.getppid()))
 print(os.getpid(), flush=True)
 time.sleep(100)
 """
@@ -211,7 +211,7 @@ def test_a_folder_that_is_not_there_is_refused(tmp_path):
 
 
 def test_confinement_that_the_kernel_lacks_is_refused_before_anything_is_changed(monkeypatch):
-    monkeypatch.setattr(landlock, "version", lambda: 0)
+    monkeypatch.setattr(landlock, "abi_version", lambda: 0)
     limits = resource.getrlimit(resource.RLIMIT_AS)
     with pytest.raises(InputError, match=r"Landlock is needed \(Linux 5.13"):
         enter_sandbox(SandboxSettings(confine="required"))
@@ -220,7 +220,7 @@ def test_confinement_that_the_kernel_lacks_is_refused_before_anything_is_changed
 
 @needs_landlock
 def test_a_network_that_the_kernel_cannot_close_is_refused(monkeypatch):
-    monkeypatch.setattr(landlock, "version", lambda: 3)
+    monkeypatch.setattr(landlock, "abi_version", lambda: 3)
     with pytest.raises(InputError, match="needs Landlock 4"):
         enter_sandbox(SandboxSettings(confine="required"))
 

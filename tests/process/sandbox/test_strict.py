@@ -64,7 +64,7 @@ def prowling(home: Path, port: int = 9, **more: Any) -> Path:
         "port": port,
         "process": os.getpid(),
     }
-    component = {"python": "prowler.py:Prowler", "arguments": arguments}
+    component = {"python": "prowler.py:SandboxProbe", "arguments": arguments}
     content = {"name": "prowling", "stop_time": 0.1, "step_size": 0.01, "components": {"p": component}, **more}
     file = home / "project/prowling.json"
     file.write_text(json.dumps(content))

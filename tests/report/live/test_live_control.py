@@ -138,7 +138,7 @@ def test_rows_come_as_columns_of_floats(recorded):
 
 
 def test_rows_of_long_runs_are_thinned(recorded, monkeypatch):
-    monkeypatch.setattr(cosim.report.live.feed, "MOST_VALUES", 4 * 26)
+    monkeypatch.setattr(cosim.report.live.feed, "MAX_VALUES", 4 * 26)
     feed = RowFeed(*recorded, expected_rows=101)
     assert (feed.stride, feed.available(1), feed.available(9), feed.capacity) == (4, 1, 3, 26)
     assert np.frombuffer(feed.read(1, 25), "<f4").reshape(4, 25)[2].tolist() == list(range(4, 101, 4))

@@ -19,9 +19,9 @@ def run(tmp_path):
 def page(chromium, run):
     context = chromium.new_context(viewport={"width": 640, "height": 480})
     page = context.new_page()
-    page.complaints, page.requests = [], []
-    page.on("pageerror", lambda error: page.complaints.append(str(error)))
-    page.on("console", lambda said: page.complaints.append(said.text) if said.type == "error" else None)
+    page.console_messages, page.requests = [], []
+    page.on("pageerror", lambda error: page.console_messages.append(str(error)))
+    page.on("console", lambda said: page.console_messages.append(said.text) if said.type == "error" else None)
     page.on("request", lambda request: page.requests.append(request.url))
     page.goto(run.url)
     page.wait_for_selector("#replay[data-ready]", timeout=60_000)
@@ -58,7 +58,7 @@ def test_a_run_is_watched_steered_and_replayed(run, page):
     page.get_by_role("button", name="Resume", exact=True).click()
     assert run.wait() in (0, 3)
     waiting(page, "document.querySelector('.state').textContent === 'Finished'")
-    assert run.about()["live_events"] == [{"time": pytest.approx(0.01 * rows), "set": {"usv.speed_command": 0.25}}]
+    assert run.run_metadata()["live_events"] == [{"time": pytest.approx(0.01 * rows), "set": {"usv.speed_command": 0.25}}]
     result = Result.from_csv(run.out / "result.csv")
     assert page.evaluate("cosimReplay.live.run.rows") == len(result.time)
     waiting(page, "cosimReplay.player.time === 6")
@@ -69,4 +69,4 @@ def test_a_run_is_watched_steered_and_replayed(run, page):
     page.locator(".play").click()
     waiting(page, "cosimReplay.player.time > 2 && cosimReplay.player.playing")
     assert {url for url in page.requests if not url.startswith((run.url, "data:"))} == set()
-    assert [text for text in page.complaints if "400 (Bad Request)" not in text] == []
+    assert [text for text in page.console_messages if "400 (Bad Request)" not in text] == []

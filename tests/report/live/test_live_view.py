@@ -74,8 +74,8 @@ def test_what_was_set_stands_in_the_result_as_events_that_repeat_it(begun):
     described = {each["name"]: each["value"] for each in begun.page()["adjustable"]}
     assert (described["usv.speed_command"], described[FORCE]) == (0.5, -2)
     assert begun.end() in (0, 3)
-    assert "values were set 2 times while it ran" in begun.said
-    events = begun.about()["live_events"]
+    assert "values were set 2 times while it ran" in begun.output
+    events = begun.run_metadata()["live_events"]
     assert [event["set"] for event in events] == [{"usv.speed_command": 0.5}, {FORCE: -2}]
     assert round(events[1]["time"] - events[0]["time"], 9) == 0.07
     result = Result.from_csv(begun.out / "result.csv")
@@ -114,7 +114,7 @@ def test_an_interrupt_ends_a_run_that_is_paused(begun):
     begun.command("set", name=FORCE, value=1.5)
     begun.process.send_signal(signal.SIGINT)
     assert begun.wait() == 130
-    about = begun.about()
+    about = begun.run_metadata()
     assert (about["failure"], [event["set"] for event in about["live_events"]]) == ("interrupted", [{FORCE: 1.5}])
 
 
@@ -123,7 +123,7 @@ def test_a_run_that_is_killed_leaves_what_was_set(begun):
     number = begun.process.pid
     os.kill(int(Path(f"/proc/{number}/task/{number}/children").read_text().split()[0]), signal.SIGKILL)
     assert begun.wait() == 1
-    assert [event["set"] for event in begun.about()["live_events"]] == [{FORCE: 1.5}]
+    assert [event["set"] for event in begun.run_metadata()["live_events"]] == [{FORCE: 1.5}]
     assert len(Result.from_csv(begun.out / "result.csv").time)
 
 
@@ -132,7 +132,7 @@ def test_a_run_that_is_killed_leaves_what_was_set(begun):
 
 @pytest.mark.parametrize("path", ["/", "/rows?first=0&version=-1", "/wrong/", "//", "/?token"])
 def test_without_the_token_nobody_gets_in(paused, path):
-    reply = paused.ask("GET", path)
+    reply = paused.request("GET", path)
     assert (reply.status, reply.body) == (403, b"Forbidden")
 
 
@@ -143,7 +143,9 @@ def test_another_host_is_refused(paused, method, host):
     host = host and host.format(port=paused.host.rpartition(":")[2])
     body = {"body": b"{}", "Content_Length": "2", "Content_Type": "application/json"} if method == "POST" else {}
     origin = {"Origin": f"http://{host}"} if method == "POST" else {}
-    assert paused.ask(method, f"{paused.path}{'command' if method == 'POST' else ''}", **body, Host=host, **origin).status == 403
+    assert (
+        paused.request(method, f"{paused.path}{'command' if method == 'POST' else ''}", **body, Host=host, **origin).status == 403
+    )
 
 
 def test_localhost_is_this_machine(paused):
@@ -211,7 +213,7 @@ def test_there_is_nothing_else_to_get(paused, resource, status):
 
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS", "HEAD"])
 def test_there_is_nothing_else_to_do(paused, method):
-    assert paused.ask(method, paused.path).status == 501
+    assert paused.request(method, paused.path).status == 501
 
 
 def test_the_page_may_ask_its_server_only_and_nobody_may_frame_it(paused):

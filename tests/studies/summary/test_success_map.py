@@ -54,21 +54,21 @@ def success_map(tmp_path):
 def test_shares_are_those_of_the_runs_of_a_cell(success_map):
     shares = {(*cell.labels.values(),): (cell.passed, len(cell.runs)) for cell in success_map.cells.values()}
     assert shares == {("old", 0.5): (3, 3), ("old", 1.0): (1, 3), ("new", 0.5): (0, 3), ("new", 1.0): (0, 0)}
-    assert math.isnan(success_map.cell(None, None, "new", 1.0).share)
+    assert math.isnan(success_map.cell(None, None, "new", 1.0).success_rate)
 
 
 def test_a_run_without_success_is_shown_before_all_others(success_map):
     cell = success_map.cell(None, None, "old", 1.0)
-    assert (cell.shown.number, cell.why) == (4, "the first that is no success")
+    assert (cell.representative_run.number, cell.selection_reason) == (4, "the first that is no success")
 
 
 def test_of_successes_the_median_one_is_shown(success_map):
     cell = success_map.cell(None, None, "old", 0.5)
-    assert (cell.shown.number, cell.why) == (2, "the median of landing.lateral_error")
+    assert (cell.representative_run.number, cell.selection_reason) == (2, "the median of landing.lateral_error")
 
 
 def test_nothing_is_shown_where_nothing_was_run(success_map):
-    assert success_map.cell(None, None, "new", 1.0).shown is None
+    assert success_map.cell(None, None, "new", 1.0).representative_run is None
 
 
 def test_panels_tell_further_factors_apart(tmp_path):

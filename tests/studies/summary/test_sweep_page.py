@@ -41,7 +41,7 @@ class Reader(HTMLParser):
 def lag(make_lag):
     """The folder of a sweep."""
     found = make_lag()
-    found.call("sweep", found.write(**STUDY), "--workers", 1)
+    found.run_command("sweep", found.write(**STUDY), "--workers", 1)
     return found
 
 
@@ -58,7 +58,7 @@ def page(results):
 @pytest.fixture(scope="module")
 def replayed(lag, page, results):
     """The page after the sweep was called again, for replays, and what that call said."""
-    done = lag.call("sweep", "sweep.json", "--workers", 1, "--replays")
+    done = lag.run_command("sweep", "sweep.json", "--workers", 1, "--replays")
     return Reader((results / "sweep.html").read_text()), done
 
 
@@ -110,7 +110,7 @@ def test_a_run_that_crashes_has_its_command_and_is_named(replayed):
 
 def test_a_replay_is_made_once(lag, replayed, results):
     before = {path: path.stat().st_mtime_ns for path in (results / "replays").iterdir()}
-    lag.call("sweep", "sweep.json", "--workers", 1, "--replays")
+    lag.run_command("sweep", "sweep.json", "--workers", 1, "--replays")
     assert {path: path.stat().st_mtime_ns for path in (results / "replays").iterdir()} == before
 
 

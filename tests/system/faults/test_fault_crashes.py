@@ -151,14 +151,14 @@ def test_an_fmu_that_overwrites_what_the_supervisor_reads(fmus, runner, tmp_path
     assert done.code == 1, done.err
     assert "lag: " in done.err
     assert (tmp_path / "out/result.csv").exists()
-    assert (done.temporaries, done.processes, done.changes) == ([], [], [])
+    assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
 
 
 def test_an_fmu_that_takes_all_descriptors_costs_no_rows(fmus, runner, tmp_path, version):
     done = runner.run(tmp_path, fmus(version, "DoStep 6 open_files"))
     assert done.code in (0, 1)
     assert len(done.rows) >= 6
-    assert (done.temporaries, done.processes, done.changes) == ([], [], [])
+    assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
 
 
 def test_an_fmu_that_empties_all_open_files_is_named(fmus, runner, tmp_path, version):
@@ -167,7 +167,7 @@ def test_an_fmu_that_empties_all_open_files_is_named(fmus, runner, tmp_path, ver
     assert "lag: fmi" in done.err
     assert "ended by signal 7 (SIGBUS" in done.err
     assert (done.code, done.rows) == (1, [])
-    assert (done.temporaries, done.processes, done.changes) == ([], [], [])
+    assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
 
 
 def test_an_fmu_that_empties_all_open_files_reaches_no_rows_from_its_own_process(fmus, runner, tmp_path, version):
@@ -180,7 +180,7 @@ def test_an_fmu_that_closes_all_files_is_named(fmus, runner, tmp_path, version):
     done = runner.run(tmp_path, fmus(version, "DoStep 6 close_all"))
     assert "lag: a call that closed the files of the process failed: " in done.err
     assert (done.code, len(done.rows)) == (1, ALL)
-    assert (done.temporaries, done.processes, done.changes) == ([], [], [])
+    assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
 
 
 @pytest.mark.parametrize("what", ["fork", "daemon"])
@@ -218,7 +218,7 @@ def test_one_fmu_alone_is_supervised_too(fmus, runner, tmp_path, version, what):
     done = runner.simulate(tmp_path, fmus(version, f"DoStep 6 {what}"), limit=20)
     assert (done.code, len(done.rows)) == (1, 6), done.err
     assert f"fmi{version}DoStep" in done.err
-    assert (done.temporaries, done.processes, done.changes) == ([], [], [])
+    assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
 
 
 def test_the_innocent_are_not_accused(fmus, runner, tmp_path, version):

@@ -41,7 +41,7 @@ def test_it_is_named_and_the_rows_are_kept(fmus, runner, tmp_path, case):
     assert (done.code, len(done.rows)) == (code, rows), done.err
     assert words in done.err
     assert "Traceback" not in done.err
-    assert (done.temporaries, done.processes, done.changes) == ([], [], [])
+    assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
 
 
 def test_the_array_is_read_when_all_is_well(fmus, runner, tmp_path):

@@ -183,7 +183,7 @@ class TestSandbox:
     def test_it_writes_to_its_temporary_folder_which_goes_with_it(self, confined):
         done = confined("DoStep 6 write_temporary", "--sandbox")
         assert "fault_was_here 1" in done.err
-        assert (done.code, done.temporaries) == (0, [])
+        assert (done.code, done.temporary_files) == (0, [])
 
     @pytest.mark.parametrize(("words", "answer"), [((), "Connection refused"), (("--sandbox",), "Permission denied")])
     def test_it_opens_no_connection(self, confined, words, answer):
@@ -206,14 +206,14 @@ class TestSandbox:
     def test_strictly_it_has_neither_files_nor_network_nor_other_processes(self, confined, tmp_path, order, words):
         done = confined(order, "--sandbox", "strict", "--isolation", "run")
         assert re.search(words, done.err)
-        assert (done.code, len(done.rows), done.processes, done.temporaries) == (0, ALL, [], [])
+        assert (done.code, len(done.rows), done.processes, done.temporary_files) == (0, ALL, [], [])
         assert not (tmp_path / "fault_was_here").exists()
 
     @needs_bubblewrap
     def test_strictly_a_crash_is_named_and_the_rows_are_kept(self, confined, version):
         done = confined("DoStep 6 segv", "--sandbox", "strict", "--isolation", "run")
         assert f"lag: fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.err
-        assert (done.code, len(done.rows), done.processes, done.temporaries) == (1, 6, [], [])
+        assert (done.code, len(done.rows), done.processes, done.temporary_files) == (1, 6, [], [])
 
     @pytest.mark.skipif(not may_leave_network(), reason="user namespaces are forbidden here")
     @pytest.mark.parametrize(("words", "answer"), [((), "0 Success"), (("--sandbox",), "-1 Network is unreachable")])

@@ -60,7 +60,7 @@ def test_a_bad_return_stops_the_run_with_one_line_and_keeps_the_rows(fmus, runne
     assert [row["lag.y"] for row in done.rows] == [lag_output(n) for n in range(case.rows)]
     assert case.words.format(f=function_name(version, case.order.split()[0])) in done.err
     assert "Traceback" not in done.err
-    assert (done.temporaries, done.processes, done.changes) == ([], [], [])
+    assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def test_one_fmu_alone_keeps_its_rows_too(fmus, runner, tmp_path, version, what)
     done = runner.simulate(tmp_path, fmus(version, f"DoStep 6 {what}"))
     assert (done.code, len(done.rows)) == (1, 6), done.err
     assert f"fmi{version}DoStep" + T5 in done.err
-    assert (done.temporaries, done.changes) == ([], [])
+    assert (done.temporary_files, done.changes) == ([], [])
 
 
 def test_a_scenario_tells_an_fmu_by_its_parameter_to_misbehave(fmus, runner, tmp_path, version):

@@ -46,7 +46,7 @@ def judge(fmus, runner, names: list[str], version: int, n: int, what: str, **con
     assert len(done.rows) == (expected_rows(names, n) if done.code and name not in LAST else STEP_COUNT + 1), where
     assert done.code == 0 or re.search(r"^(WARNING |ERROR )?lag: ", done.err, re.MULTILINE), where
     assert violations(fmus.lines()) == [], where
-    assert [folder for folder in done.temporaries if folder.startswith("cosim-")] == [], where
+    assert [folder for folder in done.temporary_files if folder.startswith("cosim-")] == [], where
     assert (done.processes, done.changes) == ([], []), where
 
 

@@ -36,7 +36,7 @@ class CommandFolder:
             "name": "robust",
             "stop_time": stop,
             "step_size": 0.01,
-            "components": {"ticker": {"python": f"{TICKER}:Ticker", "arguments": arguments}},
+            "components": {"ticker": {"python": f"{TICKER}:SlowCounter", "arguments": arguments}},
             **more,
         }
         path = self.folder / "robust.json"

@@ -53,7 +53,7 @@ class Disk(CommandFolder):
         self._environment = {"LD_PRELOAD": str(library), "FULL_DISK": str(self.out), "FULL_DISK_LEFT": str(self._left)}
 
     def begin(self, **scenario: object) -> None:
-        figure = {"name": "picture", "python": f"{TICKER}:picture"}
+        figure = {"name": "picture", "python": f"{TICKER}:plot_count"}
         file = self.scenario(figures=[figure], **scenario)
         self.process = self.start("run", file, *RUN, environment=self._environment)
 
@@ -140,7 +140,7 @@ def test_a_folder_that_may_not_be_written(workplace, command, parent):
     folder.chmod(0o755)
     assert done.returncode == 2, done.stderr
     assert done.stderr.splitlines() == [f'cannot write to "{folder / "new"}": Permission denied']
-    assert workplace.left() == []
+    assert workplace.leftovers() == []
 
 
 @pytest.mark.parametrize("command", ["run", "simulate"])
@@ -151,7 +151,7 @@ def test_a_file_where_a_folder_should_be(workplace, command):
     assert done.returncode == 2
     assert done.stderr.splitlines() == [f'cannot write to "{workplace.folder / "file"}": File exists']
     assert (workplace.folder / "file").read_text() == "mine"
-    assert workplace.left() == []
+    assert workplace.leftovers() == []
 
 
 def test_a_folder_where_the_result_should_be(workplace):
@@ -159,7 +159,7 @@ def test_a_folder_where_the_result_should_be(workplace):
     done = workplace.run("run", workplace.scenario(0.1), *RUN)
     assert done.returncode == 2
     assert done.stderr.splitlines() == [f'cannot replace "{workplace.out / "result.csv"}": Is a directory']
-    assert workplace.left() == []
+    assert workplace.leftovers() == []
 
 
 def test_a_path_as_long_as_paths_may_be(workplace):
@@ -167,4 +167,4 @@ def test_a_path_as_long_as_paths_may_be(workplace):
     words = ("run", workplace.scenario(0.1), "--output-dir", "/".join(["d" * 200] * 17))
     done = workplace.run(*words)
     assert done.returncode == 0, done.stderr
-    assert workplace.left() == []
+    assert workplace.leftovers() == []

@@ -50,10 +50,10 @@ def test_while_a_component_is_at_work(workplace, isolation, place, kept):
 
 @pytest.mark.parametrize(("place", "more"), [("kpi", {}), ("figure", {"figures": [entry("slow_figure")]})])
 def test_when_all_rows_are_there(workplace, place, more):
-    kpis = [entry("rows"), *([entry("slow_kpi")] if place == "kpi" else [])]
+    kpis = [entry("row_count"), *([entry("slow_kpi")] if place == "kpi" else [])]
     interrupted(workplace, place, kpis=kpis, **more)
     assert rows(workplace) == 51
-    assert json.loads((workplace.out / "kpis.json").read_text()) == {"rows.number": 51}
+    assert json.loads((workplace.out / "kpis.json").read_text()) == {"row_count.number": 51}
 
 
 def test_a_component_that_does_not_listen_is_ended_after_a_while(workplace):
@@ -75,4 +75,4 @@ def test_the_end_of_the_terminal_is_no_loss(workplace):
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 130, errors
     assert rows(workplace) > before > 0
-    assert workplace.left() == []
+    assert workplace.leftovers() == []

@@ -92,10 +92,10 @@ def test_the_next_run_removes_what_a_killed_one_left(workplace):
     killed = Killed(workplace, "both", 1.5)
     killed.begin()
     killed.kill()
-    assert len(workplace.left()) == 2  # the rows, and a folder in tmp
+    assert len(workplace.leftovers()) == 2  # the rows, and a folder in tmp
     done = workplace.run("run", workplace.scenario(stop=0.1), "--output-dir", "out", "--no-report")
     assert done.returncode == 0, done.stderr
-    assert workplace.left() == []
+    assert workplace.leftovers() == []
     assert len(cosim.Result.from_csv(workplace.out / "result.csv").time) == 11
 
 
@@ -142,5 +142,5 @@ def test_one_fmu_alone_leaves_nothing_when_its_process_is_killed(workplace):
     os.kill(child_processes(process.pid)[0], signal.SIGKILL)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 1, errors
-    assert workplace.left() == []
+    assert workplace.leftovers() == []
     assert len(cosim.Result.from_csv(workplace.folder / "x.csv").time) > 1

@@ -28,7 +28,7 @@ def probe(probes):
 def scenario(place: CommandFolder, probe: Path, stop: float = 1000.0) -> Path:
     """A ticker and two FMUs, each in a process of its own."""
     fmus = {name: {"fmu": str(probe), "isolation": "fmu"} for name in ("lag", "twin")}
-    return place.scenario(stop, components={"ticker": {"python": f"{TICKER}:Ticker"}, **fmus})
+    return place.scenario(stop, components={"ticker": {"python": f"{TICKER}:SlowCounter"}, **fmus})
 
 
 def family(supervisor: int) -> dict[str, list[int]]:
@@ -42,7 +42,7 @@ OTHERS = [pytest.param(whom, marks=pytest.mark.long) for whom in ("child", "ever
 @pytest.mark.parametrize("whom", ["supervisor", "worker", *OTHERS])
 def test_nothing_stays_and_the_rows_can_be_read(workplace, probe, whom):
     process = workplace.start("run", scenario(workplace, probe), "--output-dir", "out", "--no-report")
-    assert workplace.reached("started"), process.communicate()
+    assert workplace.wait_for_file("started"), process.communicate()
     started = float((workplace.folder / "started").read_text())
     time.sleep(random.Random(whom).uniform(0.4, 0.8))  # noqa: S311 - the same moment each time
     for victim in family(process.pid)[whom]:
@@ -53,7 +53,7 @@ def test_nothing_stays_and_the_rows_can_be_read(workplace, probe, whom):
     if whom in ("child", "worker"):
         assert process.returncode == 1
         assert "signal 9 (SIGKILL" in errors
-        assert workplace.left() == []
+        assert workplace.leftovers() == []
     if whom == "worker":
         assert "lag: " in json.loads((workplace.out / "run.json").read_text())["failure"]
     rows = cosim.Result.from_csv(workplace.out / "result.csv")
@@ -62,7 +62,7 @@ def test_nothing_stays_and_the_rows_can_be_read(workplace, probe, whom):
     (workplace.folder / "started").unlink()
     again = workplace.run("run", scenario(workplace, probe, 0.1), "--output-dir", "out", "--no-report")
     assert again.returncode == 0, again.stderr
-    assert workplace.left() == []
+    assert workplace.leftovers() == []
 
 
 def test_a_killed_worker_leaves_no_descriptor_in_the_importer(workplace, probe, monkeypatch):
@@ -124,8 +124,8 @@ def test_what_a_killed_program_left_goes_at_the_start_of_the_next_one(workplace,
 
 FORGETFUL = """
 import os, sys
-from cosim.process.temporary_folders import FMU, LockedFolder
-folder = LockedFolder(FMU)
+from cosim.process.temporary_folders import FMU_PREFIX, LockedFolder
+folder = LockedFolder(FMU_PREFIX)
 if os.fork() == 0:
     sys.exit()
 os.wait()

@@ -61,7 +61,7 @@ def worker():
 
     yield start
     for process in started:
-        process.end()
+        process.stop()
 
 
 @pytest.fixture
@@ -147,7 +147,7 @@ def test_a_process_that_ended_between_two_commands_is_missed(children, worker):
 def test_what_a_process_prints_is_passed_on_up_to_a_limit(worker, capfd):
     process = worker(lambda line: os.write(1, b"x" * 1_000_000) and line)
     assert process.request(STEP_COMMAND, 5.0) == STEP_DONE
-    process.end()
+    process.stop()
     assert capfd.readouterr().err.count("x") == 1 << 16
 
 
@@ -157,7 +157,7 @@ def test_python_code_prints_as_c_code_does(worker, capfd, monkeypatch, tmp_path)
         monkeypatch.setattr("sys.stdout", stream)
         process = worker(lambda line: print("hello") or line)
         assert process.request(STEP_COMMAND, 5.0) == STEP_DONE
-    process.end()
+    process.stop()
     assert capfd.readouterr().err == "hello\n"
 
 
@@ -227,16 +227,16 @@ def test_an_instance_that_is_never_bound_needs_no_process(children, probe):
 IMPORTER = """
 import os, sys
 sys.path.insert(0, sys.argv[1])
-from helpers import system
+from helpers import make_system
 from pathlib import Path
-from cosim.components.fmi import FmuFile, Isolation, instantiate
+from cosim.components.fmi import FmuFile, Isolation, create_component
 from cosim.engine.run_loop import Settings, simulate
-from cosim.core.time_grid import exact
+from cosim.core.time_grid import exact_fraction
 def killed(n, count):
     print(Path(f"/proc/self/task/{os.getpid()}/children").read_text(), flush=True)
     os.kill(os.getpid(), 9)
-fmu = instantiate(FmuFile(Path(sys.argv[2])), "a", isolation=Isolation())
-simulate(system({"a": fmu}), Settings(exact(0), exact(1), exact("1/100")), [killed])
+fmu = create_component(FmuFile(Path(sys.argv[2])), "a", isolation=Isolation())
+simulate(make_system({"a": fmu}), Settings(exact_fraction(0), exact_fraction(1), exact_fraction("1/100")), [killed])
 """
 
 

@@ -167,7 +167,12 @@ def test_a_good_fmu_has_no_findings(version, probes):
         Member("resources/stored", b"x", deflated=False),
         with_headers(EXTRA, mode=0),
         with_headers(EXTRA, mode=0o100755),
-        replace(EXTRA, local={"flags": 0x808, "crc": 0, "compressed": 0, "size": 0}, central={"flags": 0x808}, behind=bytes(16)),
+        replace(
+            EXTRA,
+            local={"flags": 0x808, "crc": 0, "compressed": 0, "size": 0},
+            central={"flags": 0x808},
+            trailing_bytes=bytes(16),
+        ),
         replace(
             EXTRA,
             local={

@@ -193,4 +193,4 @@ def test_this_machine_is_called_as_fmpy_calls_it():
     ],
 )
 def test_other_machines_have_the_names_of_the_standard(machine, names):
-    assert (machine.folder(2), machine.folder(3)) == names
+    assert (machine.binary_folder(2), machine.binary_folder(3)) == names
