@@ -16,7 +16,7 @@ from cosim.core.errors import ComponentError, InputError, Problem, did_you_mean
 
 from . import world_settings
 from .catalogue import MODELS
-from .environment.surroundings import EnvironmentModel
+from .environment.environment_model import EnvironmentModel
 from .physics.body import InvalidStateError, create_compound_shape, set_dynamics
 from .physics.client import connect, preconnect, pybullet
 from .physics.compiled_equations import library_path

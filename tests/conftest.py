@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import pytest
-from foreign import probe, probes
-from validation import MeasurementCheck, ValidationReport
+from plant_validation import MeasurementCheck, ValidationReport
+from probe_fmus import probe, probes
 
 from cosim.engine import EXECUTORS
 from cosim.engine import native_available as native_available
@@ -29,7 +29,7 @@ def pytest_collection_modifyitems(config, items):
 
 @pytest.fixture
 def measured(request):
-    """States a quantity of the plant beside its reference (tests/support/validation.py)."""
+    """States a quantity of the plant beside its reference (tests/support/plant_validation.py)."""
     return MeasurementCheck(request.node)
 
 

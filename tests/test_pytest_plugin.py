@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-BLOCKS = Path(__file__).parent / "scenario" / "blocks.py"
+BLOCKS = Path(__file__).parent / "scenario" / "pythonfmu_blocks.py"
 KPIS = [{"name": "y", "python": "cosim.kpis:final", "arguments": {"signal": "a.y"}}]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from .fleet import GRAVITY, MAX_ROTOR_SPEED
 from .fleet.pid import Pid
-from .fleet.sampled import SampledController
+from .fleet.sampled_controller import SampledController
 
 
 class AltitudeController(SampledController):

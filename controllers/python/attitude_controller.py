@@ -6,7 +6,7 @@ from typing import Any
 
 from .fleet import DEGREES_PER_RADIAN, wrap_angle
 from .fleet.pid import Pid
-from .fleet.sampled import SampledController
+from .fleet.sampled_controller import SampledController
 
 
 class AttitudeController(SampledController):

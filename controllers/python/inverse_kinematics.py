@@ -8,7 +8,7 @@ from typing import Any
 from .fleet import GRAVITY, MAX_ROTOR_SPEED, limit
 from .fleet.butterworth import Butterworth
 from .fleet.pid import Pid
-from .fleet.sampled import SampledController
+from .fleet.sampled_controller import SampledController
 
 
 class InverseKinematics(SampledController):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .fleet import MAX_ROTOR_SPEED, limit
-from .fleet.sampled import SampledController
+from .fleet.sampled_controller import SampledController
 
 
 class Mixer(SampledController):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .fleet import SAMPLE_PERIOD, FlightMode, horizontal_norm, limit
-from .fleet.sampled import SampledController
+from .fleet.sampled_controller import SampledController
 
 
 class Vtol(SampledController):

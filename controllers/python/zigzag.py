@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from .fleet.sampled import SampledController
+from .fleet.sampled_controller import SampledController
 
 
 class Zigzag(SampledController):

@@ -52,7 +52,7 @@ def run_with_view(
 ) -> int:
     """Do as `supervision.protected` while the page is served; `run` gets the pipe that commands come through."""
     from ..process.temporary_folders import temporary_run_folder
-    from ..report.live.viewing import LiveView, has_display, open_browser
+    from ..report.live.live_view import LiveView, has_display, open_browser
 
     viewing = LiveView(port)
     click.echo(f"live view: {viewing.url}")

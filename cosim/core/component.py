@@ -3,6 +3,7 @@
 A component lives through the FMI Co-Simulation life cycle:
 
     bind                                            once: the arrays that carry its inputs and outputs
+    instantiate                                     once: foreign code is loaded here, not before
     set                                             parameters and start values
     enter_initialization_mode                       { set_inputs, get_outputs } may be repeated here
     exit_initialization_mode                        get_outputs: the initial outputs
@@ -175,6 +176,9 @@ class Component(Protocol):
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         """From now on inputs are read from and outputs written to these arrays."""
+
+    def instantiate(self) -> None:
+        """Create the instance and acquire its resources (FMI: fmi3InstantiateCoSimulation); called once, after `bind`."""
 
     def set_inputs(self) -> None:
         """Take over the values in the bound input arrays."""

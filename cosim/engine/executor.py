@@ -22,8 +22,8 @@ from .iteration import FixedPointIteration, IterationPhase
 from .parallel import MEASURED_STEPS, ParallelGroup, ThreadPool, available_processors, releases_gil
 from .plan import Loop, Phase, Plan, Step
 from .recorder import Recorder
+from .transfer_calls import DelayLine, TransferCall, compile_transfer
 from .transfer_plan import Transfer
-from .transfers import DelayLine, TransferCall, compile_transfer
 
 #: places in the marker: number of the present call, macro steps finished, rows recorded
 MARKER_CALL, MARKER_STEPS, MARKER_ROWS, MARKER_SIZE = 0, 1, 2, 3
@@ -71,10 +71,12 @@ class Executor(ABC):
     # -- initialization ------------------------------------------------------------------------------------------------
 
     def instantiate(self) -> None:
-        """Bind all components to their arrays: FMUs are extracted, loaded and instantiated here."""
+        """Bind all components to their arrays and instantiate them: FMUs are extracted and loaded here."""
         for name, component in self.plan.system.components.items():
             with calling_component(name, "bind", "load"):
                 component.bind(self.plan.inputs.ports[name], self.plan.outputs.ports[name])
+            with calling_component(name, "instantiate", "load"):
+                component.instantiate()
 
     def initialize(self) -> None:
         """From instantiated components to the initial outputs at the start time, recorded as row 0.

@@ -13,7 +13,7 @@ from ..process.journal import calling_component
 from .component_step import abbreviate_names
 from .layout import Dtype
 from .plan import Plan
-from .transfers import compile_transfer
+from .transfer_calls import compile_transfer
 
 #: a loop may take so many rounds more than a chain, until outputs change by no more than this, relative to 1 + their size
 EXTRA_ITERATIONS, TOLERANCE = 100, 1e-12

@@ -19,7 +19,7 @@ from ..process.journal import calling_component
 from .component_step import ScheduledStep, abbreviate_names
 from .layout import Dtype, Layout
 from .plan import Loop
-from .transfers import TransferCall
+from .transfer_calls import TransferCall
 
 #: the moves of a phase, those that are made in the first round only, and its turns
 IterationPhase = tuple[Sequence[TransferCall], Sequence[TransferCall], Sequence[ScheduledStep]]

@@ -17,7 +17,7 @@ from .component_step import ScheduledStep
 from .executor import MARKER_CALL, MARKER_ROWS, MARKER_STEPS, Executor
 from .parallel import MEASURED_STEPS
 from .plan import Phase
-from .transfers import TransferCall, contiguous_views
+from .transfer_calls import TransferCall, contiguous_views
 
 #: from so many on it is numpy that picks bytes out of floats faster
 MIN_NUMPY_FLOATS = 256

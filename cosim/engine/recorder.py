@@ -14,7 +14,7 @@ from ..core.system import Endpoint
 from ..process.run_files.row_store import compute_in_chunks, open_row_store
 from .layout import ArrayPosition
 from .plan import Plan
-from .transfers import MAX_SINGLE_COPIES
+from .transfer_calls import MAX_SINGLE_COPIES
 
 #: puts the present values into a row, given its number
 RowWriter = Callable[[int], object]

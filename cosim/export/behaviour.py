@@ -98,6 +98,7 @@ def _record_trace(path: Path, random: np.random.Generator, vary_parameters: bool
     failure = ""
     try:
         component.bind(inputs, outputs)
+        component.instantiate()
         if vary_parameters:
             _set_random_parameters(component, random, ("fixed", "tunable"))
         for _ in _simulate(component, inputs, random):

@@ -24,9 +24,9 @@ from pathlib import Path
 from ..core.errors import ComponentError, join_alternatives
 from . import journal as journals
 from .journal import CALL_NUMBER, CHANGE_COUNT, EXIT_CODE, ROW_COUNT, STEP_COUNT, Journal, Phase
-from .run_files.csv_writer import LiveCsvWriter
 from .run_files.folder import read_header
-from .sandbox.process import detach, lower_limit
+from .run_files.live_csv_writer import LiveCsvWriter
+from .sandbox.limits import detach, lower_limit
 from .standard_streams import ignoring_broken_pipe
 from .temporary_folders import temporary_run_folder
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from ..results import Result
 from ..results.files import writing_atomically
 from ..results.kpi import ResultFunction
-from .numbers import write_figure_data
+from .figure_data import write_figure_data
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..core.errors import InputError
 from ..results import Kpis, Result
-from ..scenario.functions import load_function
+from ..scenario.named_functions import load_function
 
 NamedCall = tuple[str, Callable[..., Any], Mapping[str, Any]]
 

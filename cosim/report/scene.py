@@ -26,8 +26,8 @@ from typing import Any
 from ..components.python_class import load_object
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, did_you_mean
 from ..results.files import to_json_types
-from ..scenario.functions import load_function
 from ..scenario.json_document import read_document
+from ..scenario.named_functions import load_function
 
 LIST_KEYS = ("bodies", "fixed", "markers", "views", "spans", "plots")
 

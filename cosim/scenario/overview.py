@@ -7,7 +7,7 @@ from typing import Any
 
 from ..core.system import Connection, Group, Stage, System
 from ..engine.transfer_plan import unit_conversion
-from .assembly import PreparedRun
+from .prepared_run import PreparedRun
 
 
 def describe_system(assembly: PreparedRun) -> dict[str, Any]:

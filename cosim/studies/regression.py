@@ -160,8 +160,8 @@ class _FinishedRun:
 
     def draw_tubes(self, comparison: Comparison, directory: Path) -> Path:
         """The worst signals in their tubes, as a file in `directory`."""
+        from ..report.comparison_figure import draw_tubes
         from ..report.figures import draw_figure, save_figure
-        from ..report.tubes import draw_tubes
 
         arguments = {"reference": self.reference, "tolerances": self.tolerances, "comparison": comparison}
         path = directory / "tubes.png"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .noise import Channel, ColouredNoise
+from .coloured_noise import Channel, ColouredNoise
 
 
 @dataclass(frozen=True)

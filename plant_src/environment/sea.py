@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .seeds import generator
+from .random_generator import generator
 from .spectrum import GRAVITY, SPECTRA
 
 #: the part of a spectrum that becomes waves, in peak frequencies

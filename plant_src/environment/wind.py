@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .noise import Channel, ColouredNoise
+from .coloured_noise import Channel, ColouredNoise
 
 FOOT = 0.3048
 

@@ -16,7 +16,7 @@ from .body import ContactBody, InvalidStateError, PlanarBody, body_class
 from .clearance import BoundingBox, Clearance
 from .client import pybullet
 from .contacts import Contacts
-from .memory import VehicleArrays
+from .vehicle_arrays import VehicleArrays
 
 #: so often a step of Bullet is made again at most
 MAX_REPEATS = 10

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from .fmu_base import ReplicaFmu
 from .interface import OUTPUTS
-from .unit import ReplicaFmu
 
 
 class Bus(ReplicaFmu):

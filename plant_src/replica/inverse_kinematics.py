@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from ..vehicles.ar_drone.parameters import THRUST_COEFFICIENT
+from .fmu_base import ReplicaFmu
 from .pid import Pid
-from .unit import ReplicaFmu
 
 MASS = 0.441  # kg, as the controller has it
 MAX_SPEED = 5000.0  # 1/min

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from .fmu_base import ReplicaFmu
 from .interface import ROTORS
 from .pid import Pid
-from .unit import ReplicaFmu
 
 POSITION_INPUTS = ("vehicle.position.x", "vehicle.position.y")
 TARGET_INPUTS = ("target.position.x", "target.position.y")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from .fmu_base import ReplicaFmu
 from .pid import Pid
-from .unit import ReplicaFmu
 
 MAX_WAYPOINTS = 32
 

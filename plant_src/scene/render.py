@@ -10,12 +10,21 @@ import numpy as np
 from cosim.core.errors import InputError, did_you_mean
 
 from .cameras import CAMERAS, View
-from .land import add_land
-from .light import FAR_HILLS_COLOUR, HAZE_DISTANCE, Rays, horizon_row, pixel_rays, sky_colour, water_distance, water_pixels
-from .looks import vehicle_parts
 from .mission import Mission
-from .models import static_parts
-from .stage import Picture, SolidRenderer
+from .parts import static_parts
+from .shores import add_land
+from .sky_and_water import (
+    FAR_HILLS_COLOUR,
+    HAZE_DISTANCE,
+    Rays,
+    horizon_row,
+    pixel_rays,
+    sky_colour,
+    water_distance,
+    water_pixels,
+)
+from .solid_renderer import Picture, SolidRenderer
+from .vehicle_parts import vehicle_parts
 
 
 class Layer:

@@ -14,8 +14,8 @@ import numpy as np
 from ..catalogue import VEHICLE_MODELS
 from ..environment import sea
 from ..environment.sea import Sea
-from .looks import vehicle_parts
-from .models import platform_parts
+from .parts import platform_parts
+from .vehicle_parts import vehicle_parts
 
 Scene = dict[str, Any]
 

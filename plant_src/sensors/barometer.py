@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from .noise import gauss_markov_factors
-from .sampled import Measurement, SampledSensor, timing_variables
-from .signals import real_parameter, real_variable, seed_parameter
+from .counter_based_noise import gauss_markov_factors
+from .sampled_sensor import Measurement, SampledSensor, timing_variables
+from .signal_component import real_parameter, real_variable, seed_parameter
 
 #: international standard atmosphere, ISO 2533: p = p0 (1 - L z / T0)^EXPONENT
 STANDARD_PRESSURE = 101325.0  # Pa

@@ -14,14 +14,14 @@ from ..catalogue import VEHICLE_MODELS
 from ..json_reader import JsonReader
 from ..physics.client import pybullet
 from ..scene.cameras import UP, View
-from ..scene.light import HAZE_DISTANCE, HORIZON_COLOUR, WATER_COLOUR, pixel_rays, sky_colour
-from ..scene.looks import vehicle_parts
-from ..scene.models import Part, platform_parts
-from ..scene.stage import SolidRenderer
-from .frames import quaternion_product, to_world
-from .optics import camera_attitude
-from .sampled import Measurement, SampledSensor, timing_variables
-from .signals import pose_inputs, raise_problems, real_parameter, real_variable
+from ..scene.parts import Part, platform_parts
+from ..scene.sky_and_water import HAZE_DISTANCE, HORIZON_COLOUR, WATER_COLOUR, pixel_rays, sky_colour
+from ..scene.solid_renderer import SolidRenderer
+from ..scene.vehicle_parts import vehicle_parts
+from .pinhole_camera import camera_attitude
+from .rotations import quaternion_product, to_world
+from .sampled_sensor import Measurement, SampledSensor, timing_variables
+from .signal_component import pose_inputs, raise_problems, real_parameter, real_variable
 
 _POSE_SIZE = 7  # numbers of a position and an orientation
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .frames import Vector, to_world
 from .history import History
-from .signals import SignalComponent, pose_inputs, real_parameter, real_variable, vector_variables
+from .rotations import Vector, to_world
+from .signal_component import SignalComponent, pose_inputs, real_parameter, real_variable, vector_variables
 
 
 class DeckTracker(SignalComponent):

@@ -12,7 +12,15 @@ from cosim.core.errors import did_you_mean
 from cosim.core.units import parse_unit
 
 from ..json_reader import JsonReader
-from .signals import SignalComponent, boolean_variable, check_seed, raise_problems, real_parameter, real_variable, seed_parameter
+from .signal_component import (
+    SignalComponent,
+    boolean_variable,
+    check_seed,
+    raise_problems,
+    real_parameter,
+    real_variable,
+    seed_parameter,
+)
 
 #: what happens to the affected signals
 FAULT_MODES = ("normal", "frozen", "stuck", "missing")

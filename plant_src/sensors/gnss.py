@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..json_reader import JsonReader
-from .noise import gauss_markov_factors
-from .parameters import GNSS_RECEIVERS
-from .sampled import Measurement, SampledSensor, timing_variables
-from .signals import boolean_variable, check_seed, raise_problems, real_parameter, seed_parameter, vector_variables
+from .counter_based_noise import gauss_markov_factors
+from .device_data import GNSS_RECEIVERS
+from .sampled_sensor import Measurement, SampledSensor, timing_variables
+from .signal_component import boolean_variable, check_seed, raise_problems, real_parameter, seed_parameter, vector_variables
 
 
 class Gnss(SampledSensor):

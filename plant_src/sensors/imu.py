@@ -15,10 +15,18 @@ from typing import NamedTuple
 from cosim.core.component import Variable
 
 from ..json_reader import JsonReader
-from .frames import Vector, midpoint_attitude, to_body
-from .noise import CounterBasedNoise, gauss_markov_factors
-from .parameters import IMU_DEVICES, Numbers
-from .signals import SignalComponent, check_seed, raise_problems, real_parameter, real_variable, seed_parameter, vector_variables
+from .counter_based_noise import CounterBasedNoise, gauss_markov_factors
+from .device_data import IMU_DEVICES, Numbers
+from .rotations import Vector, midpoint_attitude, to_body
+from .signal_component import (
+    SignalComponent,
+    check_seed,
+    raise_problems,
+    real_parameter,
+    real_variable,
+    seed_parameter,
+    vector_variables,
+)
 
 GRAVITY = 9.81  # m/s2, as in the equations of the vehicles
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from .frames import euler_angles, to_body
-from .sampled import Measurement, SampledSensor, timing_variables
-from .signals import real_parameter, real_variable, seed_parameter, vector_variables
+from .rotations import euler_angles, to_body
+from .sampled_sensor import Measurement, SampledSensor, timing_variables
+from .signal_component import real_parameter, real_variable, seed_parameter, vector_variables
 
 #: east, north and up (T): about 40 degrees north in Europe, from the World Magnetic Model 2025, rounded
 EARTH_FIELD = (0.5e-6, 25.5e-6, -37.0e-6)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .frames import Vector, euler_angles, inverse_quaternion, quaternion_product, to_body, to_world
-from .noise import normal_to_uniform
-from .optics import camera_attitude, project, to_camera_axes
-from .sampled import Measurement, SampledSensor, timing_variables
-from .signals import boolean_variable, pose_inputs, real_parameter, real_variable, seed_parameter, vector_variables
+from .counter_based_noise import normal_to_uniform
+from .pinhole_camera import camera_attitude, project, to_camera_axes
+from .rotations import Vector, euler_angles, inverse_quaternion, quaternion_product, to_body, to_world
+from .sampled_sensor import Measurement, SampledSensor, timing_variables
+from .signal_component import boolean_variable, pose_inputs, real_parameter, real_variable, seed_parameter, vector_variables
 
 
 class MarkerCamera(SampledSensor):

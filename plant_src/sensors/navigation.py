@@ -11,7 +11,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .frames import (
+from .history import History
+from .imu import GRAVITY
+from .magnetometer import EARTH_FIELD
+from .rotations import (
     Quaternion,
     Vector,
     cross,
@@ -23,10 +26,7 @@ from .frames import (
     to_body,
     to_world,
 )
-from .history import History
-from .imu import GRAVITY
-from .magnetometer import EARTH_FIELD
-from .signals import SignalComponent, real_parameter, real_variable, vector_variables
+from .signal_component import SignalComponent, real_parameter, real_variable, vector_variables
 
 _STATE_ATTRIBUTES = (
     "_position",

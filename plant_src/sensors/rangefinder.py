@@ -11,9 +11,17 @@ from ..json_reader import JsonReader
 from ..physics.body import create_compound_shape
 from ..physics.client import pybullet
 from ..vehicles.common.shapes import Box
-from .frames import Vector, to_world
-from .sampled import Measurement, SampledSensor, timing_variables
-from .signals import boolean_variable, check_seed, pose_inputs, raise_problems, real_parameter, real_variable, seed_parameter
+from .rotations import Vector, to_world
+from .sampled_sensor import Measurement, SampledSensor, timing_variables
+from .signal_component import (
+    boolean_variable,
+    check_seed,
+    pose_inputs,
+    raise_problems,
+    real_parameter,
+    real_variable,
+    seed_parameter,
+)
 
 _POSE_SIZE = 7  # numbers of a position and an orientation
 _HIT_BODY, _HIT_FRACTION = 0, 2  # fields of what Bullet says of a ray

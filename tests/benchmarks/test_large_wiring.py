@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from lag import lag_fmu
+from lag_fmus import lag_fmu
 
 import cosim
 

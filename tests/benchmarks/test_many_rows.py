@@ -9,7 +9,7 @@ import subprocess
 import sys
 
 import pytest
-from lag import lag_fmu
+from lag_fmus import lag_fmu
 
 ROWS = 10_000_000
 #: asked for (MB)

@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 from bullet_calls import record_calls
-from importer import executor_label, executors
-from measure import Stopwatch, measure_rounds, print_heading, print_rows
+from cosim_contender import executor_label, executors
+from cost_measurement import Stopwatch, measure_rounds, print_heading, print_rows
 
 import cosim
 from cosim.engine import ExecutorKind

@@ -6,10 +6,10 @@ Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_one_fmu.py
 from __future__ import annotations
 
 import pytest
-from importer import cpu_per_step, executor_label, executors, ring_system, single_fmu_system
-from lag import lag_fmu
-from limit import CLimit
-from measure import measure_rounds, print_heading, print_rows
+from c_limit import CLimit
+from cosim_contender import cpu_per_step, executor_label, executors, ring_system, single_fmu_system
+from cost_measurement import measure_rounds, print_heading, print_rows
+from lag_fmus import lag_fmu
 
 STEPS = 100_000
 WIDTH = 1000

@@ -8,9 +8,9 @@ from __future__ import annotations
 from fractions import Fraction
 
 import pytest
-from busy import slow_fmu
-from importer import executors
-from measure import measure_rounds, print_heading, print_rows
+from cosim_contender import executors
+from cost_measurement import measure_rounds, print_heading, print_rows
+from slow_fmus import slow_fmu
 
 from cosim.components.fmi import FmuFile, create_component
 from cosim.core.system import Parallel, System

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from measure import MedianCost, measure_rounds, print_heading, print_rows
+from cost_measurement import MedianCost, measure_rounds, print_heading, print_rows
 
 from cosim.core.component import Ports
 from cosim.engine.initialization import copy_start_values

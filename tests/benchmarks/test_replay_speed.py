@@ -7,7 +7,7 @@ import os
 from statistics import median
 
 import pytest
-from browser import SOFTWARE_RENDERING_FLAGS, open_browser
+from chromium import SOFTWARE_RENDERING_FLAGS, open_browser
 
 import cosim
 from cosim.report.replay import write_replay

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable
 
 import pytest
-from measure import measure_rounds, print_heading, print_rows
+from cost_measurement import measure_rounds, print_heading, print_rows
 
 COMMANDS = {
     "python -c pass": ["-c", "pass"],

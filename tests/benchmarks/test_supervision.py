@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from measure import measure_rounds, print_heading, print_rows
+from cost_measurement import measure_rounds, print_heading, print_rows
 
 pytestmark = pytest.mark.benchmark
 

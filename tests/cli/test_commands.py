@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-BLOCKS = ROOT / "tests/scenario/blocks.py"
+BLOCKS = ROOT / "tests/scenario/pythonfmu_blocks.py"
 
 
 def cosim(*arguments, cwd=None, **more):

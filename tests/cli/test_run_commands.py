@@ -6,7 +6,7 @@ import sys
 import time
 
 import pytest
-from busy import slow_fmu
+from slow_fmus import slow_fmu
 
 from cosim.results import Result
 

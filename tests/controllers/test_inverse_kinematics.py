@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import fact_sheet
+import controller_reference
 import numpy as np
 import pytest
 from controller_fmu import ControllerFmu
@@ -38,7 +38,7 @@ class Reference:
         self.p, self.weight = p, p["mass"] * 9.81
         limits = (p["force_min"], p["force_max"])
         gains = (p["altitude_P"], p["altitude_I"], p["altitude_D"], p["altitude_N"])
-        self.pid = fact_sheet.Pid(*gains, limits, self.weight)
+        self.pid = controller_reference.Pid(*gains, limits, self.weight)
         self.sos = butter(15, p["filter_frequency"], fs=100, output="sos")
         self.state = sosfilt_zi(self.sos) * self.weight
 

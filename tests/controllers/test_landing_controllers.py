@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from helpers import connection
+from systems import connection
 
 import cosim
 from cosim.core import resources

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from math import pi
 from typing import Any
 
-import fact_sheet
+import controller_reference
 import numpy as np
 import pytest
 
@@ -269,7 +269,7 @@ def erratic(rng: np.random.Generator, k: int, altitude: float, offset: np.ndarra
 def test_agrees_with_its_restatement_on_erratic_flights(controller: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
     parameters = random_parameters(rng) if seed else DEFAULTS
-    vtol, reference = controller("vtol", parameters if seed else {}), fact_sheet.Vtol(parameters)
+    vtol, reference = controller("vtol", parameters if seed else {}), controller_reference.Vtol(parameters)
     altitude, offset, seen = 0.532, np.zeros(2), [IDLE]
     for k in range(2500):
         inputs = erratic(rng, k, altitude, offset)

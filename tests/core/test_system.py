@@ -1,5 +1,5 @@
 from fakes import FakeComponent, gain, inputs, outputs
-from helpers import make_system
+from systems import make_system
 
 from cosim.core.component import Variable
 from cosim.core.units import parse_unit

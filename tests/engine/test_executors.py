@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fakes import FakeComponent
-from helpers import endpoint
+from systems import endpoint
 
 from cosim.components.fmi import FmuFile, Isolation, create_component
 from cosim.core.component import DTYPES, Variable

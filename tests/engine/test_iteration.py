@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 from fakes import FakeComponent, gain, inputs, integrator, outputs
-from helpers import connection, make_system, run_system
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+from systems import connection, make_system, run_system
 
 from cosim.api import load
 from cosim.components.python_class import PythonFmuComponent

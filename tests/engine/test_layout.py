@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from fakes import FakeComponent
-from helpers import endpoint, make_system
+from systems import endpoint, make_system
 
 from cosim.core.component import Variable
 from cosim.core.time_grid import TimeGrid, exact_fraction

@@ -9,7 +9,7 @@ from threading import Timer
 import numpy as np
 import pytest
 from fakes import FakeComponent, counter, outputs
-from helpers import endpoint, make_system
+from systems import endpoint, make_system
 
 import cosim.engine.pacer
 from cosim.core.errors import InputError, LateError

@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import pytest
 from fakes import FakeComponent, counter, gain, inputs, integrator, outputs
-from helpers import endpoint, make_system, run_system
+from systems import endpoint, make_system, run_system
 
 from cosim.components.fmi import FmuFile, create_component
 from cosim.core.component import StepResult, Variable

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from validation import MeasurementCheck
+from plant_validation import MeasurementCheck
 
 import cosim
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pybullet
 import pytest
-from worlds import PLATFORM, WorldHarness, quadcopter_settings, vessel_settings
+from world_harness import PLATFORM, WorldHarness, quadcopter_settings, vessel_settings
 
 from cosim.core.errors import ComponentError, InputError
 from plant_src.world import World

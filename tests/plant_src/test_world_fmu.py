@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
-from validation import MeasurementCheck
-from worlds import WorldHarness
+from plant_validation import MeasurementCheck
+from world_harness import WorldHarness
 
 import cosim
 from cosim.export.foreign.python_class import write_python_fmu

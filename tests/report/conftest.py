@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from browser import open_browser
+from chromium import open_browser
 
 import cosim
 

@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 
 from click.testing import CliRunner
-from test_runs import write
+from test_run_folders import write
 
 from cosim.cli.commands.plot import command
 from cosim.core.errors import InputError
@@ -59,7 +59,7 @@ def test_run_says_where_its_scenario_is(tmp_path):
     import cosim
     from cosim.results import write_run
 
-    block = Path(__file__).parents[1] / "scenario/blocks.py"
+    block = Path(__file__).parents[1] / "scenario/pythonfmu_blocks.py"
     scenario = {"name": "small", "stop_time": 1, "step_size": 1, "components": {"a": {"python": f"{block}:Gain"}}}
     (tmp_path / "small.json").write_text(json.dumps(scenario))
     write_run(cosim.run(tmp_path / "small.json"), tmp_path / "run")

@@ -8,8 +8,8 @@ import pytest
 
 from cosim.core.recording import Recording
 from cosim.report.diagram import WIDTH
-from cosim.report.html import write_report
 from cosim.report.replay import write_replay
+from cosim.report.run_page import write_report
 from cosim.results import Result
 from plant_src.environment import sea
 

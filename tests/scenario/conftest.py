@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-BLOCKS = Path(__file__).parent / "blocks.py"
+BLOCKS = Path(__file__).parent / "pythonfmu_blocks.py"
 
 
 class ScenarioFolder:

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from helpers import make_system, run_system
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Integer, Real, String
+from systems import make_system, run_system
 
 from cosim.components.python_class import PythonFmuComponent
 from cosim.core.errors import ComponentError

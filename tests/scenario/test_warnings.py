@@ -1,11 +1,11 @@
 """Scenarios that can run, though something in them is probably a mistake."""
 
 import pytest
-from helpers import connection
+from systems import connection
 
 import cosim
 from cosim.core import resources
-from cosim.scenario.warnings import find_warnings
+from cosim.scenario.plausibility import find_warnings
 
 SHIPPED = sorted((resources.root() / "scenarios").glob("*.json"))
 BOTH = [connection("plant.ship", "pilot.vehicle"), connection("pilot.motor", "plant.ship.motor")]

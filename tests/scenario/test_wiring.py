@@ -1,7 +1,7 @@
 """Names, prefixes, ports: what a scenario's connections and parameters mean."""
 
 import pytest
-from helpers import connection
+from systems import connection
 
 import cosim
 from cosim.core.time_grid import exact_fraction
@@ -201,7 +201,7 @@ def test_a_component_that_fails_keeps_its_rows(folder):
     file = folder.scenario({"a": folder.block("FailingBlock")})
     with pytest.raises(cosim.ComponentError) as failure:
         cosim.run(file)
-    assert str(failure.value).startswith("a: do_step failed at t = 2 s: ValueError: tilt beyond limit (blocks.py:")
+    assert str(failure.value).startswith("a: do_step failed at t = 2 s: ValueError: tilt beyond limit (pythonfmu_blocks.py:")
     assert failure.value.result["a.y"].tolist() == [0, 1, 2]
 
 

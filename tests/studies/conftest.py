@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from fault_fmu import build_library
-from lag_sweeps import LagProject, MakeLagProject
+from lag_project import LagProject, MakeLagProject
 
 
 @pytest.fixture(scope="session")

@@ -6,8 +6,8 @@ import shutil
 import time
 
 import pytest
-from clusters import DaskCluster, running_cluster
-from lag_sweeps import SEGV_ORDER, descendants, is_alive
+from dask_cluster import DaskCluster, running_cluster
+from lag_project import SEGV_ORDER, descendants, is_alive
 
 import cosim
 from cosim.core.resources import root

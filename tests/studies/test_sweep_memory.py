@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 import pytest
-from lag_sweeps import descendants
+from lag_project import descendants
 
 from cosim.studies.execution.job import Record
 from cosim.studies.execution.run_store import RunStore

@@ -7,7 +7,7 @@ import math
 
 import pytest
 from fault_fmu import lag_output
-from lag_sweeps import SEGV_ORDER
+from lag_project import SEGV_ORDER
 
 #: 5 % of the runs end their process
 RUNS, CRASHES = 40, {3: SEGV_ORDER, 23: "DoStep 6 abort"}

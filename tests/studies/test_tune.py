@@ -7,7 +7,7 @@ import math
 
 import pytest
 from fault_fmu import lag_output
-from lag_sweeps import SEGV_ORDER
+from lag_project import SEGV_ORDER
 
 import cosim
 from cosim.core.errors import InputError

@@ -33,7 +33,7 @@ def build_library(version: int, folder: Path) -> Path:
     """The misbehaving lag of an FMI version as shared library."""
     compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
     library = folder / f"fault{version}.so"
-    sources = [HERE / f"fault{version}.c", HERE / "misbehave.c"]
+    sources = [HERE / f"fault{version}.c", HERE / "fault_actions.c"]
     options = ["-shared", "-fPIC", "-O1", "-Wl,-Bsymbolic", f"-I{HEADERS}"]
     subprocess.run([compiler, *options, *sources, "-o", library, "-lm", "-lpthread"], check=True)
     return library
@@ -48,7 +48,7 @@ def changed(text: str, changes: Mapping[str, str]) -> str:
 
 @dataclass(frozen=True)
 class FaultFmus:
-    """`fmus(2, "DoStep 6 segv")` is an FMI 2.0 FMU that crashes in its sixth step; the orders stand in misbehave.h, with
+    """`fmus(2, "DoStep 6 segv")` is an FMI 2.0 FMU that crashes in its sixth step; the orders stand in fault_actions.h, with
     the names of FMI 2.0 for both versions. `changes` replaces words of its description.
 
     Each of its calls, and what became of an order, is a line in the file `calls`.

@@ -6,7 +6,7 @@ from typing import Any
 
 from . import wrap_angle
 from .pid import Pid
-from .sampled import SampledController
+from .sampled_controller import SampledController
 
 
 class HeadingControl(SampledController):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .pid import Pid
-from .sampled import SampledController
+from .sampled_controller import SampledController
 
 
 class SpeedControl(SampledController):

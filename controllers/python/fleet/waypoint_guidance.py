@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from . import MAX_WAYPOINTS, EndPolicy, horizontal_norm
-from .sampled import SampledController
+from .sampled_controller import SampledController
 
 
 class WaypointGuidanceBase(SampledController):

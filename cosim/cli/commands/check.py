@@ -27,7 +27,7 @@ def command(scenario: str, settings: tuple[str, ...], connections: bool, isolati
     """
     from ...api import load
     from ...scenario.nested_systems import parse_settings
-    from ...scenario.warnings import find_warnings
+    from ...scenario.plausibility import find_warnings
 
     apart: Literal["fmu", "none"] = "fmu" if isolation == "fmu" else "none"
     assembly = load(scenario, parse_settings(settings), isolation=apart, sandbox=bool(sandbox))
@@ -69,7 +69,7 @@ def _print_components(assembly: PreparedRun) -> None:
 
 
 def _print_processes(assembly: PreparedRun, isolation: str, sandbox: str | None) -> None:
-    from ...components.fmi.isolated.remote import IsolatedFmu
+    from ...components.fmi.isolated.isolated_fmu import IsolatedFmu
 
     components = assembly.system.components
     apart = {name: component.isolation for name, component in components.items() if isinstance(component, IsolatedFmu)}
@@ -112,7 +112,7 @@ def _print_connections(assembly: PreparedRun) -> None:
 
 def _print_unconnected_inputs(assembly: PreparedRun) -> None:
     """Inputs that keep their own start values."""
-    from ...scenario.warnings import unconnected_inputs
+    from ...scenario.plausibility import unconnected_inputs
 
     free: dict[str, list[str]] = {}
     for end in unconnected_inputs(assembly):

@@ -76,8 +76,8 @@ def _scenario_reference(scenario: Path) -> tuple[Path, Mapping[str, Tolerance]]:
 def _draw_tubes(
     result: Result, reference: Result, tolerances: Mapping[str, Tolerance], comparison: Comparison, path: Path
 ) -> None:
+    from ...report.comparison_figure import draw_tubes
     from ...report.figures import draw_figure, save_figure
-    from ...report.tubes import draw_tubes
 
     arguments = {"reference": reference, "tolerances": tolerances, "comparison": comparison}
     save_figure(draw_figure(result, "tubes", draw_tubes, arguments), path)

@@ -17,7 +17,7 @@ def command(result: Path, output_file: Path | None, shall_open: bool) -> None:
     The page is one file and needs no network.
     """
     from ...report.figures import draw_figure, figure_to_svg
-    from ...report.html import write_report
+    from ...report.run_page import write_report
     from ...report.runs import load_figures, read_run
     from ...results.checks import evaluate_checks
 

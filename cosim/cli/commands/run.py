@@ -104,7 +104,7 @@ def _run_scenario(
     from ...results.mcap_files import require_mcap
     from ...results.parquet_files import require_parquet
     from ...scenario.nested_systems import parse_settings
-    from ...scenario.warnings import missing_connections
+    from ...scenario.plausibility import missing_connections
     from .. import messages
 
     warnings = messages.print_log()
@@ -174,7 +174,7 @@ def _write_figures_and_report(
 ) -> list[str]:
     """Draw the figures and write the report; returns the names of the files."""
     from ...report.figures import draw_figure, figure_to_svg, save_figure
-    from ...report.html import write_report
+    from ...report.run_page import write_report
 
     pictures = {}
     for name, function, arguments in assembly.figures():

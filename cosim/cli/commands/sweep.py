@@ -13,8 +13,8 @@ from .. import study_options
 
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore
-    from ...studies.summary.files import SweepSummary
     from ...studies.summary.statistics import RunGroup
+    from ...studies.summary.sweep_files import SweepSummary
     from ...studies.sweep import Sweep
 
 #: so many groups and causes are printed; the files hold all of them
@@ -50,7 +50,7 @@ def _run_sweep(
     sweep: Sweep, ledger: RunStore, folder: Path, parquet: bool, replays: bool, workers: int | None, scheduler: str | None
 ) -> int:
     from ...process.supervisor import interrupt_on_termination
-    from ...studies.summary.files import write_sweep_files
+    from ...studies.summary.sweep_files import write_sweep_files
 
     began, interrupted = time.monotonic(), False
     done = sum(key in ledger for key in sweep.keys)

@@ -63,7 +63,7 @@ def _max_runs(tuning: Tuning) -> int:
 
 
 def _print_best(tuning: Tuning, best: Trial, folder: Path) -> None:
-    from ...studies.summary.files import format_run_command
+    from ...studies.summary.sweep_files import format_run_command
 
     first = tuning.trials[0]
     rows = [[name, f"{first.parameters[name]:.6g}", f"{value:.6g}"] for name, value in best.parameters.items()]

@@ -19,7 +19,7 @@ def create_component(
     """
     kind = Fmi2Instance if file.description.major == 2 else Fmi3Instance
     if isolation:
-        from .isolated.remote import IsolatedFmu
+        from .isolated.isolated_fmu import IsolatedFmu
 
         return IsolatedFmu(kind, file, instance_name, logging_on, isolation)
     return kind(file, instance_name, logging_on)

@@ -28,7 +28,7 @@ class Fmi2Instance(FmuInstance):
 
         return FMU2Slave(**arguments)
 
-    def _instantiate(self) -> None:
+    def _create_instance(self) -> None:
         from fmpy import calloc, fmi2, free
 
         # fixed arity: the text is passed on as it is, printf directives in it are not expanded

@@ -30,7 +30,7 @@ class Fmi3Instance(FmuInstance):
 
         return FMU3Slave(**arguments)
 
-    def _instantiate(self) -> None:
+    def _create_instance(self) -> None:
         try:
             self._fmu.instantiate(
                 loggingOn=self._logging_on, logMessage=lambda _, status, __, text: self.log_message(status, text)

@@ -20,8 +20,8 @@ from ...core import component_log
 from ...core.component import SUCCESS_STATUSES, Component, NativeGetSet, Ports, PreparedCall, StepResult, Variable
 from ...core.errors import ComponentError, InputError
 from ...process import float_mode
-from ...process.containment import restoring_process_state
 from ...process.journal import calling_component
+from ...process.process_state import restoring_process_state
 from .c_functions import FunctionTable, as_double, as_pointer, as_size, function_address
 from .file import FmuFile
 
@@ -60,7 +60,7 @@ class FmuInstance(Component):
     def _create_fmpy_slave(self, **arguments: Any) -> Any:
         raise NotImplementedError
 
-    def _instantiate(self) -> None:
+    def _create_instance(self) -> None:
         raise NotImplementedError
 
     def _get_strings(self, reference: int, count: int) -> Sequence[bytes | None]:
@@ -80,20 +80,27 @@ class FmuInstance(Component):
 
     # -- life cycle ----------------------------------------------------------------------------------------------------
 
-    def _load_and_instantiate(self) -> None:
-        """Load the library and instantiate the FMU. Raises InputError or ComponentError."""
+    def instantiate(self) -> None:
+        """Load the library, create the FMU instance and prepare the calls that transfer the bound arrays.
+
+        Raises:
+            InputError: The binary cannot be loaded.
+            ComponentError: The FMU refuses to be instantiated.
+        """
         folder = self._file.acquire()
         self._holds_folder = True
         with restoring_process_state(self.name), calling_component(self.name, "loading the binary", "load"):
             self._fmu = self._fmpy_instance(folder)
         with restoring_process_state(self.name), calling_component(self.name, self._instantiate_function, "load"):
-            self._instantiate()
+            self._create_instance()
         self._is_instantiated = True
         self._handle: int = self._fmu.component
         self._do_step = self._fmu.functions[f"{self.prefix}DoStep"]
         self._instance = as_pointer(self._handle)
         self._clock, self._step_size = ctypes.c_double(), ctypes.c_double()
         self._do_step_calls = self._prepare_do_step(self._step_size, 0.0)
+        self._set_calls = self._prepare_accessors("Set", self._inputs)
+        self._get_calls = self._prepare_accessors("Get", self._outputs)
 
     def _fmpy_instance(self, folder: Path) -> Any:
         """FMPy's object for this instance: a copy of one that is made once for all instances, which takes milliseconds."""
@@ -210,8 +217,7 @@ class FmuInstance(Component):
     # -- the hot path --------------------------------------------------------------------------------------------------
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
-        self._load_and_instantiate()
-        self._set_calls, self._get_calls = self._prepare_accessors("Set", inputs), self._prepare_accessors("Get", outputs)
+        self._inputs, self._outputs = inputs, outputs
 
     def _prepare_accessors(self, verb: str, ports: Ports) -> list[PreparedCall]:
         """One call for each run of variables with the same accessor; strings and binaries go one by one."""

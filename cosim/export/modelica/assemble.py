@@ -19,7 +19,7 @@ from .causality.matching import is_input
 from .frontend.constants import inline_constants
 from .frontend.folded_branches import check_folded_branches
 from .frontend.reader import ModelReader
-from .frontend.rumoca import ModelicaSources, flatten_model
+from .frontend.rumoca_frontend import ModelicaSources, flatten_model
 from .model.flat_model import Model, Variable, raise_model_error
 
 _FMI_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}

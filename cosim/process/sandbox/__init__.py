@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Literal
 
 from ...core.errors import InputError
-from . import landlock, process
+from . import landlock, limits
 from .bubblewrap import bubblewrap_command, find_bubblewrap
 from .folders import interpreter_folders
-from .report import ActiveRestrictions, AvailableSandboxes, find_available_sandboxes, probe_restrictions
+from .status import ActiveRestrictions, AvailableSandboxes, find_available_sandboxes, probe_restrictions
 
 __all__ = [
     "ActiveRestrictions",
@@ -70,8 +70,8 @@ def enter_sandbox(settings: SandboxSettings) -> None:
     confined = settings.confine == "required" or (settings.confine == "available" and landlock.abi_version() > 0)
     if confined and (reason := _unmet_requirement(settings)):
         raise InputError(f"the sandbox cannot be entered: {reason}")
-    process.detach(settings.parent)
-    process.set_limits(settings.memory, settings.open_files, settings.file_size, settings.cpu_seconds)
+    limits.detach(settings.parent)
+    limits.set_limits(settings.memory, settings.open_files, settings.file_size, settings.cpu_seconds)
     if confined:
         landlock.confine(settings.readable, settings.writable, network=settings.network)
 
@@ -86,6 +86,6 @@ def _unmet_requirement(settings: SandboxSettings) -> str:
         return "Landlock is needed (Linux 5.13 or newer, enabled); this kernel has none"
     if settings.confine == "required" and not settings.network and found < landlock.NETWORK_ABI:
         return f"to close the network needs Landlock {landlock.NETWORK_ABI} (Linux 6.7); this kernel has {found}"
-    if process.thread_count() > 1:
+    if limits.thread_count() > 1:
         return "the process has more than one thread, and the others would stay free"
     return ""

@@ -23,10 +23,10 @@ from typing import Any
 from ...components.fmi import FmuFile
 from ...components.python_class import load_object
 from ...core.errors import CosimError
-from ...process.sandbox.process import detach, thread_count
+from ...process.sandbox.limits import detach, thread_count
 from ...process.temporary_folders import temporary_run_folder
 from ...scenario import load_scenario
-from ...scenario.functions import function_problem, load_function
+from ...scenario.named_functions import function_problem, load_function
 from ...scenario.nested_systems import Scenario
 from .job import Job, StudyContext
 from .run import FmuFiles, ReplayRequest, supervised_check, supervised_run
@@ -36,7 +36,7 @@ _PRELOADED_MODULES = (
     "fmpy.fmi1",
     "fmpy.fmi2",
     "fmpy.fmi3",
-    "cosim.components.fmi.isolated.remote",
+    "cosim.components.fmi.isolated.isolated_fmu",
     "cosim.engine.native_executor",
     "numpy.random",
 )

@@ -14,10 +14,10 @@ from ...results.checks import evaluate_checks
 from ...results.files import remove_files, writing_atomically
 from ..design import Design
 from ..sweep import Sweep
-from .files import SweepSummary, format_run_command
 from .replays import replay_path, replay_settings
 from .success_map import MAP_NAME, MapCell, SuccessMap
 from .success_map_figure import draw_map
+from .sweep_files import SweepSummary, format_run_command
 
 PAGE_FILE = "sweep.html"
 _MAP_FILE = re.compile(rf"{MAP_NAME}(_\d+)?\.(png|svg)")

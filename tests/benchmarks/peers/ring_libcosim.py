@@ -48,7 +48,7 @@ def run(ring: Ring) -> Outcome:
 
 def _reference(fmu: str, name: str) -> int:
     with ZipFile(fmu) as archive:
-        root = ElementTree.fromstring(archive.read("modelDescription.xml"))  # noqa: S314 - written by lag.py
+        root = ElementTree.fromstring(archive.read("modelDescription.xml"))  # noqa: S314 - written by lag_fmus.py
     return next(int(v.attrib["valueReference"]) for v in root.iter("ScalarVariable") if v.get("name") == name)
 
 

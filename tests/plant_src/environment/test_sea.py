@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from plant_validation import MeasurementCheck
 from scipy.integrate import quad
-from validation import MeasurementCheck
 
 from plant_src.environment import sea
 from plant_src.environment.spectrum import SIGNIFICANT_HEIGHTS, fully_developed_period, jonswap, pierson_moskowitz

@@ -6,7 +6,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
-from worlds import WorldHarness, quadcopter_settings
+from world_harness import WorldHarness, quadcopter_settings
 
 from cosim.core import resources
 from cosim.core.errors import InputError

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import plant_reference as reference
+import original_system_reference as reference
 import pytest
-from validation import MeasurementCheck
-from worlds import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, WorldHarness, quadcopter_settings, vessel_settings
+from plant_validation import MeasurementCheck
+from world_harness import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, WorldHarness, quadcopter_settings, vessel_settings
 
 WEIGHT = reference.QUADCOPTER_MASS * reference.GRAVITY
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-import plant_reference as reference
+import original_system_reference as reference
 import pytest
 from plant_fmu import PlantFmu
-from validation import MeasurementCheck
-from worlds import WorldHarness, quadcopter_settings, vessel_settings
+from plant_validation import MeasurementCheck
+from world_harness import WorldHarness, quadcopter_settings, vessel_settings
 
 STEP = 0.01
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from worlds import DECK_TOP, PLATFORM, PLATFORM_TOP, WorldHarness, vessel_settings
+from world_harness import DECK_TOP, PLATFORM, PLATFORM_TOP, WorldHarness, vessel_settings
 
 from plant_src.vehicles.crazyflie import geometry as crazyflie
 from plant_src.vehicles.survey_hexacopter import geometry as survey_hexacopter

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from validation import MeasurementCheck
+from plant_validation import MeasurementCheck
 
 import cosim
 from cosim.results import Result

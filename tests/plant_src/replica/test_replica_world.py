@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from validation import MeasurementCheck
+from plant_validation import MeasurementCheck
 
 from cosim.core.component import Ports
 from cosim.core.errors import ComponentError, InputError

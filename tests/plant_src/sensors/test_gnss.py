@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sensor_trial import SensorHarness, with_parameters
+from sensor_harness import SensorHarness, with_parameters
 
 from cosim.core.errors import InputError
 from plant_src.sensors.gnss import Gnss

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from sensor_trial import SensorHarness, with_parameters
+from sensor_harness import SensorHarness, with_parameters
 
 from plant_src.sensors.marker_camera import MarkerCamera
 

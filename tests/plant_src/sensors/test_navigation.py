@@ -5,13 +5,13 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from sensor_trial import SensorHarness, with_parameters
+from sensor_harness import SensorHarness, with_parameters
 
 from plant_src.sensors.deck_tracker import DeckTracker
-from plant_src.sensors.frames import quaternion_from_euler
 from plant_src.sensors.history import History
 from plant_src.sensors.magnetometer import EARTH_FIELD
 from plant_src.sensors.navigation import Navigation
+from plant_src.sensors.rotations import quaternion_from_euler
 
 STEP, UP = 0.01, np.array([0, 0, 9.81])
 

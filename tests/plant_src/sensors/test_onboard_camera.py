@@ -4,7 +4,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from sensor_trial import SensorHarness, with_parameters
+from sensor_harness import SensorHarness, with_parameters
 
 from cosim.core.errors import InputError
 from plant_src.sensors.camera import Camera

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from sensor_trial import SensorHarness, quaternion, with_parameters
+from sensor_harness import SensorHarness, quaternion, with_parameters
 
 from cosim.core.errors import InputError
 from plant_src.sensors.rangefinder import Rangefinder

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from sensor_trial import SensorHarness, with_parameters
+from sensor_harness import SensorHarness, with_parameters
 
 from cosim.core.errors import ComponentError, InputError
 from plant_src.sensors.barometer import Barometer

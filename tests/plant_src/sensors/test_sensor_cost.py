@@ -7,7 +7,7 @@ import ctypes
 import time
 
 import pytest
-from sensor_trial import SensorHarness, with_parameters
+from sensor_harness import SensorHarness, with_parameters
 
 from plant_src.sensors.barometer import Barometer
 from plant_src.sensors.camera import Camera

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sensor_trial import SensorHarness
+from sensor_harness import SensorHarness
 
 from cosim.core.errors import ComponentError, InputError
 from plant_src.sensors.fault import SignalFault

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from multirotor_reference import GRAVITY, VEHICLES, Vehicle
 from plant_fmu import PlantFmu
-from validation import MeasurementCheck
+from plant_validation import MeasurementCheck
 
 from plant_src.vehicles.crazyflie.parameters import AIRFRAME
 from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations, derive_constants

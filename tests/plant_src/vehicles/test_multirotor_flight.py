@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from multirotor_reference import FLIP, VEHICLES, HeldInputs, InputFunction, Vehicle, initial_state, simulate_flight
 from plant_fmu import PlantFmu
-from validation import MeasurementCheck
+from plant_validation import MeasurementCheck
 
 STEP = 0.01
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from otter_reference import Otter
-from validation import MeasurementCheck
-from worlds import WorldHarness
+from plant_validation import MeasurementCheck
+from world_harness import WorldHarness
 
 GOLDEN, NUMPY = "golden value of MSS `otter.m`", "`otter.m` a second time in NumPy"
 FLIP = np.array([1.0, -1.0, -1.0])

@@ -7,9 +7,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from floating_reference import wave_kinematics
-from validation import MeasurementCheck
-from worlds import WorldHarness, vessel_settings
+from catamaran_reference import wave_kinematics
+from plant_validation import MeasurementCheck
+from world_harness import WorldHarness, vessel_settings
 
 from plant_src.environment import sea
 from plant_src.environment.sea import Sea

@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from fakes import counter
-from helpers import endpoint, make_system
+from systems import endpoint, make_system
 
 from cosim.engine.run_loop import Settings, simulate
 from cosim.process.run_files.row_store import read_rows

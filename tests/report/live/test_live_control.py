@@ -7,7 +7,7 @@ from multiprocessing import Pipe
 import numpy as np
 import pytest
 from fakes import FakeComponent, inputs, outputs
-from helpers import endpoint, make_system
+from systems import endpoint, make_system
 
 import cosim.report.live.feed
 from cosim.core.component import Variable

@@ -1,7 +1,7 @@
 """The page of a run that goes on, in a real browser."""
 
 import pytest
-from watched import LiveRun, wait_until
+from live_run import LiveRun, wait_until
 
 from cosim.results import Result
 

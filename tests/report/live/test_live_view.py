@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from watched import LiveRun, wait_until
+from live_run import LiveRun, wait_until
 
 import cosim
-from cosim.report.live.viewing import open_browser
+from cosim.report.live.live_view import open_browser
 from cosim.results import Result
 
 STOP = 3.0

@@ -4,7 +4,7 @@ import re
 from html.parser import HTMLParser
 
 import pytest
-from lag_sweeps import SEGV_ORDER
+from lag_project import SEGV_ORDER
 
 from cosim.studies.summary.page import _design_rows
 from cosim.studies.sweep import Sweep

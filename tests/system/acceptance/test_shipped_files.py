@@ -5,7 +5,7 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
-from helpers import make_system, run_system
+from systems import make_system, run_system
 
 import cosim
 from cosim.api import evaluate_scenario_checks, execute

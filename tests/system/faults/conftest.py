@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from command_runner import CommandRunner
 from fault_fmu import FaultFmus, build_library
-from fault_runs import CommandRunner
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "fmi2FunctionTypes.h"
-#include "misbehave.h"
+#include "fault_actions.h"
 
 const char PREFIX[] = "fmi2";
 static const fmi2CallbackFunctions *voice;

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "fmi3FunctionTypes.h"
-#include "misbehave.h"
+#include "fault_actions.h"
 
 enum { ARRAY = 6, LENGTH = 3 };
 const char PREFIX[] = "fmi3";

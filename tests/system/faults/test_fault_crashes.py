@@ -8,8 +8,8 @@ import sys
 from dataclasses import dataclass
 
 import pytest
+from command_runner import CommandResult
 from fault_fmu import STEP_COUNT, function_name, scenario
-from fault_runs import CommandResult
 
 from cosim.engine import native_available as native_available
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from call_rules import calls, violations
+from command_runner import CommandResult, CommandRunner
 from fault_fmu import STEP_COUNT, FaultFmus, lag_output, scenario
-from fault_runs import CommandResult, CommandRunner
+from fmi_call_rules import calls, violations
 from test_fault_crashes import ALL, CRASHES, DEADLINES, EXIT, FAILED, LATE, SIGNAL, SLACK, T5, Case, check, table
 
 from cosim.process.sandbox import find_available_sandboxes, landlock

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from commands import CommandFolder
+from command_folder import CommandFolder
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from good_scenario import INNER_SYSTEM, SCENARIO, write_scenario_files
-from mutations import value_at
+from complete_scenario import INNER_SYSTEM, SCENARIO, write_scenario_files
+from scenario_mutations import value_at
 
 import cosim
 from cosim import cli
@@ -63,7 +63,7 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "unknown key of a connection": (put("connections/0/form", "a.y"), 'connections[0].form: unknown key; did you mean "from"?'),
     "unknown key of a check": (put("checks/0/maximum", 1), "$.checks[0].maximum: unknown key"),
     "no components": (put("components", {}), "$.components: expected at least one component, found none"),
-    "a name with a dot": (put("components/a.b", {"python": "blocks.py:Gain"}), "letters, digits and underscores"),
+    "a name with a dot": (put("components/a.b", {"python": "pythonfmu_blocks.py:Gain"}), "letters, digits and underscores"),
     # types
     "text for a number": (put("checks/0/max", "10"), '$.checks[0].max: expected a valid number; found "10"'),
     "number for a text": (put("name", 3), "$.name: expected a valid string; found 3"),
@@ -92,8 +92,8 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "a folder as FMU": (put("components/f/fmu", "."), "is a folder, expected a regular file"),
     "a text as FMU": (put("components/f/fmu", "profile.csv"), "is no FMU"),
     "missing Python file": (put("components/a/python", "block.py:Gain"), 'file "block.py" does not exist'),
-    "missing class": (put("components/a/python", "blocks.py:Gian"), 'did you mean "Gain"?'),
-    "no class": (put("components/a/python", "blocks.py"), 'expected "file.py:name", found "blocks.py"'),
+    "missing class": (put("components/a/python", "pythonfmu_blocks.py:Gian"), 'did you mean "Gain"?'),
+    "no class": (put("components/a/python", "pythonfmu_blocks.py"), 'expected "file.py:name", found "pythonfmu_blocks.py"'),
     "a function that makes no component": (put("components/c/python", "kpis.py:nothing"), "makes a dict: it has no variables"),
     "two sources": (put("components/a/fmu", "probe.fmu"), "found fmu and python"),
     "arguments for an FMU": (put("components/f/arguments", {"x": 1}), '"arguments" are for components with "python"'),

@@ -7,7 +7,7 @@ import signal
 import time
 
 import pytest
-from commands import TICKER, CommandFolder, wait_until
+from command_folder import TICKER, CommandFolder, wait_until
 
 import cosim
 

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from good_scenario import INNER_SYSTEM, SCENARIO, write_scenario_files
+from complete_scenario import INNER_SYSTEM, SCENARIO, write_scenario_files
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
-from mutations import mutants
+from scenario_mutations import mutants
 
 import cosim
 from cosim.core import resources

@@ -36,7 +36,7 @@ class Worker:
         self._states: dict[int, Any] = {}
         self._state_numbers = count()
         self._commands: dict[str, Callable[..., Any]] = {
-            "bind": self._bind,
+            "instantiate": self._instantiate,
             "set": instance.set,
             "get": instance.get,
             "enter_initialization_mode": instance.enter_initialization_mode,
@@ -86,9 +86,10 @@ class Worker:
         except Exception as error:
             return encode_line({"failed": (self._instance.name, "its own process", f"{type(error).__name__}: {error}", None)})
 
-    def _bind(self) -> None:
+    def _instantiate(self) -> None:
         self._setup()
         self._instance.bind(self._block.inputs, self._block.outputs)
+        self._instance.instantiate()
 
     # -- texts do not lie in shared memory -----------------------------------------------------------------------------
 

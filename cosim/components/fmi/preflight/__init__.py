@@ -14,9 +14,9 @@ from . import rules_model, rules_structure, rules_values, rules_variables
 from .archive import Archive, open_regular_file
 from .binary import check_binary
 from .findings import DESCRIPTION_FILE, FatalFinding, Finding, Rule, raise_errors
+from .fmu_platform import current_platform
 from .limits import DEFAULT_LIMITS, PreflightLimits
 from .model_description import ModelDescription
-from .platform import current_platform
 from .xml import parse_xml
 from .xml_reader import check_repeated_elements, read_model
 

@@ -9,10 +9,10 @@ from pathlib import Path
 from . import elf, macho, pe
 from .archive import Archive
 from .findings import Finding, Rule
+from .fmu_platform import FmuPlatform
 from .library import InvalidLibrary, SharedLibrary
 from .limits import PreflightLimits
 from .model_description import ModelDescription
-from .platform import FmuPlatform
 
 _BINARIES = "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5.1"
 _FUNCTIONS = "FMI 2.0.5 sections 2.1 and 4.2, FMI 3.0.2 section 2.5"

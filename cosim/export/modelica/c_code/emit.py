@@ -25,9 +25,9 @@ from ..model.flat_model import (
 )
 from ..model.traversal import assigned_references
 from .c_values import C_TYPES, CExpression, CValue, c_literal, scalar_value
+from .formatting import function_definition, uses_variable
 from .functions import FunctionTranslator
 from .header import HeaderWriter, struct_member, struct_members
-from .layout import function_definition, uses_variable
 from .model_step import continuous_step_body, sampled_step_body
 from .statements import StatementLowering
 

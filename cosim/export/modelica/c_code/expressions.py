@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from ..model import flat_model
 from ..model.flat_model import SourceLocation, raise_model_error
-from .builtins import BUILTINS
+from .builtin_functions import BUILTINS
 from .c_values import (
     CExpression,
     CValue,

@@ -9,7 +9,7 @@ from ..model import flat_model
 from ..model.flat_model import Function, FunctionVariable, SourceLocation, raise_model_error, referenced_variable
 from ..model.traversal import read_references
 from .c_values import C_TYPES, CValue, c_identifier, variable_value
-from .layout import uses_variable, wrap_lines
+from .formatting import uses_variable, wrap_lines
 from .lowering import FunctionInstance
 from .statements import StatementLowering
 

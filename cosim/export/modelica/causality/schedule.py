@@ -29,9 +29,9 @@ from ..model.flat_model import (
     referenced_variable,
 )
 from ..model.traversal import assigned_references, pre_references, read_references, rewrite, walk
-from .clocks import Clock, WhenConditions, tick_flag
-from .dependencies import Node, merge_statements, required_nodes, sort_topologically
 from .matching import ScalarKey, match_equations, match_initial_equations, scalar_keys
+from .topological_sort import Node, merge_statements, required_nodes, sort_topologically
+from .when_conditions import Clock, WhenConditions, tick_flag
 
 _TRUE = Literal(True, "Boolean")
 _ZERO = {"Real": Literal(0.0, "Real"), "Integer": Literal(0, "Integer"), "Boolean": Literal(False, "Boolean")}

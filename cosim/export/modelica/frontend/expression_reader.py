@@ -9,7 +9,7 @@ from typing import Any
 
 from ..model import flat_model
 from ..model.flat_model import Expression, SourceLocation, raise_model_error
-from .rumoca import ModelicaSources
+from .rumoca_frontend import ModelicaSources
 
 Json = Mapping[str, Any]
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ..model.flat_model import SourceLocation, raise_model_error
-from .rumoca import ModelicaSources
+from .rumoca_frontend import ModelicaSources
 
 _TOKEN = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])*\'|[A-Za-z_]\w*|\d[\w.]*|\S', re.DOTALL)
 _SECTIONS = {"algorithm", "equation", "public", "protected", "initial", "external"}

@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from ....core.errors import InputError, Problem
-from .rumoca import find_packages, model_name
+from .rumoca_frontend import find_packages, model_name
 
 _ERROR = re.compile(r"^(?:\[(?P<file>[^\]]+?):(?P<line>\d+):\d+-\d+:\d+:\w+\] )?Error: (?P<what>.+)$", re.MULTILINE)
 _TIMEOUT = 1800.0

@@ -7,7 +7,7 @@ import casadi as ca
 from cosim.export.fmu.block import Block
 
 from ....vehicles.strider import parameters as p
-from ..model import VESSEL_INPUTS, force_model, load_outputs, planar_velocity, tunable_parameter
+from ..force_model import VESSEL_INPUTS, force_model, load_outputs, planar_velocity, tunable_parameter
 
 VARIABLES = (
     *VESSEL_INPUTS,

@@ -9,7 +9,7 @@ from cosim.core.units import parse_unit
 from cosim.export.fmu.block import Block
 
 from ....vehicles.ar_drone.parameters import THRUST_COEFFICIENT, TORQUE_COEFFICIENT
-from ..model import force_model, tunable_parameter
+from ..force_model import force_model, tunable_parameter
 
 MAX_SPEED = 5000 * 0.10471976  # rad/s; the factor from 1/min is rounded as published
 

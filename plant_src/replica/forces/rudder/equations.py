@@ -14,7 +14,7 @@ from cosim.export.fmu.block import Block
 
 from ....vehicles.common.interface import scalar_variable, vector_variables
 from ....vehicles.strider import parameters as p
-from ..model import VESSEL_INPUTS, force_model, planar_velocity, tunable_parameter
+from ..force_model import VESSEL_INPUTS, force_model, planar_velocity, tunable_parameter
 
 VARIABLES = (
     *VESSEL_INPUTS,

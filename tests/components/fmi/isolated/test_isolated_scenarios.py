@@ -12,11 +12,11 @@ from zipfile import ZipFile
 import fmpy
 import numpy as np
 import pytest
-from foreign import HEADERS, PROBE_SOURCES
+from probe_fmus import HEADERS, PROBE_SOURCES
 
 import cosim
 from cosim import api, cli
-from cosim.components.fmi.isolated.remote import IsolatedFmu
+from cosim.components.fmi.isolated.isolated_fmu import IsolatedFmu
 from cosim.core.errors import InputError
 from cosim.process.sandbox import find_available_sandboxes, landlock
 from cosim.scenario import prepare

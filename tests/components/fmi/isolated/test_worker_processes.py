@@ -16,7 +16,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from helpers import endpoint, make_system, run_system
+from systems import endpoint, make_system, run_system
 
 from cosim.components.fmi import FmuFile, Isolation, create_component
 from cosim.components.fmi.isolated.pipes import (
@@ -29,8 +29,8 @@ from cosim.components.fmi.isolated.pipes import (
     read_line,
     write_line,
 )
-from cosim.components.fmi.isolated.process import WorkerLost, WorkerProcess
 from cosim.components.fmi.isolated.shared_memory import SharedMemoryBlock
+from cosim.components.fmi.isolated.worker_process import WorkerLost, WorkerProcess
 from cosim.core.component import Ports, Variable
 from cosim.core.time_grid import exact_fraction
 from cosim.engine.run_loop import Settings, simulate
@@ -227,7 +227,7 @@ def test_an_instance_that_is_never_bound_needs_no_process(children, probe):
 IMPORTER = """
 import os, sys
 sys.path.insert(0, sys.argv[1])
-from helpers import make_system
+from systems import make_system
 from pathlib import Path
 from cosim.components.fmi import FmuFile, Isolation, create_component
 from cosim.engine.run_loop import Settings, simulate

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from fmu_corpus import read_members
+from bad_fmus import read_members
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from fmu_corpus import Member, find_problems, members, pack_archive, refusal_message, with_headers
+from bad_fmus import Member, find_problems, members, pack_archive, refusal_message, with_headers
 
 from cosim.components.fmi import FmuFile
 from cosim.components.fmi.preflight import PreflightLimits

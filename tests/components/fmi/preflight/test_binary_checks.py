@@ -7,14 +7,14 @@ import sys
 
 import fmpy
 import pytest
+from bad_fmus import find_problems, members, pack_archive, refusal_message
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
-from fmu_corpus import find_problems, members, pack_archive, refusal_message
 
 from cosim.components.fmi import FmuFile
 from cosim.components.fmi.preflight import elf
 from cosim.components.fmi.preflight.binary import REQUIRED_FUNCTIONS
-from cosim.components.fmi.preflight.platform import FmuPlatform, current_platform
+from cosim.components.fmi.preflight.fmu_platform import FmuPlatform, current_platform
 from cosim.core import resources
 from cosim.export.fmu.compiler import find_compiler
 

@@ -1,7 +1,7 @@
 """One wrong thing in a good model description: found by its rule, at its line, and refused."""
 
 import pytest
-from fmu_corpus import find_problems, refusal_message, with_change, with_description
+from bad_fmus import find_problems, refusal_message, with_change, with_description
 
 #: FMI version, text of the good description, what stands there instead, rule, line, words
 ERRORS = {

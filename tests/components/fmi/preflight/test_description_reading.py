@@ -3,8 +3,8 @@
 import math
 
 import pytest
+from bad_fmus import members, pack_archive
 from fmpy import read_model_description
-from fmu_corpus import members, pack_archive
 
 from cosim.components.fmi import FmuFile
 from cosim.core import resources

@@ -1,7 +1,7 @@
 """What breaks the standard without harm to a run is told by its rule, at its line, and not refused."""
 
 import pytest
-from fmu_corpus import find_problems, with_change, with_description
+from bad_fmus import find_problems, with_change, with_description
 
 from cosim.components.fmi import FmuFile
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import fmpy
 import pytest
-from fmu_corpus import members, pack_archive
+from bad_fmus import members, pack_archive
 
 from cosim.components.fmi.preflight import DEFAULT_LIMITS, examine, macho, open_regular_file
 from cosim.components.fmi.preflight.archive import Archive
 from cosim.components.fmi.preflight.binary import REQUIRED_FUNCTIONS, check_binary
+from cosim.components.fmi.preflight.fmu_platform import FmuPlatform
 from cosim.components.fmi.preflight.library import InvalidLibrary
-from cosim.components.fmi.preflight.platform import FmuPlatform
 
 FMPY = Path(fmpy.__file__).parent
 MACHINES = {"aarch64": "x86_64", "x86_64": "aarch64"}

@@ -4,13 +4,13 @@ import random
 import struct
 
 import pytest
-from fmu_corpus import read_members
+from bad_fmus import read_members
 
 from cosim.components.fmi.preflight import DEFAULT_LIMITS, examine, open_regular_file, pe
 from cosim.components.fmi.preflight.archive import Archive
 from cosim.components.fmi.preflight.binary import REQUIRED_FUNCTIONS, check_binary
+from cosim.components.fmi.preflight.fmu_platform import FmuPlatform
 from cosim.components.fmi.preflight.library import InvalidLibrary
-from cosim.components.fmi.preflight.platform import FmuPlatform
 from cosim.core import resources
 
 FMU = resources.root() / "fmus/python/vtol.fmu"

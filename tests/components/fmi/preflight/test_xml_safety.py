@@ -7,7 +7,7 @@ import time
 from contextlib import contextmanager
 
 import pytest
-from fmu_corpus import find_problems, members, pack_archive, refusal_message
+from bad_fmus import find_problems, members, pack_archive, refusal_message
 
 from cosim.components.fmi import FmuFile
 from cosim.core.errors import InputError

@@ -1,0 +1,268 @@
+"""From a scenario to a system that can be simulated; everything that is wrong is collected and reported together."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from ..components.fmi import FmuFile, Isolation
+from ..components.input_table import read_input_table
+from ..core.component import Component, Variable
+from ..core.errors import InputError, Problem
+from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System
+from ..engine.run_loop import Event, Settings, find_problems
+from ..process.journal import Deadlines
+from .component_factory import ComponentFactory
+from .name_resolution import SlotIndex, Target, UnknownName, check_assignment, resolve_name
+from .named_functions import function_problem, kpi_name_problem, signal_problems
+from .nested_systems import Node, Scenario
+from .recorded_signals import SignalSelector
+from .schema import SystemSpec, accepted
+from .wiring import Wiring
+
+#: full name of the components made from input profiles: PROFILES.0, PROFILES.1, ...
+PROFILE_PREFIX = "inputs"
+
+
+class SystemBuilder:
+    """The steps of assembling, each adding to `problems`."""
+
+    def __init__(self, scenario: Scenario, isolate_fmus: bool, sandbox: bool, loaded_fmus: Mapping[Path, FmuFile]):
+        self.root, self.spec, self.assignments = scenario.root, scenario.spec, scenario.assignments
+        self.problems: list[Problem] = list(scenario.problems)
+        deadlines = Deadlines(**self.spec.deadlines.model_dump())
+        self.component_factory = ComponentFactory(Isolation(deadlines, sandbox), isolate_fmus or sandbox, loaded_fmus)
+        self.components: dict[str, Component] = {}
+        self._variables_by_component: dict[str, Mapping[str, Variable]] = {}
+        #: signals are missing because something was refused
+        self._incomplete = False
+        self.start_values: dict[str, dict[str, Any]] = defaultdict(dict)
+
+    def build_system(self) -> None:
+        """Everything that follows once the components are made."""
+        self._set_start_values()
+        aliases = self._aliases()
+        connections = list(self._connections())
+        self.system = System(
+            self.components,
+            connections,
+            (*self._root_stages(), *([tuple(self.profiles)] if self.profiles else [])),
+            dict(self._periods(self.root)),
+            self.start_values,
+            aliases,
+            _parallel_mode(self.spec),
+        )
+        self.settings = Settings(
+            self.spec.start_time,
+            self.spec.stop_time,
+            self.spec.step_size,
+            self._columns(aliases),
+            self.spec.record.interval,
+            list(self._events()),
+            require_finite=self.spec.non_finite == "error",
+        )
+        self.problems += [
+            self._with_location(problem)
+            for problem in find_problems(self.system, self.settings)
+            if not self._is_consequence(problem)
+        ]
+        self._check_functions()
+
+    # -- components and their start values -----------------------------------------------------------------------------
+
+    def make_components(self) -> None:
+        """The components of the scenario and of its nested systems, and the tables of its input profiles."""
+        for node, name in self.root.leaves():
+            try:
+                self.components[node.full_name(name)] = self.component_factory.create(node, name)
+            except InputError as error:
+                node.invalid_components.add(name)
+                self._add_problems(error, node, "components", name)
+        self.profiles = [f"{PROFILE_PREFIX}.{i}" for i, _ in accepted(self.spec.inputs)]
+        for i, spec in accepted(self.spec.inputs):
+            try:
+                table = read_input_table(self.root.folder / spec.file, list(spec.to), spec.interpolation)
+                self.components[f"{PROFILE_PREFIX}.{i}"] = table
+            except InputError as error:
+                self.profiles.remove(f"{PROFILE_PREFIX}.{i}")
+                self._add_problems(error, self.root, "inputs", i)
+
+    def _set_start_values(self) -> None:
+        """Nested systems first, so that outer values win; those from outside come last."""
+        for node in self.root.walk():
+            for name, spec in node.spec.components.items():
+                for variable, value in spec.parameters.items():
+                    where = node.where("components", name, "parameters", variable)
+                    self._assign(self.start_values, node, f"{name}.{variable}", value, where)
+        for name, value in self.assignments.items():
+            self._assign(self.start_values, self.root, name, value, f'setting "{name}"')
+
+    def _assign(
+        self, values: dict[str, dict[str, Any]], node: Node, name: str, value: Any, where: str, all_elements: bool = False
+    ) -> None:
+        try:
+            for target in resolve_name(node, name, ("parameters", "inputs"), include_inner=True):
+                if target.component in self.components:
+                    variables = self._variables(target.component)
+                    values[target.component] |= check_assignment(target.component, variables, target.prefix, value, all_elements)
+        except (UnknownName, ValueError) as error:
+            if str(error):
+                self.problems.append(Problem(str(error), where))
+
+    def _variables(self, name: str) -> Mapping[str, Variable]:
+        if name not in self._variables_by_component:
+            self._variables_by_component[name] = {variable.name: variable for variable in self.components[name].variables}
+        return self._variables_by_component[name]
+
+    # -- wiring --------------------------------------------------------------------------------------------------------
+
+    def _connections(self) -> Iterator[Connection]:
+        given = {
+            Endpoint(name, slot)
+            for name, values in self.start_values.items()
+            for variable in self.components[name].variables
+            if variable.name in values
+            for slot in variable.scalar_names
+        }
+        wiring = Wiring(self.components, given)
+        for node in self.root.walk():
+            wiring.connect(node)
+        for i, spec in accepted(self.spec.inputs):
+            if f"{PROFILE_PREFIX}.{i}" in self.components:
+                for column, names in spec.to.items():
+                    for name in names:
+                        where = self.root.where("inputs", i, "to", column)
+                        wiring.connect_output(self.root, Endpoint(f"{PROFILE_PREFIX}.{i}", column), name, where)
+        yield from wiring.connections()
+        self.problems += wiring.problems
+
+    def _stages(self, node: Node) -> tuple[Stage, ...]:
+        """Names that mean nothing, stand twice or are missing are left to the system's own checks."""
+        if "components" in node.invalid_keys:
+            return ()
+        listed = node.spec.algorithm.stages if node.spec.algorithm else [[name] for name in node.spec.components]
+        return tuple(
+            tuple(self._stage_member(node, name) for name in stage if name not in node.invalid_components)
+            for stage in listed
+            if stage
+        )
+
+    def _root_stages(self) -> tuple[Stage, ...]:
+        """The root's stages; when they are iterated, as a group without the profiles."""
+        stages, iteration = self._stages(self.root), _iteration_settings(self.spec)
+        return ((Group(self.spec.name, stages, _parallel_mode(self.spec), iteration),),) if iteration else stages
+
+    def _stage_member(self, node: Node, name: str) -> str | Group:
+        if name in node.children:
+            child = node.children[name]
+            return Group(node.full_name(name), self._stages(child), _parallel_mode(child.spec), _iteration_settings(child.spec))
+        return node.full_name(name)
+
+    def _periods(self, node: Node, inherited: Fraction | None = None) -> Iterator[tuple[str, Fraction]]:
+        for name, spec in node.spec.components.items():
+            period = spec.period or inherited
+            if name in node.children:
+                yield from self._periods(node.children[name], period)
+            elif period and node.full_name(name) in self.components:
+                yield node.full_name(name), period
+
+    def _aliases(self) -> dict[str, Endpoint]:
+        """Outputs of nested systems under the names of their ports."""
+        aliases: dict[str, Endpoint] = {}
+        for node in self.root.walk():
+            for name, child in node.children.items():
+                for port, inner in child.spec.ports.outputs.items():  # type: ignore[attr-defined]
+                    if port in child.spec.components:
+                        text = f'"{port}" is the name of a component here: it cannot be that of an output port, too'
+                        self.problems.append(Problem(text, child.where("ports", "outputs", port)))
+                    try:
+                        (target,) = resolve_name(child, inner, ("outputs",))
+                    except UnknownName as error:
+                        if str(error):
+                            self.problems.append(Problem(str(error), child.where("ports", "outputs", port)))
+                        continue
+                    aliases |= self._alias_endpoints(target, f"{node.full_name(name)}.{port}")
+        return aliases
+
+    def _alias_endpoints(self, target: Target, alias: str) -> dict[str, Endpoint]:
+        if target.component not in self.components:
+            return {}
+        slots = SlotIndex(self.components[target.component], "output").below(target.prefix)
+        return {alias + rest: Endpoint(target.component, slot) for rest, slot in slots.items()}
+
+    # -- what is recorded, set and computed ----------------------------------------------------------------------------
+
+    def _columns(self, aliases: Mapping[str, Endpoint]) -> dict[str, Endpoint]:
+        broken = [node.full_name(name) for node in self.root.walk() for name in node.invalid_components]
+        broken += [node.prefix for node in self.root.walk() if "components" in node.invalid_keys]
+        selection = SignalSelector(self.components, aliases, broken)
+        patterns = [(text, self.root.where("record", "signals", i)) for i, text in enumerate(self.spec.record.signals)]
+        chosen = selection.select(patterns)
+        self.problems += selection.problems
+        self._incomplete = bool(broken or selection.problems)
+        return chosen
+
+    def _events(self) -> Iterator[Event]:
+        for i, spec in accepted(self.spec.events):
+            values: dict[str, dict[str, Any]] = defaultdict(dict)
+            for name, value in spec.values.items():
+                self._assign(values, self.root, name, value, self.root.where("events", i, "set", name), all_elements=True)
+            yield Event(spec.time, values, self.root.where("events", i))
+
+    def _check_functions(self) -> None:
+        for kind in ("kpis", "figures"):
+            specs = list(accepted(getattr(self.spec, kind)))
+            for i, spec in specs:
+                if text := function_problem(spec, self.root.folder):
+                    self.problems.append(Problem(text, self.root.where(kind, i)))
+            names = [spec.name for _, spec in specs]
+            for i, spec in specs:
+                if spec.name in names[:i]:
+                    self.problems.append(Problem(f'the name "{spec.name}" stands twice', self.root.where(kind, i, "name")))
+        if self.spec.scene and (text := function_problem(self.spec.scene, self.root.folder)):
+            self.problems.append(Problem(text, self.root.where("scene")))
+        kpis = [spec for _, spec in accepted(self.spec.kpis)]
+        if not self._incomplete:
+            self.problems += signal_problems(self.root, "kpis", self.settings.columns)
+        for i, check in accepted(self.spec.checks):
+            if text := kpi_name_problem(check.kpi, kpis, self.root.folder):
+                self.problems.append(Problem(text, self.root.where("checks", i, "kpi")))
+
+    # -- reporting -----------------------------------------------------------------------------------------------------
+
+    def _add_problems(self, error: InputError, node: Node, *path: str | int) -> None:
+        self.problems += [
+            replace(problem, where=node.where(*path, *problem.subject), subject=())
+            if problem.subject or not problem.where
+            else problem
+            for problem in error.problems
+        ]
+
+    def _is_consequence(self, problem: Problem) -> bool:
+        """Whether a problem only follows from a time or a component list that was refused."""
+        times = {"stop_time", "step_size", "start_time"} & self.root.invalid_keys
+        timing = problem.subject[:1] in (("stop_time",), ("record",)) or problem.subject[-1:] == ("period",)
+        return bool(times and (timing or problem.message.startswith("event time")))
+
+    def _with_location(self, problem: Problem) -> Problem:
+        """A problem of the system, with the place in the file of the setting it is about."""
+        if problem.where or not problem.subject:
+            return problem
+        for node in self.root.walk():
+            for name in node.spec.components:
+                if problem.subject[:2] == ("components", node.full_name(name)):
+                    return replace(problem, where=node.where("components", name, *problem.subject[2:]), subject=())
+        return replace(problem, where=self.root.where(*problem.subject), subject=())
+
+
+def _parallel_mode(spec: SystemSpec) -> Parallel:
+    return spec.algorithm.parallel if spec.algorithm else "auto"
+
+
+def _iteration_settings(spec: SystemSpec) -> Iteration | None:
+    found = spec.algorithm.iteration if spec.algorithm else None
+    return Iteration(found.tolerance, found.limit) if found else None

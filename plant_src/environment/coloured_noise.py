@@ -1,0 +1,103 @@
+"""Coloured noise on a fixed grid of time, as a pure function of seed, name and place on the grid.
+
+A channel is white noise through (1 + b T s) / (1 + T s)^2, or through 1 / (1 + T s), discretised exactly: sampled at the grid it
+has the variance, the autocorrelation and the joint distribution of the continuous process, for any T. With
+
+    T x1' = -x1 + white,  T x2' = -x2 + x1,  y = b x1 + (1 - b) x2      (b = 1: first order)
+
+the variances are P11 = p, P12 = P22 = p / 2, and y has b^2 p + (1 - b)^2 p / 2 + b (1 - b) p.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .random_generator import generator
+
+#: a value holds so long (s)
+GRID_STEP = 0.01
+
+#: values that are computed together
+BLOCK_LENGTH = 256
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Noise of a standard deviation, a time constant T (s) and a lead b; b = 1 is first order."""
+
+    deviation: float
+    time_constant: float
+    lead: float = 1.0
+
+
+class ColouredNoise:
+    """Channels of noise: `noise[k]` are their values from k GRID to (k + 1) GRID.
+
+    In steps of the grid: x1 <- a x1 + n1, x2 <- a (x2 + g x1) + n2, with correlated noises n1 and n2.
+    """
+
+    def __init__(self, seed: int, name: str, channels: Sequence[Channel]):
+        self._seed, self._name = seed, name
+        deviation, time_constant, lead = np.array([(c.deviation, c.time_constant, c.lead) for c in channels]).T[:, :, None]
+        p = deviation**2 / (lead**2 + (1 - lead) ** 2 / 2 + lead * (1 - lead))
+        self._g = g = GRID_STEP / time_constant
+        self._a = a = np.exp(-g)
+        self._lead = lead
+        kept = a**2 * np.array([p, p * (g + 1 / 2), p * (g**2 + g + 1 / 2)])  # of P11, P12 and P22 after a step
+        self._noise_root = _covariance_root(*(np.array([p, p / 2, p / 2]) - kept))
+        white = generator(seed, name).standard_normal((2, len(channels), 1))
+        #: x1 and x2 at the start of each block, as far as this was computed
+        self._block_start_states = [_correlated(_covariance_root(p, p / 2, p / 2), white)]
+        self._block_number, self._values = -1, [()]
+
+    def __getitem__(self, index: int) -> tuple[float, ...]:
+        number, place = divmod(index, BLOCK_LENGTH)
+        return self.values_in_block(number)[place]
+
+    def values_in_block(self, number: int) -> Sequence[tuple[float, ...]]:
+        """The values from the place `number` times BLOCK on, BLOCK of them."""
+        if number != self._block_number:
+            for missing in range(len(self._block_start_states) - 1, number):
+                self._compute(missing)
+            self._compute(number)
+        return self._values
+
+    def _compute(self, number: int) -> None:
+        white = generator(self._seed, self._name, str(number)).standard_normal((2, len(self._a), BLOCK_LENGTH))
+        n1, n2 = _correlated(self._noise_root, white)
+        start1, start2 = self._block_start_states[number]
+        x1 = _first_order_recursion(self._a, start1, n1)
+        x2 = _first_order_recursion(self._a, start2, self._a * self._g * x1[:, :-1] + n2)
+        if number + 1 == len(self._block_start_states):
+            self._block_start_states.append(np.array([x1[:, -1:], x2[:, -1:]]))
+        values = self._lead * x1[:, :-1] + (1 - self._lead) * x2[:, :-1]
+        self._block_number, self._values = number, list(zip(*self._map_channels(values).tolist(), strict=True))
+
+    def _map_channels(self, values: np.ndarray) -> np.ndarray:
+        """What is given of the values of all channels, a row each."""
+        return values
+
+
+def _covariance_root(c11: np.ndarray, c12: np.ndarray, c22: np.ndarray) -> tuple[np.ndarray, ...]:
+    """r11, r21, r22 of the lower triangular square root of a covariance (2, 2), for each channel."""
+    r11 = np.sqrt(c11)
+    r21 = np.divide(c12, r11, out=np.zeros_like(r11), where=r11 > 0)
+    return r11, r21, np.sqrt(np.maximum(c22 - r21**2, 0))
+
+
+def _correlated(root: Sequence[np.ndarray], white: np.ndarray) -> np.ndarray:
+    """Two noises (2, channels, n) of that covariance from two white ones."""
+    r11, r21, r22 = root
+    return np.array([r11 * white[0], r21 * white[0] + r22 * white[1]])
+
+
+def _first_order_recursion(a: np.ndarray, start: np.ndarray, forcing: np.ndarray) -> np.ndarray:
+    """x[k + 1] = a x[k] + forcing[k] from x[0] = start along the last axis, by doubling: log2(n) additions of arrays."""
+    x, reach, power = np.concatenate([start, forcing], axis=1), 1, a
+    while reach < x.shape[1]:
+        x[:, reach:] += power * x[:, :-reach]
+        reach, power = 2 * reach, power**2
+    return x

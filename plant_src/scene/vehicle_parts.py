@@ -1,0 +1,85 @@
+"""What each vehicle looks like; those without a drawing of their own follow from their rotors or from their body in Bullet."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+
+from ..catalogue import VEHICLE_MODELS as CATALOGUE
+from ..vehicles.common.shapes import Body, Box, Quaternion, Vector
+from ..vehicles.crazyflie.parameters import AIRFRAME as CRAZYFLIE
+from ..vehicles.multirotor.airframe import Airframe, Rotor
+from ..vehicles.survey_hexacopter.parameters import AIRFRAME as SURVEY_HEXACOPTER
+from .parts import ALONG_X, BLACK, GREY, ORANGE, RED, SILVER, YELLOW, Part, ar_drone_parts, landing_mark, strider_parts
+
+DETAILED_MODELS: Mapping[str, Callable[[], list[Part]]] = {"ar_drone": ar_drone_parts, "strider": strider_parts}
+AIRFRAMES: Mapping[str, Airframe] = {airframe.name: airframe for airframe in (CRAZYFLIE, SURVEY_HEXACOPTER)}
+
+
+def vehicle_parts(vehicle: str) -> list[Part]:
+    """The parts of a vehicle ("crazyflie") in its body frame."""
+    if vehicle in DETAILED_MODELS:
+        return DETAILED_MODELS[vehicle]()
+    model = next(iter(CATALOGUE[vehicle].values()))
+    if vehicle in AIRFRAMES:
+        return list(multirotor_parts(AIRFRAMES[vehicle], model.body))
+    return list(catamaran_parts(model.body) if model.is_vessel else box_parts(model.body))
+
+
+def box_parts(body: Body) -> Iterator[Part]:
+    """What Bullet knows of a vehicle."""
+    for box in body.boxes:
+        x, y, z = box.half_extents
+        yield Part("box", (2 * x, 2 * y, 2 * z), box.position, GREY, box.orientation)
+
+
+def catamaran_parts(body: Body) -> Iterator[Part]:
+    """Round hulls in the place of the lower boxes, and struts from them to the landing deck, the highest box."""
+    deck = max(body.boxes, key=lambda box: box.position[2])
+    (length, width, thickness), (x, y, z) = deck.half_extents, deck.position
+    yield Part("box", (2 * length, 2 * width, 2 * thickness), deck.position, GREY)
+    yield from landing_mark(x, y, z + thickness)
+    for hull in body.boxes:
+        if hull is not deck:
+            yield from _hull_parts(hull, x - 0.8 * length, x + 0.8 * length, z)
+
+
+def _hull_parts(hull: Box, aft: float, fore: float, deck: float) -> Iterator[Part]:
+    (length, beam, _), (x, y, z) = hull.half_extents, hull.position
+    yield Part("cylinder", (beam, 2 * (length - beam)), hull.position, YELLOW, ALONG_X)
+    for end in (-1.0, 1.0):
+        yield Part("sphere", (beam,), (x + end * (length - beam), y, z), YELLOW)
+    for place in (aft, fore):
+        yield Part("cylinder", (0.16 * beam, deck - z), (place, y, (deck + z) / 2), SILVER)
+
+
+def multirotor_parts(airframe: Airframe, body: Body) -> Iterator[Part]:
+    """A hull in the middle, and for each rotor an arm, a motor and the disc of the propeller; red in front. It stands on legs."""
+    _, _, height = airframe.rotor_centre
+    arm = max(math.hypot(*rotor.position[:2]) for rotor in airframe.rotors)
+    hull = 0.42 * arm
+    yield Part("cylinder", (hull, 0.28 * arm), (0.0, 0.0, height - 0.16 * arm), BLACK)
+    yield Part("box", (1.2 * hull, 0.7 * hull, 0.3 * arm), (0.0, 0.0, height - 0.05 * arm), ORANGE)
+    yield Part("sphere", (0.16 * arm,), (0.8 * hull, 0.0, height - 0.3 * arm), GREY)
+    for rotor in airframe.rotors:
+        yield from _arm_parts(rotor, airframe.rotor_radius, arm)
+    yield from _leg_parts(body, 0.035 * arm, height)
+
+
+def _arm_parts(rotor: Rotor, radius: float, arm: float) -> Iterator[Part]:
+    x, y, z = rotor.position
+    thickness, turn = 0.06 * arm, math.atan2(y, x) / 2
+    along: Quaternion = (0.0, 0.0, math.sin(turn), math.cos(turn))
+    yield Part("box", (math.hypot(x, y), thickness, thickness), (x / 2, y / 2, z - 0.12 * arm), GREY, along)
+    yield Part("cylinder", (0.07 * arm, 0.16 * arm), (x, y, z - 0.06 * arm), BLACK)
+    colour: Vector = RED if x > 1e-6 else SILVER
+    yield Part("cylinder", (0.98 * radius, 0.012 * arm), (x, y, z + 0.02 * arm), BLACK, opacity=0.5)
+    yield Part("cylinder", (0.9 * radius, 0.02 * arm), (x, y, z + 0.02 * arm), colour, opacity=0.6)
+
+
+def _leg_parts(body: Body, radius: float, top: float) -> Iterator[Part]:
+    """A leg at each lower corner of the body's boxes."""
+    for box in body.boxes:
+        corners = sorted(box.corners().tolist(), key=lambda corner: corner[2])
+        for x, y, z in corners[:4]:
+            yield Part("cylinder", (radius, top - z), (x, y, (top + z) / 2), GREY)

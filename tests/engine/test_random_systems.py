@@ -1,0 +1,128 @@
+"""Random systems against the simplest importer there is: it moves one value after the other, in the order that the stages say."""
+
+import math
+import random
+
+import pytest
+from fakes import FakeComponent, inputs, outputs
+from systems import run_system
+
+from cosim.core.system import Connection, Endpoint, Group, System, component_names
+from cosim.core.time_grid import exact_fraction
+from cosim.core.units import parse_unit
+
+UNITS = {name: parse_unit(name) for name in ("rad", "deg", "m", "mm", "degC", "K")} | {"": None}
+STEPS = 12
+
+pytestmark = pytest.mark.usefixtures("executor")
+
+
+def mixed(seed, j, t, h, given):
+    return math.sin(seed + j + t) + 0.3 * given[j] + 0.01 * sum(given) + h
+
+
+def mixer(seed, units):
+    """As many inputs u0, u1, ... and outputs y0, y1, ... as there are units."""
+    places = range(len(units))
+
+    def step(values, t, h):
+        given = [values[f"u{j}"] for j in places]
+        for j in places:
+            values[f"y{j}"] = mixed(seed, j, t, h, given)
+
+    sides = [side(f"{letter}{j}", unit=UNITS[units[j]])[0] for side, letter in ((inputs, "u"), (outputs, "y")) for j in places]
+    return FakeComponent(sides, step, start={f"y{j}": seed + 0.1 * j for j in places})
+
+
+def in_stages(draw, members_):
+    """The members in random order, spread over random stages."""
+    left, stages = draw.sample(members_, len(members_)), []
+    while left:
+        count = draw.randint(1, len(left))
+        stages.append(tuple(left[:count]))
+        left = left[count:]
+    return tuple(stages)
+
+
+def random_system(seed):
+    """Mixers with units, delays, periods and stages, some of them in a group of their own; and the units."""
+    draw = random.Random(seed)  # noqa: S311
+    names = [f"m{i}" for i in range(draw.randint(2, 5))]
+    units = {name: [draw.choice(list(UNITS)) for _ in range(draw.randint(1, 6))] for name in names}
+    outs = [(Endpoint(name, f"y{j}"), unit) for name in names for j, unit in enumerate(units[name])]
+    connections = []
+    for name in names:
+        for j, unit in enumerate(units[name]):
+            sources = [source for source, other in outs if _fits(other, unit)]
+            if draw.random() < 0.8:
+                connections.append(Connection(draw.choice(sources), Endpoint(name, f"u{j}"), draw.choice([0, 0, 0, 1, 2, 5])))
+    grouped = draw.sample(names, draw.choice([0, 0, 1, 2]))
+    outside = [name for name in names if name not in grouped]
+    stages = in_stages(draw, outside + ([Group("g", in_stages(draw, grouped))] if grouped else []))
+    periods = {name: exact_fraction(f"{count}/10") for name in names if (count := draw.choice([1, 1, 1, 2, 3])) > 1}
+    components = {name: mixer(i, units[name]) for i, name in enumerate(names)}
+    return System(components, connections, stages, periods), units
+
+
+def _fits(one, other):
+    return not one or not other or UNITS[one].converts_to(UNITS[other])
+
+
+class Oracle:
+    """Every value of every step, moved one by one."""
+
+    def __init__(self, system, units):
+        self.system, self.units = system, units
+        self.seeds = {name: i for i, name in enumerate(units)}
+        self.y = {name: [self.seeds[name] + 0.1 * j for j in range(len(units[name]))] for name in units}
+        self.u = {name: [0.0] * len(units[name]) for name in units}
+        self.waiting = {c: [self.y[c.source.component][int(c.source.scalar[1:])]] * c.delay for c in system.connections}
+
+    def rows(self):
+        rows = [{name: list(values) for name, values in self.y.items()}]
+        for n in range(STEPS):
+            self.stages(self.system.stages, set(self.units), n)
+            rows.append({name: list(values) for name, values in self.y.items()})
+        return rows
+
+    def stages(self, stages, inside, n):
+        for stage in stages:
+            groups = [set(component_names(member.stages)) for member in stage if isinstance(member, Group)]
+            for connection in self.system.connections:
+                ends = {connection.source.component, connection.target.component}
+                reads_now = connection.target.component in component_names([stage]) and connection.source.component in inside
+                if reads_now and not any(ends <= group for group in groups):
+                    self.read(connection)
+            for member in stage:
+                if not isinstance(member, Group):
+                    self.step(member, n)
+            for member in stage:
+                if isinstance(member, Group):
+                    self.stages(member.stages, set(component_names(member.stages)), n)
+
+    def read(self, connection):
+        source, target = connection.source.component, connection.target.component
+        i, j = int(connection.source.scalar[1:]), int(connection.target.scalar[1:])
+        queue = self.waiting[connection]
+        queue.append(self.y[source][i])
+        value, one, other = queue.pop(0), UNITS[self.units[source][i]], UNITS[self.units[target][j]]
+        factor, offset = one.conversion(other) if one and other else (1.0, 0.0)
+        self.u[target][j] = value if (factor, offset) == (1.0, 0.0) else factor * value + offset
+
+    def step(self, name, n):
+        count = int(self.system.periods.get(name, exact_fraction("1/10")) / exact_fraction("1/10"))
+        if n % count == 0:
+            h = float(exact_fraction("1/10") * count)
+            given = self.u[name]
+            self.y[name] = [mixed(self.seeds[name], j, n / 10, h, given) for j in range(len(given))]
+
+
+@pytest.mark.parametrize("first", range(0, 120, 10))
+def test_random_systems_do_what_stages_units_delays_and_periods_say(first):
+    for seed in range(first, first + 10):
+        system, units = random_system(seed)
+        names = [f"{name}.y{j}" for name in units for j in range(len(units[name]))]
+        recording = run_system(system, STEPS * exact_fraction("1/10"), "1/10", names)
+        for n, row in enumerate(Oracle(system, units).rows()):
+            found = {name: recording.columns[name][n] for name in names}
+            assert found == {f"{name}.y{j}": row[name][j] for name in units for j in range(len(units[name]))}, (seed, n)

@@ -1,0 +1,134 @@
+"""Files in, flat model out: how names resolve, and what the front end's failures look like."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cosim.core.errors import InputError
+from cosim.export.modelica import load_block
+from cosim.export.modelica.frontend import rumoca_frontend
+
+PACKAGE = """package Lib
+  constant Real Ts = 0.01;
+  connector RealInput = input Real;
+end Lib;"""
+MEMBER = """within Lib;
+block Double
+  RealInput u;
+  output Real y(start = 0, fixed = true);
+equation
+  when sample(0, Ts) then
+    y = 2*u;
+  end when;
+end Double;"""
+TOP = """model Top
+  Lib.RealInput u;
+  output Real y;
+  Lib.Double double;
+equation
+  connect(u, double.u);
+  y = double.y;
+end Top;"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    root = tmp_path / "models"
+    (root / "Lib").mkdir(parents=True)
+    (root / "Lib" / "package.mo").write_text(PACKAGE)
+    (root / "Lib" / "Double.mo").write_text(MEMBER)
+    (root / "Top.mo").write_text(TOP)
+    return root
+
+
+def test_a_model_uses_packages_beside_it_and_ships_their_sources(folder, compile_both):
+    model = compile_both(folder / "Top.mo")
+    assert sorted(model.c.block.resources) == ["Lib/Double.mo", "Lib/package.mo", "Top.mo"]
+    model.set(u=1.5)
+    model.initialize()
+    model.step(0.0)
+    assert model.get("y") == 3.0
+
+
+def test_files_beside_the_model_are_not_read(folder):
+    expected = load_block(folder / "Top.mo").files
+    (folder / "Broken.mo").write_text("this is no Modelica")
+    (folder / "Twin.mo").write_text("model Top\n  output Real z;\nequation\n  z = 1;\nend Top;")
+    assert load_block(folder / "Top.mo").files == expected
+
+
+def test_a_member_of_a_package_is_loaded_as_such(folder):
+    block = load_block(folder / "Lib" / "Double.mo")
+    assert (block.identifier, sorted(block.resources)) == ("Double", ["Lib/Double.mo", "Lib/package.mo"])
+
+
+def test_one_of_several_models_of_a_file(write_model):
+    path = write_model(
+        "model A\n  output Real y;\nequation\n  y = 1;\nend A;\nmodel B\n  output Real z;\nequation\n  z = 2;\nend B;"
+    )
+    assert [v.name for v in load_block(path, "A").variables] == ["y"]
+    assert [v.name for v in load_block(path).variables] == ["z"]
+
+
+def test_syntax_errors_come_with_file_and_line(folder):
+    (folder / "Lib" / "Double.mo").write_text(MEMBER.replace("RealInput u;", "RealInput u"))
+    (folder / "Top.mo").write_text(TOP.replace("output Real y;", "output Real ;"))
+    with pytest.raises(InputError) as caught:
+        load_block(folder / "Top.mo")
+    places = {problem.where for problem in caught.value.problems}
+    assert places == {f"{folder / 'Top.mo'}:3", f"{folder / 'Lib' / 'Double.mo'}:3"}
+
+
+def test_unknown_names_come_with_file_and_line(folder):
+    (folder / "Lib" / "Double.mo").write_text(MEMBER.replace("2*u", "2*velocity"))
+    with pytest.raises(InputError, match=r"Double.mo:7: unresolved component reference: 'velocity'"):
+        load_block(folder / "Top.mo")
+
+
+def test_a_model_is_not_confused_with_a_member_of_the_same_name(folder):
+    text = TOP.replace("Top", "Double").replace("  y = double.y;", "  y = sin(y) + double.y;")
+    (folder / "Double.mo").write_text(text)
+    with pytest.raises(InputError, match=r"models/Double.mo:7: algebraic loop: y \(Double.mo:7\)"):
+        load_block(folder / "Double.mo")
+
+
+def test_a_panic_of_the_front_end_is_an_input_error(write_model):
+    path = write_model("""model M
+  input Real w[3];
+  output Real y;
+equation
+  when sample(0, 0.01) then
+    y = sum(w[i]*i for i in 1:3);
+  end when;
+end M;""")
+    with pytest.raises(InputError, match=r"M.mo: the Modelica front end failed on the model M"):
+        load_block(path)
+
+
+def test_a_missing_model_and_a_missing_file(folder, write_model):
+    with pytest.raises(InputError, match="no such Modelica file"):
+        load_block(folder / "Nothing.mo")
+    with pytest.raises(InputError, match=r"Top.mo: .*Other"):
+        load_block(folder / "Top.mo", "Other")
+
+
+def test_another_version_of_the_front_end_is_refused(folder, monkeypatch):
+    monkeypatch.setattr(rumoca_frontend, "RUMOCA_VERSION", "0.9.0")
+    with pytest.raises(InputError, match=r"rumoca 0.10.2 is installed, but only 0.9.0 is known to work"):
+        load_block(folder / "Top.mo")
+
+
+def test_a_place_that_the_front_end_knows_is_kept(write_model):
+    path = write_model("""package P
+  constant Integer n = 3;
+end P;
+model M
+  Real v[P.n];
+  output Real y;
+equation
+  y = 1;
+end M;""")
+    with pytest.raises(InputError, match=r"M.mo:5: typecheck failed: .*unevaluable array dimensions for 'v'"):
+        load_block(path)

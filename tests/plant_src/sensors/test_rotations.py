@@ -1,0 +1,47 @@
+"""Rotations in plain floats against SciPy's."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from plant_src.sensors import rotations
+
+RANDOM = np.random.default_rng(5)
+QUATERNIONS = [q / np.linalg.norm(q) for q in RANDOM.normal(size=(20, 4))]
+
+
+def scipys(q):
+    return Rotation.from_quat([*q[1:], q[0]])
+
+
+@pytest.mark.parametrize("q", QUATERNIONS)
+def test_vectors_turn_as_in_scipy_and_back(q):
+    v = RANDOM.normal(size=3)
+    assert np.allclose(rotations.to_world(q, v), scipys(q).apply(v), atol=1e-14)
+    assert np.allclose(rotations.to_body(q, rotations.to_world(q, v)), v, atol=1e-14)
+
+
+@pytest.mark.parametrize("q", QUATERNIONS)
+def test_angles_are_those_of_scipy_and_lead_back(q):
+    roll, pitch, yaw = rotations.euler_angles(q)
+    assert np.allclose((yaw, pitch, roll), scipys(q).as_euler("ZYX"), atol=1e-12)
+    assert abs(np.dot(rotations.quaternion_from_euler(roll, pitch, yaw), q)) == pytest.approx(1, abs=1e-14)
+
+
+def test_products_and_rotation_vectors_are_those_of_scipy():
+    for a, b in zip(QUATERNIONS[::2], QUATERNIONS[1::2], strict=True):
+        assert np.allclose(
+            scipys(rotations.quaternion_product(a, b)).as_matrix(), (scipys(a) * scipys(b)).as_matrix(), atol=1e-14
+        )
+        v = RANDOM.normal(size=3)
+        assert np.allclose(
+            scipys(rotations.quaternion_from_rotation_vector(v)).as_matrix(), Rotation.from_rotvec(v).as_matrix(), atol=1e-14
+        )
+
+
+def test_halfway_turns_by_half_of_the_shorter_way():
+    a, b = rotations.quaternion_from_rotation_vector((0.0, 0.0, 0.2)), rotations.quaternion_from_rotation_vector((0.0, 0.0, 0.8))
+    for other in (b, [-x for x in b]):
+        assert np.allclose(
+            rotations.midpoint_attitude(a, other), rotations.quaternion_from_rotation_vector((0.0, 0.0, 0.5)), atol=1e-15
+        )

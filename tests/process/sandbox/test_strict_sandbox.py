@@ -1,0 +1,189 @@
+"""`--sandbox strict`: not only FMUs, the whole command sees and reaches nothing but what it needs."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cosim.process.sandbox import find_available_sandboxes
+
+pytestmark = [
+    pytest.mark.skipif(not find_available_sandboxes().bubblewrap, reason="no bubblewrap that works"),
+    pytest.mark.skipif(
+        not find_available_sandboxes().landlock, reason="this kernel has no Landlock, which FMUs in a sandbox need"
+    ),
+]
+
+
+def words(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "cosim", *map(str, arguments)]
+
+
+def cosim(folder: Path, *arguments: object, **variables: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "TMPDIR": str(folder / "tmp"), **variables}
+    (folder / "tmp").mkdir(exist_ok=True)
+    return subprocess.run(
+        words(*arguments), cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=100
+    )
+
+
+@pytest.fixture
+def server():
+    """Listens at one port to TCP and UDP; what came by UDP is read at once or not at all."""
+    with socket.socket() as stream, socket.socket(type=socket.SOCK_DGRAM) as datagrams:
+        stream.bind(("127.0.0.1", 0))
+        stream.listen()
+        datagrams.bind(stream.getsockname())
+        datagrams.settimeout(0.2)
+        yield datagrams
+
+
+@pytest.fixture
+def home(tmp_path):
+    """A folder with a scenario in a folder of its own, and a private file beside it."""
+    (tmp_path / "project").mkdir()
+    (tmp_path / "private.txt").write_text("secret")
+    shutil.copy(Path(__file__).with_name("sandbox_probe.py"), tmp_path / "project")
+    return tmp_path
+
+
+def prowling(home: Path, port: int = 9, **more: Any) -> Path:
+    arguments = {
+        "private": str(home / "private.txt"),
+        "own": str(home / "out/own.txt"),
+        "port": port,
+        "process": os.getpid(),
+    }
+    component = {"python": "sandbox_probe.py:SandboxProbe", "arguments": arguments}
+    content = {"name": "prowling", "stop_time": 0.1, "step_size": 0.01, "components": {"p": component}, **more}
+    file = home / "project/prowling.json"
+    file.write_text(json.dumps(content))
+    return file
+
+
+def report(done: subprocess.CompletedProcess[str]) -> dict[str, Any]:
+    (line,) = [line for line in done.stdout.splitlines() if line.startswith("{")]
+    return dict(json.loads(line))
+
+
+def test_the_run_writes_its_results_and_reaches_nothing_else(home, server):
+    file = prowling(home, server.getsockname()[1])
+    done = cosim(home, "run", file, "--output-dir", "out", "--no-report", "--sandbox", "strict")
+    assert done.returncode == 0, done.stderr
+    found = report(done)
+    assert found.pop("see processes") < 10
+    assert found == {
+        "write beside its source": "OSError",  # read-only file system
+        "write to the system": "OSError",
+        "write to its own folder": 4,
+        "read a private file": "FileNotFoundError",
+        "connect": "ConnectionRefusedError",  # this machine is another one there
+        "send": 3,
+        "signal": "ProcessLookupError",
+    }
+    with pytest.raises(TimeoutError):
+        server.recv(10)
+    assert len((home / "out/result.csv").read_text().splitlines()) == 12
+    assert list((home / "tmp").iterdir()) == []
+
+
+def test_without_it_the_same_run_reaches_everything(home, server):
+    """Or the test above would prove nothing."""
+    done = cosim(home, "run", prowling(home, server.getsockname()[1]), "--output-dir", "out", "--no-report")
+    found = report(done)
+    assert (found["read a private file"], found["connect"], found["send"], found["signal"]) == ("secret", "connected", 3, None)
+    assert (found["write beside its source"], server.recv(10)) == (4, b"out")
+
+
+@pytest.mark.parametrize("before", [True, False], ids=["before", "after"])
+def test_the_kind_of_sandbox_may_be_left_out(home, before):
+    file = prowling(home)
+    order = ["--sandbox", file] if before else [file, "--sandbox"]
+    done = cosim(home, "run", *order, "--output-dir", "out", "--no-report")
+    assert done.returncode == 0, done.stderr
+    assert report(done)["read a private file"] == "secret"  # no FMU, so nobody is confined
+
+
+def test_a_refused_scenario_leaves_no_folder(home):
+    file = prowling(home, connections=[{"from": "p.z", "to": "q.u"}])
+    done = cosim(home, "run", file, "--output-dir", "new/out", "--sandbox", "strict")
+    assert done.returncode == 2
+    assert "q" in done.stderr and "connections" in done.stderr
+    assert not (home / "new").exists()
+
+
+def test_without_bubblewrap_it_is_refused_before_anything_runs(home, tmp_path):
+    done = cosim(home, "run", prowling(home), "--sandbox", "strict", PATH=str(tmp_path))
+    assert done.returncode == 2
+    assert done.stderr.startswith("the strict sandbox needs bubblewrap")
+    assert not (home / "runs").exists()
+
+
+def test_a_bubblewrap_that_starts_nothing_is_no_success(home):
+    (home / "bwrap").write_text("#!/bin/sh\nexit 0\n")
+    (home / "bwrap").chmod(0o755)
+    done = cosim(home, "run", prowling(home), "--sandbox", "strict", PATH=f"{home}:/bin")
+    assert (done.returncode, done.stderr) == (2, "bubblewrap could not start the command (exit code 0)\n")
+    assert not (home / "runs").exists()
+
+
+def test_one_fmu_alone(home, probe):
+    done = cosim(home, "simulate", probe, "--output-file", "out/x.csv", "--sandbox", "strict")
+    assert done.returncode == 0, done.stderr
+    free = cosim(home, "simulate", probe, "--output-file", "free.csv")
+    assert free.returncode == 0, free.stderr
+    assert (home / "out/x.csv").read_bytes() == (home / "free.csv").read_bytes()
+
+
+def slow(home: Path) -> subprocess.Popen[str]:
+    """A run that keeps pace with the clock, so that it lasts, and has written rows."""
+    order = ("run", prowling(home, stop_time=1000), "--output-dir", "out", "--no-report", "--sandbox", "strict", "--real-time")
+    (home / "tmp").mkdir()
+    environment = {**os.environ, "TMPDIR": str(home / "tmp"), "MARK": str(home)}
+    process = subprocess.Popen(words(*order), cwd=home, env=environment, stderr=subprocess.PIPE, text=True)
+    latest = time.monotonic() + 60
+    while not (home / "out/result.csv").exists() and time.monotonic() < latest:
+        time.sleep(0.02)
+    return process
+
+
+def marked(home: Path) -> list[str]:
+    """Processes of the run, by their environment."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        try:
+            if entry.name.isdigit() and f"MARK={home}\0".encode() in (entry / "environ").read_bytes():
+                found.append(entry.name)
+        except OSError:
+            continue
+    return found
+
+
+def test_an_interrupt_reaches_the_run_inside(home):
+    process = slow(home)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 130, errors
+    assert "rows until t = " in errors
+    assert (marked(home), list((home / "tmp").iterdir())) == ([], [])
+
+
+def test_nothing_inside_outlives_a_killed_command(home):
+    process = slow(home)
+    assert len(marked(home)) >= 4  # this command, bubblewrap, and the two of the run
+    process.kill()
+    process.communicate(timeout=30)
+    latest = time.monotonic() + 10
+    while marked(home) and time.monotonic() < latest:
+        time.sleep(0.02)
+    assert marked(home) == []

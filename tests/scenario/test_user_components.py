@@ -1,0 +1,97 @@
+"""A component of one's own is examined when it is loaded: what would fail later, or silently do nothing, is said at once."""
+
+import pytest
+from test_invalid_scenarios import refused
+
+import cosim
+from cosim.core.errors import ComponentError
+
+OWN = """
+from cosim.core.component import Component, StepResult, Variable
+from cosim.core.units import parse_unit
+
+
+class Own(Component):
+    binds_everything = True
+    has_state = False
+
+    def __init__(self, instance_name):
+        self.variables = [
+            Variable("u", causality="input", start=1.0, unit=parse_unit("N")),
+            Variable("y", causality="output", variability="continuous"),
+        ]
+        self.u = 1.0
+
+    def set(self, name, value):
+        self.u = value
+
+    def get(self, name):
+        return self.u
+
+    def bind(self, inputs, outputs):
+        (self.inputs,), (self.outputs,) = inputs.arrays.values(), outputs.arrays.values()
+
+    def set_inputs(self):
+        self.u = self.inputs.item(0)
+
+    def do_step(self, time, step_size):
+        return None
+
+    def get_outputs(self):
+        self.outputs[0] = 2 * self.u
+"""
+
+
+@pytest.fixture
+def own(folder):
+    """Writes the component with one edit; returns the scenario's components."""
+
+    def write(before="", after=""):
+        assert before in OWN
+        (folder.path / "own.py").write_text(OWN.replace(before, after))
+        return {"a": {"python": "own.py:Own", "parameters": {"u": 3.0}}}
+
+    return write
+
+
+def test_a_sound_one_runs_with_what_it_does_not_need_left_out(folder, own):
+    assert cosim.run(folder.scenario(own()))["a.y"].tolist() == [6.0] * 4
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "line"),
+    [
+        ("def do_step", "def dostep", 'it does not define "do_step", but "dostep"'),
+        ("def get_outputs", "def outputs_of", 'it does not define "get_outputs"'),
+        ("has_state = False", "has_state = True", 'it does not define "get_state"'),
+        ("do_step(self, time, step_size)", "do_step(self, time)", '"do_step" does not take the arguments (time, step_size)'),
+        ('parse_unit("N")', '"N"', "variable \"u\": unit is 'N', expected a cosim.core.units.Unit, such as parse('N')"),
+        ('"output", v', '"outptu", v', 'variable "y": causality is "outptu"; did you mean "output"?'),
+        ('"continuous"', '"continous"', 'variable "y": variability is "continous"; did you mean "continuous"?'),
+        ('Variable("y", ', 'Variable("u", ', 'variable "u" stands there 2 times'),
+        ('Variable("y", ', 'Variable("y", shape=3, ', 'variable "y": shape is 3, expected a tuple of sizes'),
+        ('Variable("y", causality="output", variability="continuous")', '"y"', "\"variables\" holds 'y', expected a cosim"),
+        ("has_state = False", "", "it has no has_state; expected a component or an Fmi2Slave class"),
+        (
+            'Variable("y", ',
+            'Variable("y", "Flaot64", ',
+            'variable "y": type is "Flaot64", expected one of FMI 3.0; did you mean "Float64"?',
+        ),
+    ],
+)
+def test_a_mistake_is_named(folder, own, before, after, line):
+    found = refused(folder, own(before, after))
+    assert line in found[0]
+    assert found[0].startswith("scenario.json:1:") and "$.components.a: own.py:Own" in found[0]
+
+
+def test_all_mistakes_are_named_together(folder, own):
+    own("def do_step", "def dostep")
+    file = folder.path / "own.py"
+    file.write_text(file.read_text().replace('"output", v', '"outptu", v'))
+    assert len(refused(folder, {"a": {"python": "own.py:Own"}})) == 2
+
+
+def test_a_step_returns_nothing_or_how_it_ended(folder, own):
+    with pytest.raises(ComponentError, match="a: do_step failed at t = 0 s: returned True, expected None or a StepResult"):
+        cosim.run(folder.scenario(own("return None", "return True")))
