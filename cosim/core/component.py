@@ -179,6 +179,7 @@ class Component(Protocol):
 
     def instantiate(self) -> None:
         """Create the instance and acquire its resources (FMI: fmi3InstantiateCoSimulation); called once, after `bind`."""
+        return
 
     def set_inputs(self) -> None:
         """Take over the values in the bound input arrays."""

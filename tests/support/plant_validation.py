@@ -49,8 +49,8 @@ Every model of the plant beside a reference that is independent of it, with the 
 pytest tests -m "" --validation docs/validation.md
 ```
 
-never by hand: a statement that is not met fails its test, and `tests/test_validation_document.py` fails where this page lists other
-statements than the tests make. Speed has a page of its own: [performance.md](performance.md).
+never by hand: a statement that is not met fails its test, and `tests/test_validation_document.py` fails where this page
+lists other statements than the tests make. Speed has a page of its own: [performance.md](performance.md).
 
 * *Reference* and *measured* are left out where the quantity is a deviation by itself. Of several values the worst stands here.
 * *Deviation* is absolute, or a share of the reference where it says "rel."; what is below 1e-12 is rounding. *Exact*: to the
