@@ -61,7 +61,7 @@ def _load_modelica(path: Path, model: str | None) -> Block:
 
 
 def _load_equations(path: Path, model: str | None) -> Block:
-    from ..components.python_class import load_object
+    from ..components.python_import import load_object
 
     block = load_object(f"{path.name}:block", path.parent)
     try:

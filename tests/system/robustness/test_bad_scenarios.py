@@ -94,7 +94,7 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "missing Python file": (put("components/a/python", "block.py:Gain"), 'file "block.py" does not exist'),
     "missing class": (put("components/a/python", "pythonfmu_blocks.py:Gian"), 'did you mean "Gain"?'),
     "no class": (put("components/a/python", "pythonfmu_blocks.py"), 'expected "file.py:name", found "pythonfmu_blocks.py"'),
-    "a function that makes no component": (put("components/c/python", "kpis.py:nothing"), "makes a dict: it has no variables"),
+    "a function that makes no component": (put("components/c/python", "kpis.py:nothing"), "creates a dict: it has no variables"),
     "two sources": (put("components/a/fmu", "probe.fmu"), "found fmu and python"),
     "arguments for an FMU": (put("components/f/arguments", {"x": 1}), '"arguments" are for components with "python"'),
     "a path with a null character": (put("components/f/fmu", "a\0b"), "the character U+0000 is not allowed"),
