@@ -30,7 +30,7 @@ from cosim.components.fmi.isolated.pipes import (
     write_line,
 )
 from cosim.components.fmi.isolated.shared_memory import SharedMemoryBlock
-from cosim.components.fmi.isolated.worker_process import WorkerLost, WorkerProcess
+from cosim.components.fmi.isolated.worker_process import WorkerLostError, WorkerProcess
 from cosim.core.component import Ports, Variable
 from cosim.core.time_grid import exact_fraction
 from cosim.engine.run_loop import Settings, simulate
@@ -111,7 +111,7 @@ def test_who_waits_in_vain_sleeps_at_once_and_ever_longer(monkeypatch):
 
 def test_a_process_that_does_not_answer_is_found_at_its_deadline(worker):
     began = time.monotonic()
-    with pytest.raises(WorkerLost, match=r"did not return within 0\.2 s"):
+    with pytest.raises(WorkerLostError, match=r"did not return within 0\.2 s"):
         worker(lambda line: time.sleep(60)).request(STEP_COMMAND, 0.2)
     assert 0.2 < time.monotonic() - began < 0.7
 
@@ -130,9 +130,9 @@ def test_the_deadline_holds_for_each_call_that_the_journal_tells_of(worker):
 
 def test_the_exit_code_of_a_process_is_told(worker):
     process = worker(lambda line: os._exit(3))
-    with pytest.raises(WorkerLost, match="it ended the process with exit code 3"):
+    with pytest.raises(WorkerLostError, match="it ended the process with exit code 3"):
         process.request(STEP_COMMAND, 5.0)
-    with pytest.raises(WorkerLost):
+    with pytest.raises(WorkerLostError):
         process.request(STEP_COMMAND, 5.0)
 
 
@@ -140,7 +140,7 @@ def test_a_process_that_ended_between_two_commands_is_missed(children, worker):
     process = worker(lambda line: line)
     (child,) = children()
     os.kill(int(child), signal.SIGKILL)
-    with pytest.raises(WorkerLost, match="signal 9"):
+    with pytest.raises(WorkerLostError, match="signal 9"):
         process.request(STEP_COMMAND, 5.0)
 
 
