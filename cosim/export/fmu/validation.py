@@ -20,12 +20,12 @@ def validate_description(description: bytes, source: Path) -> None:
     from fmpy.model_description import ValidationError
 
     from ...components.fmi.preflight import DEFAULT_LIMITS
-    from ...components.fmi.preflight.findings import FatalFinding, raise_errors
+    from ...components.fmi.preflight.findings import FatalFindingError, raise_errors
     from ...components.fmi.preflight.xml import parse_xml
 
     try:
         parse_xml(description, DESCRIPTION_FILE, DEFAULT_LIMITS)
-    except FatalFinding as flaw:
+    except FatalFindingError as flaw:
         raise_errors(source, [flaw.finding])
     archive = BytesIO()
     with ZipFile(archive, "w") as file:

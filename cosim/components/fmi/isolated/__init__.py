@@ -1,7 +1,7 @@
 """FMUs in worker processes: a crash, exit or hang of an FMU does not affect the importer and the other components.
 
-Importer process: `IsolatedFmu` (isolated_fmu.py) is the component; `WorkerProcess` (worker_process.py) starts the worker process,
-sends commands and waits for answers.
+Importer process: `IsolatedFmu` (isolated_fmu.py) is the component, based on `WorkerClient` (worker_client.py), which sends
+commands; `WorkerProcess` (worker_process.py) starts the worker process, waits for its answers and ends it.
 
 Worker process: `Worker` (worker.py) executes the commands on one `FmuInstance`.
 

@@ -3,33 +3,27 @@
 from __future__ import annotations
 
 import ctypes
-import math
 import os
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ....core import component_log
 from ....core.component import Component, Ports, PreparedCall, StepResult
-from ....core.errors import ComponentError, InputError
-from ....process.journal import CALL_NUMBER, Phase
+from ....core.errors import InputError
 from ....process.temporary_folders import WORKER_PREFIX, LockedFolder
 from ..file import FmuFile
 from ..function_calls import DISCARD, OK
 from ..instance import FmuInstance
 from .isolation import Isolation
-from .pipes import STEP_COMMAND, STEP_DONE, decode_line, encode_line
+from .pipes import STEP_COMMAND, STEP_DONE
 from .shared_memory import SharedMemoryBlock, matching_buffers, string_array
 from .worker import Worker
-from .worker_process import WorkerLostError, WorkerProcess
+from .worker_client import WorkerClient
+from .worker_process import WorkerProcess
 
 
-class WorkerEndedError(ComponentError):
-    """Failure of a component whose worker process ended or was stopped."""
-
-
-class IsolatedFmu(Component):
+class IsolatedFmu(WorkerClient, Component):
     """Component whose FMU instance runs in a worker process.
 
     Results are identical to those of `FmuInstance`. A crash, exit or hang of the FMU raises a ComponentError.
@@ -55,18 +49,12 @@ class IsolatedFmu(Component):
         if not hasattr(os, "fork"):
             raise InputError("isolated FMUs need an operating system with fork (Linux, macOS)")
         file.check_binary()
-        self.name, self._file, self._instance_class, self.isolation = instance_name, file, instance_class, isolation
+        super().__init__(file, instance_name, isolation.deadlines.load)
+        self._instance_class, self.isolation = instance_class, isolation
         self.description = file.description
         self.variables, self.has_state = self.description.variables, self.description.has_state
         self._logging_on = logging_on
-        self._process: WorkerProcess | None = None
         self._temporary_folder: LockedFolder | None = None
-        #: deadline (s) of the calls in the present phase of the life cycle
-        self._deadline = isolation.deadlines.load
-        #: command that the worker process executes now
-        self._command = "instantiate"
-        #: names of the FMI calls of a prepared step, in their order
-        self._call_names: Sequence[str] = [""]
         self._result: StepResult | None = None
 
     # -- life cycle ----------------------------------------------------------------------------------------------------
@@ -131,19 +119,6 @@ class IsolatedFmu(Component):
             self._temporary_folder.cleanup()
             self._temporary_folder = None
             self._file.release()
-
-    def _execute_or_warn(self, command: str) -> None:
-        """Execute a command after the last step; an end of the worker process is only a warning, as all results are complete."""
-        try:
-            if self._process:
-                self._execute(command)
-        except WorkerEndedError as error:
-            component_log.log_message(self.name, component_log.WARNING, f"{error.function} failed: {error.reason}")
-
-    def _stop_worker(self) -> None:
-        assert self._process is not None
-        self._process.stop()
-        self._process = None
 
     # -- access outside the stepping loop ---------------------------------------------------------------------------------------
 
@@ -228,55 +203,3 @@ class IsolatedFmu(Component):
     def _copy_outputs(self) -> None:
         for target, source in self._output_buffers:
             target[:] = source
-
-    # -- commands and answers ------------------------------------------------------------------------------------------
-
-    def _execute(self, command: str, *arguments: Any) -> Any:
-        self._command = command
-        return self._parse_answer(self._request(encode_line([command, *arguments])))
-
-    def _request(self, line: bytes) -> bytes:
-        process = self._process
-        if process is None:
-            raise WorkerEndedError(self.name, self._command, "its worker process has already ended")
-        try:
-            return process.request(line, self._deadline)
-        except WorkerLostError as error:
-            self._stop_worker()
-            raise self._worker_ended_error(str(error)) from None
-        except BaseException:  # after an interrupt, the pending answer would be taken for that of the next command
-            self._stop_worker()
-            raise
-
-    def _parse_answer(self, answer: bytes) -> Any:
-        if answer == STEP_DONE:
-            return None
-        message = self._decode_answer(answer)
-        self._file.has_fatal_error = self._file.has_fatal_error or bool(message.get("fatal"))
-        if "component_error" in message:
-            raise ComponentError(*message["component_error"])
-        if "input_error" in message:
-            raise InputError(message["input_error"])
-        return message["value"]
-
-    def _decode_answer(self, answer: bytes) -> dict[str, Any]:
-        try:
-            message = decode_line(answer)
-        except ValueError:
-            message = None
-        if not isinstance(message, dict) or not {"value", "component_error", "input_error"} & message.keys():
-            self._stop_worker()
-            raise WorkerEndedError(self.name, self._command, "its worker process sent an invalid answer")
-        return message
-
-    def _worker_ended_error(self, reason: str) -> WorkerEndedError:
-        """Return the error for an ended worker process; its journal names the FMI function that was being called."""
-        journal = self._shared_memory.journal
-        if journal.phase == Phase.CALLING:
-            activity = journal.activity()
-            time = None if math.isnan(activity.time) else activity.time
-            return WorkerEndedError(self.name, activity.function, reason, time)
-        if self._command == "step" and 0 <= journal[CALL_NUMBER] < len(self._call_names):
-            function = self._call_names[journal[CALL_NUMBER]]
-            return WorkerEndedError(self.name, function, reason, self._current_time.value)
-        return WorkerEndedError(self.name, self._command, reason)

@@ -9,7 +9,7 @@ from bad_fmus import Member, members, pack_archive, read_members
 from cosim.components.fmi import FmuFile
 from cosim.components.fmi.preflight import elf
 from cosim.components.fmi.preflight.fmu_platform import current_platform
-from cosim.components.fmi.preflight.library import InvalidLibrary, SharedLibrary
+from cosim.components.fmi.preflight.library import InvalidLibraryError, SharedLibrary
 from cosim.components.fmi.preflight.validation import validate_fmu
 from cosim.core import resources
 from cosim.core.errors import InputError
@@ -133,8 +133,8 @@ def test_mutated_libraries(name, count):
         begin = time.process_time()
         try:
             results.add(type(elf.read_library(content, current_platform().architecture)))
-        except InvalidLibrary as damage:
+        except InvalidLibraryError as damage:
             assert str(damage).startswith(("is ", "has "))
             results.add(type(damage))
         assert time.process_time() - begin < 2
-    assert results == {SharedLibrary, InvalidLibrary}
+    assert results == {SharedLibrary, InvalidLibraryError}

@@ -12,7 +12,7 @@ from cosim.components.fmi.preflight import DEFAULT_LIMITS, examine, macho, open_
 from cosim.components.fmi.preflight.archive import Archive
 from cosim.components.fmi.preflight.binary import REQUIRED_FUNCTIONS, check_binary
 from cosim.components.fmi.preflight.fmu_platform import FmuPlatform
-from cosim.components.fmi.preflight.library import InvalidLibrary
+from cosim.components.fmi.preflight.library import InvalidLibraryError
 
 FMPY = Path(fmpy.__file__).parent
 MACHINES = {"aarch64": "x86_64", "x86_64": "aarch64"}
@@ -107,13 +107,13 @@ DAMAGED = {
 @pytest.mark.parametrize("case", DAMAGED)
 def test_damaged_libraries_are_told(case, library, architecture):
     change, words = DAMAGED[case]
-    with pytest.raises(InvalidLibrary, match=words):
+    with pytest.raises(InvalidLibraryError, match=words):
         macho.read_library(change(library), architecture)
 
 
 def test_another_architecture_is_told(library, architecture):
     other = MACHINES[architecture]
-    with pytest.raises(InvalidLibrary, match=f"is made for {architecture}; this machine is {other}"):
+    with pytest.raises(InvalidLibraryError, match=f"is made for {architecture}; this machine is {other}"):
         macho.read_library(library, other)
 
 
@@ -138,7 +138,7 @@ def test_mutants_are_read_or_damaged(library, architecture):
             content[draw.randrange(4096)] = draw.randrange(256)
         try:
             outcomes.add(type(macho.read_library(bytes(content), architecture)))
-        except InvalidLibrary as damage:
+        except InvalidLibraryError as damage:
             assert str(damage).startswith(("is ", "has "))
-            outcomes.add(InvalidLibrary)
+            outcomes.add(InvalidLibraryError)
     assert len(outcomes) == 2

@@ -10,7 +10,7 @@ from cosim.components.fmi.preflight import DEFAULT_LIMITS, examine, open_regular
 from cosim.components.fmi.preflight.archive import Archive
 from cosim.components.fmi.preflight.binary import REQUIRED_FUNCTIONS, check_binary
 from cosim.components.fmi.preflight.fmu_platform import FmuPlatform
-from cosim.components.fmi.preflight.library import InvalidLibrary
+from cosim.components.fmi.preflight.library import InvalidLibraryError
 from cosim.core import resources
 
 FMU = resources.root() / "fmus/python/vtol.fmu"
@@ -63,7 +63,7 @@ DAMAGED = {
 @pytest.mark.parametrize("case", DAMAGED)
 def test_damaged_libraries_are_told(case, library):
     change, words = DAMAGED[case]
-    with pytest.raises(InvalidLibrary, match=words):
+    with pytest.raises(InvalidLibraryError, match=words):
         pe.read_library(change(library), "x86_64")
 
 
@@ -80,6 +80,6 @@ def test_mutants_are_read_or_damaged(library):
             content[draw.randrange(1024)] = draw.randrange(256)
         try:
             outcomes.add(type(pe.read_library(bytes(content), "x86_64")))
-        except InvalidLibrary:
-            outcomes.add(InvalidLibrary)
+        except InvalidLibraryError:
+            outcomes.add(InvalidLibraryError)
     assert len(outcomes) == 2
