@@ -90,7 +90,7 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "a module that panics": (put("components/a/python", "panics.py:A"), '"panics.py" cannot be imported: BaseException: lost'),
     "a class that panics": (put("components/a/python", "panic.py:A"), "panic.py:A cannot be constructed: BaseException: lost"),
     "a folder as FMU": (put("components/f/fmu", "."), "is a folder, expected a regular file"),
-    "a text as FMU": (put("components/f/fmu", "profile.csv"), "is no FMU"),
+    "a text as FMU": (put("components/f/fmu", "profile.csv"), "is not an FMU"),
     "missing Python file": (put("components/a/python", "block.py:Gain"), 'file "block.py" does not exist'),
     "missing class": (put("components/a/python", "pythonfmu_blocks.py:Gian"), 'did you mean "Gain"?'),
     "no class": (put("components/a/python", "pythonfmu_blocks.py"), 'expected "file.py:name", found "pythonfmu_blocks.py"'),

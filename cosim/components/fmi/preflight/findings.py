@@ -79,8 +79,8 @@ def raise_errors(path: Path, findings: Iterable[Finding]) -> None:
     """
     errors = [finding for finding in findings if finding.rule.severity == "error"]
     lines = [f'"{path}": {finding}' for finding in dict.fromkeys(errors[:_MAX_SHOWN])]
-    if len(errors) > _MAX_SHOWN:
-        lines.append(f'"{path}": and {len(errors) - _MAX_SHOWN} more errors')
+    if (hidden := len(errors) - _MAX_SHOWN) > 0:
+        lines.append(f'"{path}": and {hidden} more error{"s" if hidden > 1 else ""}')
     if lines:
         raise InputError(lines)
 

@@ -92,9 +92,8 @@ def read_central_directory(file: BufferedReader, max_entries: int) -> tuple[list
         entry, position = _read_entry(directory, position)
         entries.append(entry)
     if position != size:
-        raise FatalFindingError(
-            CENTRAL_DIRECTORY(f"the central directory has {size - position} bytes more than its {count} members need")
-        )
+        text = f"the central directory is {size - position} bytes longer than its {count} header{'s' if count != 1 else ''}"
+        raise FatalFindingError(CENTRAL_DIRECTORY(text))
     return entries, offset
 
 
