@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import os
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
+from typing import TYPE_CHECKING
 
 from ..core.component import NativeDoStep, PreparedCall
 from ..core.errors import join_alternatives
@@ -22,13 +21,13 @@ from .plan import Phase, Step
 from .schedule import Schedule
 from .step_runner import StepRunner
 
+if TYPE_CHECKING:
+    from .thread_pool import ThreadPool
+
 #: macro steps whose durations are measured before any step runs on a thread (also in _native.c)
 MEASURED_STEPS = 3
 #: shortest step (s) for which a thread pays off: passing a step to a thread takes about 50 us
 MIN_PARALLEL_DURATION = 100e-6
-
-Item = TypeVar("Item")
-Result = TypeVar("Result")
 
 
 @dataclass(eq=False)
@@ -93,7 +92,7 @@ class ParallelSteps:
         self._runner = runner
         #: by the index of the phase: the steps that may run at the same time, and the one step that replaces them
         self._candidates: dict[int, tuple[ParallelGroup, ScheduledStep]] = {}
-        self._threads: ThreadPoolExecutor | None = None
+        self._threads: ThreadPool | None = None
 
     @property
     def has_candidates(self) -> bool:
@@ -124,12 +123,14 @@ class ParallelSteps:
                 schedule.phases[index] = [parallel_step, *(s for s in schedule.phases[index] if not releases_gil(s))]
             largest = max(largest, len(group.partitions))
         if largest > 1:
-            self._threads = ThreadPoolExecutor(largest - 1, thread_name_prefix="cosim")
+            from .thread_pool import ThreadPool
+
+            self._threads = ThreadPool(largest - 1)
 
     def _run_group(self, group: ParallelGroup) -> int:
         assert self._threads is not None
         run_partition = partial(run_due, n=self._runner.completed_steps)
-        failures = [failure for found in map_concurrently(self._threads, run_partition, group.partitions) for failure in found]
+        failures = [failure for found in self._threads.map(run_partition, group.partitions) for failure in found]
         for failure in sorted(failures, key=lambda failure: failure.step.first_call):
             if failure.status is None:
                 self._runner.raise_float_mode_changed(failure.step, failure.call)
@@ -140,35 +141,4 @@ class ParallelSteps:
     def close(self) -> None:
         """End the threads."""
         if self._threads:
-            self._threads.shutdown()
-
-
-def map_concurrently(threads: ThreadPoolExecutor, function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-    """Call `function` with every item: with the first one in this thread, with the others in `threads`.
-
-    Returns or raises only when all calls have ended, since a component must not be freed during its step.
-
-    Returns:
-        The results in the order of `items`.
-
-    Raises:
-        KeyboardInterrupt: the process was interrupted.
-        BaseException: the first error in the order of `items`.
-    """
-    futures = [threads.submit(function, item) for item in items[1:]]
-    try:
-        return [function(items[0]), *(future.result() for future in futures)]
-    finally:
-        _wait_for(futures)
-
-
-def _wait_for(futures: Sequence[Future[Result]]) -> None:
-    """Wait until all calls have ended, and only then raise a KeyboardInterrupt that came meanwhile."""
-    interrupt: KeyboardInterrupt | None = None
-    while not all(future.done() for future in futures):
-        try:
-            wait(futures)
-        except KeyboardInterrupt as error:
-            interrupt = error
-    if interrupt:
-        raise interrupt
+            self._threads.close()

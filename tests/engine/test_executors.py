@@ -2,7 +2,6 @@
 
 import random
 import struct
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +18,7 @@ from cosim.core.units import parse_unit
 from cosim.engine import EXECUTORS, native_available, parallel, step_runner
 from cosim.engine.run_loop import simulate
 from cosim.engine.settings import Settings
+from cosim.engine.thread_pool import ThreadPool
 from cosim.process import journal
 
 if native_available():
@@ -131,11 +131,11 @@ def test_random_systems_with_foreign_fmus_of_all_types(seed, probes):
 def test_random_systems_with_fmus_on_threads(seed, kind, probes, monkeypatch):
     thread_pools = []
 
-    def create_thread_pool(*arguments, **named):
-        thread_pools.append(ThreadPoolExecutor(*arguments, **named))
+    def create_thread_pool(size):
+        thread_pools.append(ThreadPool(size))
         return thread_pools[-1]
 
-    monkeypatch.setattr("cosim.engine.parallel.ThreadPoolExecutor", create_thread_pool)
+    monkeypatch.setattr("cosim.engine.thread_pool.ThreadPool", create_thread_pool)
 
     def build(parallel):
         files = [FmuFile(path) for path in probes.values()]

@@ -1,11 +1,6 @@
 """Stages on threads: when they are, and that nothing else changes."""
 
-import os
-import signal
-import time
-from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
-from threading import Timer
 
 import pytest
 from slow_fmus import slow_fmu
@@ -14,7 +9,6 @@ from systems import endpoint, make_system
 from cosim.components.fmi import FmuFile, create_component
 from cosim.core.errors import ComponentError
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.parallel import map_concurrently
 from cosim.engine.run_loop import simulate
 from cosim.engine.settings import Event, Settings
 
@@ -84,46 +78,3 @@ def test_a_failure_on_a_thread_names_component_function_and_time(long):
     assert isinstance(parallel.failure, ComponentError)
     assert str(parallel.failure) == str(serial.failure)
     assert len(parallel.recording.time) == len(serial.recording.time)
-
-
-def reciprocal(x):
-    return 1 / x
-
-
-def test_map_concurrently_returns_results_in_order_and_raises_the_first_error():
-    with ThreadPoolExecutor(2) as threads:
-        assert map_concurrently(threads, reciprocal, [1, 2, 4]) == [1, 0.5, 0.25]
-        with pytest.raises(ZeroDivisionError):
-            map_concurrently(threads, reciprocal, [1, 0, 4])
-        assert map_concurrently(threads, reciprocal, [4, 2]) == [0.25, 0.5]
-
-
-@pytest.mark.parametrize("failing_item", [0, 1], ids=["first item", "item on a thread"])
-def test_map_concurrently_raises_only_when_all_calls_have_ended(failing_item):
-    ended = []
-
-    def fail_or_sleep(item):
-        if item == failing_item:
-            raise ValueError(item)
-        time.sleep(0.2)
-        ended.append(item)
-
-    with ThreadPoolExecutor(2) as threads:
-        with pytest.raises(ValueError, match=str(failing_item)):
-            map_concurrently(threads, fail_or_sleep, [0, 1, 2])
-        assert sorted(ended) == [item for item in range(3) if item != failing_item]
-
-
-def test_an_interrupt_is_raised_only_when_all_calls_have_ended():
-    ended = []
-
-    def sleep(seconds):
-        time.sleep(seconds)
-        ended.append(seconds)
-
-    timer = Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT))
-    timer.start()
-    with ThreadPoolExecutor(1) as threads:
-        with pytest.raises(KeyboardInterrupt):
-            map_concurrently(threads, sleep, [0.0, 0.6])
-        assert ended == [0.0, 0.6]
