@@ -51,7 +51,7 @@ class Stopwatch:
     def __init__(self) -> None:
         self._marks: list[tuple[int, float, float]] = []
 
-    def __call__(self, finished: int, count: int) -> None:
+    def __call__(self, finished: int, _count: int) -> None:
         self._marks.append((finished, process_time(), perf_counter()))
 
     @property

@@ -80,7 +80,7 @@ def round_trip() -> float:
         while line := os.read(here[0], 100):
             os.write(there[1], line)
         os._exit(0)
-    cost = microseconds(lambda n: [(os.write(here[1], b"\n"), os.read(there[0], 100)) for _ in range(BATCH)])
+    cost = microseconds(lambda _n: [(os.write(here[1], b"\n"), os.read(there[0], 100)) for _ in range(BATCH)])
     for descriptor in (*here, *there):
         os.close(descriptor)
     os.waitpid(child, 0)
@@ -123,7 +123,7 @@ def own_memory(process: str) -> int:
 def test_memory(tmp_path):
     found: list[int] = []
 
-    def look(finished: int, count: int) -> None:
+    def look(_finished: int, _count: int) -> None:
         workers = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
         found.append(max(own_memory(worker) for worker in workers))
 
