@@ -98,7 +98,7 @@ def test_every_source_that_is_named_is_there(fmu):
         ({"start": (1.0, 2.0)}, "found 2 start values, expected 1"),
         ({"name": "limit"}, 'variable name "limit" is used 2 times'),
         ({"name": "time"}, 'variable name "time" is used 2 times'),
-        ({"type": "Boolean"}, "type Boolean cannot be continuous"),
+        ({"type": "Boolean"}, "found variability continuous for the type Boolean, expected discrete"),
         ({"type": "Enumeration", "variability": "tunable"}, "the enumeration has no literals"),
     ],
 )
