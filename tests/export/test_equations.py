@@ -265,5 +265,5 @@ def test_structural_zeros_are_written(tmp_path: Path) -> None:
 
 
 def test_an_operation_without_counterpart_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"probe: CasADi operation .* cannot be written in C"):
+    with pytest.raises(ValueError, match=r"probe: the CasADi operation .* has no counterpart in C"):
         as_block(oscillator(), [ca.Function("probe", [a], [ca.erf(a)])])

@@ -80,7 +80,7 @@ def test_a_missing_model_function_is_found_when_linking(make_block, tmp_path):
 
 def test_without_a_compiler_it_says_what_to_do(block, tmp_path, monkeypatch):
     monkeypatch.setenv("CC", "no-such-compiler")
-    with pytest.raises(InputError, match=r"needs a C compiler and none was found .*no-such-compiler.*; install gcc or set CC"):
+    with pytest.raises(InputError, match=r"needs a C compiler, but none was found .*no-such-compiler.*; install gcc or set CC"):
         write_fmu(block, 2, tmp_path / "sample.fmu")
 
 

@@ -116,7 +116,7 @@ def test_a_missing_model_and_a_missing_file(folder, write_model):
 
 def test_another_version_of_the_front_end_is_refused(folder, monkeypatch):
     monkeypatch.setattr(rumoca_frontend, "RUMOCA_VERSION", "0.9.0")
-    with pytest.raises(InputError, match=r"rumoca 0.10.2 is installed, but only 0.9.0 is known to work"):
+    with pytest.raises(InputError, match=r"found rumoca 0.10.2, but only 0.9.0 is supported"):
         load_block(folder / "Top.mo")
 
 

@@ -69,7 +69,7 @@ CASES = {
         "a = u > 0;\n  b = pre(a);\n  y = if b then 1 else 0;",
         r"pre\(a\) outside a when",
     ),
-    "warning": ("", 'y = u;\n  assert(u > 0, "low", AssertionLevel.warning);', "M.mo:9: assert.. with a level below error"),
+    "warning": ("", 'y = u;\n  assert(u > 0, "low", AssertionLevel.warning);', "M.mo:9: assert.. with a level other than AssertionLevel.error"),
     "text": ('parameter String name = "x";', "y = u;", "M.mo:6: name: variables of type String are not supported"),
     "message": ('parameter String name = "x";', "y = u;\n  assert(u > 0, name);", "M.mo:9: the message of an assert.. must be a"),
     "text of a number": (

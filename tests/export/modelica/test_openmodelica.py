@@ -66,7 +66,7 @@ def test_errors_are_told_with_file_and_line(omc, write_model, tmp_path):
 def test_silence_is_an_error_too(omc, write_model, tmp_path):
     path = write_model(MODEL)
     omc("exit 0")
-    with pytest.raises(InputError, match="OpenModelica has made no FMU: it printed nothing"):
+    with pytest.raises(InputError, match="OpenModelica has created no FMU: it printed nothing"):
         export_with_omc(path, tmp_path / "m.fmu")
 
 

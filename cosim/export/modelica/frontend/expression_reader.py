@@ -1,4 +1,4 @@
-"""Reads the expressions of rumoca's JSON. What is not known here is refused, never dropped."""
+"""Conversion of expressions from rumoca's JSON to the flat model; unknown elements are errors, they are never ignored."""
 
 from __future__ import annotations
 
@@ -28,39 +28,46 @@ _MODELICA_SPELLING = {"noevent": "noEvent", "outerproduct": "outerProduct"}
 
 
 def split_tagged(node: Json) -> tuple[str, Any]:
-    """The kind and the payload of a node `{kind: payload}`."""
+    """Return the kind and the payload of a node `{kind: payload}`."""
     ((kind, payload),) = node.items()
     return kind, payload
 
 
 def _fold_constants(node: Expression) -> Expression:
-    """An Integer in place of sums and products of Integers, such as the subscripts of an unrolled loop have."""
+    """Evaluate sums, differences and products of Integer literals, as they occur in the subscripts of an unrolled loop."""
     if not (isinstance(node, flat_model.Binary) and node.operator in _INTEGER_OPERATORS):
         return node
     left, right = _fold_constants(node.left), _fold_constants(node.right)
     if isinstance(left, flat_model.Literal) and isinstance(right, flat_model.Literal) and left.type == right.type == "Integer":
-        return flat_model.Literal(_INTEGER_OPERATORS[node.operator](left.value, right.value), "Integer")
+        return flat_model.Literal(_INTEGER_OPERATORS[node.operator](left.number, right.number), "Integer")
     return node
 
 
 @dataclass(frozen=True)
 class ExpressionReader:
-    """`json` is the whole document: names and functions are looked up in it."""
+    """Reader of expressions."""
 
+    #: rumoca's document of the flat model
     json: Json
     sources: ModelicaSources
 
     def locate(self, node: Json) -> SourceLocation | None:
+        """Return the source location of a node, or None for a node that the front end has generated."""
         return self.sources.locate(node.get("span") or node.get("source_span"))
 
     def _type(self, canonical: int) -> str:
-        predefined = {number: name.capitalize() for name, number in self.json["predefined_types"].items()}
+        predefined: dict[int, str] = {number: name.capitalize() for name, number in self.json["predefined_types"].items()}
         return predefined.get(canonical, "Enumeration")
 
     def _optional(self, node: Json | None) -> Expression | None:
         return None if node is None else self.read_expression(node)
 
     def read_expression(self, node: Json) -> Expression:
+        """Convert an expression.
+
+        Raises:
+            InputError: The expression is not supported.
+        """
         kind, payload = split_tagged(node)
         readers: Mapping[str, Callable[[Json], Expression]] = {
             "Literal": self._literal,
@@ -139,7 +146,11 @@ class ExpressionReader:
         return self._function_call(node["name"], node["args"], self.locate(node))
 
     def _function_call(self, reference: Json, arguments: list[Json], where: SourceLocation | None) -> flat_model.Call:
-        """A call; rumoca knows functions by name and would silently take another package's function of the same short name."""
+        """Convert a function call.
+
+        rumoca identifies functions by their short names and would silently use a function of another package with the same
+        name. Such calls are rejected.
+        """
         name = reference["name"]
         function = self.json["functions"].get(name) or raise_model_error(f"unknown function {name}", where)
         if reference["component_ref"]["parts"][-1]["def_id"] != function["def_id"]:

@@ -1,4 +1,4 @@
-"""Reads rumoca's JSON of a flat model into `flat.Model`. What is not known here is refused, never dropped."""
+"""Conversion of rumoca's JSON to the flat model; unknown elements are errors, they are never ignored."""
 
 from __future__ import annotations
 
@@ -13,9 +13,17 @@ from .unrolling import unroll_equations
 
 
 class ModelReader(StatementReader):
-    """Reads one flat model; `json` is the whole document."""
+    """Reader of a flat model."""
 
     def read_model(self, name: str) -> flat_model.Model:
+        """Convert the whole document.
+
+        Args:
+            name: The name of the model.
+
+        Raises:
+            InputError: The model contains an element that is not supported.
+        """
         self._check_document()
         names = self.json["variables"]
         return flat_model.Model(
@@ -51,12 +59,13 @@ class ModelReader(StatementReader):
             raise_model_error("a for-equation among the initial equations was not unrolled by the front end", None)
 
     def _resolve_name(self, candidates: list[str]) -> str:
-        """Of the names by which a parameter may be meant, from the inside out, the one that exists."""
+        """Return the first of the candidate names (innermost scope first) that is a variable."""
         return next((name for name in candidates if name in self.json["variables"]), candidates[0])
 
     # variables
 
     def read_variable(self, name: str) -> flat_model.Variable:
+        """Convert the declaration of a variable."""
         node = self.json["variables"][name]
         type_name = self.json["variable_type_names"][name]
         kind = self._type(self.json["effective_types"][str(node["type_id"])]["canonical_type"])
@@ -93,7 +102,7 @@ class ModelReader(StatementReader):
         return "local" if word == "empty" else word
 
     def _is_top_level(self, name: str) -> bool:
-        """Whether a name is the model's own, if need be as a field of its own records or connectors."""
+        """Return whether a variable belongs to the model itself, also as a field of its records or connectors."""
         parts = name.split(".")
         owners = (".".join(parts[:depth]) for depth in range(1, len(parts)))
         return parts[0] in self.json["top_level_connectors"] or all(owner in self.json["record_instances"] for owner in owners)
@@ -105,7 +114,7 @@ class ModelReader(StatementReader):
         return (
             str(literal.value)
             if isinstance(literal, flat_model.Literal)
-            else raise_model_error("a text literal is expected", self.locate(node))
+            else raise_model_error("a String literal is expected", self.locate(node))
         )
 
     def _enumerations(self) -> dict[str, tuple[str, ...]]:
@@ -119,28 +128,29 @@ class ModelReader(StatementReader):
     # equations
 
     def read_equations(self, section: str) -> tuple[flat_model.Equation, ...]:
+        """Convert the equations of a section of the document."""
         return tuple(pair for node in self.json[section] for pair in self._equation(node))
 
     def _unrolled_equations(self) -> Iterator[flat_model.Equation]:
-        """The equations with the for-equations that the front end has left rolled up."""
-        true = dict(unroll_equations(self.json, "structured_equations"))
-        for place, node in enumerate(self.json["equations"]):
-            written = self._equation({**node, "residual": true.get(place, node["residual"])})
-            if [e.left for e in written] != [e.left for e in self._equation(node)]:
+        """Yield all equations, with the placeholders of for-equations replaced (see `unrolling`)."""
+        replacements = dict(unroll_equations(self.json, "structured_equations"))
+        for index, node in enumerate(self.json["equations"]):
+            equations = self._equation({**node, "residual": replacements.get(index, node["residual"])})
+            if [e.left for e in equations] != [e.left for e in self._equation(node)]:
                 raise_model_error(
                     "this for-equation was not unrolled by the front end; write its equations one by one", self.locate(node)
                 )
-            yield from written
+            yield from equations
 
     def _equation(self, node: Json) -> list[flat_model.Equation]:
         kind, residual = split_tagged(node["residual"])
         if kind != "Binary" or residual["op"] != "Sub":
-            raise_model_error("an equation that is not of the form a = b", self.locate(node))
+            raise_model_error("this equation does not have the form a = b", self.locate(node))
         left, right, where = self.read_expression(residual["lhs"]), self.read_expression(residual["rhs"]), self.locate(node)
         return [flat_model.Equation(a, b, where) for a, b in self._split_records(left, right)]
 
     def _split_records(self, left: Expression, right: Expression) -> list[tuple[Expression, Expression]]:
-        """The pairs of fields when two records are equated, else the pair itself."""
+        """Return the pairs of fields of an equation between two records, or the pair itself for all other equations."""
         records = self.json["record_instances"]
         if not (isinstance(left, flat_model.Name) and left.name in records):
             return [(left, right)]
@@ -154,7 +164,7 @@ class ModelReader(StatementReader):
         ]
 
     def _declaration_equations(self) -> list[flat_model.Equation]:
-        """`Real y = 2*u;` of a variable that is no parameter."""
+        """Return the declaration equations (`Real y = 2*u;`) of all variables that are neither parameters nor constants."""
         variables = [self.read_variable(name) for name in self.json["variables"]]
         return [
             flat_model.Equation(flat_model.Name(v.name, v.where), v.binding, v.where)
@@ -163,6 +173,7 @@ class ModelReader(StatementReader):
         ]
 
     def read_when_chain(self, chain: Json) -> flat_model.When:
+        """Convert a when-clause of an equation section, with its `elsewhen` branches."""
         blocks = [chain["first"], *chain["else_when"]]
         branches = tuple((self.read_expression(block["condition"]), self._when_body(block["equations"])) for block in blocks)
         return flat_model.When(branches, self.locate(chain))
@@ -185,7 +196,7 @@ class ModelReader(StatementReader):
         raise_model_error(f"{kind} in a when-equation is not supported", self.locate(node))
 
     def _parse_target(self, target: str, where: SourceLocation | None) -> flat_model.Name | flat_model.Index:
-        """A target of a when-equation comes as text: a name, perhaps with constant subscripts."""
+        """Parse the target of a when-equation, given as text: a name, perhaps with constant subscripts."""
         if target in self.json["variables"]:
             return flat_model.Name(target, where)
         base, bracket, subscripts = target.rpartition("[")

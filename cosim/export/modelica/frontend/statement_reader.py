@@ -1,4 +1,4 @@
-"""Reads the statements and functions of rumoca's JSON."""
+"""Conversion of statements and functions from rumoca's JSON to the flat model."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from .expression_reader import ExpressionReader, Json, split_tagged
 
 
 class StatementReader(ExpressionReader):
-    """Adds statements and functions."""
+    """Reader of statements and functions."""
 
     def read_body(self, nodes: list[Json]) -> Body:
+        """Convert a list of statements."""
         return tuple(self._statement(*split_tagged(node)) for node in nodes)
 
     def _statement(self, kind: str, node: Json) -> Statement:
@@ -40,7 +41,7 @@ class StatementReader(ExpressionReader):
         return flat_model.Index(name, subscripts, where) if subscripts else name
 
     def _constant_subscripts(self, nodes: list[Json], where: SourceLocation | None) -> str:
-        """Subscripts of a component array are part of the flat name: "b[1]"."""
+        """Return the constant subscripts of a component array as text; they are part of the flat name: "b[1]"."""
         numbers = [payload["value"] for kind, payload in map(split_tagged, nodes) if kind == "Index"]
         if len(numbers) != len(nodes):
             raise_model_error("a component of an array can only be assigned with a constant subscript", where)
@@ -69,7 +70,7 @@ class StatementReader(ExpressionReader):
     def _assert(self, node: Json) -> flat_model.Assert:
         message, where = self.read_expression(node["message"]), self.locate(split_tagged(node["condition"])[1])
         if node["level"] is not None and self.read_expression(node["level"]) != flat_model.Literal(2, "Integer"):
-            raise_model_error("assert() with a level below error is not supported", where)
+            raise_model_error("assert() with a level other than AssertionLevel.error is not supported", where)
         return flat_model.Assert(self.read_expression(node["condition"]), self._message_text(message, where), where)
 
     def _message_text(self, message: Expression, where: SourceLocation | None) -> str:
@@ -77,13 +78,18 @@ class StatementReader(ExpressionReader):
             return str(message.value)
         if isinstance(message, flat_model.Binary) and message.operator == "+":
             return self._message_text(message.left, where) + self._message_text(message.right, where)
-        raise_model_error("the message of an assert() must be a literal text", where)
+        raise_model_error("the message of an assert() must be a String literal", where)
 
     def read_function(self, node: Json) -> flat_model.Function:
+        """Convert a function.
+
+        Raises:
+            InputError: The function is external or contains an unsupported element.
+        """
         if node["external"]:
             raise_model_error(f"the external function {node['name']} is not supported", self.locate(node))
-        inputs, outputs, inner = (tuple(map(self._local, node[kind])) for kind in ("inputs", "outputs", "locals"))
-        return flat_model.Function(node["name"], inputs, outputs, inner, self.read_body(node["body"]), self.locate(node))
+        inputs, outputs, local = (tuple(map(self._local, node[kind])) for kind in ("inputs", "outputs", "locals"))
+        return flat_model.Function(node["name"], inputs, outputs, local, self.read_body(node["body"]), self.locate(node))
 
     def _local(self, node: Json) -> flat_model.FunctionVariable:
         where = self.locate(node)

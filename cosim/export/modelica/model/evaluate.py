@@ -1,4 +1,4 @@
-"""Evaluates expressions and executes statements of a flat model in plain Python."""
+"""Evaluation of the expressions and execution of the statements of a flat model in Python."""
 
 from __future__ import annotations
 
@@ -18,7 +18,11 @@ DTYPES = {"Real": np.float64, "Integer": np.int64, "Enumeration": np.int64, "Boo
 
 
 def convert_to_type(value: Any, kind: str, shape: tuple[int, ...]) -> Any:
-    """The value as a variable of this type and shape holds it: a Python scalar or a numpy array of its own."""
+    """Convert a value to a Modelica type and shape.
+
+    Returns:
+        A Python scalar for the shape (), else a new NumPy array.
+    """
     if shape:
         return np.array(np.broadcast_to(np.asarray(value, DTYPES[kind]), shape))
     return float(value) if kind == "Real" else bool(value) if kind == "Boolean" else int(value)
@@ -26,17 +30,29 @@ def convert_to_type(value: Any, kind: str, shape: tuple[int, ...]) -> Any:
 
 @dataclass
 class Evaluator:
-    """`values` are the variables that can be seen, `memory` their values before the event, `flags` the due(k) and risen(k)."""
+    """Evaluator of expressions and statements in one scope: the model, or the body of a function.
+
+    The methods for the kinds of nodes are named after the classes of `flat_model`.
+    """
 
     functions: Mapping[str, Function]
+    #: variable -> current value
     values: MutableMapping[str, Any]
+    #: variable -> value before the current event
     pre_values: MutableMapping[str, Any] = field(default_factory=dict)
+    #: ("due", k): clock k ticks in the current event; ("risen", k): edge detector k has detected a rising edge
     event_flags: dict[tuple[str, int], bool] = field(default_factory=dict)
+    #: edge detector -> its condition at the previous event
     previous_conditions: dict[int, bool] = field(default_factory=dict)
 
     # statements
 
     def execute(self, body: Body) -> None:
+        """Execute statements in order.
+
+        Raises:
+            EvaluationError: The model has failed.
+        """
         for statement in body:
             getattr(self, f"_{type(statement).__name__.lower()}")(statement)
 
@@ -45,13 +61,13 @@ class Evaluator:
 
     def _store(self, target: flat_model.Name | flat_model.Index, value: Any) -> None:
         name = flat_model.referenced_variable(target)
-        old = self.values[name]
+        current = self.values[name]
         if isinstance(target, flat_model.Index):
-            old[self._indices(target, old.shape)] = value
-        elif isinstance(old, np.ndarray):
-            old[...] = value
+            current[self._indices(target, current.shape)] = value
+        elif isinstance(current, np.ndarray):
+            current[...] = value
         else:
-            self.values[name] = type(old)(value)
+            self.values[name] = type(current)(value)
 
     def _multiassign(self, node: flat_model.MultiAssign) -> None:
         for target, value in zip(node.targets, self._call_function(node.call), strict=False):
@@ -61,30 +77,35 @@ class Evaluator:
         self.execute(next((body for condition, body in node.branches if self(condition)), node.otherwise))
 
     def _for(self, node: flat_model.For) -> None:
-        hidden = self.values.get(node.index)
+        shadowed = self.values.get(node.index)
         for index in self._range(node.range):
             self.values[node.index] = int(index)
             self.execute(node.body)
         self.values.pop(node.index, None)
-        if hidden is not None:
-            self.values[node.index] = hidden
+        if shadowed is not None:
+            self.values[node.index] = shadowed
 
     def _assert(self, node: flat_model.Assert) -> None:
         if not self(node.condition):
             raise EvaluationError(node.message, node.where)
 
     def _edgedetector(self, node: flat_model.EdgeDetector) -> None:
-        holds = bool(self(node.condition))
-        self.event_flags["risen", node.index] = holds and not self.previous_conditions.get(node.index, True)
-        self.previous_conditions[node.index] = holds
+        condition = bool(self(node.condition))
+        self.event_flags["risen", node.index] = condition and not self.previous_conditions.get(node.index, True)
+        self.previous_conditions[node.index] = condition
 
     # expressions
 
     def __call__(self, node: Expression) -> Any:
+        """Return the value of an expression.
+
+        Raises:
+            EvaluationError: The model has failed.
+        """
         return getattr(self, f"_{type(node).__name__.lower()}")(node)
 
     def _literal(self, node: flat_model.Literal) -> Any:
-        return float(node.value) if node.type == "Real" else node.value
+        return float(node.number) if node.type == "Real" else node.value
 
     def _name(self, node: flat_model.Name) -> Any:
         return self.values[node.name]
@@ -136,13 +157,13 @@ class Evaluator:
 
     def _call_function(self, node: flat_model.Call) -> list[Any]:
         function, arguments = self.functions[node.function], [self(argument) for argument in node.arguments]
-        inside = Evaluator(self.functions, {})
+        scope = Evaluator(self.functions, {})
         for local, value in zip(function.inputs, arguments, strict=True):
-            inside.values[local.name] = convert_to_type(value, local.type, np.shape(value))
+            scope.values[local.name] = convert_to_type(value, local.type, np.shape(value))
         for local in (*function.outputs, *function.locals):
-            inside._declare(local)
-        inside.execute(function.body)
-        return [inside.values[local.name] for local in function.outputs]
+            scope._declare(local)
+        scope.execute(function.body)
+        return [scope.values[local.name] for local in function.outputs]
 
     def _declare(self, local: FunctionVariable) -> None:
         shape = tuple(int(self(d)) for d in local.dimensions if d is not None)
@@ -150,7 +171,7 @@ class Evaluator:
 
     def _builtin(self, node: flat_model.Builtin) -> Any:
         if node.name in ("due", "risen"):
-            return self.event_flags[node.name, node.arguments[0].value]  # type: ignore[union-attr, index]
+            return self.event_flags[node.name, self(node.arguments[0])]
         if node.name in ("pre", "edge", "change"):
             return self._evaluate_pre(node)
         if node.name == "smooth":
@@ -158,8 +179,8 @@ class Evaluator:
         return BUILTINS[node.name](*map(self, node.arguments))
 
     def _evaluate_pre(self, node: flat_model.Builtin) -> Any:
-        before = Evaluator(self.functions, ChainMap(self.pre_values, self.values))(node.arguments[0])
+        previous = Evaluator(self.functions, ChainMap(self.pre_values, self.values))(node.arguments[0])
         if node.name == "pre":
-            return before
-        now = self(node.arguments[0])
-        return (now and not before) if node.name == "edge" else now != before
+            return previous
+        current = self(node.arguments[0])
+        return (current and not previous) if node.name == "edge" else current != previous

@@ -1,7 +1,9 @@
-"""A flattened Modelica model as plain frozen data: what the front end hands to the sorter, the emitter and the interpreter.
+"""The flat model: abstract syntax tree of a flattened Modelica model as immutable data.
 
-Flattened means: components, connections and modifiers are resolved; names are dotted ("pid.kp"), every `for` of an equation
-section is unrolled, constants are values. Types are "Real", "Integer", "Boolean", "Enumeration" (an Integer from 1) and "String".
+The front end produces it; causality analysis, code generation and the interpreter use it. In a flat model components,
+connections and modifiers are resolved, names are dotted ("pid.kp"), and for-equations are unrolled. Types are "Real",
+"Integer", "Boolean", "Enumeration" (an Integer, counted from 1) and "String". The attribute `where` of a node is its location
+in the source.
 """
 
 from __future__ import annotations
@@ -26,12 +28,12 @@ class SourceLocation(NamedTuple):
 
     @property
     def file_and_line(self) -> str:
-        """Without the folder: the same on every machine."""
+        """Location without the folder, so that it does not depend on the machine."""
         return f"{self.path.name}:{self.line}"
 
 
 def raise_model_error(message: str, where: SourceLocation | None) -> NoReturn:
-    """Say what cannot be translated, and where it stands."""
+    """Raise an InputError for a part of the model that cannot be translated, with its location."""
     raise InputError(Problem(message, str(where or "")))
 
 
@@ -42,13 +44,21 @@ Body: TypeAlias = "tuple[Statement, ...]"
 
 @dataclass(frozen=True, slots=True)
 class Literal:
+    """A literal of a predefined type or of an enumeration (its number)."""
+
     value: float | int | bool | str
     type: str
+
+    @property
+    def number(self) -> float:
+        """Value of a literal that is not text."""
+        assert not isinstance(self.value, str)
+        return self.value
 
 
 @dataclass(frozen=True, slots=True)
 class Name:
-    """A variable, a local of a function, a loop index, or `time`."""
+    """A reference to a variable, a function local, a loop index or `time`."""
 
     name: str
     where: SourceLocation | None = field(default=None, compare=False)
@@ -60,6 +70,8 @@ class Colon(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Index:
+    """A subscripted expression: `a[i, :]`."""
+
     base: Expression
     subscripts: tuple[Expression | Colon, ...]
     where: SourceLocation | None = field(default=None, compare=False)
@@ -67,13 +79,15 @@ class Index:
 
 @dataclass(frozen=True, slots=True)
 class Unary:
+    """A unary operation."""
+
     operator: OneOf["-", "not"]
     operand: Expression
 
 
 @dataclass(frozen=True, slots=True)
 class Binary:
-    """`operator` as Modelica writes it; the elementwise ones are ".+", ".-", ".*", "./" and ".^"."""
+    """A binary operation; the operators are those of Modelica, with ".+", ".-", ".*", "./" and ".^" for elementwise ones."""
 
     operator: str
     left: Expression
@@ -83,17 +97,23 @@ class Binary:
 
 @dataclass(frozen=True, slots=True)
 class If:
+    """An if-expression: pairs of condition and value, and the value after `else`."""
+
     branches: tuple[tuple[Expression, Expression], ...]
     otherwise: Expression
 
 
 @dataclass(frozen=True, slots=True)
 class Array:
+    """An array constructor: `{a, b}`."""
+
     elements: tuple[Expression, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
+    """A range: `start:stop` or `start:step:stop`."""
+
     start: Expression
     step: Expression | None
     stop: Expression
@@ -101,7 +121,7 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class Builtin:
-    """A function or operator of the language, by its Modelica name: sin, pre, sample, size ..."""
+    """A call of a built-in function or operator of Modelica: sin, pre, sample, size, ..."""
 
     name: str
     arguments: tuple[Expression, ...]
@@ -110,7 +130,7 @@ class Builtin:
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A function of the model; one argument for each of its inputs."""
+    """A call of a function of the model, with one argument for each of its inputs."""
 
     function: str
     arguments: tuple[Expression, ...]
@@ -119,19 +139,21 @@ class Call:
 
 @dataclass(frozen=True, slots=True)
 class Assign:
+    """An assignment `target := value`, from an algorithm or from an equation after causality analysis."""
+
     target: Name | Index
     value: Expression
     where: SourceLocation | None = field(default=None, compare=False)
 
     @property
     def name(self) -> str:
-        """The variable that is assigned, or of which a part is assigned."""
+        """Name of the variable that is assigned as a whole or in part."""
         return referenced_variable(self.target)
 
 
 @dataclass(frozen=True, slots=True)
 class MultiAssign:
-    """`(a, b[i]) := f(x)`."""
+    """An assignment of several results of a function: `(a, b[i]) := f(x)`."""
 
     targets: tuple[Name | Index, ...]
     call: Call
@@ -140,6 +162,8 @@ class MultiAssign:
 
 @dataclass(frozen=True, slots=True)
 class IfStatement:
+    """An if-statement: pairs of condition and body, and the body after `else`."""
+
     branches: tuple[tuple[Expression, Body], ...]
     otherwise: Body
     where: SourceLocation | None = field(default=None, compare=False)
@@ -147,6 +171,8 @@ class IfStatement:
 
 @dataclass(frozen=True, slots=True)
 class For:
+    """A for-loop over a range."""
+
     index: str
     range: Range
     body: Body
@@ -155,6 +181,8 @@ class For:
 
 @dataclass(frozen=True, slots=True)
 class Assert:
+    """An `assert` with the level error."""
+
     condition: Expression
     message: str
     where: SourceLocation | None = field(default=None, compare=False)
@@ -162,7 +190,7 @@ class Assert:
 
 @dataclass(frozen=True, slots=True)
 class When:
-    """`when ... elsewhen ... end when`, of an algorithm or of an equation section (then its body is unordered)."""
+    """A when-clause, `when ... elsewhen ... end when`; in an equation section the order of its body has no meaning."""
 
     branches: tuple[tuple[Expression, Body], ...]
     where: SourceLocation | None = field(default=None, compare=False)
@@ -170,7 +198,10 @@ class When:
 
 @dataclass(frozen=True, slots=True)
 class EdgeDetector:
-    """Made by the sorter: compares a condition with its value at the last event and sets the flag risen(index)."""
+    """A comparison of a condition with its value at the previous event; sets the flag risen(index) at a rising edge.
+
+    It is inserted by the analysis of when-clauses.
+    """
 
     index: int
     condition: Expression
@@ -179,7 +210,7 @@ class EdgeDetector:
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A variable of the flat model. `enumeration` names its enumeration type; `binding` is a declaration equation."""
+    """A variable of the flat model with its attributes."""
 
     name: str
     type: str
@@ -187,21 +218,27 @@ class Variable:
     variability: OneOf["constant", "parameter", "discrete", "continuous"]
     causality: OneOf["input", "output", "local"]
     start: Expression | None
+    #: right side of the declaration equation
     binding: Expression | None
+    #: true if the binding comes from a modifier of the component that contains the variable
     bound_by_modifier: bool
     final: bool
     protected: bool
+    #: true if the variable belongs to the model itself and not to one of its components
     top_level: bool
     unit: str
     description: str
     minimum: Expression | None
     maximum: Expression | None
+    #: name of the enumeration type, or ""
     enumeration: str
     where: SourceLocation | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
 class Equation:
+    """An equation `left = right`."""
+
     left: Expression
     right: Expression
     where: SourceLocation | None = field(default=None, compare=False)
@@ -209,7 +246,7 @@ class Equation:
 
 @dataclass(frozen=True, slots=True)
 class FunctionVariable:
-    """An input, output or protected variable of a function; a dimension is None where the argument decides (`:`)."""
+    """An input, output or protected variable of a function; a dimension declared as `:` is None."""
 
     name: str
     type: str
@@ -220,6 +257,8 @@ class FunctionVariable:
 
 @dataclass(frozen=True, slots=True)
 class Function:
+    """A function of the model."""
+
     name: str
     inputs: tuple[FunctionVariable, ...]
     outputs: tuple[FunctionVariable, ...]
@@ -229,7 +268,7 @@ class Function:
 
 
 class StructuralParameters(NamedTuple):
-    """Parameters whose default the front end has used to choose array sizes, loop ranges or equations."""
+    """Parameters whose default value determined an array size, a loop range or the choice of equations in the front end."""
 
     purpose: str
     parameters: tuple[str, ...]
@@ -238,40 +277,44 @@ class StructuralParameters(NamedTuple):
 
 @dataclass(frozen=True)
 class Model:
-    """Everything of a flat model; `whens` are those of equation sections, `enumerations` maps a type to its literals.
-
-    `states` are the continuous ones, which der() makes (see states.py).
-    """
+    """A flat model."""
 
     name: str
     description: str
     variables: Mapping[str, Variable]
     equations: tuple[Equation, ...]
+    #: when-clauses of equation sections; those of algorithms are statements of `algorithms`
     whens: tuple[When, ...]
     algorithms: tuple[Body, ...]
     asserts: tuple[Assert, ...]
     initial_equations: tuple[Equation, ...]
     initial_algorithms: tuple[Body, ...]
     functions: Mapping[str, Function]
+    #: enumeration type -> literals
     enumerations: Mapping[str, tuple[str, ...]]
     structural: tuple[StructuralParameters, ...]
+    #: continuous states (see `causality/continuous_states.py`)
     states: tuple[str, ...] = ()
 
 
 def referenced_variable(target: Expression) -> str:
-    """The variable behind a reference such as `q` or `q[i]`."""
+    """Return the name of the variable in a reference such as `q` or `q[i]`.
+
+    Raises:
+        TypeError: The expression is not a reference.
+    """
     while isinstance(target, Index):
         target = target.base
     if not isinstance(target, Name):
-        raise TypeError(f"not a reference: {target}")
+        raise TypeError(f"expected a reference, found {target}")
     return target.name
 
 
 def derivative_name(state: str) -> str:
-    """The name of the variable that holds the derivative of a state."""
+    """Return the name of the variable that holds the derivative of a state."""
     return f"der({state})"
 
 
 def owning_component(name: str) -> str:
-    """The component that a variable belongs to; "" for the model's own."""
+    """Return the component that a variable belongs to, or "" for the model itself."""
     return name.removeprefix("der(").rpartition(".")[0]
