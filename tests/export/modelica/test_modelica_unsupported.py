@@ -23,7 +23,7 @@ CASES = {
     "der of an input": ("", "y = der(u);", r"M.mo:8: der\(...\) must name a coordinate classified as a continuous state"),
     "der of an Integer": ("Integer n;", "n = 1;\n  y = der(n);", "M.mo:9: .*n"),
     "index reduction": ("Real x;", "x = sin(time);\n  y = der(x);", "M.mo:8: this equation defines no variable"),
-    "parameter of a variable": ("parameter Real p = u;", "y = p;", "M.mo:6: the parameter p depends on u, which is no parameter"),
+    "parameter of a variable": ("parameter Real p = u;", "y = p;", "M.mo:6: the parameter p depends on u, which is not a parameter"),
     "a state in an algorithm": (
         "Real x;",
         "der(x) = 1;\nalgorithm\n  x := u;\n  y := x;\nequation",
@@ -32,7 +32,7 @@ CASES = {
     "steady start": (
         "Real x;",
         "der(x) = u - x;\n  y = x;\ninitial equation\n  der(x) = 0;\nequation",
-        "M.mo:11: an initial equation must have a continuous state, or a variable",
+        "M.mo:11: one side of an initial equation must be a continuous state, or a variable",
     ),
     "loop": (
         "Real a;\n  Real b;",
@@ -47,7 +47,7 @@ CASES = {
     "implicit": (
         "Real a;",
         "a + u = 2*a;\n  y = a;",
-        "M.mo:8: this equation defines no variable: write it with a variable",
+        "M.mo:8: this equation defines no variable: one side must be a variable",
     ),
     "structural if": (
         "parameter Integer n = 2;",
@@ -57,7 +57,7 @@ CASES = {
     "structural size": (
         "parameter Integer n = 2;\n  parameter Integer m = n + 1;\n  Real v[m];",
         "for i in 1:m loop\n    v[i] = u;\n  end for;\n  y = v[1];",
-        "M.mo:8: the parameter n cannot be settable: it decides the size of an array",
+        "M.mo:8: the parameter n cannot be settable: it determines the size of an array",
     ),
     "slice": (
         "parameter Integer n = 2;\n  Real v[3];",
@@ -112,7 +112,7 @@ end M;""")
     ("when", "message"),
     [
         ("sample(0, u)", "sample interval is not parameter-evaluable"),
-        ("sample(0, 0.1) and u > 1", r"sample\(\) must stand alone in a when-condition"),
+        ("sample(0, 0.1) and u > 1", r"sample\(\) cannot be combined with other conditions"),
         ("edge(b)", "in a when-condition are not supported"),
     ],
 )

@@ -160,11 +160,11 @@ class _Scanner:
                     return
 
     def _skip(self, word: str) -> None:
-        """Advance past the next occurrence of a token outside brackets (a matrix may contain semicolons)."""
+        """Advance past the next occurrence of a symbol outside brackets (a matrix may contain semicolons)."""
         brackets = 0
         while self._next < len(self._tokens) - 1:
             self._next += 1
-            token = self._tokens[self._next - 1]
-            brackets += (token == "[") - (token == "]")
-            if token == word and brackets == 0:
+            symbol = self._tokens[self._next - 1]
+            brackets += (symbol == "[") - (symbol == "]")
+            if symbol == word and brackets == 0:
                 return
