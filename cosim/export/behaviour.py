@@ -55,9 +55,7 @@ def compare_fmus(first: Sequence[Path], second: Sequence[Path], seed: int = 1) -
     with ProcessPoolExecutor(1, context) as first_pool, ProcessPoolExecutor(1, context) as second_pool:
         first_traces = [first_pool.submit(record_traces, path, seed) for path in first]
         second_traces = [second_pool.submit(record_traces, path, seed) for path in second]
-        differences = {
-            path: _difference_of_results(a, b) for path, a, b in zip(second, first_traces, second_traces, strict=True)
-        }
+        differences = {path: _difference_of_results(a, b) for path, a, b in zip(second, first_traces, second_traces, strict=True)}
     return {path: difference for path, difference in differences.items() if difference}
 
 

@@ -62,7 +62,7 @@ CASES = {
     "slice": (
         "parameter Integer n = 2;\n  Real v[3];",
         "v = {u, u, u};\n  y = sum(v[1:n]);",
-        "M.mo:10: the bounds of a slice must be",
+        "M.mo:10: the bounds of a range must be",
     ),
     "pre outside when": (
         "Boolean a;\n  Boolean b;",

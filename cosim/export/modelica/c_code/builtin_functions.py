@@ -1,10 +1,9 @@
-"""The functions and operators of the language in C. Most are a call of a helper in runtime.h or of the C library."""
+"""Lowering of Modelica's built-in functions to C, most of them to calls of runtime.h or of the C library."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import reduce
-from typing import Any
 
 from ..model import flat_model
 from ..model.flat_model import raise_model_error
@@ -28,7 +27,7 @@ _MATH_FUNCTIONS = (
     "ceil",
     "floor",
 )
-#: names of the helpers for Real and for Integer
+#: functions of runtime.h for Real and for Integer operands
 _TWO_OPERAND_HELPERS = {
     "min": ("smaller", "smaller_integer"),
     "max": ("larger", "larger_integer"),
@@ -36,6 +35,7 @@ _TWO_OPERAND_HELPERS = {
     "rem": ("real_remainder", "remainder_of"),
     "div": ("real_quotient", "divide"),
 }
+#: functions of runtime.h that can fail and therefore take the model as first argument
 _FALLIBLE = ("modulo", "remainder_of", "divide")
 
 
@@ -48,19 +48,19 @@ def _atan2(lowering: SubscriptLowering, node: flat_model.Builtin) -> CValue:
     return scalar_value("Real", c_call("atan2", y, x))
 
 
-def _call_helper(name: str, kind: str, a: CExpression, b: CExpression) -> CExpression:
-    helper = _TWO_OPERAND_HELPERS[name][kind != "Real"]
+def _call_helper(name: str, type_name: str, a: CExpression, b: CExpression) -> CExpression:
+    helper = _TWO_OPERAND_HELPERS[name][type_name != "Real"]
     return c_call(helper, "m", a, b) if helper in _FALLIBLE else c_call(helper, a, b)
 
 
 def _two_operand_function(lowering: SubscriptLowering, node: flat_model.Builtin) -> CValue:
-    """min and max of two scalars or of an array; div, mod and rem."""
+    """Lower min() and max() of two scalars or of an array, div(), mod() and rem()."""
     values = [lowering.lower(argument) for argument in node.arguments]
-    kind = common_type([value.type for value in values])
+    type_name = common_type([value.type for value in values])
     elements = [value.element(k) for value in values for k in range(value.size)]
     if (len(values) == 2 and any(value.shape for value in values)) or not elements:
         raise_model_error(f"{node.name}() takes two scalars or one array", node.where)
-    return scalar_value(kind, reduce(lambda a, b: _call_helper(node.name, kind, a, b), elements))
+    return scalar_value(type_name, reduce(lambda a, b: _call_helper(node.name, type_name, a, b), elements))
 
 
 def _abs(lowering: SubscriptLowering, node: flat_model.Builtin) -> CValue:
@@ -71,7 +71,7 @@ def _abs(lowering: SubscriptLowering, node: flat_model.Builtin) -> CValue:
 
 
 def _integer(lowering: SubscriptLowering, node: flat_model.Builtin) -> CValue:
-    """integer(x): the largest Integer not above x; Integer(e): the number of an enumeration literal."""
+    """Lower integer(x), the largest Integer not above x, and Integer(e), the number of an enumeration literal."""
     value = lowering.lower(node.arguments[0])
     return map_elements(value, "Integer", (lambda x: c_call("integer_of", "m", x)) if value.type == "Real" else (lambda x: x))
 
@@ -108,11 +108,11 @@ def _transpose(lowering: SubscriptLowering, node: flat_model.Builtin) -> CValue:
 
 
 def _fill(lowering: SubscriptLowering, node: flat_model.Builtin) -> CValue:
-    """fill(value, sizes), zeros(sizes), ones(sizes)."""
+    """Lower fill(value, sizes), zeros(sizes) and ones(sizes)."""
     sizes = node.arguments[1:] if node.name == "fill" else node.arguments
     value = lowering.evaluated_once(lowering.lower(node.arguments[0])) if node.name == "fill" else None
-    filled = value or scalar_value("Integer", c_literal(int(node.name == "ones"), "Integer"))
-    return CValue(filled.type, _shape(lowering, node, sizes), lambda _: filled.text, reusable=True)
+    element = value or scalar_value("Integer", c_literal(int(node.name == "ones"), "Integer"))
+    return CValue(element.type, _shape(lowering, node, sizes), lambda _: element.text, reusable=True)
 
 
 def _identity(lowering: SubscriptLowering, node: flat_model.Builtin) -> CValue:
@@ -135,13 +135,13 @@ def _cat(lowering: SubscriptLowering, node: flat_model.Builtin) -> CValue:
         raise_model_error("cat() is supported along the first dimension only", node.where)
     elements = [(part, k) for part in parts for k in range(part.size)]
     shape = (sum(part.shape[0] for part in parts), *parts[0].shape[1:])
-    simple = all(part.reusable for part in parts)
+    reusable = all(part.reusable for part in parts)
     return CValue(
         common_type([p.type for p in parts]),
         shape,
         lambda k: elements[int(k)][0].element(elements[int(k)][1]),
         indexable_in_loop=False,
-        reusable=simple,
+        reusable=reusable,
     )
 
 
@@ -154,15 +154,15 @@ def _size(lowering: SubscriptLowering, node: flat_model.Builtin) -> CValue:
     dimension = lowering.static_integer(node.arguments[1])
     if dimension is None or not 1 <= dimension <= len(shape):
         raise_model_error("size() needs a constant dimension of the array", node.where)
-    return scalar_value("Integer", c_literal(shape[dimension - 1], "Integer"), simple=True)
+    return scalar_value("Integer", c_literal(shape[dimension - 1], "Integer"), reusable=True)
 
 
 def _ndims(lowering: SubscriptLowering, node: flat_model.Builtin) -> CValue:
-    return scalar_value("Integer", c_literal(len(lowering.lower(node.arguments[0]).shape), "Integer"), simple=True)
+    return scalar_value("Integer", c_literal(len(lowering.lower(node.arguments[0]).shape), "Integer"), reusable=True)
 
 
 def _first_argument(lowering: SubscriptLowering, node: flat_model.Builtin) -> CValue:
-    """noEvent(x) and homotopy(actual, simplified): nothing here makes events or iterates."""
+    """Lower noEvent(x) and homotopy(actual, simplified) to their first argument: there are no state events or iterations."""
     return lowering.lower(node.arguments[0])
 
 
@@ -188,21 +188,22 @@ def _pre_value(lowering: SubscriptLowering, name: flat_model.Expression, node: f
 
 
 def _edge(lowering: SubscriptLowering, node: flat_model.Builtin) -> CValue:
-    now = lowering.scalar_of(node.arguments[0])
-    return scalar_value("Boolean", infix("&&", now, prefix("!", _pre(lowering, node).text)))
+    current = lowering.scalar_of(node.arguments[0])
+    return scalar_value("Boolean", infix("&&", current, prefix("!", _pre(lowering, node).text)))
 
 
 def _change(lowering: SubscriptLowering, node: flat_model.Builtin) -> CValue:
-    now = lowering.scalar_of(node.arguments[0])
-    return scalar_value("Boolean", infix("!=", now, _pre(lowering, node).text))
+    current = lowering.scalar_of(node.arguments[0])
+    return scalar_value("Boolean", infix("!=", current, _pre(lowering, node).text))
 
 
 def _event_flag(lowering: SubscriptLowering, node: flat_model.Builtin) -> CValue:
-    """due(k) and risen(k), the flags of when-clauses."""
-    return scalar_value("Boolean", CExpression(f"{node.name}[{node.arguments[0].value}]"), simple=True)  # type: ignore[union-attr]
+    """Lower the event flags due(k) and risen(k)."""
+    index = lowering.static_integer(node.arguments[0])
+    return scalar_value("Boolean", CExpression(f"{node.name}[{index}]"), reusable=True)
 
 
-BUILTINS: dict[str, Callable[[Any, flat_model.Builtin], CValue]] = {
+BUILTINS: dict[str, Callable[[SubscriptLowering, flat_model.Builtin], CValue]] = {
     **dict.fromkeys(_MATH_FUNCTIONS, _math_function),
     **dict.fromkeys(_TWO_OPERAND_HELPERS, _two_operand_function),
     **dict.fromkeys(("fill", "zeros", "ones"), _fill),

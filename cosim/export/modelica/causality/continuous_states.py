@@ -50,11 +50,11 @@ def _der_calls(model: Model) -> Iterator[tuple[str, Builtin]]:
 
 def _der_argument(call: Builtin) -> Name | Index:
     (argument,) = call.arguments
-    if isinstance(argument, Name) or (isinstance(argument, Index) and isinstance(argument.base, Name)):
-        return argument
-    raise_model_error(
-        "der() of an expression is not supported; give the expression a variable with an equation der(x) = ...", call.where
-    )
+    if not (isinstance(argument, Name) or (isinstance(argument, Index) and isinstance(argument.base, Name))):
+        raise_model_error(
+            "der() of an expression is not supported; declare a variable x for the expression and use der(x)", call.where
+        )
+    return argument
 
 
 def _check_state(model: Model, name: str, call: Builtin) -> None:

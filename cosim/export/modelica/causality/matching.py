@@ -136,11 +136,14 @@ def match_initial_equations(model: Model, assigned: Collection[str]) -> list[Ass
 
 
 def _initial_assignment(model: Model, equation: Equation, assigned: Collection[str]) -> Assign:
+    assignments = []
     for side, other in ((equation.left, equation.right), (equation.right, equation.left)):
         target: Expression = side.arguments[0] if isinstance(side, Builtin) and side.name == "pre" else side
         if isinstance(target, Name | Index) and {name for name, _ in scalar_keys(model.variables, target)} & set(assigned):
-            return Assign(target, other, equation.where)
-    raise_model_error(
-        "one side of an initial equation must be a continuous state, or a variable that a when-clause assigns",
-        equation.where,
-    )
+            assignments.append(Assign(target, other, equation.where))
+    if not assignments:
+        raise_model_error(
+            "one side of an initial equation must be a continuous state, or a variable that a when-clause assigns",
+            equation.where,
+        )
+    return assignments[0]

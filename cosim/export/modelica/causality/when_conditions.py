@@ -99,7 +99,6 @@ class WhenConditions:
         return self.clocks.index(clock)
 
 
-
 def _alternatives(condition: Expression) -> tuple[Expression, ...]:
     return condition.elements if isinstance(condition, Array) else (condition,)
 

@@ -182,18 +182,16 @@ class ModelReader(StatementReader):
         return tuple(self._when_equation(*split_tagged(node)) for node in nodes)
 
     def _when_equation(self, kind: str, node: Json) -> Statement:
-        if kind == "Assign":
-            where = self.locate(node)
-            return flat_model.Assign(self._parse_target(node["target"], where), self.read_expression(node["value"]), where)
-        if kind == "Reinit":
-            where = self.locate(node)
-            return flat_model.Assign(self._parse_target(node["state"], where), self.read_expression(node["value"]), where)
         if kind == "Conditional":
             branches = tuple((self.read_expression(condition), self._when_body(body)) for condition, body in node["branches"])
             return flat_model.IfStatement(branches, self._when_body(node["else_branch"] or []), self.locate(node))
         if kind == "Assert":
             return self._assert(node)
-        raise_model_error(f"{kind} in a when-equation is not supported", self.locate(node))
+        where = self.locate(node)
+        if kind not in ("Assign", "Reinit"):
+            raise_model_error(f"{kind} in a when-equation is not supported", where)
+        target = self._parse_target(node["target" if kind == "Assign" else "state"], where)
+        return flat_model.Assign(target, self.read_expression(node["value"]), where)
 
     def _parse_target(self, target: str, where: SourceLocation | None) -> flat_model.Name | flat_model.Index:
         """Parse the target of a when-equation, given as text: a name, perhaps with constant subscripts."""

@@ -102,9 +102,7 @@ def _import_rumoca() -> Any:
     except ImportError as error:
         raise InputError('Modelica needs the compiler front end rumoca: pip install "fmi-cosim[build]"') from error
     if (version := rumoca.version()) != RUMOCA_VERSION:
-        raise InputError(
-            f"found rumoca {version}, but only {RUMOCA_VERSION} is supported: pip install rumoca=={RUMOCA_VERSION}"
-        )
+        raise InputError(f"found rumoca {version}, but only {RUMOCA_VERSION} is supported: pip install rumoca=={RUMOCA_VERSION}")
     return rumoca
 
 

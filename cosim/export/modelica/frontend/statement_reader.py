@@ -74,11 +74,11 @@ class StatementReader(ExpressionReader):
         return flat_model.Assert(self.read_expression(node["condition"]), self._message_text(message, where), where)
 
     def _message_text(self, message: Expression, where: SourceLocation | None) -> str:
-        if isinstance(message, flat_model.Literal) and message.type == "String":
-            return str(message.value)
         if isinstance(message, flat_model.Binary) and message.operator == "+":
             return self._message_text(message.left, where) + self._message_text(message.right, where)
-        raise_model_error("the message of an assert() must be a String literal", where)
+        if not (isinstance(message, flat_model.Literal) and message.type == "String"):
+            raise_model_error("the message of an assert() must be a String literal", where)
+        return str(message.value)
 
     def read_function(self, node: Json) -> flat_model.Function:
         """Convert a function.

@@ -17,15 +17,15 @@ from .flat_model import Body, Expression, Function, FunctionVariable
 DTYPES = {"Real": np.float64, "Integer": np.int64, "Enumeration": np.int64, "Boolean": np.bool_}
 
 
-def convert_to_type(value: Any, kind: str, shape: tuple[int, ...]) -> Any:
+def convert_to_type(value: Any, type_name: str, shape: tuple[int, ...]) -> Any:
     """Convert a value to a Modelica type and shape.
 
     Returns:
         A Python scalar for the shape (), else a new NumPy array.
     """
     if shape:
-        return np.array(np.broadcast_to(np.asarray(value, DTYPES[kind]), shape))
-    return float(value) if kind == "Real" else bool(value) if kind == "Boolean" else int(value)
+        return np.array(np.broadcast_to(np.asarray(value, DTYPES[type_name]), shape))
+    return float(value) if type_name == "Real" else bool(value) if type_name == "Boolean" else int(value)
 
 
 @dataclass
