@@ -141,10 +141,10 @@ class FmuInstance:
         if self.version == 2:
             # FMPy's own logger would format the messages
             self._callbacks = fmi2CallbackFunctions()
-            self._callbacks.logger = fmi2CallbackLoggerTYPE(lambda e, name, status, category, text: self._log(text))
+            self._callbacks.logger = fmi2CallbackLoggerTYPE(lambda _e, _name, _status, _category, text: self._log(text))
             self.fmu.instantiate(callbacks=self._callbacks)
         else:
-            self.fmu.instantiate(logMessage=lambda environment, status, category, text: self._log(text))
+            self.fmu.instantiate(logMessage=lambda _environment, _status, _category, text: self._log(text))
 
     def _log(self, text: bytes) -> None:
         self.messages.append(text.decode())

@@ -70,7 +70,8 @@ def test_the_step_size_and_capabilities_are_stated(fmu):
     model = read_model_description(fmu)
     interface = model.coSimulation
     assert float(model.defaultExperiment.stepSize) == 0.01
-    assert interface.canGetAndSetFMUstate and interface.canSerializeFMUstate
+    assert interface.canGetAndSetFMUstate
+    assert interface.canSerializeFMUstate
     assert interface.canHandleVariableCommunicationStepSize
     assert model.generationDateAndTime is None
 

@@ -35,7 +35,7 @@ def model(rate: Callable[..., ca.SX], *parameters: Variable, **more: object) -> 
         ("x",),
         lambda _: ca.SX(0),
         rate,
-        lambda x, u, p: x,
+        lambda x, _u, _p: x,
         **more,  # type: ignore[arg-type]
     )
 
@@ -55,7 +55,7 @@ def numbers(count: int) -> np.ndarray:
 def test_a_sum_over_rows_counts_only_those_in_use(count: int, tmp_path: Path) -> None:
     callee, x, n, table = waves(), ca.SX.sym("x", 2), ca.SX.sym("n"), ca.SX.sym("table", ROWS, 2)
     probe = ca.Function("probe", [x, n, table], [3 * callee(x, n, table)])
-    compiled = Compiled(as_block(model(lambda x, u, p: u, callees=[callee]), [probe]), tmp_path)
+    compiled = Compiled(as_block(model(lambda _x, u, _p: u, callees=[callee]), [probe]), tmp_path)
     amplitude, frequency = np.split(numbers(2 * ROWS), 2)
     amplitude[count:] = np.nan
     found = compiled.call("probe", 2, [0.3, 0.2], [float(count)], [*amplitude, *frequency])
@@ -69,7 +69,7 @@ def test_a_sum_has_the_same_bits_in_registers_of_every_width(count: int, tmp_pat
     """As one that chooses by itself; a fused multiplication and addition would be seen."""
     callee, x, table = waves(lambda angle: 1 - angle**2 * (0.5 - 0.04 * angle**2)), ca.SX.sym("x", 2), ca.SX.sym("table", ROWS, 2)
     probe = ca.Function("probe", [x, table], [callee(x, ca.SX(count), table)])
-    block = as_block(model(lambda x, u, p: u, callees=[callee]), [probe])
+    block = as_block(model(lambda _x, u, _p: u, callees=[callee]), [probe])
     known = {"sse2", "avx2", "avx512f"} & {*Path("/proc/cpuinfo").read_text().split()}
     options = {name: [f'-DWIDE=__attribute__((target("{name}")))'] for name in known} | {"by itself": []}
     found = []
@@ -102,7 +102,7 @@ def test_a_called_function_is_a_function_in_c(tmp_path: Path) -> None:
     outer = ca.Function("outer", [b, a], [ca.sum1(scaled) + difference])
     (total,) = call_in_c(outer, b, a)
     probe = ca.Function("probe", [a, b], [ca.vertcat(total, call_in_c(inner, a, b)[1], call_in_c(inner, a, total)[0])])
-    block = as_block(model(lambda x, u, p: u), [probe])
+    block = as_block(model(lambda _x, u, _p: u), [probe])
     text = block.files["model.c"]
     assert text.count("static void inner(") == text.count("static void outer(") == 1
     assert text.index("static void inner(") < text.index("static void outer(")
@@ -118,7 +118,7 @@ def test_a_callee_with_a_body_of_its_own_and_what_it_needs(tmp_path: Path) -> No
     either = ca.Function("either", [x], [ca.if_else(x > 0, ca.sqrt(ca.fabs(x)), -1)])
     branch = Callee(either, "{\n    if (in[0][0] > 0) root(in, out);\n    else out[0][0] = -1;\n}\n", [root])
     probe = ca.Function("probe", [x], [2 * branch(x)])
-    compiled = Compiled(as_block(model(lambda x, u, p: u, callees=[branch]), [probe]), tmp_path)
+    compiled = Compiled(as_block(model(lambda _x, u, _p: u, callees=[branch]), [probe]), tmp_path)
     assert [compiled.call("probe", 1, [value]) for value in (9.0, -4.0)] == [[6.0], [-2.0]]
 
 
@@ -148,7 +148,7 @@ def test_the_loop_is_part_of_the_rate(tmp_path: Path) -> None:
 def exponential(tmp_path: Path) -> Compiled:
     """x' = u / (time constant), which is computed of mass and damping."""
     model_ = model(
-        lambda x, u, c: u / c[1],
+        lambda _x, u, c: u / c[1],
         parameter("mass", 6.0),
         parameter("damping", 2.0),
         derived_parameters=lambda p: ca.vertcat(p[0], p[0] / p[1], p[1]),
@@ -166,7 +166,7 @@ def test_constants_follow_from_the_parameters_at_initialization(exponential: Com
 
 
 def test_a_model_without_constants_has_no_room_for_them(tmp_path: Path) -> None:
-    compiled = Compiled(as_block(model(lambda x, u, p: u * p[0], parameter("gain", 2.0))), tmp_path)
+    compiled = Compiled(as_block(model(lambda _x, u, p: u * p[0], parameter("gain", 2.0))), tmp_path)
     assert not hasattr(compiled.model, "constant")
     compiled.initialize()
     compiled.step(0.1)

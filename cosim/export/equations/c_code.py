@@ -25,31 +25,13 @@ _OPERATIONS = {
     ca.OP_INV: "1.0 / {}",
     ca.OP_TWICE: "2.0 * {}",
     ca.OP_SQ: "{0} * {0}",
-    ca.OP_SQRT: "sqrt({})",
     ca.OP_POW: "pow({}, {})",
     ca.OP_CONSTPOW: "pow({}, {})",
-    ca.OP_EXP: "exp({})",
-    ca.OP_LOG: "log({})",
-    ca.OP_SIN: "sin({})",
-    ca.OP_COS: "cos({})",
-    ca.OP_TAN: "tan({})",
-    ca.OP_ASIN: "asin({})",
-    ca.OP_ACOS: "acos({})",
-    ca.OP_ATAN: "atan({})",
-    ca.OP_ATAN2: "atan2({}, {})",
-    ca.OP_SINH: "sinh({})",
-    ca.OP_COSH: "cosh({})",
-    ca.OP_TANH: "tanh({})",
-    ca.OP_HYPOT: "hypot({}, {})",
-    ca.OP_FABS: "fabs({})",
-    ca.OP_FLOOR: "floor({})",
-    ca.OP_CEIL: "ceil({})",
-    ca.OP_FMOD: "fmod({}, {})",
     # not fmin and fmax: compilers do not inline them, and they suppress NaN
     ca.OP_FMIN: "{0} < {1} ? {0} : {1}",
     ca.OP_FMAX: "{0} > {1} ? {0} : {1}",
     ca.OP_SIGN: "(double)({0} > 0) - (double)({0} < 0)",
-    ca.OP_COPYSIGN: "copysign({}, {})",
+
     ca.OP_LT: "{} < {}",
     ca.OP_LE: "{} <= {}",
     ca.OP_EQ: "{} == {}",
@@ -59,7 +41,9 @@ _OPERATIONS = {
     ca.OP_OR: "{} || {}",
     ca.OP_IF_ELSE_ZERO: "{} != 0 ? {} : 0",
 }
-
+_UNARY_FUNCTIONS = "sqrt exp log sin cos tan asin acos atan sinh cosh tanh fabs floor ceil".split()
+_OPERATIONS |= {getattr(ca, f"OP_{name.upper()}"): f"{name}({{}})" for name in _UNARY_FUNCTIONS}
+_OPERATIONS |= {getattr(ca, f"OP_{name.upper()}"): f"{name}({{}}, {{}})" for name in ("atan2", "hypot", "fmod", "copysign")}
 
 _SIGNATURE = "void {}(const double *const in[], double *const out[])"
 

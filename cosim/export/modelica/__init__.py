@@ -7,7 +7,8 @@ The package rumoca parses, checks and flattens a model. The order of computation
 | `frontend/`  | `rumoca_frontend`: run rumoca; `reader` (`expression_reader`, `statement_reader`, `unrolling`): convert    |
 |              | its JSON to the flat model; `constants`: inline constants; `folded_branches`: reject models that rumoca    |
 |              | simplifies wrongly; `openmodelica`: export with OpenModelica instead                                       |
-| `model/`     | `flat_model`: the data structure; `traversal`; `evaluate`, `arithmetic`: evaluation in Python              |
+| `model/`     | `flat_model`, `syntax_tree`: the data structure; `traversal`; `evaluate`, `arithmetic`: evaluation in      |
+|              | Python                                                                                                     |
 | `causality/` | `continuous_states`: replace der(x) by a variable; `matching`: which variable an equation defines;         |
 |              | `when_conditions`: clocks and edge detectors; `topological_sort`; `schedule`: the order of computation;    |
 |              | `parameter_roles`: which parameters can be set; `interpreter`: simulation of a model in Python             |

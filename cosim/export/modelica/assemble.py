@@ -20,7 +20,8 @@ from .frontend.constants import inline_constants
 from .frontend.folded_branches import check_folded_branches
 from .frontend.reader import ModelReader
 from .frontend.rumoca_frontend import ModelicaSources, flatten_model
-from .model.flat_model import Model, Variable, raise_model_error
+from .model.flat_model import Model, Variable
+from .model.syntax_tree import raise_model_error
 
 _FMI_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 _DEFAULT_STEP_SIZE = 0.01

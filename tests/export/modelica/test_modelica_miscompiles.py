@@ -77,7 +77,9 @@ end M;"""
     ],
 )
 def test_b_an_if_equation_that_the_front_end_decides_by_a_default_is_refused(write_model, equations):
-    with pytest.raises(InputError, match=r"M.mo:7: the front end evaluates the condition of this if-equation with the default value of hold"):
+    with pytest.raises(
+        InputError, match=r"M.mo:7: the front end evaluates the condition of this if-equation with the default value of hold"
+    ):
         load_block(write_model(FOLDED.format(equations)))
 
 

@@ -23,7 +23,11 @@ CASES = {
     "der of an input": ("", "y = der(u);", r"M.mo:8: der\(...\) must name a coordinate classified as a continuous state"),
     "der of an Integer": ("Integer n;", "n = 1;\n  y = der(n);", "M.mo:9: .*n"),
     "index reduction": ("Real x;", "x = sin(time);\n  y = der(x);", "M.mo:8: this equation defines no variable"),
-    "parameter of a variable": ("parameter Real p = u;", "y = p;", "M.mo:6: the parameter p depends on u, which is not a parameter"),
+    "parameter of a variable": (
+        "parameter Real p = u;",
+        "y = p;",
+        "M.mo:6: the parameter p depends on u, which is not a parameter",
+    ),
     "a state in an algorithm": (
         "Real x;",
         "der(x) = 1;\nalgorithm\n  x := u;\n  y := x;\nequation",
@@ -69,7 +73,11 @@ CASES = {
         "a = u > 0;\n  b = pre(a);\n  y = if b then 1 else 0;",
         r"pre\(a\) outside a when",
     ),
-    "warning": ("", 'y = u;\n  assert(u > 0, "low", AssertionLevel.warning);', "M.mo:9: assert.. with a level other than AssertionLevel.error"),
+    "warning": (
+        "",
+        'y = u;\n  assert(u > 0, "low", AssertionLevel.warning);',
+        "M.mo:9: assert.. with a level other than AssertionLevel.error",
+    ),
     "text": ('parameter String name = "x";', "y = u;", "M.mo:6: name: variables of type String are not supported"),
     "message": ('parameter String name = "x";', "y = u;\n  assert(u > 0, name);", "M.mo:9: the message of an assert.. must be a"),
     "text of a number": (

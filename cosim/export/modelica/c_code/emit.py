@@ -13,16 +13,8 @@ import numpy as np
 from ..causality.interpreter import Interpreter
 from ..causality.matching import is_input
 from ..causality.schedule import finite_variables, pre_variables, start_value
-from ..model.flat_model import (
-    Body,
-    Name,
-    SourceLocation,
-    Statement,
-    Variable,
-    derivative_name,
-    owning_component,
-    referenced_variable,
-)
+from ..model.flat_model import Variable, derivative_name, owning_component
+from ..model.syntax_tree import Body, Name, SourceLocation, Statement, referenced_variable
 from ..model.traversal import assigned_references
 from .c_values import C_TYPES, CExpression, CValue, c_literal, scalar_value
 from .formatting import function_definition, uses_variable

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..model import flat_model
-from ..model.flat_model import SourceLocation, raise_model_error
+from ..model import syntax_tree
+from ..model.syntax_tree import SourceLocation, raise_model_error
 from .builtin_functions import BUILTINS
 from .c_values import (
     CExpression,
@@ -35,19 +35,19 @@ _COMPARISONS = {"<": "<", "<=": "<=", ">": ">", ">=": ">=", "==": "==", "<>": "!
 class ExpressionLowering(SubscriptLowering):
     """Lowering of expressions."""
 
-    def _literal(self, node: flat_model.Literal) -> CValue:
+    def _literal(self, node: syntax_tree.Literal) -> CValue:
         if node.type == "String":
             raise_model_error("a String is only supported as the message of assert()", None)
         if node.type == "Integer" and not -(2**31) <= node.number < 2**31:
             raise_model_error(f"the Integer {node.value} does not fit into 32 bits; use a Real", None)
         return scalar_value(node.type, c_literal(node.number, node.type), reusable=True)
 
-    def _name(self, node: flat_model.Name) -> CValue:
+    def _name(self, node: syntax_tree.Name) -> CValue:
         if node.name not in self.scope:
             raise_model_error(f"unknown name {node.name}", node.where)
         return self.scope[node.name]
 
-    def _array(self, node: flat_model.Array) -> CValue:
+    def _array(self, node: syntax_tree.Array) -> CValue:
         parts = [self.lower(element) for element in node.elements]
         if len({part.shape for part in parts}) != 1:
             raise_model_error("the elements of an array constructor have different shapes", None)
@@ -61,7 +61,7 @@ class ExpressionLowering(SubscriptLowering):
             reusable=reusable,
         )
 
-    def _range(self, node: flat_model.Range) -> CValue:
+    def _range(self, node: syntax_tree.Range) -> CValue:
         numbers = self.static_range(node)
         return CValue(
             "Integer", (len(numbers),), lambda k: c_literal(numbers[int(k)], "Integer"), indexable_in_loop=False, reusable=True
@@ -69,17 +69,17 @@ class ExpressionLowering(SubscriptLowering):
 
     # operators
 
-    def _unary(self, node: flat_model.Unary) -> CValue:
+    def _unary(self, node: syntax_tree.Unary) -> CValue:
         operand = self.lower(node.operand)
         if node.operator == "not":
             return map_elements(operand, "Boolean", lambda text: prefix("!", text))
-        if isinstance(node.operand, flat_model.Literal):
+        if isinstance(node.operand, syntax_tree.Literal):
             return scalar_value(operand.type, c_literal(-node.operand.number, operand.type), reusable=True)
         if operand.type == "Integer":
             return map_elements(operand, "Integer", lambda text: c_call("subtract", "m", "0", text))
         return map_elements(operand, "Real", lambda text: prefix("-", text))
 
-    def _binary(self, node: flat_model.Binary) -> CValue:
+    def _binary(self, node: syntax_tree.Binary) -> CValue:
         operator = node.operator
         if operator in ("and", "or"):
             return self._logical(node)
@@ -93,10 +93,10 @@ class ExpressionLowering(SubscriptLowering):
         return self._lower_elementwise(left, right, type_name, self._arithmetic(operator, type_name, left, node), node.where)
 
     def _arithmetic(
-        self, operator: str, type_name: str, left: CValue, node: flat_model.Binary
+        self, operator: str, type_name: str, left: CValue, node: syntax_tree.Binary
     ) -> Callable[[CExpression, CExpression], CExpression]:
         if operator == "^":
-            if node.right == flat_model.Literal(2, "Integer"):
+            if node.right == syntax_tree.Literal(2, "Integer"):
                 return lambda a, _: c_call("square", a)
             return lambda a, b: c_call("pow", a, b)
         if type_name == "Integer":
@@ -105,7 +105,7 @@ class ExpressionLowering(SubscriptLowering):
             return lambda a, b: infix("/", CExpression(a.code + ".0") if a.code.isdigit() else prefix("(double)", a), b)
         return lambda a, b: infix(operator, a, b)
 
-    def _logical(self, node: flat_model.Binary) -> CValue:
+    def _logical(self, node: syntax_tree.Binary) -> CValue:
         left = self.scalar_of(node.left)
         with self.collect_lines() as lines:
             right = self.scalar_of(node.right)
@@ -157,13 +157,13 @@ class ExpressionLowering(SubscriptLowering):
             type_name, (*left.shape[:-1], *right.shape[1:]), element, indexable_in_loop=columns == 1 and left.indexable_in_loop
         )
 
-    def _if(self, node: flat_model.If) -> CValue:
+    def _if(self, node: syntax_tree.If) -> CValue:
         (condition, yes), rest = node.branches[0], node.branches[1:]
         test = self.scalar_of(condition)
         with self.collect_lines() as yes_lines:
             first = self.lower(yes)
         with self.collect_lines() as no_lines:
-            second = self.lower(flat_model.If(rest, node.otherwise) if rest else node.otherwise)
+            second = self.lower(syntax_tree.If(rest, node.otherwise) if rest else node.otherwise)
         type_name = common_type([first.type, second.type])
         if not (yes_lines or no_lines or first.shape):
             return scalar_value(type_name, conditional(test, first.text, second.text))
@@ -177,15 +177,15 @@ class ExpressionLowering(SubscriptLowering):
 
     # functions
 
-    def _builtin(self, node: flat_model.Builtin) -> CValue:
+    def _builtin(self, node: syntax_tree.Builtin) -> CValue:
         if node.name not in BUILTINS:
             raise_model_error(f"{node.name}() is not supported here", node.where)
         return BUILTINS[node.name](self, node)
 
-    def _call(self, node: flat_model.Call) -> CValue:
+    def _call(self, node: syntax_tree.Call) -> CValue:
         return self.lower_call(node)[0]
 
-    def lower_call(self, node: flat_model.Call, target: str | None = None) -> tuple[CValue, ...]:
+    def lower_call(self, node: syntax_tree.Call, target: str | None = None) -> tuple[CValue, ...]:
         """Lower a call of a function of the model.
 
         Args:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from ..model import flat_model
-from ..model.flat_model import Function, FunctionVariable, SourceLocation, raise_model_error, referenced_variable
+from ..model import syntax_tree
+from ..model.flat_model import Function, FunctionVariable
+from ..model.syntax_tree import SourceLocation, raise_model_error, referenced_variable
 from ..model.traversal import read_references
 from .c_values import C_TYPES, CValue, c_identifier, variable_value
 from .formatting import uses_variable, wrap_lines
@@ -28,7 +29,7 @@ class FunctionTranslator:
     _instances: dict[tuple[str, Shapes], FunctionInstance] = field(default_factory=dict)
     _in_translation: list[str] = field(default_factory=list)
 
-    def function_instance(self, call: flat_model.Call, shapes: Shapes) -> FunctionInstance:
+    def function_instance(self, call: syntax_tree.Call, shapes: Shapes) -> FunctionInstance:
         """Return the C function for a call; it is translated at the first call with arguments of these shapes.
 
         Raises:
@@ -79,7 +80,7 @@ class FunctionTranslator:
     def _initialize_variables(self, lowering: StatementLowering, variables: tuple[FunctionVariable, ...]) -> None:
         for local in variables:
             if local.default is not None:
-                lowering.store(lowering.scope[local.name], local.default, flat_model.Name(local.name))
+                lowering.store(lowering.scope[local.name], local.default, syntax_tree.Name(local.name))
 
     def _name(self, name: str) -> str:
         base = c_identifier(name) if "." in name else c_identifier(name) + "_"

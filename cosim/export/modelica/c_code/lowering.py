@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from math import prod
 from typing import Protocol
 
-from ..model import flat_model
-from ..model.flat_model import Expression, SourceLocation, raise_model_error
+from ..model import syntax_tree
+from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
 from .c_values import C_TYPES, CExpression, CValue, scalar_value, variable_value
 
 
@@ -35,7 +35,7 @@ class TranslationUnit(Protocol):
     def failure_code(self, reason: str, where: SourceLocation | None) -> str:
         """Return the number of a failure reason."""
 
-    def function_instance(self, call: flat_model.Call, shapes: tuple[tuple[int, ...], ...]) -> FunctionInstance:
+    def function_instance(self, call: syntax_tree.Call, shapes: tuple[tuple[int, ...], ...]) -> FunctionInstance:
         """Return the C function for a call with arguments of these shapes."""
 
 
@@ -43,7 +43,7 @@ class TranslationUnit(Protocol):
 class Lowering:
     """Lowering in one scope: the model, or the body of a function.
 
-    The methods of the subclasses for the kinds of nodes are named after the classes of `flat_model`.
+    The methods of the subclasses for the kinds of nodes are named after the classes of `syntax_tree`.
     """
 
     translation_unit: TranslationUnit
@@ -131,29 +131,29 @@ class Lowering:
 
     def static_integer(self, node: Expression) -> int | None:
         """Evaluate an Integer expression of literals, size(), `+`, `-` and `*`; return None for all other expressions."""
-        if isinstance(node, flat_model.Literal) and node.type in ("Integer", "Enumeration"):
+        if isinstance(node, syntax_tree.Literal) and node.type in ("Integer", "Enumeration"):
             return int(node.number)
-        if isinstance(node, flat_model.Unary) and node.operator == "-":
+        if isinstance(node, syntax_tree.Unary) and node.operator == "-":
             operand = self.static_integer(node.operand)
             return None if operand is None else -operand
-        if isinstance(node, flat_model.Binary) and node.operator in ("+", "-", "*"):
+        if isinstance(node, syntax_tree.Binary) and node.operator in ("+", "-", "*"):
             left, right = self.static_integer(node.left), self.static_integer(node.right)
             if left is None or right is None:
                 return None
             return {"+": left + right, "-": left - right, "*": left * right}[node.operator]
-        if isinstance(node, flat_model.Builtin) and node.name == "size" and len(node.arguments) == 2:
+        if isinstance(node, syntax_tree.Builtin) and node.name == "size" and len(node.arguments) == 2:
             dimension = self.static_integer(node.arguments[1])
             return None if dimension is None else self.shape_of(node.arguments[0])[dimension - 1]
         return None
 
-    def static_range(self, node: flat_model.Range) -> list[int]:
+    def static_range(self, node: syntax_tree.Range) -> list[int]:
         """Return the values of a range.
 
         Raises:
             InputError: The bounds or the step are not constant.
         """
         start, step, stop = (
-            self.static_integer(e) for e in (node.start, node.step or flat_model.Literal(1, "Integer"), node.stop)
+            self.static_integer(e) for e in (node.start, node.step or syntax_tree.Literal(1, "Integer"), node.stop)
         )
         if start is None or step is None or stop is None:
             raise_model_error("the bounds of a range must be constant here", getattr(node.stop, "where", None))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ..model import flat_model
-from ..model.flat_model import Body, Expression, Statement, raise_model_error
+from ..model import syntax_tree
+from ..model.syntax_tree import Body, Expression, Statement, raise_model_error
 from ..model.traversal import assigned_references, read_references, variable_names
 from .c_values import CExpression, CValue, c_identifier, scalar_value
 from .expressions import ExpressionLowering
@@ -33,7 +33,7 @@ class StatementLowering(ExpressionLowering):
         """
         getattr(self, f"_{type(node).__name__.lower()}")(node)
 
-    def _assign(self, node: flat_model.Assign) -> None:
+    def _assign(self, node: syntax_tree.Assign) -> None:
         self.store(self.lower(node.target), node.value, node.target)
 
     def store(self, target: CValue, value: Expression, reference: Expression) -> None:
@@ -44,10 +44,10 @@ class StatementLowering(ExpressionLowering):
             value: The expression.
             reference: The assigned variable as an expression. It determines whether `value` depends on the target.
         """
-        if isinstance(value, flat_model.If) and (target.shape or self._needs_if_statement(target, value)):
+        if isinstance(value, syntax_tree.If) and (target.shape or self._needs_if_statement(target, value)):
             self._lower_choice(target, value, reference)
         elif (
-            isinstance(value, flat_model.Call)
+            isinstance(value, syntax_tree.Call)
             and target.pointer
             and not _variables_read(value) & variable_names(reference)
             and self._can_return_into(value, target)
@@ -67,19 +67,19 @@ class StatementLowering(ExpressionLowering):
             lowered = self.evaluated_once(replace(lowered, reusable=False))
         self.copy_elements(target, lowered)
 
-    def _can_return_into(self, value: flat_model.Call, target: CValue) -> bool:
+    def _can_return_into(self, value: syntax_tree.Call, target: CValue) -> bool:
         """Return whether a function can write its result to the target without a copy."""
         outputs = self.translation_unit.function_instance(value, tuple(map(self.shape_of, value.arguments))).outputs
         return [(output.type, output.shape) for output in outputs] == [(target.type, target.shape)]
 
-    def _needs_if_statement(self, target: CValue, value: flat_model.If) -> bool:
+    def _needs_if_statement(self, target: CValue, value: syntax_tree.If) -> bool:
         if len(value.branches) > 1:
             return True
         with self.collect_lines() as lines:
             text = self.lower(value).text
         return bool(lines) or len(target.text.code) + len(text.code) > _MAX_CONDITIONAL_LENGTH
 
-    def _lower_choice(self, target: CValue, value: flat_model.If, reference: Expression) -> None:
+    def _lower_choice(self, target: CValue, value: syntax_tree.If, reference: Expression) -> None:
         """Lower an if-expression to an if-statement; an `else if` is nested if its condition requires statements."""
         (condition, first), rest = value.branches[0], value.branches[1:]
         self.lines.append(f"if ({self.scalar_of(condition).code}) {{")
@@ -87,7 +87,7 @@ class StatementLowering(ExpressionLowering):
             self.store(target, first, reference)
         with self.collect_lines() as no:
             if rest:
-                self._lower_choice(target, flat_model.If(rest, value.otherwise), reference)
+                self._lower_choice(target, syntax_tree.If(rest, value.otherwise), reference)
             else:
                 self.store(target, value.otherwise, reference)
         self._close_if(yes, no)
@@ -102,25 +102,25 @@ class StatementLowering(ExpressionLowering):
         else:
             self.lines.append("}")
 
-    def _ifstatement(self, node: flat_model.IfStatement) -> None:
+    def _ifstatement(self, node: syntax_tree.IfStatement) -> None:
         (condition, body), rest = node.branches[0], node.branches[1:]
         self.lines.append(f"if ({self.scalar_of(condition).code}) {{")
         with self.collect_lines() as yes:
             self.body(body)
         with self.collect_lines() as no:
             if rest:
-                self._ifstatement(flat_model.IfStatement(rest, node.otherwise, node.where))
+                self._ifstatement(syntax_tree.IfStatement(rest, node.otherwise, node.where))
             else:
                 self.body(node.otherwise)
         self._close_if(yes, no)
 
-    def _for(self, node: flat_model.For) -> None:
+    def _for(self, node: syntax_tree.For) -> None:
         start, stop = self.scalar_of(node.range.start), self.scalar_of(node.range.stop)
         step = self.static_integer(node.range.step) if node.range.step else 1
         if not step:
             raise_model_error("the step of a for-loop must be a constant other than 0", node.where)
         if not stop.code.lstrip("-").isdigit() and _variables_read(node.range.stop) & {
-            flat_model.referenced_variable(t) for t in assigned_references(node.body)
+            syntax_tree.referenced_variable(t) for t in assigned_references(node.body)
         }:
             stop = self.evaluated_once(scalar_value("Integer", stop)).text
         index = c_identifier(node.index)
@@ -139,16 +139,16 @@ class StatementLowering(ExpressionLowering):
             self.scope[node.index] = shadowed
         self.lines += [*lines, "}"]
 
-    def _assert(self, node: flat_model.Assert) -> None:
+    def _assert(self, node: syntax_tree.Assert) -> None:
         condition = self.scalar_of(node.condition)
         failure = self.translation_unit.failure_code(node.message, node.where)
         self.lines.append(f"if (!{condition.parenthesized(13)}) fail(m, {failure});")
 
-    def _multiassign(self, node: flat_model.MultiAssign) -> None:
+    def _multiassign(self, node: syntax_tree.MultiAssign) -> None:
         for target, result in zip(node.targets, self.lower_call(node.call), strict=False):
             self.copy_elements(self.lower(target), result)
 
-    def _edgedetector(self, node: flat_model.EdgeDetector) -> None:
+    def _edgedetector(self, node: syntax_tree.EdgeDetector) -> None:
         """Set the flag risen(k) if the condition has become true since the previous event."""
         condition = self.scalar_of(node.condition).code
         if self.initial:
@@ -163,7 +163,7 @@ class StatementLowering(ExpressionLowering):
 
 def _variables_read(node: Expression) -> set[str]:
     """Return the variables whose current value an expression reads."""
-    return {flat_model.referenced_variable(reference) for reference in read_references(node)}
+    return {syntax_tree.referenced_variable(reference) for reference in read_references(node)}
 
 
 def _is_one_if(lines: list[str]) -> bool:

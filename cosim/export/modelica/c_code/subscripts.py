@@ -5,8 +5,8 @@ from __future__ import annotations
 from itertools import product
 from math import prod
 
-from ..model import flat_model
-from ..model.flat_model import Expression, SourceLocation, raise_model_error
+from ..model import syntax_tree
+from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
 from .c_values import CValue, c_call, linear_index, variable_value
 from .lowering import Lowering
 
@@ -14,11 +14,11 @@ from .lowering import Lowering
 class SubscriptLowering(Lowering):
     """Lowering of subscripted expressions such as `a[i]`."""
 
-    def _index(self, node: flat_model.Index) -> CValue:
+    def _index(self, node: syntax_tree.Index) -> CValue:
         base = self.lower(node.base)
         return self.select_elements(base, node)
 
-    def select_elements(self, base: CValue, node: flat_model.Index) -> CValue:
+    def select_elements(self, base: CValue, node: syntax_tree.Index) -> CValue:
         """Return the element or slice of an array; it can be the target of an assignment.
 
         Args:
@@ -31,8 +31,8 @@ class SubscriptLowering(Lowering):
         if len(node.subscripts) > len(base.shape):
             found = f"found {len(node.subscripts)} {'subscript' if len(node.subscripts) == 1 else 'subscripts'}"
             raise_model_error(f"{found}, expected at most {len(base.shape)}", node.where)
-        label = node.base.name if isinstance(node.base, flat_model.Name) else "array"
-        subscripts = [*node.subscripts, *[flat_model.Colon()] * (len(base.shape) - len(node.subscripts))]
+        label = node.base.name if isinstance(node.base, syntax_tree.Name) else "array"
+        subscripts = [*node.subscripts, *[syntax_tree.Colon()] * (len(base.shape) - len(node.subscripts))]
         offsets = [self._element_offsets(s, n, label, node.where) for s, n in zip(subscripts, base.shape, strict=True)]
         if any(isinstance(offset, str) for offset in offsets) and base.pointer is None:
             base = variable_value(base.type, base.shape, self.as_c_array(base, base.type))
@@ -45,12 +45,12 @@ class SubscriptLowering(Lowering):
         return CValue(base.type, shape, lambda k: base.element(selected[int(k)]), indexable_in_loop=False, reusable=base.reusable)
 
     def _element_offsets(
-        self, subscript: Expression | flat_model.Colon, size: int, label: str, where: SourceLocation | None
+        self, subscript: Expression | syntax_tree.Colon, size: int, label: str, where: SourceLocation | None
     ) -> list[int] | int | str:
         """Return the offset (from 0) of an element as a number or C code, or the offsets of a slice as a list."""
-        if isinstance(subscript, flat_model.Colon):
+        if isinstance(subscript, syntax_tree.Colon):
             return list(range(size))
-        if isinstance(subscript, flat_model.Range):
+        if isinstance(subscript, syntax_tree.Range):
             return [self._check_bounds(k, size, label, where) for k in self.static_range(subscript)]
         if (static := self.static_integer(subscript)) is not None:
             return self._check_bounds(static, size, label, where)

@@ -6,17 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from ..model.flat_model import (
-    Builtin,
-    Expression,
-    Index,
-    Model,
-    Name,
-    Variable,
-    derivative_name,
-    raise_model_error,
-    referenced_variable,
-)
+from ..model.flat_model import Model, Variable, derivative_name
+from ..model.syntax_tree import Builtin, Expression, Index, Name, raise_model_error, referenced_variable
 from ..model.traversal import rewrite, walk
 from .matching import is_input
 

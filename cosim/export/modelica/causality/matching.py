@@ -9,19 +9,8 @@ from collections.abc import Collection, Iterable, Mapping
 from itertools import product
 from math import prod
 
-from ..model.flat_model import (
-    Assign,
-    Builtin,
-    Colon,
-    Equation,
-    Expression,
-    Index,
-    Literal,
-    Model,
-    Name,
-    Variable,
-    raise_model_error,
-)
+from ..model.flat_model import Equation, Model, Variable
+from ..model.syntax_tree import Assign, Builtin, Colon, Expression, Index, Literal, Name, raise_model_error
 
 #: a scalar: variable name and row-major index of the element
 ScalarKey = tuple[str, int]

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 
-from ..model.flat_model import Model, Variable, raise_model_error
+from ..model.flat_model import Model, Variable
+from ..model.syntax_tree import raise_model_error
 from ..model.traversal import variable_names
 from .schedule import Schedule
 

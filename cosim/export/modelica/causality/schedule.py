@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from ..model.flat_model import (
+from ..model.flat_model import Model, derivative_name
+from ..model.syntax_tree import (
     Assert,
     Assign,
     Binary,
@@ -22,11 +23,9 @@ from ..model.flat_model import (
     Expression,
     IfStatement,
     Literal,
-    Model,
     Name,
     Statement,
     When,
-    derivative_name,
     raise_model_error,
     referenced_variable,
 )

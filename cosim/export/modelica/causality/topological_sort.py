@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ..model.flat_model import Body, IfStatement, SourceLocation, Statement, owning_component, raise_model_error
+from ..model.flat_model import owning_component
+from ..model.syntax_tree import Body, IfStatement, SourceLocation, Statement, raise_model_error
 from ..model.traversal import has_builtin
 from .matching import ScalarKey
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..model.flat_model import (
+from ..model.flat_model import Model
+from ..model.syntax_tree import (
     Array,
     Binary,
     Body,
@@ -17,7 +18,6 @@ from ..model.flat_model import (
     Expression,
     IfStatement,
     Literal,
-    Model,
     SourceLocation,
     When,
     raise_model_error,

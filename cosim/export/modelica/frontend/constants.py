@@ -6,7 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 from ..model.evaluate import Evaluator
-from ..model.flat_model import Literal, Model, Name, Variable
+from ..model.flat_model import Model, Variable
+from ..model.syntax_tree import Literal, Name
 from ..model.traversal import rewrite, variable_names
 
 

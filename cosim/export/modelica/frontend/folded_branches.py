@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..model.flat_model import SourceLocation, raise_model_error
+from ..model.syntax_tree import SourceLocation, raise_model_error
 from .rumoca_frontend import ModelicaSources
 
 _TOKEN = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])*\'|[A-Za-z_]\w*|\d[\w.]*|\S', re.DOTALL)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from ..model import flat_model
-from ..model.flat_model import Body, Expression, SourceLocation, Statement, raise_model_error
+from ..model import flat_model, syntax_tree
+from ..model.syntax_tree import Body, Expression, SourceLocation, Statement, raise_model_error
 from .expression_reader import Json, split_tagged
 from .statement_reader import StatementReader
 from .unrolling import unroll_equations
@@ -113,7 +113,7 @@ class ModelReader(StatementReader):
         literal = self.read_expression(node)
         return (
             str(literal.value)
-            if isinstance(literal, flat_model.Literal)
+            if isinstance(literal, syntax_tree.Literal)
             else raise_model_error("a String literal is expected", self.locate(node))
         )
 
@@ -152,31 +152,32 @@ class ModelReader(StatementReader):
     def _split_records(self, left: Expression, right: Expression) -> list[tuple[Expression, Expression]]:
         """Return the pairs of fields of an equation between two records, or the pair itself for all other equations."""
         records = self.json["record_instances"]
-        if not (isinstance(left, flat_model.Name) and left.name in records):
+        if not (isinstance(left, syntax_tree.Name) and left.name in records):
             return [(left, right)]
-        if not (isinstance(right, flat_model.Name) and right.name in records):
+        if not (isinstance(right, syntax_tree.Name) and right.name in records):
             raise_model_error(
                 "a record can only be equated with a record variable; write one equation for each field", left.where
             )
         names = [name for name in self.json["variables"] if name.startswith(left.name + ".")]
         return [
-            (flat_model.Name(n, left.where), flat_model.Name(right.name + n.removeprefix(left.name), right.where)) for n in names
+            (syntax_tree.Name(n, left.where), syntax_tree.Name(right.name + n.removeprefix(left.name), right.where))
+            for n in names
         ]
 
     def _declaration_equations(self) -> list[flat_model.Equation]:
         """Return the declaration equations (`Real y = 2*u;`) of all variables that are neither parameters nor constants."""
         variables = [self.read_variable(name) for name in self.json["variables"]]
         return [
-            flat_model.Equation(flat_model.Name(v.name, v.where), v.binding, v.where)
+            flat_model.Equation(syntax_tree.Name(v.name, v.where), v.binding, v.where)
             for v in variables
             if v.binding is not None and v.variability not in ("constant", "parameter")
         ]
 
-    def read_when_chain(self, chain: Json) -> flat_model.When:
+    def read_when_chain(self, chain: Json) -> syntax_tree.When:
         """Convert a when-clause of an equation section, with its `elsewhen` branches."""
         blocks = [chain["first"], *chain["else_when"]]
         branches = tuple((self.read_expression(block["condition"]), self._when_body(block["equations"])) for block in blocks)
-        return flat_model.When(branches, self.locate(chain))
+        return syntax_tree.When(branches, self.locate(chain))
 
     def _when_body(self, nodes: list[Json]) -> Body:
         return tuple(self._when_equation(*split_tagged(node)) for node in nodes)
@@ -184,23 +185,23 @@ class ModelReader(StatementReader):
     def _when_equation(self, kind: str, node: Json) -> Statement:
         if kind == "Conditional":
             branches = tuple((self.read_expression(condition), self._when_body(body)) for condition, body in node["branches"])
-            return flat_model.IfStatement(branches, self._when_body(node["else_branch"] or []), self.locate(node))
+            return syntax_tree.IfStatement(branches, self._when_body(node["else_branch"] or []), self.locate(node))
         if kind == "Assert":
             return self._assert(node)
         where = self.locate(node)
         if kind not in ("Assign", "Reinit"):
             raise_model_error(f"{kind} in a when-equation is not supported", where)
         target = self._parse_target(node["target" if kind == "Assign" else "state"], where)
-        return flat_model.Assign(target, self.read_expression(node["value"]), where)
+        return syntax_tree.Assign(target, self.read_expression(node["value"]), where)
 
-    def _parse_target(self, target: str, where: SourceLocation | None) -> flat_model.Name | flat_model.Index:
+    def _parse_target(self, target: str, where: SourceLocation | None) -> syntax_tree.Name | syntax_tree.Index:
         """Parse the target of a when-equation, given as text: a name, perhaps with constant subscripts."""
         if target in self.json["variables"]:
-            return flat_model.Name(target, where)
+            return syntax_tree.Name(target, where)
         base, bracket, subscripts = target.rpartition("[")
         if not bracket or base not in self.json["variables"]:
             raise_model_error(f'cannot assign "{target}" in a when-equation; write one equation for each variable', where)
         numbers = subscripts.rstrip("]").split(",")
-        return flat_model.Index(
-            flat_model.Name(base, where), tuple(flat_model.Literal(int(k), "Integer") for k in numbers), where
+        return syntax_tree.Index(
+            syntax_tree.Name(base, where), tuple(syntax_tree.Literal(int(k), "Integer") for k in numbers), where
         )

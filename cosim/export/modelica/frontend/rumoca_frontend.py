@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ....core.errors import InputError, Problem
-from ..model.flat_model import SourceLocation
+from ..model.syntax_tree import SourceLocation
 
 RUMOCA_VERSION = "0.10.2"
 _WITHIN = re.compile(r"^\s*within\s+([\w.]+)\s*;", re.MULTILINE)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from .flat_model import SourceLocation
+from .syntax_tree import SourceLocation
 
 _INT32 = range(-(2**31), 2**31)
 

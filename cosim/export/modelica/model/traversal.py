@@ -6,7 +6,18 @@ from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from .flat_model import Assign, Builtin, Colon, Expression, Index, Literal, MultiAssign, Name, SourceLocation, referenced_variable
+from .syntax_tree import (
+    Assign,
+    Builtin,
+    Colon,
+    Expression,
+    Index,
+    Literal,
+    MultiAssign,
+    Name,
+    SourceLocation,
+    referenced_variable,
+)
 
 #: operators that use the value of a variable before the current event
 PRE_OPERATORS = ("pre", "edge", "change")
