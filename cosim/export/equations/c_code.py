@@ -31,7 +31,6 @@ _OPERATIONS = {
     ca.OP_FMIN: "{0} < {1} ? {0} : {1}",
     ca.OP_FMAX: "{0} > {1} ? {0} : {1}",
     ca.OP_SIGN: "(double)({0} > 0) - (double)({0} < 0)",
-
     ca.OP_LT: "{} < {}",
     ca.OP_LE: "{} <= {}",
     ca.OP_EQ: "{} == {}",
@@ -41,7 +40,8 @@ _OPERATIONS = {
     ca.OP_OR: "{} || {}",
     ca.OP_IF_ELSE_ZERO: "{} != 0 ? {} : 0",
 }
-_UNARY_FUNCTIONS = "sqrt exp log sin cos tan asin acos atan sinh cosh tanh fabs floor ceil".split()
+_TRIGONOMETRIC_FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")
+_UNARY_FUNCTIONS = (*_TRIGONOMETRIC_FUNCTIONS, "sqrt", "exp", "log", "fabs", "floor", "ceil")
 _OPERATIONS |= {getattr(ca, f"OP_{name.upper()}"): f"{name}({{}})" for name in _UNARY_FUNCTIONS}
 _OPERATIONS |= {getattr(ca, f"OP_{name.upper()}"): f"{name}({{}}, {{}})" for name in ("atan2", "hypot", "fmod", "copysign")}
 

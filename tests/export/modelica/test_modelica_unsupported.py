@@ -1,4 +1,4 @@
-"""What is not supported is refused with file, line and reason, never left out."""
+"""Unsupported features are refused with file, line and reason; they are never ignored."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_refused(write_model, case):
+def test_an_unsupported_feature_is_refused_with_file_and_line(write_model, case):
     declarations, equations, message = CASES[case]
     path = write_model(f"""model M
   input Real u;
@@ -124,7 +124,7 @@ end M;""")
         ("edge(b)", "in a when-condition are not supported"),
     ],
 )
-def test_refused_when_conditions(write_model, when, message):
+def test_an_unsupported_when_condition_is_refused(write_model, when, message):
     path = write_model(f"""model M
   input Real u;
   output Real y;
@@ -174,7 +174,7 @@ end M;""")
         ModelReader(json, sources).read_model("M")
 
 
-def test_unknown_json_is_refused_not_dropped():
+def test_unknown_elements_of_the_front_ends_json_are_refused():
     from cosim.export.modelica.frontend.reader import ModelReader
     from cosim.export.modelica.frontend.rumoca_frontend import ModelicaSources
 

@@ -10,23 +10,8 @@ from ..model.syntax_tree import raise_model_error
 from .c_values import CExpression, CValue, c_call, c_literal, common_type, infix, map_elements, prefix, scalar_value, sum_terms
 from .subscripts import SubscriptLowering
 
-_MATH_FUNCTIONS = (
-    "sin",
-    "cos",
-    "tan",
-    "asin",
-    "acos",
-    "atan",
-    "sinh",
-    "cosh",
-    "tanh",
-    "exp",
-    "log",
-    "log10",
-    "sqrt",
-    "ceil",
-    "floor",
-)
+_TRIGONOMETRIC_FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")
+_MATH_FUNCTIONS = (*_TRIGONOMETRIC_FUNCTIONS, "exp", "log", "log10", "sqrt", "ceil", "floor")
 #: functions of runtime.h for Real and for Integer operands
 _TWO_OPERAND_HELPERS = {
     "min": ("smaller", "smaller_integer"),
