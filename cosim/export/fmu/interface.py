@@ -20,7 +20,7 @@ _DEFAULT_START = {"Float64": 0.0, "Int32": 0, "Boolean": False, "Enumeration": 1
 
 
 class TableRow(NamedTuple):
-    """A row of the table of variables; the position in the table is the value reference (FMI 3.0: less 1, for `time`)."""
+    """A row of the table of variables; its index is the value reference in FMI 2.0 and the value reference - 1 in FMI 3.0."""
 
     variable: BlockVariable
     #: index of the element in the array `variable.member`

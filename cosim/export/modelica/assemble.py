@@ -131,7 +131,7 @@ def _block_variable(variable: Variable, member: str, role: FmiRole, defaults: In
 def _literals(variable: Variable, model: Model) -> tuple[str, ...]:
     """Return the literals of a variable's enumeration type; the type name may lack the package."""
     name = variable.enumeration
-    candidates = {literals for owner, literals in model.enumerations.items() if name and f".{owner}".endswith(f".{name}")}
+    candidates = {literals for key, literals in model.enumerations.items() if name and f".{key}".endswith(f".{name}")}
     if len(candidates) > 1:
         raise_model_error(f'{variable.name}: several enumerations are named "{name}"; give them different names', variable.where)
     return next(iter(candidates), ())

@@ -107,7 +107,7 @@ def build_schedule(model: Model) -> Schedule:
 
 
 def _with_states_before_reinit(model: Model, detector: EdgeDetector) -> EdgeDetector:
-    """Replace states by pre() of them in a condition if a reinit() assigns them, since reinit() may depend on the condition."""
+    """Replace each state that a reinit() assigns by its pre() in a condition, since reinit() may depend on this condition."""
     reinitialized = {referenced_variable(target) for target in assigned_references(model.whens)} & set(model.states)
 
     def replace_state(node: Any) -> Any:
@@ -133,8 +133,8 @@ def _check_pre_usage(model: Model) -> None:
         )
 
 
-def _make_node(model: Model, statements: Body, local: Iterable[str] = ()) -> Node:
-    """Create the node of some statements; `local` are variables that they assign before they read them."""
+def _make_node(model: Model, statements: Body, assigned: Iterable[str] = ()) -> Node:
+    """Create the node of some statements; reading the variables `assigned`, of an algorithm, creates no dependency."""
     written = {
         key
         for target in assigned_references(statements)
@@ -145,7 +145,7 @@ def _make_node(model: Model, statements: Body, local: Iterable[str] = ()) -> Nod
     read = {key for reference in read_references(statements) for key in scalar_keys(model.variables, reference)}
     flags_read = {_flag_key(item.arguments[0]) for item in walk(statements) if isinstance(item, Builtin) and item.name == "risen"}
     flags_written = {_flag_key(Literal(s.index, "Integer")) for s in statements if isinstance(s, EdgeDetector)}
-    return Node(statements, {key for key in read if key[0] not in local} | flags_read, written | flags_written)
+    return Node(statements, {key for key in read if key[0] not in assigned} | flags_read, written | flags_written)
 
 
 def _flag_key(index: Expression) -> ScalarKey:

@@ -120,10 +120,10 @@ class ModelReader(StatementReader):
     def _enumerations(self) -> dict[str, tuple[str, ...]]:
         types: dict[str, dict[int, str]] = {}
         for key, ordinal in self.json["enum_literal_ordinals"].items():
-            owner, _, literal = key.rpartition(".")
+            type_name, _, literal = key.rpartition(".")
             if not literal.startswith("'"):
-                types.setdefault(owner, {})[ordinal] = literal
-        return {owner: tuple(literals[k] for k in sorted(literals)) for owner, literals in types.items()}
+                types.setdefault(type_name, {})[ordinal] = literal
+        return {type_name: tuple(literals[k] for k in sorted(literals)) for type_name, literals in types.items()}
 
     # equations
 

@@ -41,7 +41,7 @@ def to_python_scalar(value: Any) -> Any:
 
 
 def check_int32(value: float | int) -> float | int:
-    """Return a number unchanged.
+    """Return a number after the check that it is not an Integer outside the range of int32.
 
     Raises:
         EvaluationError: The number is an Integer outside the range of int32.
