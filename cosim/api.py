@@ -112,11 +112,10 @@ def execute(assembly: PreparedRun, observers: Sequence[Observer] = ()) -> Result
         with executing(assembly, observers) as execution:
             pass
     except ComponentError as error:  # while terminating
-        if execution:
-            error.result = execution.result  # type: ignore[attr-defined]
+        error.result = execution.result if execution else None
         raise
     if execution.failure:
-        execution.failure.result = execution.result  # type: ignore[attr-defined]
+        vars(execution.failure)["result"] = execution.result  # any exception has it, a KeyboardInterrupt too
         raise execution.failure
     return execution.result
 

@@ -16,6 +16,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 #: what passes through other people's code without being its failure; all else is, also what is no Exception (a library's panic)
 PASS_THROUGH_EXCEPTIONS = (KeyboardInterrupt, GeneratorExit)
@@ -24,9 +25,16 @@ _MAX_TEXT_LENGTH = 2000
 
 
 class CosimError(Exception):
-    """Base of all errors that are meant for the user; its text needs no traceback."""
+    """Base of all errors that are meant for the user; the text is complete without a traceback.
+
+    Attributes:
+        exit_code: Exit code of the command `cosim` for this class of error.
+        result: The `cosim.Result` recorded before the failure, if `cosim.run` raised the error after it began to simulate; else
+            None.
+    """
 
     exit_code = 70
+    result: Any = None
 
 
 @dataclass(frozen=True, slots=True)
