@@ -119,14 +119,24 @@ def describe_exception(error: BaseException) -> str:
     return f"{type(error).__name__}: {text}{where}"
 
 
-def join_alternatives(names: Iterable[str]) -> str:
-    """Who a failure may be of, when it cannot be known: the name, or "one of a, b", of many not all.
+def abbreviate_names(names: Iterable[str], limit: int = 8) -> str:
+    """Return the names as a list in one line, each name once; after the first `limit` names only the number of the others.
 
-    >>> one_of(["uav"]), one_of(["uav", "usv"])
+    >>> abbreviate_names("abcdea", limit=3)
+    'a, b, c and 2 more'
+    """
+    different = list(dict.fromkeys(names))
+    return ", ".join(different[:limit]) + (f" and {len(different) - limit} more" if len(different) > limit else "")
+
+
+def join_alternatives(names: Iterable[str]) -> str:
+    """Return the name of the component a failure is attributed to, or "one of ..." if several come into question.
+
+    >>> join_alternatives(["uav"]), join_alternatives(["uav", "usv"])
     ('uav', 'one of uav, usv')
     """
-    some = list(names)
-    return some[0] if len(some) == 1 else f"one of {', '.join(some[:8])}{' ...' if len(some) > 8 else ''}"
+    different = dict.fromkeys(names)
+    return f"{'one of ' if len(different) > 1 else ''}{abbreviate_names(different)}"
 
 
 def did_you_mean(name: str, valid: Iterable[str]) -> str:

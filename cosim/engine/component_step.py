@@ -2,23 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from ..core.component import SUCCESS_STATUSES, PreparedCall
 from ..process import float_mode
 from .plan import Step
-
-#: components or outputs shown in messages about several
-MAX_NAMES_SHOWN = 8
-
-
-def abbreviate_names(names: Iterable[str]) -> str:
-    """The names, each once; of many the first ones and how many there are."""
-    different = list(dict.fromkeys(names))
-    return ", ".join(different[:MAX_NAMES_SHOWN]) + (
-        f", ... ({len(different)} in all)" if len(different) > MAX_NAMES_SHOWN else ""
-    )
 
 
 class ScheduledStep(NamedTuple):

@@ -13,10 +13,10 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 
 from ..core.component import SUCCESS_STATUSES, PreparedCall, StepResult
-from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, describe_exception
+from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, abbreviate_names, describe_exception
 from ..process import float_mode
 from ..process.journal import calling_component
-from .component_step import ScheduledStep, StepFailure, abbreviate_names, run_due
+from .component_step import ScheduledStep, StepFailure, run_due
 from .initialization import copy_start_values, propagate_initial_values
 from .iteration import FixedPointIteration, IterationPhase
 from .parallel import MEASURED_STEPS, ParallelGroup, ThreadPool, available_processors, releases_gil

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from ..core.component import Component
-from ..core.errors import ComponentError
+from ..core.errors import ComponentError, abbreviate_names
 from ..process.journal import calling_component
-from .component_step import ScheduledStep, abbreviate_names
+from .component_step import ScheduledStep
 from .layout import Dtype, Layout
 from .plan import Loop
 from .transfer_calls import TransferCall
