@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from .executor import MARKER_SIZE, Executor, Termination
+from .executor import Executor, Termination
 from .native_executor import NativeExecutor, native_available
 from .plan import Plan, compile_plan
 from .python_executor import PythonExecutor
@@ -22,7 +22,6 @@ def executor_class(kind: ExecutorKind) -> type[Executor]:
 
 __all__ = [
     "EXECUTORS",
-    "MARKER_SIZE",
     "Executor",
     "ExecutorKind",
     "Plan",

@@ -15,7 +15,7 @@ import numpy as np
 from ..core.component import SUCCESS_STATUSES, PreparedCall, StepResult
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, abbreviate_names, describe_exception
 from ..process import float_mode
-from ..process.journal import calling_component
+from ..process.journal import CALL_NUMBER, MARKER_SIZE, ROW_COUNT, STEP_COUNT, calling_component
 from .component_step import ScheduledStep, StepFailure, run_due
 from .initialization import copy_start_values, propagate_initial_values
 from .iteration import FixedPointIteration, IterationPhase
@@ -24,9 +24,6 @@ from .plan import Loop, Phase, Plan, Step
 from .recorder import Recorder
 from .transfer_calls import DelayLine, TransferCall, compile_transfer
 from .transfer_plan import Transfer
-
-#: places in the marker: number of the present call, macro steps finished, rows recorded
-MARKER_CALL, MARKER_STEPS, MARKER_ROWS, MARKER_SIZE = 0, 1, 2, 3
 
 #: status of a Python component's turn in a macro step after which the simulation ends; no FMU can return it
 _STATUS_TERMINATION = 1 << 32
@@ -45,8 +42,8 @@ class Termination(NamedTuple):
 class Executor(ABC):
     """Initializes the components of a plan and runs macro steps.
 
-    `marker` (int64) says at any moment, also to another process that shares its memory, which call is being made: see CALL,
-    STEPS and ROWS. With `finite`, a value that is connected somewhere and not finite ends the run.
+    `marker` (int64) holds the present call, the number of finished macro steps and the number of recorded rows (see
+    `process.journal`). It may lie in shared memory. With `require_finite` a connected output that is not finite ends the run.
     """
 
     def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None, require_finite: bool = True):
@@ -66,7 +63,7 @@ class Executor(ABC):
     @property
     def completed_steps(self) -> int:
         """Macro steps finished so far."""
-        return int(self.marker[MARKER_STEPS])
+        return int(self.marker[STEP_COUNT])
 
     # -- initialization ------------------------------------------------------------------------------------------------
 
@@ -106,7 +103,7 @@ class Executor(ABC):
         self._schedule()
         self._prepare()
         self.recorder.record(0)
-        self.marker[MARKER_ROWS] = self.recorder.row_count
+        self.marker[ROW_COUNT] = self.recorder.row_count
 
     # -- turns ---------------------------------------------------------------------------------------------------------
 
@@ -146,7 +143,7 @@ class Executor(ABC):
     def _run_step(self, turn: ScheduledStep, begin: int = 0) -> None:
         """Take a turn from Python, from one of its calls on."""
         for number, call in enumerate(turn.calls[begin:], start=turn.first_call + begin):
-            self.marker[MARKER_CALL] = number
+            self.marker[CALL_NUMBER] = number
             if (status := call.function(*call.arguments)) not in SUCCESS_STATUSES:
                 self._handle_status(turn, call, status)
         if float_mode.is_changed():
@@ -265,7 +262,7 @@ class Executor(ABC):
             try:
                 self._run_macro_steps(self.completed_steps, min(end, self.recorder.last_point_in_chunk(self.completed_steps)))
             finally:
-                self.recorder.set_row_count(int(self.marker[MARKER_ROWS]))
+                self.recorder.set_row_count(int(self.marker[ROW_COUNT]))
 
     @abstractmethod
     def _run_macro_steps(self, first: int, end: int) -> None:

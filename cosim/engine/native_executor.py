@@ -8,8 +8,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ..core.component import NativeDoStep, NativeFlagCheck, NativeGetSet, PreparedCall
+from ..process.journal import ROW_COUNT
 from .component_step import ScheduledStep
-from .executor import MARKER_ROWS, Executor
+from .executor import Executor
 from .parallel import MEASURED_STEPS
 from .transfer_plan import Transfer
 
@@ -126,7 +127,7 @@ class NativeExecutor(Executor):
 
     def _record(self, n: int) -> None:
         self.recorder.record(n)
-        self.marker[MARKER_ROWS] = self.recorder.row_count
+        self.marker[ROW_COUNT] = self.recorder.row_count
 
     def _on_status(self, number: int, status: int) -> int:
         """What a bad status means; returns 1 when the simulation shall end after this macro step, 2 when it was not finished."""

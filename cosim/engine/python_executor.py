@@ -13,8 +13,9 @@ import numpy as np
 
 from ..core.component import SUCCESS_STATUSES, NativeDoStep, PreparedCall
 from ..process import float_mode
+from ..process.journal import CALL_NUMBER, ROW_COUNT, STEP_COUNT
 from .component_step import ScheduledStep
-from .executor import MARKER_CALL, MARKER_ROWS, MARKER_STEPS, Executor
+from .executor import Executor
 from .parallel import MEASURED_STEPS
 from .plan import Phase
 from .transfer_calls import TransferCall, contiguous_views
@@ -41,7 +42,7 @@ class _DueSteps:
         self._turns, self._divisors, self._marker = turns, divisors, marker
 
     def __iter__(self) -> Iterator[Sequence[NumberedCall]]:
-        n = self._marker[MARKER_STEPS]
+        n = self._marker[STEP_COUNT]
         return compress(self._turns, [n % divisor == 0 for divisor in self._divisors])
 
 
@@ -98,9 +99,9 @@ class PythonExecutor(Executor):
                 for move in moves:
                     move()
                 for calls in turns:
-                    for marker[MARKER_CALL], function, arguments in calls:
+                    for marker[CALL_NUMBER], function, arguments in calls:
                         if (status := function(*arguments)) and status not in SUCCESS_STATUSES:
-                            self._handle_status(*self._find_call(marker[MARKER_CALL]), status)
+                            self._handle_status(*self._find_call(marker[CALL_NUMBER]), status)
                     if one + little != one - little or not least + least:
                         self._raise_float_mode_changed(*self._find_call(calls[-1][0]))
             if (termination := self.termination) and not termination.complete:
@@ -112,8 +113,8 @@ class PythonExecutor(Executor):
                 for keep in keepers:
                     keep(row)
                 row += 1
-                marker[MARKER_ROWS] = row
-            marker[MARKER_STEPS] = n + 1
+                marker[ROW_COUNT] = row
+            marker[STEP_COUNT] = n + 1
             if termination:
                 return
 

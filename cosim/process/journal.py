@@ -18,9 +18,12 @@ from typing import Any, NamedTuple
 
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, describe_exception
 
-#: bytes of a journal; its fields: int64 until 64, the time as double, then two texts
+#: size of a journal (bytes)
 JOURNAL_SIZE = 5 * 4096
+#: indices of the int64 fields, which occupy the first 64 bytes
 CALL_NUMBER, STEP_COUNT, ROW_COUNT, PHASE, CHANGE_COUNT, DEADLINE, EXIT_CODE, CSV_UPDATE = range(8)
+#: number of leading fields that form the marker, which the executor updates: present call, finished macro steps, recorded rows
+MARKER_SIZE = 3
 _TIME_OFFSET, _COMPONENT_OFFSET, _FUNCTION_OFFSET, _FOLDER_OFFSET, _CSV_PATH_OFFSET, _MAX_TEXT_SIZE = (
     64,
     4096,
