@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ..core.json_values import encode_value
 from ..core.system import Endpoint
 from ..process.run_files.folder import HEADER_FILE, ROWS_FILE, TEXTS_FILE
 from . import Recorder
@@ -35,11 +36,7 @@ class SavingRecorder(Recorder):
         texts = {name: array[place] for name, array, place in self._text_signals}
         if changed := {name: text for name, text in texts.items() if text != self._saved_texts[name]}:
             self._saved_texts |= changed
-            os.write(self._file.fileno(), json.dumps([row, changed], default=_encode_bytes).encode() + b"\n")
-
-
-def _encode_bytes(value: bytes) -> dict[str, str]:
-    return {"bytes": value.hex()}
+            os.write(self._file.fileno(), json.dumps([row, changed], default=encode_value).encode() + b"\n")
 
 
 def write_header(folder: Path, executor: Executor) -> None:

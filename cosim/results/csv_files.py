@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pydantic_core
 
+from ..core.csv_text import format_header, quote_cell
 from ..core.errors import InputError, Problem
 from ..core.paths import open_text
 from ..core.recording import Recording
@@ -23,20 +24,16 @@ def write_csv(recording: Recording, path: str | Path) -> None:
     """Write `recording` to `path`, which is replaced only when the file is complete."""
     columns = [recording.time, *recording.columns.values()]
     with writing_atomically(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(",".join(map(_quote_csv, ("time", *recording.columns))) + "\n")
+        file.write(format_header(recording.columns))
         for piece in iterate_chunks(columns, ROWS_PER_CHUNK):
             cells = [_format_column(column[piece]) for column in columns]
             file.writelines(",".join(row) + "\n" for row in zip(*cells, strict=True))
 
 
-def _quote_csv(text: str) -> str:
-    return '"' + str(text).replace('"', '""') + '"'
-
-
 def _format_column(column: np.ndarray) -> list[str]:
     """The texts of one column. pydantic's writer finds the shortest digits that round-trip three times faster than `repr`."""
     if column.dtype == object:
-        return list(map(_quote_csv, column))
+        return list(map(quote_cell, column))
     numbers = column.astype(np.uint8) if column.dtype == bool else column
     return pydantic_core.to_json(numbers.tolist(), inf_nan_mode="constants")[1:-1].decode().split(",")
 

@@ -17,6 +17,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from ...core.json_values import decode_object
 from ..journal import current_journal
 
 if TYPE_CHECKING:
@@ -135,13 +136,9 @@ class TextReader:
                 self._file.seek(-len(line), os.SEEK_CUR)
                 self._pending_change = (-1, {})
                 break
-            first, texts = json.loads(line, object_hook=_decode_bytes)
+            first, texts = json.loads(line, object_hook=decode_object)
             self._pending_change = (first, texts)
         return list(self._texts.values())
-
-
-def _decode_bytes(value: dict[str, Any]) -> Any:
-    return bytes.fromhex(value["bytes"]) if value.keys() == {"bytes"} else value
 
 
 def write_metadata(metadata: dict[str, Any]) -> None:

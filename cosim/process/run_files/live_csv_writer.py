@@ -15,6 +15,7 @@ from pathlib import Path
 from shutil import copyfileobj
 from typing import IO
 
+from ...core.csv_text import format_header, quote_cell
 from ..journal import ROW_COUNT, Journal
 from .folder import ROWS_FILE, RowsHeader, TextReader, read_header
 
@@ -121,7 +122,7 @@ class CsvLineReader:
 
     def header_line(self) -> bytes:
         """The line of names."""
-        return ",".join(map(_quote_csv, ("time", *self._header.names))).encode() + b"\n"
+        return format_header(self._header.names).encode()
 
     def read_lines(self, source: IO[bytes], rows: int) -> bytes:
         """Lines of some of the rows that follow, of `rows` that there are in the file."""
@@ -147,13 +148,9 @@ class CsvLineReader:
         for row, line in enumerate(lines.decode().splitlines(), start=first):
             time, *numbers = line.split(",")
             whole.append(
-                ",".join([time, *self._header.merge_columns(numbers, map(_quote_csv, self._texts.read_row(row)))]) + "\n"
+                ",".join([time, *self._header.merge_columns(numbers, map(quote_cell, self._texts.read_row(row)))]) + "\n"
             )
         return "".join(whole).encode()
-
-
-def _quote_csv(text: str) -> str:
-    return '"' + str(text).replace('"', '""') + '"'
 
 
 def _row_format(header: RowsHeader) -> str:
