@@ -1,4 +1,4 @@
-"""Conversion of values that JSON does not have: bytes become {"bytes": hexadecimal digits}, NumPy values become lists and numbers."""
+"""Values that JSON does not have: bytes become {"bytes": hexadecimal digits}, NumPy values become lists and numbers."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def test_an_output_is_no_target():
 
 def test_a_component_steps_once():
     built = make_system({"a": gain()}, stages=[("a",), ("a",)])
-    assert texts(built) == ['component "a" stands in the stages twice']
+    assert texts(built) == ['component "a" is in the stages twice']
 
 
 def test_different_quantities_are_not_connected():
@@ -49,7 +49,7 @@ def test_different_quantities_are_not_connected():
 def test_types_that_would_lose_something_are_not_connected():
     for source, target in [("Float64", "Int32"), ("Int64", "Int32"), ("Boolean", "Float64"), ("String", "Float64")]:
         built = make_system({"a": typed("output", source), "b": typed("input", target)}, "a.v > b.v")
-        assert texts(built) == [f"a.v cannot feed b.v: type {source} does not become {target}"]
+        assert texts(built) == [f"a.v cannot feed b.v: type {source} cannot be converted to {target}"]
 
 
 def test_types_that_lose_nothing_are_connected():
