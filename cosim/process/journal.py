@@ -117,12 +117,7 @@ class Journal:
         return Phase(self[PHASE])
 
     def enter_phase(self, phase: Phase, deadline: float = math.inf) -> None:
-        """Begin a phase, after the supervisor has finished an update of the result file.
-
-        Args:
-            phase: The new phase.
-            deadline: Maximum duration of one call in this phase (s).
-        """
+        """Begin a phase with a maximum duration of each call (s); wait for the end of an update of the result file."""
         self[CHANGE_COUNT] += 1  # first, so that a reader of the new deadline also reads the new count
         self[DEADLINE] = -1 if math.isinf(deadline) else int(min(deadline * 1000, _MAX_DEADLINE))
         self[PHASE] = phase
@@ -139,13 +134,7 @@ class Journal:
             self[CSV_UPDATE] = 0
 
     def record_call(self, component: str, function: str, time: float = math.nan) -> None:
-        """Record the present call.
-
-        Args:
-            component: Name of the component.
-            function: Name of its function.
-            time: Simulation time (s); NaN outside the simulation.
-        """
+        """Record the present call and its simulation time (s; NaN outside the simulation)."""
         struct.pack_into("d", self.memory, _TIME_OFFSET, time)
         self._write_text(_COMPONENT_OFFSET, component)
         self._write_text(_FUNCTION_OFFSET, function)
@@ -232,16 +221,7 @@ def calling_component(component: str, function: str, deadline_name: str, time: f
 
 @contextmanager
 def as_component_error(component: str, function: str, time: float = math.nan) -> Iterator[None]:
-    """Convert exceptions raised in the block.
-
-    Args:
-        component: Name of the component.
-        function: Name of its function.
-        time: Simulation time (s); NaN outside the simulation.
-
-    Raises:
-        ComponentError: The block raised an exception other than a CosimError or one of `PASS_THROUGH_EXCEPTIONS`.
-    """
+    """Raise a ComponentError for an exception in the block that is no CosimError and not in `PASS_THROUGH_EXCEPTIONS`."""
     try:
         yield
     except (CosimError, *PASS_THROUGH_EXCEPTIONS):

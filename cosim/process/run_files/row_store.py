@@ -69,7 +69,7 @@ def open_row_store(dtype: np.dtype[Any], expected: int, path: Path | None) -> Ro
     """Rows in the file at `path`; without one in memory, or in a temporary file that nobody sees when they are many."""
     if path is None and expected * dtype.itemsize <= MAX_MEMORY_BYTES:
         return RowStore(dtype, expected)
-    return FileRowStore(dtype, expected, path.open("w+b") if path else TemporaryFile())  # type: ignore[arg-type]
+    return FileRowStore(dtype, expected, path.open("w+b") if path else TemporaryFile())
 
 
 def compute_in_chunks(count: int, fill: Callable[[range], np.ndarray], dtype: np.dtype[Any]) -> np.ndarray:
