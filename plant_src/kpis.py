@@ -14,7 +14,7 @@ import numpy as np
 
 from cosim.results import Result
 from cosim.results.checks import Number
-from cosim.results.kpi import Prefix, Signal, better, units
+from cosim.results.kpi import Prefix, Signal, better, declared_units, units
 
 from . import deck_frame
 
@@ -130,7 +130,7 @@ def touchdown(result: Result, vehicle: Prefix, deck: Prefix, mass: float) -> dic
     """
     row = touchdown_row(result, vehicle)
     if row is None:
-        return dict.fromkeys(touchdown.units, math.nan)  # type: ignore[attr-defined]
+        return dict.fromkeys(declared_units(touchdown), math.nan)
     vessel = deck.removesuffix(".deck")
     forward, left, _ = deck_frame.relative_position(result, vehicle, deck)[row].tolist()
     u, v, w = deck_frame.relative_velocity(result, vehicle, deck)[row - 1].tolist()
