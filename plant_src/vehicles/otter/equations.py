@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import casadi as ca
 import numpy as np
 
@@ -11,9 +13,10 @@ from cosim.export.fmu.block import Block
 
 from ..common import kinematics
 from ..common.interface import VESSEL_STATES
+from ..common.named_values import NamedValues, values_by_name, variables_of
 from ..vessel import floating_maps, vessel_equations
 from ..vessel import hull as vessel
-from ..vessel.hull import Frame, Hull, LoadArguments, ValuesByName, load_of_force_at, transformation_matrix
+from ..vessel.hull import Frame, Hull, LoadArguments, load_of_force_at, transformation_matrix
 from ..vessel.wave_loads import Footprint
 from . import hydrostatics
 from . import parameters as p
@@ -23,7 +26,7 @@ from .interface import PROPELLER_STATES, VARIABLES
 _CENTRE_OF_FLOTATION = ca.SX(p.CENTRE_OF_FLOTATION)
 
 
-def derive_constants(parameters: ValuesByName) -> ValuesByName:
+def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     """What the equations need of the parameters."""
     payload, place, hull_centre = parameters["payload_mass"], parameters["payload_position"], ca.SX(p.HULL_CENTRE)
     mass = p.HULL_MASS + payload
@@ -64,14 +67,14 @@ def added_mass(inertia: ca.SX) -> ca.SX:
     return ca.vertcat(ca.SX(masses), ca.SX(p.ADDED_INERTIA_SHARES) * ca.diag(inertia))
 
 
-def trim(constants: ValuesByName, attitude: ca.SX) -> ca.SX:
+def trim(constants: Mapping[str, ca.SX], attitude: ca.SX) -> ca.SX:
     """Height of O, roll and pitch to which the payload presses the hull in this attitude."""
     force = attitude.T @ ca.vertcat(0, 0, constants["payload"])
     load = load_of_force_at(constants["payload_position"], force)
     return constants["settling"] @ load[2:5]
 
 
-def _equilibrium(constants: ValuesByName) -> ca.SX:
+def _equilibrium(constants: Mapping[str, ca.SX]) -> ca.SX:
     """The trim that is that of its own attitude, by iteration: each step leaves less than a tenth of the error."""
     rest = ca.SX.zeros(3)
     for _ in range(20):
@@ -79,7 +82,7 @@ def _equilibrium(constants: ValuesByName) -> ca.SX:
     return rest
 
 
-def frame(constants: ValuesByName, orientation: ca.SX) -> Frame:
+def frame(constants: NamedValues, orientation: ca.SX) -> Frame:
     """Velocities are counted in the hull's level frame, which is that of its Euler angles less those of the trim.
 
     The current is turned by the yaw angle alone.
@@ -93,7 +96,7 @@ def frame(constants: ValuesByName, orientation: ca.SX) -> Frame:
     return Frame(attitude, to_world, spin, kinematics.rotation_matrix(kinematics.quaternion_about_z(yaw)).T)
 
 
-def hull(constants: ValuesByName) -> Hull:
+def hull(constants: NamedValues) -> Hull:
     """The vessel with these constants."""
     added = ca.diag(constants["added_mass"])
     return Hull(
@@ -118,7 +121,7 @@ def _unpack_footprint(values: ca.SX) -> Footprint:
     return Footprint(*ca.vertsplit(values))
 
 
-def restoring(constants: ValuesByName, now: LoadArguments) -> ca.SX:
+def restoring(constants: NamedValues, now: LoadArguments) -> ca.SX:
     """Linear in height, roll and pitch, relative to the trim and the surface of the water at the centre of flotation."""
     angles = kinematics.euler_angles(now.orientation)[0:2]
     displacement = ca.vertcat(now.height, angles) - trim(constants, now.frame.attitude)
@@ -128,7 +131,7 @@ def restoring(constants: ValuesByName, now: LoadArguments) -> ca.SX:
     return ca.vertcat(0, 0, load, 0)
 
 
-def damping(constants: ValuesByName, now: LoadArguments) -> ca.SX:
+def damping(constants: NamedValues, now: LoadArguments) -> ca.SX:
     """Linear damping, in yaw growing with the rate, and drag of the cross-flow along the hull."""
     growth = ca.vertcat(ca.SX.ones(5), 1 + p.YAW_DAMPING_GROWTH * ca.fabs(now.relative_velocity[5]))
     load = -constants["damping"] * growth * now.relative_velocity
@@ -140,7 +143,7 @@ def damping(constants: ValuesByName, now: LoadArguments) -> ca.SX:
     return load
 
 
-def propulsion(constants: ValuesByName, now: LoadArguments) -> ca.SX:
+def propulsion(constants: NamedValues, now: LoadArguments) -> ca.SX:
     """Thrust of both propellers."""
     lag = constants["propeller_time_constant"]
     speed = ca.if_else(lag > 0, now.actuators, now.inputs["propeller_speed"])
@@ -165,7 +168,8 @@ class OtterModel(ContinuousModel):
         """The state after one step of the Runge-Kutta method, whatever `sub_steps`, and of the shafts."""
         end = super().integrate(state, inputs, parameters, step)
         first = len(VESSEL_STATES)
-        lag, shafts, commands = VESSEL.constants_by_name(parameters)["propeller_time_constant"], end[first:], inputs[0:2]
+        lag, shafts = VESSEL.constants.by_name(parameters)["propeller_time_constant"], end[first:]
+        commands = values_by_name(inputs, variables_of(VARIABLES, "input"))["propeller_speed"]
         return ca.vertcat(end[:first], shafts + ca.fmin(1, ca.if_else(lag > 0, step / lag, 1)) * (commands - shafts))
 
 

@@ -55,4 +55,4 @@ VARIABLES = (*PARAMETERS, *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *CONTACT_OUTP
 PROPELLER_STATES = ("propeller_speed[1]", "propeller_speed[2]")
 
 #: how many numbers the equations make of the parameters
-CONSTANT_COUNT = 492
+CONSTANT_COUNT = 484

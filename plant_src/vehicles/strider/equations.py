@@ -13,23 +13,23 @@ from cosim.export.fmu.block import Block
 
 from ..common import contact_maps, kinematics
 from ..common.elementary_functions import arctangent, sine_and_cosine, sine_of_right_angle_share
+from ..common.named_values import NamedValues, values_by_name
 from . import parameters as p
 from .geometry import DECK_CENTRE
-from .interface import STATES, VARIABLES
+from .interface import INPUTS, STATES, VARIABLES
 
 
-def rate(state: ca.SX, inputs: ca.SX) -> ca.SX:
+def rate(state: ca.SX, inputs: NamedValues) -> ca.SX:
     """Time derivative of (x, y, yaw, surge, sway, yaw rate)."""
     yaw, u, v, r = ca.vertsplit(state[2:6])
-    thrust, rudder_angle = inputs[0], inputs[1]
-    external_force, external_torque, wind, current = inputs[2:5], inputs[5:8], inputs[8:11], inputs[11:13]
+    external_force, wind, current = inputs["external_force"], inputs["wind"], inputs["current"]
     sin, cos = sine_and_cosine(yaw)
     u_water, v_water = u - (cos * current[0] + sin * current[1]), v - (cos * current[1] - sin * current[0])
     u_air, v_air = u - (cos * wind[0] + sin * wind[1]), v - (cos * wind[1] - sin * wind[0])
-    loads = hull_loads(v_water, r) + air_drag(u_air, v_air) + rudder_loads(u_water, v_water, r, rudder_angle)
-    surge_force = loads[0] + thrust + cos * external_force[0] + sin * external_force[1]
+    loads = hull_loads(v_water, r) + air_drag(u_air, v_air) + rudder_loads(u_water, v_water, r, inputs["rudder_angle"])
+    surge_force = loads[0] + inputs["thrust"] + cos * external_force[0] + sin * external_force[1]
     side_force = loads[1] - sin * external_force[0] + cos * external_force[1]
-    moment = loads[2] + external_torque[2]
+    moment = loads[2] + inputs["external_torque.z"]
     kinematic = (cos * u - sin * v, sin * u + cos * v, r)
     dynamic = (surge_force / p.MASS + v * r, side_force / p.MASS - u * r, moment / p.INERTIA[2])
     return ca.vertcat(*kinematic, *dynamic)
@@ -81,8 +81,8 @@ def block() -> Block:
         VARIABLES,
         STATES,
         initial_state,
-        lambda state, inputs, parameters: rate(state, inputs),
-        lambda state, inputs, parameters: ca.vertcat(observe(state), ca.SX.zeros(3)),
+        lambda state, inputs, _parameters: rate(state, values_by_name(inputs, INPUTS)),
+        lambda state, _inputs, _parameters: ca.vertcat(observe(state), ca.SX.zeros(3)),
     )
     shadow = contact_maps.PlanarContactMaps(model, p.MASS, p.INERTIA[2], p.CENTRE_OF_MASS_HEIGHT, observe)
     return as_block(model, shadow.functions())

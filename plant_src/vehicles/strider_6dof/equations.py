@@ -8,11 +8,12 @@ import numpy as np
 from cosim.export.equations.fmu_code import as_block
 from cosim.export.fmu.block import Block
 
+from ..common.named_values import NamedValues
 from ..strider.equations import air_drag, hull_loads, rudder_loads
 from ..strider.geometry import DECK_CENTRE
 from ..strider.parameters import CENTRE_OF_MASS_HEIGHT, INERTIA, MASS
 from ..vessel import floating_maps, vessel_equations
-from ..vessel.hull import Hull, LoadArguments, ValuesByName, load_of_force_at
+from ..vessel.hull import Hull, LoadArguments, load_of_force_at
 from ..vessel.wave_loads import Footprint
 from . import parameters as p
 from .geometry import BODY
@@ -25,7 +26,7 @@ _FOOTPRINT = Footprint(
 _RIGID_BODY_MASS_MATRIX = np.diag([MASS] * 3 + list(INERTIA))
 
 
-def derive_constants(parameters: ValuesByName) -> ValuesByName:
+def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     """What the equations need of the parameters."""
     share = parameters["hydrodynamics"]
     return {
@@ -37,7 +38,7 @@ def derive_constants(parameters: ValuesByName) -> ValuesByName:
     }
 
 
-def hull(constants: ValuesByName) -> Hull:
+def hull(constants: NamedValues) -> Hull:
     """The vessel with these constants."""
     share = constants["hydrodynamics"]
     return Hull(

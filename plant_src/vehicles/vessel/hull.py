@@ -7,16 +7,15 @@ State: position of O (world), orientation, velocity of O and rates (body, togeth
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
 
 from ..common import kinematics
 from ..common.interface import VESSEL_STATES
+from ..common.named_values import NamedValues
 from .wave_loads import Footprint, WaveKinematics, wave_kinematics
-
-ValuesByName = Mapping[str, ca.SX]
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ class LoadArguments:
     height: ca.SX
     elevation: ca.SX
     slopes: ca.SX
-    inputs: ValuesByName
+    inputs: NamedValues
     actuators: ca.SX
 
 
@@ -97,7 +96,7 @@ class Hull:
     loads: Callable[[LoadArguments], ca.SX]
     frame: Callable[[ca.SX], Frame] = level_frame
 
-    def initial_state(self, initial: ValuesByName, actuators: int = 0) -> ca.SX:
+    def initial_state(self, initial: NamedValues, actuators: int = 0) -> ca.SX:
         """The state from the parameters `initial.*`."""
         displacement = (initial[f"initial.{name}"] for name in ("heave", "roll", "pitch"))
         height, roll, pitch = ca.vertsplit(self.equilibrium + ca.vertcat(*displacement))
@@ -107,7 +106,7 @@ class Hull:
         velocity = initial["initial.velocity_body"] - ca.cross(rates, self.centre_of_mass)
         return ca.vertcat(origin, height, orientation, velocity, rates, initial["initial.time"], ca.SX.zeros(actuators))
 
-    def rate(self, state: ca.SX, inputs: ValuesByName) -> ca.SX:
+    def rate(self, state: ca.SX, inputs: NamedValues) -> ca.SX:
         """Time derivative of position, orientation, nu and time."""
         orientation, nu = state[3:7], state[7:13]
         frame = self.frame(orientation)
@@ -142,7 +141,7 @@ class Hull:
         return WaveKinematics(gain * felt.elevation, gain * felt.slopes, gain * felt.velocity, gain * felt.acceleration)
 
     def _load_arguments(
-        self, state: ca.SX, frame: Frame, relative: ca.SX, sea: WaveKinematics, inputs: ValuesByName
+        self, state: ca.SX, frame: Frame, relative: ca.SX, sea: WaveKinematics, inputs: NamedValues
     ) -> LoadArguments:
         cos, sin = frame.heading
         slopes = ca.vertcat(cos * sea.slopes[0] + sin * sea.slopes[1], cos * sea.slopes[1] - sin * sea.slopes[0])
@@ -152,7 +151,7 @@ class Hull:
             frame, state[3:7], relative, air, still_air, state[2], sea.elevation, slopes, inputs, state[len(VESSEL_STATES) :]
         )
 
-    def _external_load(self, frame: Frame, inputs: ValuesByName) -> ca.SX:
+    def _external_load(self, frame: Frame, inputs: NamedValues) -> ca.SX:
         force, torque = inputs["external_force"], inputs["external_torque"]
         return frame.generalised_force(force, torque + ca.cross(frame.attitude @ self.centre_of_mass, force))
 

@@ -10,7 +10,7 @@ from plant_fmu import PlantFmu
 from plant_validation import MeasurementCheck
 
 from plant_src.vehicles.crazyflie.parameters import AIRFRAME
-from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations, derive_constants
+from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations
 
 CRAZYFLIE, HEXACOPTER = VEHICLES["crazyflie"], VEHICLES["survey_hexacopter"]
 IMAGES = "Sanchez-Cuevas et al. 2017"
@@ -214,8 +214,9 @@ def test_the_rate_of_the_state_is_the_derivative_of_a_step() -> None:
     inputs = np.concatenate([1600 + random.standard_normal(4), 0.01 * random.standard_normal(6), [1, 2, 3], [0.05]])
     body = [AIRFRAME.mass, *np.diag(AIRFRAME.inertia), 0.0, 0.0, 0.0]
     effects = [0.07, 5e-8, 1e-6, 2e-6, 1e-6, 0.01, 0.02, 0.03, 1.0]
-    parameters = derive_constants(ca.DM([*np.zeros(10), *body, 0.0, *effects])).full().ravel()
-    equations, symbols = MultirotorEquations(AIRFRAME), [ca.SX.sym("", len(vector)) for vector in (state, inputs, parameters)]
-    rate = ca.Function("rate", symbols, [equations.rate(*symbols)])(state, inputs, parameters)
-    after = ca.Function("after", symbols, [equations.step_with_effects(*symbols, ca.SX(moment))])(state, inputs, parameters)
+    equations = MultirotorEquations(AIRFRAME)
+    constants = ca.DM(equations.constants.vector(ca.SX([*np.zeros(10), *body, 0.0, *effects]))).full().ravel()
+    symbols = [ca.SX.sym("", len(vector)) for vector in (state, inputs, constants)]
+    rate = ca.Function("rate", symbols, [equations.rate(*symbols)])(state, inputs, constants)
+    after = ca.Function("after", symbols, [equations.step_with_effects(*symbols, ca.SX(moment))])(state, inputs, constants)
     assert ((after - state) / moment).full().ravel() == pytest.approx(rate.full().ravel(), rel=1e-3, abs=1e-3)
