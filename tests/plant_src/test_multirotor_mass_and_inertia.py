@@ -85,8 +85,8 @@ def test_a_blow_on_the_rim_turns_it_about_its_own_axes() -> None:
     [
         ({"mass": -1.0}, "vehicles.uav.parameters.mass: found -1.0, expected a finite number greater than 0"),
         ({"mass": "heavy"}, "vehicles.uav.parameters.mass: found 'heavy', expected a finite number"),
-        (inertia(np.diag([1.0, 1.0, 3.0])), "vehicles.uav.parameters.inertia.xx: .* none greater than the sum of the others"),
-        ({"inertia.zz": -0.1}, "vehicles.uav.parameters.inertia.xx: .* expected them greater than 0"),
+        (inertia(np.diag([1.0, 1.0, 3.0])), "vehicles.uav.parameters.inertia.xx: .* none greater than the sum of the other two"),
+        ({"inertia.zz": -0.1}, "vehicles.uav.parameters.inertia.xx: .* expected all greater than 0"),
     ],
 )
 def test_impossible_bodies_are_refused_with_their_path(parameters: dict[str, Any], message: str) -> None:

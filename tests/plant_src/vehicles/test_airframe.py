@@ -20,11 +20,11 @@ FAULTS = [
         {"inertia": np.diag([1.0, 1.0, 3.0])},
         r"inertia: found the principal moments \[1.0, 1.0, 3.0\], expected none greater than the sum",
     ),
-    ({"inertia": np.diag([1.0, -1.0, 1.0])}, "expected them greater than 0"),
+    ({"inertia": np.diag([1.0, -1.0, 1.0])}, "expected all greater than 0"),
     ({"inertia": np.array([[1, 0.5, 0], [0, 1, 0], [0, 0, 1]])}, "expected a symmetric tensor"),
     ({"inertia": np.eye(2)}, "expected 3 rows of 3 finite numbers"),
     ({"rotors": ()}, "rotors: found none"),
-    ({"rotors": (Rotor("nose", (0.1, 0.0, 0.0), 0.5),)}, r"rotors\[1\].sense: found 0.5, expected 1 or -1"),
+    ({"rotors": (Rotor("nose", (0.1, 0.0, 0.0), 0.5),)}, r"rotors\[1\].torque_sign: found 0.5, expected 1 or -1"),
     ({"rotors": (Rotor("nose", (0.1, 0.0, 0.0), 1.0, (0.0, 0.0, 2.0)),)}, r"rotors\[1\].axis: .* expected a unit vector"),
     ({"effects": RotorEffects(body_drag=(0.0, -0.1, 0.0))}, "effects.body_drag: found .* expected finite numbers of at least 0"),
 ]
