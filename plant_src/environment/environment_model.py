@@ -11,7 +11,7 @@ import numpy as np
 
 from cosim.core.component import Variable
 
-from ..physics.body import FloatingBody
+from ..physics.vessel_bodies import FloatingBody
 from ..vehicles.common.interface import CURRENT_INPUTS, WAVE_GAIN_INPUT, WIND_INPUTS, scalar_variable
 from .coloured_noise import BLOCK_LENGTH, GRID_STEP
 from .current import Current

@@ -126,10 +126,10 @@ def test_one_pair() -> None:
 def raw(count: int, height: float) -> Callable[[], float]:
     """PyBullet alone with the same bodies: read every vehicle, push every vehicle, step, ask for contacts."""
     world = World("plant", pairs(count, height))
-    client, shadows = world._client, world._fleet.bodies
+    client, bodies = world._client, world._fleet.bodies
     pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP, physicsClientId=client)
     weight = 9.81 * 0.443892 if height == LANDED else 0.0
-    upwards = {shadow.body_id: weight if shadow.model.is_vessel else -weight for shadow in shadows}
+    upwards = {body.body_id: weight if body.model.is_vessel else -weight for body in bodies}
 
     def step() -> None:
         for body, force in upwards.items():

@@ -12,9 +12,10 @@ frame) and rotor speeds n_i (rad/s). With all effects:
     n_i' = (command_i - n_i) / rotor_time_constant
 
 r_i is the position of rotor i, a_i its thrust axis, s_i the sign of its reaction torque and g_i its ground-effect factor
-(`ground_effect.py`). Rotor drag, applied at each hub, and body drag follow Folk, Paulos and Kumar, "RotorPy", 2023. The rotor drag
-is the lumped model of Faessler, Franchi and Scaramuzza, "Differential Flatness of Quadrotor Dynamics Subject to Rotor Drag",
-2018, distributed over the rotors. With a rotor time constant of 0 the rotor speeds equal their commands and H' is neglected.
+(`ground_effect.py`). Rotor drag, applied at each hub, and body drag follow Folk, Paulos and Kumar, "RotorPy", 2023. The rotor
+drag is the lumped model of Faessler, Franchi and Scaramuzza, "Differential Flatness of Quadrotor Dynamics Subject to Rotor
+Drag", 2018, distributed over the rotors. With a rotor time constant of 0 the rotor speeds equal their commands, and H' is
+neglected.
 
 The rotor speeds are the exact solution for held commands. The rigid body is integrated by the classical Runge-Kutta method,
 which evaluates the rotor speeds at the times of its stages; a short time constant therefore does not limit the step. If all

@@ -11,9 +11,10 @@ from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import ContinuousModel
 from cosim.export.fmu.block import Block
 
-from ..common import contact_maps, kinematics
+from ..common import kinematics
 from ..common.elementary_functions import arctangent, sine_and_cosine, sine_of_right_angle_share
 from ..common.named_values import NamedValues, values_by_name
+from ..vessel import planar_maps
 from . import parameters as p
 from .geometry import DECK_CENTRE
 from .interface import INPUTS, STATES, VARIABLES
@@ -84,5 +85,5 @@ def block() -> Block:
         lambda state, inputs, _parameters: rate(state, values_by_name(inputs, INPUTS)),
         lambda state, _inputs, _parameters: ca.vertcat(observe(state), ca.SX.zeros(3)),
     )
-    shadow = contact_maps.PlanarContactMaps(model, p.MASS, p.INERTIA[2], p.CENTRE_OF_MASS_HEIGHT, observe)
-    return as_block(model, shadow.functions())
+    maps = planar_maps.PlanarContactMaps(model, p.MASS, p.INERTIA[2], p.CENTRE_OF_MASS_HEIGHT, observe)
+    return as_block(model, maps.functions())

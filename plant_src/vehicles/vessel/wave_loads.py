@@ -84,10 +84,10 @@ WAVE_SUM = sum_over_rows("waves", _wave_term(), MAX_WAVE_COMPONENTS)
 SURFACE_SUM = sum_over_rows("surface", _elevation_term(), MAX_WAVE_COMPONENTS)
 
 
-def create_surface_function() -> ca.Function:
+def create_elevation_function() -> ca.Function:
     """Place (x, y, time), number and table of components, column by column -> elevation of the water (m)."""
     place, count, rows = ca.SX.sym("place", 3), ca.SX.sym("count"), ca.SX.sym("rows", MAX_WAVE_COMPONENTS, _SURFACE_COLUMN_COUNT)
-    return ca.Function("shadow_surface", [place, count, ca.vec(rows)], [SURFACE_SUM(place, count, rows)])
+    return ca.Function("water_elevation", [place, count, ca.vec(rows)], [SURFACE_SUM(place, count, rows)])
 
 
 def wave_kinematics(

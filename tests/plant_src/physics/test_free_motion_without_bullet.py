@@ -14,7 +14,7 @@ from world_harness import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, WorldHa
 import cosim
 from cosim.results import Result
 from plant_src.physics import clearance
-from plant_src.physics.body import MAX_HEAVE
+from plant_src.physics.vessel_bodies import MAX_HEAVE
 
 EVERYWHERE = 1e9  # m: whatever is closer than this is near
 
@@ -59,7 +59,7 @@ def test_flight_is_the_same_bit_for_bit_and_landing_within_rounding(monkeypatch:
 
 def error_of_bullet(trial: WorldHarness) -> float:
     """How far Bullet's bodies are from where the vehicles say (m, rad)."""
-    bodies = [shadow.body_id for shadow in trial.world._fleet.bodies]
+    bodies = [body.body_id for body in trial.world._fleet.bodies]
     (uav, _), (usv, q) = (pybullet.getBasePositionAndOrientation(body, trial.world._client) for body in bodies)
     found = [*uav, *usv, *pybullet.getEulerFromQuaternion(q)]
     says = np.concatenate([trial.vector("uav.position"), trial.vector("usv.position"), [0.0, 0.0, trial["usv.attitude.yaw"]]])
