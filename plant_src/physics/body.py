@@ -29,7 +29,7 @@ from .compiled_equations import bind_arrays, load_library
 if TYPE_CHECKING:
     from ctypes import _NamedFuncPointer
 
-    from ..placement import VehiclePlacement
+    from ..placement import Platform, VehiclePlacement
     from ..vehicles.model import Model
 
 #: friction coefficient of every surface (1); Bullet multiplies those of the two bodies in contact
@@ -182,6 +182,15 @@ def create_compound_shape(boxes: Sequence[Box], client: int) -> int:
         collisionFrameOrientations=[box.orientation for box in boxes],
         physicsClientId=client,
     )
+    return int(number)
+
+
+def create_platform(client: int, platform: Platform) -> int:
+    """Create a fixed box in Bullet and return the number of its body."""
+    x, y, z = platform.size
+    shape = create_compound_shape([Box((x / 2, y / 2, z / 2), (0.0, 0.0, 0.0))], client)
+    number = pybullet.createMultiBody(0, shape, -1, platform.position, physicsClientId=client)
+    set_dynamics(client, number, -1)
     return int(number)
 
 

@@ -11,7 +11,17 @@ import numpy as np
 from .body import ContactBody
 from .client import pybullet
 
-_BODY_A, _BODY_B, _NORMAL_FORCE = 1, 2, 9  # indices in Bullet's contact points
+_BODY_A, _BODY_B, _DISTANCE, _NORMAL_FORCE = 1, 2, 8, 9  # indices in Bullet's contact points
+
+
+def overlap_depths(client: int) -> dict[tuple[int, int], float]:
+    """Return the depth (m) of the deepest contact point of each pair of Bullet bodies in their present poses."""
+    pybullet.performCollisionDetection(client)
+    depths: dict[tuple[int, int], float] = {}
+    for point in pybullet.getContactPoints(physicsClientId=client):
+        pair = point[_BODY_A], point[_BODY_B]
+        depths[pair] = max(depths.get(pair, 0.0), -point[_DISTANCE])
+    return depths
 
 
 class _ContactOutputs(NamedTuple):

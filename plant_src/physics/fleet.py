@@ -175,8 +175,6 @@ class Fleet:
             touching = self.contacts.add(step_fraction)
         self._near_vehicles_outdated = touching < len(self._active_bodies)
 
-    # -- state ---------------------------------------------------------------------------------------------------------
-
     def get_state(self) -> FleetState:
         """Return a copy of the state, which also takes memory in Bullet until `free_state`."""
         return FleetState(pybullet.saveState(self._client), self._memory.buffer.copy(), self._flags.copy(), self._is_near)

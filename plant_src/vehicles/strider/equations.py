@@ -1,6 +1,7 @@
 """Equations of motion of the catamaran in the horizontal plane: surge, sway and yaw.
 
-Equations 9, 12 and 13 of the paper; README.md has them in our notation.
+They are eqs. 9, 12 and 13 of the paper (`parameters.py`); README.md has them in the project's notation. Loads (X, Y, N) are surge
+and sway force (N) and yaw moment (N m), body frame forward-left-up.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from .interface import INPUTS, STATES, VARIABLES
 
 
 def rate(state: ca.SX, inputs: NamedValues) -> ca.SX:
-    """Time derivative of (x, y, yaw, surge, sway, yaw rate)."""
+    """Return the time derivative of the state (x, y, yaw, u, v, r); u, v and r are surge, sway and yaw rate."""
     yaw, u, v, r = ca.vertsplit(state[2:6])
     external_force, wind, current = inputs["external_force"], inputs["wind"], inputs["current"]
     sin, cos = sine_and_cosine(yaw)
@@ -37,33 +38,40 @@ def rate(state: ca.SX, inputs: NamedValues) -> ca.SX:
 
 
 def hull_loads(v: ca.SX, r: ca.SX) -> ca.SX:
-    """X, Y (N) and N (N m) of the water on the hulls, which move through it at v and r."""
+    """Return (X, Y, N) of the hulls for a sway velocity (m/s) and yaw rate (rad/s) relative to the water."""
     return p.HULL_COUNT * ca.vertcat(0, p.Y_V * v + p.Y_R * r, p.N_V * v + p.N_R * r)
 
 
 def air_drag(u: ca.SX, v: ca.SX) -> ca.SX:
-    """X, Y (N) and N (N m) of the air, through which the vessel moves at u and v."""
+    """Return (X, Y, N) of the air for a surge and sway velocity (m/s) relative to the air."""
     return -p.AIR_DRAG * ca.vertcat(ca.fabs(u) * u, ca.fabs(v) * v, 0)
 
 
 def rudder_loads(u: ca.SX, v: ca.SX, r: ca.SX, rudder_angle: ca.SX) -> ca.SX:
-    """X, Y (N) and N (N m) of the rudder; lift grows as a sine up to the stall angle. Going astern the lift changes its sign."""
+    """Return (X, Y, N) of the rudder; the lift is a sine of the angle of attack up to the stall angle.
+
+    Args:
+        u: Surge velocity relative to the water (m/s); the lift changes its sign when going astern.
+        v: Sway velocity relative to the water (m/s).
+        r: Yaw rate (rad/s).
+        rudder_angle: Rudder angle (rad).
+    """
     ahead = ca.sign(u)
     inflow_angle = arctangent(ahead * (v - p.RUDDER_ARM * r), ca.fabs(u))
     attack = ca.fmin(1, ca.fmax(-1, (rudder_angle - inflow_angle) / p.STALL_ANGLE))
-    largest = p.WATER_DENSITY / 2 * p.RUDDER_MAX_LIFT_COEFFICIENT * p.RUDDER_AREA * ahead * u**2
-    lift = largest * sine_of_right_angle_share(attack)
+    max_lift = p.WATER_DENSITY / 2 * p.RUDDER_MAX_LIFT_COEFFICIENT * p.RUDDER_AREA * ahead * u**2
+    lift = max_lift * sine_of_right_angle_share(attack)
     side_force = lift * ca.cos(rudder_angle)
     return ca.vertcat(-lift * ca.sin(rudder_angle), side_force, -p.RUDDER_ARM * side_force)
 
 
 def initial_state(parameters: ca.SX) -> ca.SX:
-    """The state from initial position, yaw, body velocity and yaw rate: they are the state."""
+    """Return the state: the parameters are initial position, yaw angle, velocity and yaw rate in the order of the state."""
     return parameters
 
 
 def observe(state: ca.SX) -> ca.SX:
-    """The published motion of the vessel and of its landing deck."""
+    """Return the motion outputs of the vessel and of its landing deck."""
     position = ca.vertcat(state[0:2], p.CENTRE_OF_MASS_HEIGHT)
     orientation = kinematics.quaternion_about_z(state[2])
     to_world = kinematics.rotation_matrix(orientation)
@@ -75,7 +83,7 @@ def observe(state: ca.SX) -> ca.SX:
 
 
 def block() -> Block:
-    """The catamaran on open water."""
+    """Return the catamaran for export."""
     model = ContinuousModel(
         "strider",
         "Strider V1.0 catamaran on calm water",

@@ -135,7 +135,7 @@ def _impulse_about_centre(hull: Hull, attitude: ca.SX, impulse: ca.SX) -> _Impul
 
 
 def _impulse_load(hull: Hull, frame: Frame, impulse: _Impulse) -> ca.SX:
-    """Return the impulse as a generalized impulse (6) about O in the equations of motion."""
+    """Return the impulse as a generalised impulse (6) about O in the equations of motion."""
     lever = frame.attitude @ hull.centre_of_mass
     return frame.generalised_force(impulse.linear, impulse.angular + ca.cross(lever, impulse.linear))
 

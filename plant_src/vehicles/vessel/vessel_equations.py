@@ -1,4 +1,4 @@
-"""A vessel's equations with their parameters as what is exported: the model of its FMU."""
+"""Equations of a vessel in six degrees of freedom as a model for export."""
 
 from __future__ import annotations
 
@@ -20,16 +20,21 @@ from .wave_loads import SURFACE_SUM, WAVE_SUM, Footprint, wave_table
 
 
 def wave_table_of(parameters: NamedValues, footprint: Footprint) -> ca.SX:
-    """The table of waves."""
+    """Return the table of wave components (`wave_loads.wave_table`) from the parameters `wave.*`."""
     return wave_table(footprint, *(parameters[f"wave.{name}"] for name in ("amplitude", "frequency", "direction", "phase")))
 
 
 @dataclass(frozen=True)
 class VesselModel:
-    """The equations of one vessel: `prepare` makes constants of its parameters, `hull` the vessel of its constants.
+    """Equations of one vessel.
 
-    Only what depends on parameters is among the constants. `actuators` are the names of further states, which `drive` moves
-    after each step: state, inputs, constants, step -> state.
+    Attributes:
+        identifier: Name of the FMU.
+        description: Description of the FMU.
+        variables: Parameters, inputs and outputs.
+        derive_constants: Function from the parameters to the constants, which holds everything that depends on parameters only.
+        hull: Function from the constants to the vessel.
+        actuators: Names of the actuator states. Their rates are 0; the kind of the exported model moves them after each step.
     """
 
     identifier: str
@@ -45,34 +50,37 @@ class VesselModel:
         return ConstantsMap(self.variables, self.derive_constants)
 
     def hull_with(self, constants: ca.SX) -> Hull:
-        """The vessel with these constants."""
+        """Return the vessel for a vector of constants."""
         return self.hull(self.constants.by_name(constants))
 
-    def create_continuous_model(self, kind: type[ContinuousModel] = ContinuousModel, **more: Any) -> ContinuousModel:
-        """What is exported: the vessel with its waves; contact reads 0."""
+    def create_continuous_model(self, kind: type[ContinuousModel] = ContinuousModel, **options: Any) -> ContinuousModel:
+        """Return the model to export; its contact outputs are 0.
+
+        Args:
+            kind: Class of the model.
+            **options: Further arguments of the class.
+        """
+        inputs, actuators = variables_of(self.variables, "input"), len(self.actuators)
         return kind(
             self.identifier,
             self.description,
             self.variables,
             (*VESSEL_STATES, *self.actuators),
-            lambda c: self.hull_with(c).initial_state(self.constants.by_name(c), len(self.actuators)),
-            lambda x, u, c: ca.vertcat(
-                self.hull_with(c).rate(x, values_by_name(u, variables_of(self.variables, "input"))),
-                ca.SX.zeros(len(self.actuators)),
-            ),
-            lambda x, u, c: ca.vertcat(self.hull_with(c).observe(x), ca.SX.zeros(3)),
+            lambda c: self.hull_with(c).initial_state(self.constants.by_name(c), actuators),
+            lambda x, u, c: ca.vertcat(self.hull_with(c).rate(x, values_by_name(u, inputs)), ca.SX.zeros(actuators)),
+            lambda x, _u, c: ca.vertcat(self.hull_with(c).observe(x), ca.SX.zeros(3)),
             normalised_state,
             derived_parameters=self.constants.vector,
             callees=[WAVE_SUM, SURFACE_SUM],
-            **more,
+            **options,
         )
 
 
 def normalised_state(state: ca.SX) -> ca.SX:
-    """The state with a unit quaternion."""
+    """Return the state with a unit quaternion."""
     return ca.vertcat(state[0:3], kinematics.normalised_quaternion(state[3:7]), state[7:])
 
 
 def initial_parameters(parameters: NamedValues) -> dict[str, ca.SX]:
-    """Those parameters that say how the vessel starts."""
+    """Return the parameters `initial.*`."""
     return {name: value for name, value in parameters.items() if name.startswith("initial.")}
