@@ -40,7 +40,8 @@ def relative_velocity(result: Result, vehicle: str, deck: str) -> np.ndarray:
 def relative_tilt(result: Result, vehicle: str, deck: str) -> np.ndarray:
     """Return the angle between the up axes of vehicle and deck (rad), shape (rows,)."""
     up, normal = (rotation_matrix(result, name)[:, :, 2] for name in (vehicle, deck.removesuffix(".deck")))
-    return np.arctan2(np.linalg.norm(np.cross(up, normal), axis=1), np.sum(up * normal, axis=1))
+    tilt: np.ndarray = np.arctan2(np.linalg.norm(np.cross(up, normal), axis=1), np.sum(up * normal, axis=1))
+    return tilt
 
 
 def _to_deck_axes(result: Result, deck: str, vectors: np.ndarray) -> np.ndarray:

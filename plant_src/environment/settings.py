@@ -1,4 +1,6 @@
-"""Reader of a world's argument "environment", a JSON object such as
+"""Reader of a world's argument "environment".
+
+The argument is a JSON object such as
 
     {"seed": 7, "sea_state": 3,
      "waves": {"spectrum": "jonswap", "significant_height": 0.05, "peak_period": 2.0, "gamma": 3.3, "direction": 0.5,

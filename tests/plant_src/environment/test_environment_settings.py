@@ -1,4 +1,4 @@
-"""What a scenario may say about the environment, and how the rest is refused."""
+"""Settings of the environment: valid ones are read, invalid ones are refused."""
 
 from __future__ import annotations
 
@@ -85,14 +85,16 @@ def test_an_empty_environment_is_calm() -> None:
 
 def test_a_direction_is_that_of_the_flow() -> None:
     found = read_valid(wind={"speed": 5.0, "direction": math.pi / 2}, current={"speed": 0.5, "direction": math.pi})
-    assert found.wind and found.current
+    assert found.wind
+    assert found.current
     assert found.wind.velocity == pytest.approx((0.0, 5.0, 0.0))
     assert found.current.velocity == pytest.approx((-0.5, 0.0))
 
 
 def test_the_turbulence_intensity_defaults_to_that_of_the_mean_wind() -> None:
     found = read_valid(wind={**WIND, "turbulence": {}}).wind
-    assert found and found.turbulence
+    assert found
+    assert found.turbulence
     assert found.turbulence.airspeed == pytest.approx(5.0)
     assert found.turbulence.intensities == pytest.approx(turbulence_intensities(5.0, 6.096))
 
@@ -100,7 +102,8 @@ def test_the_turbulence_intensity_defaults_to_that_of_the_mean_wind() -> None:
 def test_turbulence_can_be_set_explicitly() -> None:
     turbulence = {"intensity": [0.5, 0.4, 0.3], "airspeed": 2.0, "height": 20.0}
     found = read_valid(wind={"speed": 0.0, "turbulence": turbulence}).wind
-    assert found and found.turbulence
+    assert found
+    assert found.turbulence
     assert found.turbulence.intensities == (0.5, 0.4, 0.3)
     assert (found.turbulence.airspeed, found.turbulence.height) == (2.0, 20.0)
 
@@ -118,5 +121,6 @@ def test_turbulence_can_be_set_explicitly() -> None:
 )
 def test_wind_grows_with_height(profile: dict[str, float], height: float, share: float) -> None:
     found = read_valid(wind={**WIND, "profile": profile}).wind
-    assert found and found.profile
+    assert found
+    assert found.profile
     assert found.profile(height) == pytest.approx(share)

@@ -1,4 +1,4 @@
-"""The data of multirotors: what is impossible is refused where it is written down, all of it at once."""
+"""Airframes: physically impossible data are refused, all problems together."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_principal_axes_make_the_inertia_diagonal(seed: int) -> None:
     moments, axes = with_inertia(tensor).principal_axes()
     assert axes @ np.diag(moments) @ axes.T == pytest.approx(tensor, abs=1e-12)
     assert np.linalg.det(axes) == pytest.approx(1.0)
-    assert np.trace(axes) > 0  # turned by less than 120 degrees: `shapes.quaternion` can have it
+    assert np.trace(axes) > 0  # angle less than 120 degrees, as `shapes.quaternion_from_matrix` requires
 
 
 @pytest.mark.parametrize("name", ["ar_drone", "crazyflie", "survey_hexacopter"])

@@ -1,4 +1,4 @@
-"""Each effect on a multirotor by itself, against its closed form."""
+"""Each effect on a multirotor separately, against its closed form."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_rotors_follow_a_step_of_their_command_with_a_first_order_lag(measured: 
 
 
 @pytest.mark.parametrize("lag", [1e-9, 1e-5])
-def test_a_lag_much_shorter_than_a_step_is_stable_and_like_none(lag: float) -> None:
+def test_a_lag_much_shorter_than_a_step_is_stable_and_has_no_effect(lag: float) -> None:
     found = []
     for time_constant in (lag, 0.0):
         fmu = PlantFmu("crazyflie", {**STILL, "rotor_time_constant": time_constant, "initial_rotor_speed": CRAZYFLIE.hover_speed})
@@ -186,7 +186,7 @@ def test_spinning_rotors_turn_a_pitching_body_about_its_roll_axis(measured: Meas
     )
 
 
-def test_rotors_that_spin_up_turn_the_body_the_other_way() -> None:
+def test_accelerating_rotors_turn_the_body_in_the_opposite_direction() -> None:
     inertia, lag, speed, moment = 3.5e-4, 0.05, 400.0, 1e-6
     speeds = {f"rotor_speed[{number}]": speed for number in (2, 4, 6)}
     without, with_rotors = (
@@ -197,7 +197,7 @@ def test_rotors_that_spin_up_turn_the_body_the_other_way() -> None:
 
 
 def test_without_effects_shorter_code_gives_the_same_flight() -> None:
-    """An effect too small to matter has the long code run."""
+    """A negligible effect selects the longer function."""
     found = []
     for drag in (0.0, 1e-200):
         fmu = PlantFmu("ar_drone", {**HIGH, "initial.rates.p": 1.0, "body_drag.x": drag})
