@@ -1,7 +1,7 @@
-"""A vehicle seen from the landing deck of a vessel ("plant.usv.deck"), however the vessel heels and turns.
+"""Motion of a vehicle relative to the landing deck of a vessel, from a recorded result.
 
-The deck's axes are those of the vessel: forward, left, and up along the normal of the deck. Arrays have one row per row of
-the result, shape (rows, 3).
+The axes of the deck are those of the vessel's body frame: forward, left, up. A deck is named by the prefix of its signals, for
+example "plant.usv.deck". Arrays have one row per row of the result, shape (rows, 3) unless stated otherwise.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from cosim.results import Result
 
 
 def rotation_matrix(result: Result, vehicle: str) -> np.ndarray:
-    """The forward, left and up axis of a vehicle in the world's axes, as columns: Rz(yaw) Ry(pitch) Rx(roll); (rows, 3, 3)."""
+    """Return the rotation matrices body to world frame, Rz(yaw) Ry(pitch) Rx(roll), shape (rows, 3, 3)."""
     roll, pitch, yaw = (result[f"{vehicle}.attitude.{angle}"] for angle in ("roll", "pitch", "yaw"))
     (cr, sr), (cp, sp), (cy, sy) = ((np.cos(angle), np.sin(angle)) for angle in (roll, pitch, yaw))
     matrix = [
@@ -24,12 +24,12 @@ def rotation_matrix(result: Result, vehicle: str) -> np.ndarray:
 
 
 def relative_position(result: Result, vehicle: str, deck: str) -> np.ndarray:
-    """The vehicle's centre of mass from the deck centre, in the deck's axes (m)."""
+    """Return the vehicle's centre of mass relative to the deck centre (m, deck axes)."""
     return _to_deck_axes(result, deck, _world_offset(result, vehicle, deck))
 
 
 def relative_velocity(result: Result, vehicle: str, deck: str) -> np.ndarray:
-    """Velocity of the vehicle relative to the point of the deck where it is, in the deck's axes (m/s)."""
+    """Return the vehicle's velocity relative to the deck-fixed point at its centre of mass (m/s, deck axes)."""
     vessel = deck.removesuffix(".deck")
     rates_body = np.stack([result[f"{vessel}.rates.{axis}"] for axis in "pqr"], axis=1)
     rates = np.einsum("nij,nj->ni", rotation_matrix(result, vessel), rates_body)
@@ -38,18 +38,21 @@ def relative_velocity(result: Result, vehicle: str, deck: str) -> np.ndarray:
 
 
 def relative_tilt(result: Result, vehicle: str, deck: str) -> np.ndarray:
-    """Angle between the up axes of vehicle and deck (rad), shape (rows,)."""
+    """Return the angle between the up axes of vehicle and deck (rad), shape (rows,)."""
     up, normal = (rotation_matrix(result, name)[:, :, 2] for name in (vehicle, deck.removesuffix(".deck")))
-    return np.arctan2(np.linalg.norm(np.cross(up, normal), axis=1), np.sum(up * normal, axis=1))
+    tilt: np.ndarray = np.arctan2(np.linalg.norm(np.cross(up, normal), axis=1), np.sum(up * normal, axis=1))
+    return tilt
 
 
 def _to_deck_axes(result: Result, deck: str, vectors: np.ndarray) -> np.ndarray:
-    return np.einsum("nji,nj->ni", rotation_matrix(result, deck.removesuffix(".deck")), vectors)
+    in_deck_axes: np.ndarray = np.einsum("nji,nj->ni", rotation_matrix(result, deck.removesuffix(".deck")), vectors)
+    return in_deck_axes
 
 
 def _world_offset(result: Result, vehicle: str, deck: str) -> np.ndarray:
-    return _vector_signal(result, f"{vehicle}.position") - _vector_signal(result, f"{deck}.position")
+    offset: np.ndarray = _vector_signal(result, f"{vehicle}.position") - _vector_signal(result, f"{deck}.position")
+    return offset
 
 
 def _vector_signal(result: Result, name: str) -> np.ndarray:
-    return np.stack([result[f"{name}.{axis}"] for axis in "xyz"], axis=1)
+    return np.stack([np.asarray(result[f"{name}.{axis}"]) for axis in "xyz"], axis=1)
