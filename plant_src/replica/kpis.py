@@ -12,7 +12,8 @@ from cosim.results import Result
 from cosim.results.checks import Number
 from cosim.results.kpi import Prefix, units
 
-from ..kpis import horizontal_distance, waypoints
+from ..kpis import waypoints
+from ..recorded_motion import horizontal_distance
 
 
 @units(leg="m")

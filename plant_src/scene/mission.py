@@ -12,7 +12,7 @@ from cosim.core.errors import InputError
 from cosim.results import Result
 
 from ..catalogue import MODELS
-from ..kpis import touchdown_row
+from ..recorded_motion import touchdown_row
 from ..vehicles.common.shapes import Quaternion
 
 APPROACH_TIME = 8.0  # s before the touchdown that belong to the landing
