@@ -32,3 +32,12 @@ def horizontal_distance(result: Result, first: str, second: str) -> np.ndarray:
     x, y = (result[f"{first}.position.{axis}"] - result[f"{second}.position.{axis}"] for axis in "xy")
     distance: np.ndarray = np.hypot(x, y)
     return distance
+
+
+def distance_from_line(position: np.ndarray, start: complex, end: complex) -> np.ndarray:
+    """Return the distance (m) of positions x + iy from the line through two points, or from the point if they coincide."""
+    direction = end - start
+    distance: np.ndarray = (
+        np.abs(((position - start) * np.conj(direction)).imag) / abs(direction) if direction else np.abs(position - start)
+    )
+    return distance
