@@ -62,11 +62,13 @@ def slide_distance(result: Result, vehicle: str, deck: str, row: int) -> float:
 
 
 def _to_deck_axes(result: Result, deck: str, vectors: np.ndarray) -> np.ndarray:
-    return np.einsum("nji,nj->ni", rotation_matrix(result, deck.removesuffix(".deck")), vectors)
+    rotated: np.ndarray = np.einsum("nji,nj->ni", rotation_matrix(result, deck.removesuffix(".deck")), vectors)
+    return rotated
 
 
 def _world_offset(result: Result, vehicle: str, deck: str) -> np.ndarray:
-    return _vector_signal(result, f"{vehicle}.position") - _vector_signal(result, f"{deck}.position")
+    offset: np.ndarray = _vector_signal(result, f"{vehicle}.position") - _vector_signal(result, f"{deck}.position")
+    return offset
 
 
 def _vector_signal(result: Result, name: str) -> np.ndarray:
