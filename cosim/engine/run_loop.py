@@ -252,7 +252,7 @@ def find_problems(system: System, settings: Settings) -> list[Problem]:
         try:
             grid.index(event.time)
         except ValueError as error:
-            found.append(Problem(f"event time {error}", event.where))
+            found.append(Problem(f"event time {error}", event.where, subject=("events",)))
     return found
 
 
