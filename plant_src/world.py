@@ -6,7 +6,7 @@ import ctypes
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from .placement import Platform
 from .scene import replay
 from .vehicles.common.shapes import Box
 from .world_settings import WorldSettings
+
+if TYPE_CHECKING:
+    from cosim.results import Result
 
 #: a step of Bullet is at most this long (s); a longer do_step is split into equal ones
 MAX_BULLET_STEP = 0.01
@@ -94,6 +97,13 @@ class World(Component):
     def scene(name: str, scenario: Mapping[str, Any]) -> dict[str, Any]:
         """What the 3-D replay draws of a world, see `scene.replay`."""
         return replay.world_scene(name, scenario)
+
+    @staticmethod
+    def video_frames(result: Result, camera: str, times: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray]:
+        """Render the frames of a video, see `scene.video`."""
+        from .scene.video import frames
+
+        return frames(result, camera, times, size)
 
     def _populate(self, read: WorldSettings) -> None:
         names = {self._add_platform(platform): f"platforms.{platform.name}" for platform in read.platforms}
