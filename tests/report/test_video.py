@@ -132,7 +132,7 @@ def test_the_frames_come_from_the_first_component_class_that_renders_them(tmp_pa
 
 
 def test_a_scenario_without_such_a_component_has_no_video(tmp_path):
-    with pytest.raises(InputError, match='no component of the scenario renders a video: .* static method "video_frames"'):
+    with pytest.raises(InputError, match=r'no component of the scenario renders a video: .* static method "video_frames"'):
         find_frame_source(result_of(tmp_path, {"f": {"fmu": "f.fmu"}}))
 
 
