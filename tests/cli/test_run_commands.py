@@ -1,11 +1,10 @@
 """`cosim run` as a process: real time, components that step on threads, results as Parquet."""
 
 import json
-import subprocess
-import sys
 import time
 
 import pytest
+from cosim_command import run_cosim
 from slow_fmus import slow_fmu
 
 from cosim.results import Result
@@ -16,8 +15,7 @@ def cosim_run(folder, fmus, *options, **algorithm):
     components = {f"c{i}": {"fmu": str(fmu)} for i, fmu in enumerate(fmus)}
     document = {"name": "busy", "stop_time": 0.5, "step_size": 0.01, "components": components}
     (folder / "busy.json").write_text(json.dumps(document | {"algorithm": {"stages": [list(components)], **algorithm}}))
-    command = [sys.executable, "-m", "cosim", "run", "busy.json", "--output-dir", "out", *options]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    done = run_cosim("run", "busy.json", "--output-dir", "out", *options, cwd=folder)
     return done.returncode, done.stdout, done.stderr
 
 

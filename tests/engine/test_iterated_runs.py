@@ -1,11 +1,9 @@
 """Iterated systems as a process: a crash while a component returns to its state is that component's, not its neighbour's."""
 
 import json
-import os
-import subprocess
-import sys
 
 import pytest
+from cosim_command import run_cosim
 
 PARTS = '''
 import os
@@ -57,8 +55,7 @@ def cosim_run(tmp_path):
     (tmp_path / "loop.json").write_text(json.dumps(document))
 
     def run(**environment):
-        command = [sys.executable, "-m", "cosim", "run", "loop.json", "--output-dir", "out", "--no-report"]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, env={**os.environ, **environment})
+        return run_cosim("run", "loop.json", "--output-dir", "out", "--no-report", cwd=tmp_path, env=environment)
 
     return run
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
+from cosim_command import run_cosim
 from fmpy import extract, simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.validation import validate_fmu
@@ -139,8 +138,7 @@ def test_a_missing_function_is_named(folder, tmp_path):
 
 
 def cosim(*arguments, cwd):
-    command = [sys.executable, "-m", "cosim", *map(str, arguments)]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+    return run_cosim(*arguments, cwd=cwd)
 
 
 def test_the_command_builds_a_source_that_lies_anywhere(folder, tmp_path):
