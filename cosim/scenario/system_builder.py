@@ -14,7 +14,8 @@ from ..components.input_table import read_input_table
 from ..core.component import Component, Variable
 from ..core.errors import InputError, Problem
 from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System
-from ..engine.run_loop import Event, Settings, find_problems
+from ..engine.run_checks import find_problems
+from ..engine.settings import Event, Settings
 from ..process.journal import Deadlines
 from .component_factory import ComponentFactory
 from .name_resolution import SlotIndex, Target, UnknownNameError, check_assignment, resolve_name

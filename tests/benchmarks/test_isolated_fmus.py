@@ -22,7 +22,8 @@ from cosim.components.fmi import FmuFile, Isolation, create_component
 from cosim.core.system import Endpoint, System
 from cosim.core.time_grid import TimeGrid
 from cosim.engine import ExecutorKind, Recorder, compile_plan, executor_class
-from cosim.engine.run_loop import Settings, SimulationOutcome, simulate
+from cosim.engine.run_loop import SimulationOutcome, simulate
+from cosim.engine.settings import Settings
 
 STEPS, BATCH, WIDTH, STARTS = 5_000, 50, 16, 20
 #: what is promised on a quiet machine: us per FMU and step over in process, ms to start

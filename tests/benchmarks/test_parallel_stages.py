@@ -14,7 +14,8 @@ from slow_fmus import slow_fmu
 
 from cosim.components.fmi import FmuFile, create_component
 from cosim.core.system import Parallel, System
-from cosim.engine.run_loop import Settings, simulate
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Settings
 
 LONG, STEPS = 1e-3, 200
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]

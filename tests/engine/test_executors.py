@@ -15,9 +15,14 @@ from cosim.core.errors import ComponentError
 from cosim.core.system import Connection, Endpoint, Group, System, incompatibility
 from cosim.core.time_grid import exact_fraction
 from cosim.core.units import parse_unit
-from cosim.engine import EXECUTORS, native_available
-from cosim.engine.parallel import ThreadPool
-from cosim.engine.run_loop import Settings, simulate
+from cosim.engine import EXECUTORS, native_available, parallel, step_runner
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Settings
+from cosim.engine.thread_pool import ThreadPool
+from cosim.process import journal
+
+if native_available():
+    from cosim.engine import _native
 
 pytestmark = pytest.mark.skipif(not native_available(), reason="the native executor was not built")
 
@@ -124,8 +129,13 @@ def test_random_systems_with_foreign_fmus_of_all_types(seed, probes):
 @pytest.mark.parametrize("kind", EXECUTORS)
 @pytest.mark.parametrize("seed", range(4))
 def test_random_systems_with_fmus_on_threads(seed, kind, probes, monkeypatch):
-    crews = []
-    monkeypatch.setattr("cosim.engine.executor.ThreadPool", lambda *arguments: crews.append(ThreadPool(*arguments)) or crews[-1])
+    thread_pools = []
+
+    def create_thread_pool(size):
+        thread_pools.append(ThreadPool(size))
+        return thread_pools[-1]
+
+    monkeypatch.setattr("cosim.engine.thread_pool.ThreadPool", create_thread_pool)
 
     def build(parallel):
         files = [FmuFile(path) for path in probes.values()]
@@ -133,7 +143,7 @@ def test_random_systems_with_fmus_on_threads(seed, kind, probes, monkeypatch):
         return replace(built, parallel=parallel), outputs
 
     assert recorded(kind, lambda: build(True)) == recorded(kind, lambda: build(False))
-    assert len(crews) == 1
+    assert len(thread_pools) == 1
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)
@@ -202,3 +212,10 @@ def test_many_rows_do_not_fit_into_one_chunk(kind, monkeypatch):
         Settings(exact_fraction(0), exact_fraction(10000), exact_fraction(1), {"a.y": endpoint("a.y")}),
     )
     assert outcome.recording.columns["a.y"].tolist() == list(range(10001))
+
+
+def test_constants_of_the_native_module_are_those_of_python():
+    assert parallel.MEASURED_STEPS == _native.MEASURED_STEPS
+    markers = step_runner.MARKER_CALL, step_runner.MARKER_STEPS, step_runner.MARKER_ROWS
+    assert markers == (_native.MARKER_CALL, _native.MARKER_STEPS, _native.MARKER_ROWS)
+    assert markers == (journal.CALL_NUMBER, journal.STEP_COUNT, journal.ROW_COUNT)

@@ -9,8 +9,8 @@ from systems import endpoint, make_system
 from cosim.components.fmi import FmuFile, create_component
 from cosim.core.errors import ComponentError
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.parallel import ThreadPool
-from cosim.engine.run_loop import Event, Settings, simulate
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Event, Settings
 
 pytestmark = pytest.mark.usefixtures("executor")
 
@@ -24,7 +24,7 @@ def long(tmp_path_factory):
 
 @pytest.fixture(autouse=True)
 def two_processors(monkeypatch):
-    monkeypatch.setattr("cosim.engine.executor.available_processors", lambda: 2)
+    monkeypatch.setattr("cosim.engine.parallel.available_processors", lambda: 2)
 
 
 def flown(files, parallel, wires="", stop="0.3", events=(), start_values=None):
@@ -78,12 +78,3 @@ def test_a_failure_on_a_thread_names_component_function_and_time(long):
     assert isinstance(parallel.failure, ComponentError)
     assert str(parallel.failure) == str(serial.failure)
     assert len(parallel.recording.time) == len(serial.recording.time)
-
-
-def test_a_crew_returns_outcomes_in_order_and_raises_what_was_raised():
-    crew = ThreadPool(2, lambda x: 1 / x)
-    assert crew.map([1, 2, 4]) == [1, 0.5, 0.25]
-    with pytest.raises(ZeroDivisionError):
-        crew.map([1, 0, 4])
-    assert crew.map([4, 2]) == [0.25, 0.5]
-    crew.close()

@@ -15,7 +15,9 @@ from cosim.components.fmi import FmuFile, create_component
 from cosim.core.component import StepResult, Variable
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.run_loop import Event, Settings, find_problems, simulate
+from cosim.engine.run_checks import find_problems
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Event, Settings
 from cosim.process.float_mode import enabled_traps, is_changed
 
 pytestmark = pytest.mark.usefixtures("executor")
@@ -125,7 +127,7 @@ def test_observers_see_progress_and_the_end():
 
 
 def test_what_no_disk_could_hold_is_refused_before_it_is_begun():
-    with pytest.raises(InputError, match=r"3\d* rows of 1 signals take about .* GB are free in .*; make the step longer"):
+    with pytest.raises(InputError, match=r"3\d* rows of 1 signal take about .* GB are free in .*; make the step longer"):
         simulate(make_system({"a": counter()}), settings(30, exact_fraction("1/1000000000000")))
     sparse = settings(30, exact_fraction("1/1000000000000"), record_interval=exact_fraction(30))
     assert find_problems(make_system({"a": counter()}), sparse) == []

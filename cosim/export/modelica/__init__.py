@@ -24,4 +24,4 @@ equation `x = ...`.
 
 from .assemble import load_block, load_interpreter
 
-__all__ = ["load_interpreter", "load_block"]
+__all__ = ["load_block", "load_interpreter"]

@@ -13,7 +13,8 @@ from systems import endpoint, make_system, run_system
 from cosim.components.fmi import FmuFile, Isolation, create_component
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.run_loop import Settings, simulate
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Settings
 
 pytestmark = pytest.mark.usefixtures("executor")
 

@@ -21,8 +21,8 @@ from .xml import parse_xml
 from .xml_reader import check_repeated_elements, read_model
 
 __all__ = [
-    "DESCRIPTION_FILE",
     "DEFAULT_LIMITS",
+    "DESCRIPTION_FILE",
     "Examination",
     "Finding",
     "PreflightLimits",
