@@ -10,6 +10,7 @@ from ..core.component import Component
 from ..core.errors import InputError
 from ..core.paths import is_file, resolve_path
 from .nested_systems import Node
+from .schema import ComponentSpec
 
 
 class ComponentFactory:
@@ -38,16 +39,24 @@ class ComponentFactory:
         """
         spec, full_name = node.spec.components[name], node.full_name(name)
         if spec.python is not None:
-            from ..components.python_class import load_component
-
-            self.python_files.append(node.folder / spec.python.rpartition(":")[0])
-            return load_component(spec.python, node.folder, full_name, spec.arguments)
+            return self._load_python(node.folder, spec, full_name)
         path = self._build_modelica(node.folder, spec.modelica or "") if spec.fmu is None else node.folder / spec.fmu
-        is_another_instance = resolve_path(path) in self.fmus
-        file = self._fmu_file(path)
-        needs_own_process = is_another_instance and file.description.once_per_process
+        key = resolve_path(path)
+        used = self.fmus.get(key)
+        needs_own_process = used is not None and used.description.once_per_process
+        if used is None:
+            self.fmus[key] = self._loaded_fmus.get(key) or FmuFile(path)
+        elif needs_own_process:  # its process must not inherit the library that is loaded in this one
+            self.fmus[key] = FmuFile(path)
         isolated = self._isolate_fmus or spec.isolation is not None or needs_own_process
-        return create_component(file, full_name, isolation=self._isolation if isolated else None)
+        return create_component(self.fmus[key], full_name, isolation=self._isolation if isolated else None)
+
+    def _load_python(self, folder: Path, spec: ComponentSpec, full_name: str) -> Component:
+        from ..components.python_class import load_component
+
+        assert spec.python is not None
+        self.python_files.append(folder / spec.python.rpartition(":")[0])
+        return load_component(spec.python, folder, full_name, spec.arguments)
 
     def _build_modelica(self, folder: Path, reference: str) -> Path:
         """Return the FMU of "file.mo:Model", from the user's cache if source and tools are unchanged."""
@@ -60,13 +69,3 @@ class ComponentFactory:
             raise InputError(f'file "{file}" does not exist')
         self.modelica_files.append(folder / file)
         return cached_fmu(folder / file, model)
-
-    def _fmu_file(self, path: Path) -> FmuFile:
-        """Return the FMU file at `path`: that of an earlier instance, one read before, or a new one."""
-        key = resolve_path(path)
-        used = self.fmus.get(key)
-        if used is None:
-            self.fmus[key] = self._loaded_fmus.get(key) or FmuFile(path)
-        elif used.description.once_per_process:  # a worker process must not inherit the loaded library
-            self.fmus[key] = FmuFile(path)
-        return self.fmus[key]

@@ -10,7 +10,7 @@ from ..engine.transfer_plan import unit_conversion
 from .prepared_run import PreparedRun
 
 
-def describe_system(run: PreparedRun) -> dict[str, Any]:
+def describe_system(prepared: PreparedRun) -> dict[str, Any]:
     """Return the components, stages and connections of a prepared run as JSON values.
 
     - `components`: {"name", "origin", "inputs", "outputs", "period"}: the source in the scenario, the numbers of scalar inputs
@@ -18,21 +18,21 @@ def describe_system(run: PreparedRun) -> dict[str, Any]:
     - `stages`: lists of component names; a nested system is {"name", "stages"}
     - `connections`: [source, target, unit of the source or "", notes on delay and conversion or ""]
     """
-    system = run.system
+    system = prepared.system
     return {
-        "components": [_describe_component(run, name) for name in system.components],
+        "components": [_describe_component(prepared, name) for name in system.components],
         "stages": _describe_stages(system.stages),
         "connections": [_describe_connection(system, connection) for connection in system.connections],
     }
 
 
-def _describe_component(run: PreparedRun, name: str) -> dict[str, Any]:
-    variables = run.system.components[name].variables
+def _describe_component(prepared: PreparedRun, name: str) -> dict[str, Any]:
+    variables = prepared.system.components[name].variables
     inputs, outputs = (sum(len(v.scalar_names) for v in variables if v.causality == kind) for kind in ("input", "output"))
-    period = run.system.periods.get(name)
+    period = prepared.system.periods.get(name)
     return {
         "name": name,
-        "origin": run.component_source(name),
+        "origin": prepared.component_source(name),
         "inputs": inputs,
         "outputs": outputs,
         "period": None if period is None else float(period),

@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 VariablesByEndpoint = dict[Endpoint, Variable]
 
 
-def find_warnings(run: PreparedRun) -> list[Problem]:
+def find_warnings(prepared: PreparedRun) -> list[Problem]:
     """Return all warnings about a prepared run, each with its location in the scenario file."""
-    return [*missing_connections(run), *_missing_reference(run), *_late_events(run)]
+    return [*missing_connections(prepared), *_missing_reference(prepared), *_late_events(prepared)]
 
 
-def missing_connections(run: PreparedRun) -> Iterator[Problem]:
+def missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
     """Yield at most one warning: unconnected inputs for which another component has an output of the same name."""
-    system, inputs = run.system, unconnected_inputs(run)
+    system, inputs = prepared.system, unconnected_inputs(prepared)
     outputs = _outputs_by_name(system) if inputs else {}
     sources = {end: source for end, variable in inputs.items() if (source := _matching_output(end, variable, outputs))}
     if sources:
@@ -31,14 +31,14 @@ def missing_connections(run: PreparedRun) -> Iterator[Problem]:
         others = f" and {more} more input{'s' * (more > 1)}" if more else ""
         shown_source = next((port for port, inner in system.aliases.items() if inner == source), source)
         text = f"nothing feeds or sets {end}{others}, but there is an output {shown_source}: is a connection missing?"
-        yield Problem(text, run.root.where("connections"))
+        yield Problem(text, prepared.root.where("connections"))
 
 
-def unconnected_inputs(run: PreparedRun) -> VariablesByEndpoint:
+def unconnected_inputs(prepared: PreparedRun) -> VariablesByEndpoint:
     """Return the scalar inputs that no connection, start value or event sets, with their variables."""
-    system = run.system
+    system = prepared.system
     connected = {connection.target for connection in system.connections}
-    changes = [system.start_values, *(event.values for event in run.settings.events)]
+    changes = [system.start_values, *(event.values for event in prepared.settings.events)]
     assigned = {(component, name) for values in changes for component, own in values.items() for name in own}
     return {
         end: variable
@@ -83,16 +83,16 @@ def _lookup_names(slot: str) -> list[str]:
     return [slot, rest] if rest else [slot]
 
 
-def _missing_reference(run: PreparedRun) -> Iterator[Problem]:
-    reference = run.spec.reference
-    if reference and not is_file(run.root.folder / reference.file):
+def _missing_reference(prepared: PreparedRun) -> Iterator[Problem]:
+    reference = prepared.spec.reference
+    if reference and not is_file(prepared.root.folder / reference.file):
         text = f'file "{reference.file}" does not exist: `cosim regress --update` writes it'
-        yield Problem(text, run.root.where("reference", "file"))
+        yield Problem(text, prepared.root.where("reference", "file"))
 
 
-def _late_events(run: PreparedRun) -> Iterator[Problem]:
-    stop = run.settings.stop_time
-    for event in run.settings.events:
+def _late_events(prepared: PreparedRun) -> Iterator[Problem]:
+    stop = prepared.settings.stop_time
+    for event in prepared.settings.events:
         if event.time > stop:
             text = f"this event does not happen: {float(event.time):g} s is after the stop time {float(stop):g} s"
             yield Problem(text, event.where)
