@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..components.python_class import load_object
+from ..components.python_import import load_object
 from ..core.errors import CosimError
 from ..results import Result
 

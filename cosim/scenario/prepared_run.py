@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ..components.fmi import FmuFile
-from ..components.python_class import package_files
+from ..components.python_import import package_files
 from ..core.component import Component
 from ..core.errors import InputError, Problem
 from ..core.stopwatch import Stopwatch
