@@ -46,7 +46,8 @@ def must_rerun(sandbox: str | None) -> bool:
 
 def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
     """Run this command again where it sees only the folders of `files` and what Python needs, and writes only to the folder
-    `output`; returns its exit code. Raises InputError when bubblewrap cannot do that."""
+    `output`; returns its exit code. Raises InputError when bubblewrap cannot do that.
+    """
     from ..core.errors import InputError
     from ..process.sandbox import bubblewrap_command
     from ..process.supervisor import interrupt_on_termination

@@ -48,7 +48,8 @@ def parse_source(text: str) -> CandidateSource:
 @dataclass(frozen=True)
 class CandidateInterface:
     """The variables of a candidate as its place sees them, by the names of their slots; `inner` are those of a nested system's
-    own components, which scenarios may set and record too."""
+    own components, which scenarios may set and record too.
+    """
 
     inputs: Mapping[str, Variable]
     outputs: Mapping[str, Variable]
