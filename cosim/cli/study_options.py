@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -11,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+
+from ..core.processors import available_processors
 
 if TYPE_CHECKING:
     from ..studies.execution.job import Record
@@ -57,10 +58,6 @@ def create_runner(study: Study, workers: int | None, scheduler: str | None) -> C
     from ..studies.cluster import ClusterRunner
 
     return ClusterRunner(study, scheduler)
-
-
-def available_processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class StudyProgress:

@@ -14,12 +14,13 @@ import numpy as np
 
 from ..core.component import SUCCESS_STATUSES, PreparedCall, StepResult
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, describe_exception
+from ..core.processors import available_processors
 from ..process import float_mode
 from ..process.journal import calling_component
 from .component_step import ScheduledStep, StepFailure, abbreviate_names, run_due
 from .initialization import copy_start_values, propagate_initial_values
 from .iteration import FixedPointIteration, IterationPhase
-from .parallel import MEASURED_STEPS, ParallelGroup, ThreadPool, available_processors, releases_gil
+from .parallel import MEASURED_STEPS, ParallelGroup, ThreadPool, releases_gil
 from .plan import Loop, Phase, Plan, Step
 from .recorder import Recorder
 from .transfer_calls import DelayLine, TransferCall, compile_transfer

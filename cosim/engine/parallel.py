@@ -6,7 +6,6 @@ value; neither has stepping them at once. Python components take no part: they w
 
 from __future__ import annotations
 
-import os
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -71,11 +70,6 @@ def _balance_load(
 def releases_gil(turn: ScheduledStep) -> bool:
     """Whether the turn steps in C, without the interpreter."""
     return any(isinstance(call.native, NativeDoStep) for call in turn.calls)
-
-
-def available_processors() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @dataclass(eq=False)

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...core.errors import InputError, Problem
+from ...core.processors import available_processors
 from .. import supervision
 from ..bench_trial import ControllerTrial, TrialResult, run_trials
-from .regress import EXIT_CODE_SEVERITY, available_processors, check_unique_names, default_folder, find_scenario_files
+from .regress import EXIT_CODE_SEVERITY, check_unique_names, default_folder, find_scenario_files
 
 if TYPE_CHECKING:
     from ...studies.controller_bench.score import KpiComparison

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from ...core.processors import available_processors
+
 if TYPE_CHECKING:
     from packaging.requirements import Requirement
 
@@ -67,10 +69,6 @@ def _host_findings() -> Iterator[Finding]:
     there = next(path for path in (cache, *cache.parents) if path.exists())
     usable = os.access(there, os.W_OK)
     yield Finding("cosim", "cache", f"{cache}{'' if usable else ' cannot be written'}", "ok" if usable else "missing")
-
-
-def available_processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _executor_finding() -> Finding:

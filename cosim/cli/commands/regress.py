@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ import click
 
 from ...core import resources
 from ...core.errors import InputError
+from ...core.processors import available_processors
 from ...studies.regression import EXPECTATION_KEYS, Regression, RegressionOutcome, has_keys
 
 if TYPE_CHECKING:
@@ -82,11 +82,6 @@ def check_unique_names(files: Iterable[Path]) -> None:
         raise InputError(
             [f'{counts[name]} scenarios are called "{name}.json": their results would go to one folder' for name in several]
         )
-
-
-def available_processors() -> int:
-    """How many this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def run_in_parallel(work: Sequence[Callable[[], T]], jobs: int) -> Iterator[T]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...core.errors import CosimError, InputError
+from ...core.processors import available_processors
 from .. import study_options
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ def _write_maps_and_page(
     maps = success_maps(sweep, sweep.rows(ledger))
     if replays:
         runs = [cell.representative_run.number for each in maps for cell in each.cells.values() if cell.representative_run]
-        for run, cause in write_replays(sweep, runs, folder, workers or study_options.available_processors()).items():
+        for run, cause in write_replays(sweep, runs, folder, workers or available_processors()).items():
             click.echo(f"no replay of run {run}: {cause}", err=True)
     write_sweep_page(sweep, summary, maps, folder)
 
