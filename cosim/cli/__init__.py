@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import traceback
 from collections.abc import Callable
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
@@ -54,48 +55,69 @@ class _LazyGroup(click.Group):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
 
+@dataclass
+class CommandLine:
+    """Arguments of this call of `cosim`, and its option --debug once click has parsed it."""
+
+    arguments: tuple[str, ...] = ()
+    debug: bool = False
+
+
+def current_command_line() -> CommandLine:
+    """Return the command line of the running command; an empty one if the command was called without the group `cosim`."""
+    return click.get_current_context().find_root().ensure_object(CommandLine)
+
+
 @click.command(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--debug", is_flag=True, help="Show tracebacks.")
 @click.version_option(__version__, package_name="cosim", message="cosim %(version)s")
 def cli(debug: bool) -> None:
-    """FMI co-simulation of controllers and plants in lockstep."""
+    """Run FMI co-simulations of controllers and plants in lockstep."""
+    current_command_line().debug = debug
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Entry point of the command `cosim`; ends the process with the exit code of the outcome."""
+    """Run the command `cosim` and end the process with its exit code.
+
+    Args:
+        arguments: words after the program's name; default: those of this process.
+    """
     sys.stdout, sys.stderr = ignoring_broken_pipe(sys.stdout), ignoring_broken_pipe(sys.stderr)
     sys.exit(_run_command_line(sys.argv[1:] if arguments is None else arguments))
 
 
 def _run_command_line(arguments: list[str]) -> int:
-    return run_guarded(lambda: _exit_code(cli.main(arguments, prog_name="cosim", standalone_mode=False, obj=tuple(arguments))))
+    command_line = CommandLine(tuple(arguments))
+    return run_guarded(
+        lambda: _exit_code(cli.main(arguments, prog_name="cosim", standalone_mode=False, obj=command_line)), command_line
+    )
 
 
-def run_guarded(command: Callable[[], int]) -> int:
-    """The exit code of a command; what it raises is reported to the user."""
+def run_guarded(command: Callable[[], int], command_line: CommandLine) -> int:
+    """Call `command` and return its exit code; report whatever it raises to the user."""
     try:
         return command()
     except (Exception, KeyboardInterrupt) as error:
-        return report_error(error)
+        return report_error(error, command_line)
 
 
-def report_error(error: BaseException) -> int:
-    """Tell the user about an error; returns the exit code that belongs to it. With --debug the traceback is shown."""
+def report_error(error: BaseException, command_line: CommandLine) -> int:
+    """Print an error to standard error, with its traceback after --debug, and return the exit code for it."""
     if isinstance(error, KeyboardInterrupt | click.exceptions.Abort):
         click.echo("interrupted", err=True)
         return 130
     if isinstance(error, click.ClickException):
         error.show()
         return error.exit_code
-    if "--debug" in sys.argv:
+    if command_line.debug:
         traceback.print_exception(error)
     if isinstance(error, CosimError):
         click.echo(str(error), err=True)
         return error.exit_code
     if isinstance(error, OSError):
-        click.echo(f"the operating system refuses: {error}", err=True)
+        click.echo(f"operating system error: {error}", err=True)
         return 1
-    click.echo(f"internal error: {type(error).__name__}: {error}  (cosim --debug shows where)", err=True)
+    click.echo(f"internal error: {type(error).__name__}: {error}  (`cosim --debug ...` prints the traceback)", err=True)
     return 70
 
 

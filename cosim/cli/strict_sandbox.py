@@ -15,6 +15,8 @@ from typing import IO
 
 import click
 
+from . import current_command_line
+
 #: kinds of sandbox; `--sandbox` alone is the first one
 SANDBOX_KINDS = ("default", "strict")
 
@@ -58,7 +60,7 @@ def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
         reader, writer = os.pipe()
         status = stack.enter_context(os.fdopen(reader))
         with os.fdopen(writer):
-            python = [sys.executable, "-P", "-m", "cosim", *click.get_current_context().find_root().obj]
+            python = [sys.executable, "-P", "-m", "cosim", *current_command_line().arguments]
             writable = [temporary, *([output] if output else [])]
             words = bubblewrap_command(python, _readable_folders(files), writable, status=writer)
             if output:

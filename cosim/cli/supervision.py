@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..core.errors import CosimError
-from . import run_guarded
+from . import current_command_line, run_guarded
 from .strict_sandbox import SANDBOX_KINDS
 
 if TYPE_CHECKING:
@@ -55,7 +55,8 @@ def run_supervised_command(
 
     if isolation == "none" or not can_supervise():
         return entry()
-    outcome = run_supervised(lambda: run_guarded(entry), while_running)
+    command_line = current_command_line()
+    outcome = run_supervised(lambda: run_guarded(entry, command_line), while_running)
     if outcome.warning:
         click.echo(f"WARNING {outcome.warning}", err=True)
     folder = outcome.journal.folder

@@ -40,6 +40,14 @@ def test_help_names_every_command():
         assert cosim(command, "--help").returncode == 0
 
 
+def test_a_traceback_is_printed_only_with_debug():
+    plain, debugged = cosim("run", "nowhere"), cosim("--debug", "run", "nowhere")
+    assert plain.returncode == debugged.returncode == 2
+    assert "Traceback" not in plain.stderr
+    assert "Traceback" in debugged.stderr
+    assert debugged.stderr.splitlines()[-1] == plain.stderr.strip()
+
+
 def test_run_writes_results_that_can_be_read_back(tmp_path):
     done = cosim("run", scenario(tmp_path), "--set", "a.u=1.5", cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -16,7 +16,7 @@ from typing import Any
 
 from fault_fmu import FaultFmus
 
-from cosim.cli import cli, run_guarded
+from cosim.cli import CommandLine, cli, run_guarded
 
 KPIS = [{"name": "end", "python": "cosim.kpis:final", "arguments": {"signal": "lag.y"}}]
 SEGV_ORDER = "DoStep 6 segv"
@@ -57,7 +57,7 @@ class LagProject:
         """A command in this process: the imports are done."""
         out, err = StringIO(), StringIO()
         with chdir(self.folder), redirect_stdout(out), redirect_stderr(err):
-            code = run_guarded(lambda: cli.main([*map(str, words)], standalone_mode=False))
+            code = run_guarded(lambda: cli.main([*map(str, words)], standalone_mode=False), CommandLine())
         self.last_result = CommandResult(code, out.getvalue(), err.getvalue())
         return self.last_result
 

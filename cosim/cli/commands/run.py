@@ -13,7 +13,7 @@ import click
 
 from ...core.errors import CosimError, InputError
 from ...process.journal import STEP_COUNT
-from .. import live, report_error, strict_sandbox, supervision
+from .. import current_command_line, live, report_error, strict_sandbox, supervision
 from ..progress import progress_bar
 
 if TYPE_CHECKING:
@@ -159,7 +159,7 @@ def _write_outcome(
     if execution.failure:
         _write_partial_result(result, directory, shown)
         remove_run_files()
-        return report_error(execution.failure)
+        return report_error(execution.failure, current_command_line())
     write_run(result, directory)
     remove_run_files()
     outcomes = evaluate_scenario_checks(assembly, result)

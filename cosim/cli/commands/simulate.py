@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...process.temporary_folders import temporary_run_folder
-from .. import report_error, strict_sandbox, supervision
+from .. import current_command_line, report_error, strict_sandbox, supervision
 
 if TYPE_CHECKING:
     from ...components.fmi import Isolation
@@ -73,7 +73,7 @@ def _simulate(
             _write_recording(run.recording, output, shown)
             remove_run_files()
         if run.failure:
-            return supervision.results_written(report_error(run.failure))
+            return supervision.results_written(report_error(run.failure, current_command_line()))
         if not output:
             _print_final_values(run.recording)
         return supervision.results_written(0)
