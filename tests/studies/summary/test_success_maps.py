@@ -124,6 +124,7 @@ def test_cells_too_small_for_text_have_none(tmp_path):
 WORDS = {"name": "landing controller", "levels": {"inverse kinematics": {}, "incremental nonlinear dynamic inversion": {}}}
 STEPS = SPEED | {"values": [0.0137 * i for i in range(40)]}
 MANY = {"name": "sensor", "levels": {f"sensor_number_{i}": {} for i in range(16)}}
+WIDE = {"name": "WWWW", "levels": {"MMMM WWWW MMMM WWWW": {}, "iiiiiiiiii WWWWWWWWWWWWWW": {}}}
 CROWDED = {
     "long names up": ([WORDS, SPEED], {"x": "speed", "y": "landing controller"}),
     "long names along": ([WORDS, SPEED], {"x": "landing controller", "y": "speed"}),
@@ -132,6 +133,7 @@ CROWDED = {
     "long names of columns": ([WORDS, SPEED], {"x": "speed", "y": "seed", "columns": "landing controller"}),
     "long names of many columns": ([MANY, SPEED], {"x": "speed", "y": "seed", "columns": "sensor"}),
     "long names of rows": ([WORDS, SPEED], {"x": "speed", "y": "seed", "rows": "landing controller"}),
+    "wide letters": ([WIDE, SPEED], {"x": "speed", "y": "seed", "columns": "WWWW", "titles": {"speed": "WIND " * 10}}),
     "long titles": ([WORDS, SPEED], {"x": "speed", "y": "landing controller", "titles": {"speed": "speed " * 12}}),
 }
 
@@ -150,6 +152,14 @@ def test_texts_lie_inside_the_figure_and_beside_each_other(tmp_path, name):
         assert figure.bbox.containsy(place.y0) and figure.bbox.containsy(place.y1), text
     for (one, place), (other, other_place) in combinations(places.items(), 2):
         assert not place.overlaps(other_place), (one, other)
+
+
+def test_cells_have_the_same_size_whatever_the_labels(tmp_path):
+    for factors, spec in (CROWDED[name] for name in ("long names up", "long names along", "long titles")):
+        (found,) = success_maps(sweep_of(tmp_path, factors=factors, maps=[spec]), [])
+        figure = draw_map(found)
+        panel = figure.axes[0].get_position().size * figure.get_size_inches()
+        assert panel == pytest.approx([2 * 0.9, 2 * 0.46], abs=0.02)
 
 
 def test_in_svg_every_cell_with_a_run_is_a_link(success_map):
