@@ -1,4 +1,4 @@
-"""The command line. Each command imports what it needs when it runs, so that `cosim --help` is quick."""
+"""Command line of cosim; each command imports its packages only when it runs, which keeps `cosim --help` fast."""
 
 from __future__ import annotations
 
@@ -15,42 +15,45 @@ from ..core.errors import CosimError
 from ..core.version import __version__
 from ..process.standard_streams import ignoring_broken_pipe
 
-#: command -> (module in this package, what it does)
+#: module in `commands` and description of each command
 COMMANDS = {
-    "run": ("run", "Run a scenario; write results and figures."),
-    "check": ("check", "Load, wire and validate a scenario; print the expanded system."),
-    "simulate": ("simulate", "Simulate one FMU alone."),
+    "run": ("run", "Run a scenario and write results, figures and a report."),
+    "check": ("check", "Check a scenario without running it and print the expanded system."),
+    "simulate": ("simulate", "Simulate a single FMU."),
     "compare": ("compare", "Compare a result with a reference, signal by signal."),
-    "regress": ("regress", "Run all scenarios that have checks or references, and hold them against these."),
-    "bench-controller": ("bench_controller", "Put a controller in a shipped one's place, in every scenario that has it."),
-    "sweep": ("sweep", "Run a scenario at many points: parameter studies and Monte Carlo, here or on a cluster."),
-    "tune": ("tune", "Find the parameters that make a KPI small."),
+    "regress": ("regress", "Run all scenarios that have checks or a reference, and compare their results with these."),
+    "bench-controller": ("bench_controller", "Benchmark a controller in every scenario with its role."),
+    "sweep": ("sweep", "Run a scenario at many points: parameter studies and Monte Carlo."),
+    "tune": ("tune", "Find the parameters that minimise a KPI."),
     "plot": ("plot", "Draw the figures of finished runs again."),
-    "report": ("report", "Make the page about a finished run again."),
-    "replay": ("replay", "Make a page with the 3-D replay of one run, or of two to compare."),
-    "info": ("info", "Print what an FMU says about itself."),
-    "validate": ("validate", "Examine FMUs against the FMI standard without running them."),
+    "report": ("report", "Write the report of a finished run again."),
+    "replay": ("replay", "Write a page with the 3-D replay of one run, or of two runs to compare."),
+    "info": ("info", "Print the properties and variables of an FMU."),
+    "validate": ("validate", "Validate FMUs against the FMI standard without running them."),
     "build": ("build", "Export controllers and plants to fmus/."),
-    "init": ("init", "Begin a project of your own: controller, scenario, reference, tests, CI."),
-    "new": ("new", "Begin a controller of your own that runs at once."),
-    "schema": ("schema", "Print the JSON Schema of scenarios."),
-    "doctor": ("doctor", "Print what is installed and active here."),
+    "init": ("init", "Create a project with a controller, a scenario, its reference, tests and CI."),
+    "new": ("new", "Create a controller with a scenario in which it runs."),
+    "schema": ("schema", "Print the JSON Schema of scenarios, sweeps or tunings."),
+    "doctor": ("doctor", "Print which packages, tools and sandboxes are available on this machine."),
 }
 
 
 class _LazyGroup(click.Group):
-    """Knows its commands by name and imports them when they are used."""
+    """Command group that imports a command only when it is used."""
 
-    def list_commands(self, ctx: click.Context) -> list[str]:
+    def list_commands(self, _ctx: click.Context) -> list[str]:
+        """Return the names of all commands."""
         return list(COMMANDS)
 
-    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+    def get_command(self, _ctx: click.Context, name: str) -> click.Command | None:
+        """Import the command called `name`; None if there is none."""
         if name not in COMMANDS:
             return None
         command: click.Command = import_module(f".commands.{COMMANDS[name][0]}", __name__).command
         return command
 
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+    def format_commands(self, _ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of commands without importing them."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 

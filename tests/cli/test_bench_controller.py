@@ -141,9 +141,9 @@ def test_what_does_not_fit_is_said_at_once(folder):
     assert done.returncode == 2
     assert done.stderr.splitlines() == [
         f'{source}: the output "rudder_angle" (rad) is missing; did you mean "rudder_angel"?',
-        f'{source}: nothing feeds the input "vehicle.postion.y" in this role; did you mean "vehicle.position.y"?',
-        f'{source}: nothing feeds the input "wind" in this role',
-        f'{source}: "thrust" has the unit "m", expected "N" or what converts to it',
+        f'{source}: the role has no signal for the input "vehicle.postion.y"; did you mean "vehicle.position.y"?',
+        f'{source}: the role has no signal for the input "wind"',
+        f'{source}: "thrust" has the unit "m", expected "N" or a unit that converts to it',
     ]
     assert not (folder / "runs/bench/shipped").exists()
 
@@ -166,7 +166,7 @@ def test_what_the_scenario_says_about_missing_variables_is_left_out_and_noted(fo
     done = bench(folder, keeper(folder))
     assert done.returncode == 3
     assert 'note: sail: kpi "away" is left out: the candidate has no "usv.distance"' in done.stdout
-    assert 'note: sail: "usv.waypoint_count" is left out: the candidate has nothing of that name' in done.stdout
+    assert 'note: sail: "usv.waypoint_count" is left out: the candidate has no such variable' in done.stdout
     written = json.loads((folder / "runs/bench/usv_autopilot/Keeper/scenarios/sail.json").read_text())
     assert written["components"]["usv"] == {"parameters": {}, "python": f"{folder / 'keeper.py'}:Keeper"}
     assert [kpi["name"] for kpi in written["kpis"]] == ["waypoints"] and "reference" not in written

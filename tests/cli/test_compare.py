@@ -58,7 +58,7 @@ def test_a_scenario_brings_reference_and_tolerances(tmp_path):
     assert cosim("compare", csv(tmp_path / "a.csv", offset=0.4), path).returncode == 3
     path.write_text(json.dumps(scenario))
     refused = cosim("compare", tmp_path / "a.csv", path)
-    assert (refused.returncode, refused.stderr) == (2, f'{path} names no "reference"\n')
+    assert (refused.returncode, refused.stderr) == (2, f'{path} has no "reference"\n')
 
 
 def test_the_scenario_may_be_a_shipped_one_by_its_name(tmp_path):

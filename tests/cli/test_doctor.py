@@ -62,7 +62,7 @@ def test_text_and_json_tell_the_same():
 
 @pytest.mark.parametrize(
     ("required", "words"),
-    [("no-such-package>=1", "not installed"), ("numpy>=1000", f"{metadata.version('numpy')}, needed is >=1000")],
+    [("no-such-package>=1", "not installed"), ("numpy>=1000", f"{metadata.version('numpy')}, required is >=1000")],
 )
 def test_a_required_package_that_is_not_there_or_too_old_is_broken(requiring, required, words):
     environment = requiring(required)

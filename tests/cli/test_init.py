@@ -46,7 +46,7 @@ def test_the_commands_of_its_workflow_pass(project):
     commands = re.findall(r"- run: (.*)", (project / ".github/workflows/ci.yml").read_text())
     assert commands[0] == "pip install -r requirements.txt" and len(commands) == 3
     regressed, tested = (run(*shlex.split(command), cwd=project) for command in commands[1:])
-    assert regressed.returncode == 0 and "1 scenarios, all well" in regressed.stdout, regressed.stdout + regressed.stderr
+    assert regressed.returncode == 0 and "1 scenario, all passed" in regressed.stdout, regressed.stdout + regressed.stderr
     assert tested.returncode == 0 and "4 passed" in tested.stdout, tested.stdout + tested.stderr
     assert (project / "junit.xml").is_file()
 

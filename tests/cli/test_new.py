@@ -152,13 +152,17 @@ def test_files_are_overwritten_only_by_force(tmp_path):
     [
         ("keeper", "pyton", 'there is no language "pyton"; did you mean "python"?'),
         ("keeper", "ada", 'there is no language "ada"; valid: python, modelica, c'),
-        ("my-keeper", "c", '"my-keeper" is no name of a controller: expected a letter, then letters, digits and underscores'),
-        ("../keeper", "c", '"../keeper" is no name of a controller'),
-        ("2fast", "python", '"2fast" is no name of a controller'),
-        ("math", "python", '"math" means something else already; choose another name'),
-        ("pictures", "python", '"pictures" means something else already; choose another name'),
-        ("vehicle", "modelica", '"vehicle" means something else already; choose another name'),
-        ("Boolean", "modelica", '"Boolean" means something else already; choose another name'),
+        (
+            "my-keeper",
+            "c",
+            '"my-keeper" is not a valid name of a controller: expected a letter, then letters, digits and underscores',
+        ),
+        ("../keeper", "c", '"../keeper" is not a valid name of a controller'),
+        ("2fast", "python", '"2fast" is not a valid name of a controller'),
+        ("math", "python", '"math" is already used for something else; choose another name'),
+        ("pictures", "python", '"pictures" is already used for something else; choose another name'),
+        ("vehicle", "modelica", '"vehicle" is already used for something else; choose another name'),
+        ("Boolean", "modelica", '"Boolean" is already used for something else; choose another name'),
     ],
 )
 def test_unsuitable_names_and_languages_are_refused(tmp_path, name, language, message):

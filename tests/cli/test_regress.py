@@ -65,7 +65,7 @@ def test_a_reference_is_written_and_met(folder):
     assert "1 signals, " in updated.stdout
     assert json.loads((folder / "scenarios/references/cooling.json").read_text())["versions"]["numpy"]
     again = regress(folder)
-    assert (again.returncode, again.stdout.splitlines()[-1]) == (0, "1 scenarios, all well")
+    assert (again.returncode, again.stdout.splitlines()[-1]) == (0, "1 scenario, all passed")
 
 
 def test_a_changed_run_fails_and_says_what_and_since_when(folder):

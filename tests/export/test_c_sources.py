@@ -152,7 +152,7 @@ def test_the_command_builds_a_source_that_lies_anywhere(folder, tmp_path):
 @pytest.mark.parametrize(
     ("sources", "message"),
     [
-        ((), "--output needs one source, found 0"),
+        ((), "--output requires one source, found 0"),
         (("nothing.mo",), "nothing.mo: does not exist"),
         ((".",), ".: cannot be exported"),
     ],

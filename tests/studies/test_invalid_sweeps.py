@@ -70,10 +70,10 @@ B = "/components/a/parameters/b"
 @pytest.mark.parametrize(
     ("factors", "common", "words"),
     [
-        ({"f": "a.b", "g": B}, {}, 'both "f" and "g" set the same thing, as "a.b" and as "/components/a/parameters/b"'),
-        ({"f": "stop_time", "g": "/stop_time"}, {}, 'both "f" and "g" set the same thing'),
-        ({"f": B}, {"a.b": 7}, 'both the settings and "f" set the same thing'),
-        ({"f": "a.b", "g": {"/components/a": {"parameters": {"b": 1}}}}, {}, 'both "f" and "g" set the same thing'),
+        ({"f": "a.b", "g": B}, {}, 'both "f" and "g" set the same value, as "a.b" and as "/components/a/parameters/b"'),
+        ({"f": "stop_time", "g": "/stop_time"}, {}, 'both "f" and "g" set the same value'),
+        ({"f": B}, {"a.b": 7}, 'both the settings and "f" set the same value'),
+        ({"f": "a.b", "g": {"/components/a": {"parameters": {"b": 1}}}}, {}, 'both "f" and "g" set the same value'),
         ({"f": B, "g": "/components/a"}, {}, '"/components/a" of "g" replaces "/components/a/parameters/b" of "f"'),
         ({"f": "/components/a"}, {B: 7}, '"/components/a" of "f" replaces "/components/a/parameters/b" of the settings'),
     ],
@@ -120,7 +120,7 @@ def test_everything_that_is_wrong_is_said_at_once(tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ({"minimize": "1 +", "parameters": [PARAMETER]}, ["$.minimize", "is no expression"]),
+        ({"minimize": "1 +", "parameters": [PARAMETER]}, ["$.minimize", "is not an expression"]),
         ({"minimize": "k", "parameters": [PARAMETER], "constraints": ["k < 1"]}, ["$.constraints[0]", "<= or >="]),
         ({"minimize": "k", "parameters": [PARAMETER | {"start": 2.0}]}, ["$.parameters[0]", 'expected "start" between']),
         ({"minimize": "k", "parameters": []}, ["$.parameters"]),

@@ -41,7 +41,7 @@ def test_every_other_run_has_its_own_result(crashing):
 def test_the_signal_is_named_in_the_table_and_on_the_terminal(crashing):
     cause = "lag: fmi2DoStep failed at t = 0.05 s: the process was ended by signal 6 (SIGABRT, aborted)"
     assert crashing.table()[23]["failure"] == cause
-    assert f"1 failed, the first is run 23: {cause}" in crashing.last_result.err
+    assert f"1 failed, first run 23: {cause}" in crashing.last_result.err
 
 
 def test_a_failure_comes_with_the_command_that_shows_it_again(crashing):
@@ -86,7 +86,7 @@ def test_a_run_that_several_points_have_is_said_to_be_one(lag):
     factors = [{"name": "y", "set": "lag.y_start", "range": {"min": 1, "max": 2}, "integer": True}]
     content = {"factors": factors, "design": {"kind": "sobol", "runs": 8}, "success": [{"kpi": "end.value", "max": 1.5}]}
     done = lag.run_command("sweep", lag.write(**content))
-    assert "2 of 8 runs are distinct; intervals are those of so many" in done.out
+    assert "2 of 8 runs are distinct; only these count in the intervals" in done.out
     assert "2 of the 8 runs are distinct" in (lag.folder / "runs/sweep/sweep.html").read_text()
     overall = lag.table(file="success.csv")[0]
     assert (overall["runs"], overall["distinct"], overall["rate"]) == ("8", "2", "0.5")
@@ -122,7 +122,7 @@ def test_damaged_records_are_counted_and_made_again(lag):
     lines = journal.read_bytes().splitlines(keepends=True)
     journal.write_bytes(lines[0] + b"\0" * 10 + lines[1][10:] + lines[2])
     done = lag.run_command("sweep", file)
-    assert "unreadable lines in runs/sweep/journal.jsonl, whose runs are made again: 1" in done.err
+    assert "runs/sweep/journal.jsonl: 1 unreadable line; the missing runs are repeated" in done.err
     assert "3 of 3 runs, 1 made now" in done.out
 
 

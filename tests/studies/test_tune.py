@@ -24,7 +24,7 @@ HALF, QUARTER = 0.01 / (1 - 0.5**0.1), 0.01 / (1 - 0.25**0.1)
 
 
 class HereAndNow:
-    """The simplest engine: every run in this process."""
+    """The simplest runner: every run in this process."""
 
     def __init__(self, order):
         self.scenario, self.runs = order.scenario, 0
@@ -52,10 +52,10 @@ def tuned(lag, **content):
     """The best trial, all trials, and how many runs they took."""
     minimize = "abs(end.value - 0.5)"
     tuning = Tuning.from_file(lag.write("tune", **{"parameters": [PARAMETER], "minimize": minimize, "method": SEARCH, **content}))
-    engine = HereAndNow(tuning.study.context)
-    with RunStore(lag.folder) as ledger:
-        best = tuning.run(ledger, engine, lambda record: None)
-    return best, tuning.trials, engine.runs
+    runner = HereAndNow(tuning.study.context)
+    with RunStore(lag.folder) as run_store:
+        best = tuning.run(run_store, runner, lambda record: None)
+    return best, tuning.trials, runner.runs
 
 
 @pytest.mark.parametrize("kind", ["nelder_mead", "powell", "differential_evolution"])
@@ -173,7 +173,7 @@ def test_the_command_prints_how_to_run_the_best_and_says_when_all_crash(lag):
     )
     done = lag.run_command("tune", "tune.json")
     assert done.code == 1
-    assert "a run failed at every point, the first time: lag: fmi2DoStep failed" in done.err
+    assert "a run failed at every point; at the first one: lag: fmi2DoStep failed" in done.err
     trials = lag.table("runs/tune", "trials.csv")
     assert all("SIGSEGV" in trial["failure"] for trial in trials)
     assert done.out.splitlines()[-1] == f"cosim run lag.json --set lag.T={trials[0]['T']}"

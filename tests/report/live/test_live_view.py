@@ -234,9 +234,9 @@ def refused(*options):
 @pytest.mark.parametrize(
     ("options", "error"),
     [
-        (["--isolation", "none"], "--view shows a supervised run"),
-        (["--sandbox", "strict"], "--view needs the network of this machine"),
-        (["--late", "fail"], "--late fail does not go with --view"),
+        (["--isolation", "none"], "--view requires a supervised run"),
+        (["--sandbox", "strict"], "--view requires a network connection"),
+        (["--late", "fail"], "--view cannot be combined with --late fail"),
     ],
 )
 def test_conditions_under_which_nothing_can_be_shown_are_refused(options, error):

@@ -46,12 +46,12 @@ def test_it_can_be_put_back_into_a_scenario(name, tmp_path):
     role = read_role(name)
     candidate = parse_source(str(min(role.controllers)))
     scenario = ROOT / f"scenarios/{SCENARIOS.get(name, 'performance_5')}.json"
-    transplant = ControllerSubstitution(role, candidate, read_interface(candidate), scenario)
-    path = transplant.write(tmp_path)
-    assert path and len(transplant.replaced_components) == 1
+    substitution = ControllerSubstitution(role, candidate, read_interface(candidate), scenario)
+    path = substitution.write(tmp_path)
+    assert path and len(substitution.replaced_components) == 1
     assembly = prepare(path)
     try:
-        place = transplant.replaced_components[0]
+        place = substitution.replaced_components[0]
         assert any(component == place or component.startswith(f"{place}.") for component in assembly.system.components)
         assert str(min(role.controllers)) in {str(file) for file in assembly.files().values()}
     finally:
@@ -170,7 +170,7 @@ def candidate_of(inputs=(), outputs=(), parameters=()):
         (candidate_of(outputs=["thrust", "rudder"]), 'the output "rudder_angle" (rad) is missing; did you mean "rudder"?'),
         (
             candidate_of(outputs=["thrust", "rudder_angle"], inputs=["vehicle.yaw"]),
-            'nothing feeds the input "vehicle.yaw" in this role',
+            'the role has no signal for the input "vehicle.yaw"',
         ),
     ],
 )
@@ -181,7 +181,7 @@ def test_misfits_are_named(found, message):
 def test_what_is_set_has_to_be_a_variable():
     found = candidate_of(outputs=["thrust", "rudder_angle"], parameters=["heading_P", "waypoint_x[1]"])
     (problem,) = interface_problems(read_role("usv_autopilot"), found, ["heading_p", "waypoint_x", "heading_P"])
-    assert problem.message == 'it has no variable "heading_p"; did you mean "heading_P"?'
+    assert problem.message == 'the controller has no variable "heading_p"; did you mean "heading_P"?'
 
 
 @pytest.mark.parametrize(

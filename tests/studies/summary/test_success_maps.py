@@ -59,7 +59,7 @@ def test_shares_are_those_of_the_runs_of_a_cell(success_map):
 
 def test_a_run_without_success_is_shown_before_all_others(success_map):
     cell = success_map.cell(None, None, "old", 1.0)
-    assert (cell.representative_run.number, cell.selection_reason) == (4, "the first that is no success")
+    assert (cell.representative_run.number, cell.selection_reason) == (4, "the first unsuccessful run")
 
 
 def test_of_successes_the_median_one_is_shown(success_map):

@@ -78,7 +78,7 @@ def test_a_click_on_a_cell_leads_to_the_command_that_shows_a_run_in_full(lag, pa
     assert {click.partition("#")[2] for click in clicks} <= page.identifiers
     assert f"cosim run {lag.folder / 'lag.json'} --set" in page.words
     assert "/record" not in page.words
-    assert re.search(r"Run 2, the first that is no success in\s+start = high,\s+T = quick", page.words)
+    assert re.search(r"Run 2, the first unsuccessful run in\s+start = high,\s+T = quick", page.words)
 
 
 def test_rates_causes_and_the_design_stand_there(page):

@@ -66,10 +66,10 @@ def test_all_are_told_from_outside(probe, tmp_path, how):
 @pytest.mark.parametrize(
     ("words", "where"),
     [
-        ([], ["the supervised run: b", "a: one of its own"]),
-        (["--isolation", "none"], ["that of the command: b", "a: one of its own"]),
-        (["--sandbox"], ["a: one of its own, in a sandbox", "b: one of its own, in a sandbox"]),
-        (["--sandbox", "strict"], ["processes, all of them in bubblewrap", "b: one of its own, in a sandbox"]),
+        ([], ["supervised process: b", "a: its own process"]),
+        (["--isolation", "none"], ["process of the command: b", "a: its own process"]),
+        (["--sandbox"], ["a: its own process, in a sandbox", "b: its own process, in a sandbox"]),
+        (["--sandbox", "strict"], ["processes, all in bubblewrap", "b: its own process, in a sandbox"]),
     ],
 )
 def test_check_says_what_runs_where(probe, tmp_path, words, where, capsys):
