@@ -15,9 +15,10 @@ import click
 )
 @click.option("--open", "open_page", is_flag=True, help="Open the page in the browser.")
 def command(result: Path, other: Path | None, output_file: Path | None, open_page: bool) -> None:
-    """Write a page with the 3-D replay of RESULT, a folder written by `cosim run`.
+    """Write a page with the 3-D replay of one run, or of two runs to compare.
 
-    The page is a single file and needs no network. OTHER is a second run to compare: its bodies are shown in the same scene.
+    RESULT and OTHER are folders written by `cosim run`; the bodies of both are shown in the same scene. The page is a single
+    file and needs no network.
     """
     from ...report.replay import write_replay
     from ...report.runs import read_run

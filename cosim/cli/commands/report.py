@@ -14,9 +14,9 @@ import click
 )
 @click.option("--open", "open_page", is_flag=True, help="Open the page in the browser.")
 def command(result: Path, output_file: Path | None, open_page: bool) -> None:
-    """Write the report of RESULT, a folder written by `cosim run`, again: KPIs, figures, system and 3-D replay.
+    """Write the report of a finished run again: KPIs, figures, system and 3-D replay.
 
-    The page is a single file and needs no network.
+    RESULT is a folder written by `cosim run`. The page is a single file and needs no network.
     """
     from ...report.figures import draw_figure, figure_to_svg
     from ...report.run_page import write_report

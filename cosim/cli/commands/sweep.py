@@ -29,9 +29,9 @@ _MAX_PRINTED = 20
 @click.option("--replays", is_flag=True, help="Also write the 3-D replay of one run of each cell of the maps.")
 @study_options.study_options
 def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, **study: Any) -> int:
-    """Run a scenario at many points as SWEEP defines, a JSON file or the name of a shipped sweep.
+    """Run a scenario at many points: parameter studies and Monte Carlo.
 
-    Each run has its own child process. Writes table.csv (one row per run), aggregates.csv, success.csv, failures.csv,
+    SWEEP is a JSON file or the name of a shipped sweep. Each run has its own child process. Writes table.csv (one row per run), aggregates.csv, success.csv, failures.csv,
     sweep.json, sweep.html and success maps to the output directory. Called again, the command continues an interrupted sweep.
     Exit code 0: all runs reached their end; 1: some failed; 2: the sweep was refused; 130: interrupted, the finished runs are
     written.

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 @click.option("--output-dir", type=click.Path(path_type=Path), help="Folder for the results; default: runs/NAME.")
 @study_options.study_options
 def command(tuning: str, output_dir: Path | None, **study: Any) -> int:
-    """Find the parameters that minimise a KPI as TUNE defines, a JSON file or the name of a shipped tuning.
+    """Find the parameters that minimise a KPI.
 
-    Writes trials.csv (all evaluated points) and best.json to the output directory. Called again, the command continues an
+    TUNE is a JSON file or the name of a shipped tuning. Writes trials.csv (all evaluated points) and best.json to the output directory. Called again, the command continues an
     interrupted tuning. Exit code 0: a point was found; 1: a run failed at every point; 2: the tuning was refused; 3: no point
     meets the constraints, or none has a value; 130: interrupted.
     """

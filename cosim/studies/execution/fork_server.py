@@ -28,9 +28,8 @@ from ...process.temporary_folders import temporary_run_folder
 from ...scenario import load_scenario
 from ...scenario.named_functions import function_problem, load_function
 from ...scenario.nested_systems import Scenario
-from .job import Job, StudyContext
+from .job import READY, Job, StudyContext
 from .run import FmuFiles, ReplayRequest, supervised_check, supervised_run
-from .worker_pool import READY
 
 #: modules that a run imports lazily
 _PRELOADED_MODULES = (

@@ -11,6 +11,9 @@ from typing import Any, NewType, Protocol
 
 from ...results.checks import Number
 
+#: messages between the worker pool and its fork server
+READY, FORK_REQUEST = b"ready", b"fork"
+
 #: identifies a run by the content of its files and its settings; equal for equal runs
 RunKey = NewType("RunKey", str)
 

@@ -13,10 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import ComponentError, CosimError, Problem
-from .job import Job, Record, StudyContext
+from .job import FORK_REQUEST, READY, Job, Record, StudyContext
 
-#: messages between the pool and the fork server
-READY, FORK_REQUEST = b"ready", b"fork"
 #: attempts at a run whose worker process is killed
 MAX_ATTEMPTS = 3
 #: time limits for the start of the fork server and for its end (s)
