@@ -116,5 +116,5 @@ def _readable_folders(files: Iterable[Path]) -> list[Path]:
     from ..process.sandbox import interpreter_folders
 
     named = [Path(path) for file in files for path in (os.path.abspath(file), os.path.realpath(file))]  # noqa: PTH100
-    own = [*map(Path, _SYSTEM_PATHS), resources.root()]
-    return [path for path in (*interpreter_folders(), *own, *(file.parent for file in named)) if path.exists()]
+    system = [*map(Path, _SYSTEM_PATHS), resources.root()]
+    return [path for path in (*interpreter_folders(), *system, *(file.parent for file in named)) if path.exists()]

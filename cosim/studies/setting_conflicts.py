@@ -63,17 +63,17 @@ def check_conflicts(common: Mapping[str, Any], setters: Iterable[tuple[str, Iter
     """
     defaults = _expand_settings("the settings", common.items())
     known = {each.path: each for each in defaults if not each.is_pointer}
-    beneath = _pointers_by_ancestor(defaults)
+    pointers_by_path = _pointers_by_ancestor(defaults)
     for name, pairs in setters:
-        own = _expand_settings(f'"{name}"', pairs)
-        for each in own:
+        settings = _expand_settings(f'"{name}"', pairs)
+        for each in settings:
             other = known.get(each.path)
             if other and (other not in defaults or not (each.is_nested or each.name == other.name)):
                 raise ValueError(each.conflict_message(other))
-            if each.is_pointer and (other := beneath.get(each.path)):
+            if each.is_pointer and (other := pointers_by_path.get(each.path)):
                 raise ValueError(f'"{each.name}" of {each.owner} replaces "{other.name}" of {other.owner}')
-        known |= {each.path: each for each in own}
-        beneath |= _pointers_by_ancestor(own)
+        known |= {each.path: each for each in settings}
+        pointers_by_path |= _pointers_by_ancestor(settings)
 
 
 def _pointers_by_ancestor(settings: Iterable[_Setting]) -> dict[tuple[str, ...], _Setting]:

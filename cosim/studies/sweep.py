@@ -61,7 +61,7 @@ class Sweep:
 
     @cached_property
     def study(self) -> Study:
-        """The study that makes the runs."""
+        """Study that makes the runs."""
         return Study(self.study_file, tuple(self.design.level_settings()))
 
     def __len__(self) -> int:
@@ -84,8 +84,8 @@ class Sweep:
     @cached_property
     def criteria(self) -> list[dict[str, Any]]:
         """Checks that a run must meet to be a success."""
-        own = self.study_file.spec.success
-        return self.study.checks if own is None else [check.model_dump(exclude_none=True) for check in own]
+        success = self.study_file.spec.success
+        return self.study.checks if success is None else [check.model_dump(exclude_none=True) for check in success]
 
     def passed(self, kpis: Mapping[str, Number]) -> bool:
         """Return whether these KPIs meet all criteria; a missing KPI does not."""

@@ -105,12 +105,12 @@ class Tuning:
 
     @property
     def spec(self) -> TuneSpec:
-        """The content of the tuning's file."""
+        """Content of the tuning's file."""
         return self.study_file.spec
 
     @cached_property
     def study(self) -> Study:
-        """The study that makes the runs."""
+        """Study that makes the runs."""
         return Study(self.study_file, tuple(self.spec.cases))
 
     def run(self, run_store: RunStore, runner: CheckingRunner, observe: RecordObserver) -> Trial:

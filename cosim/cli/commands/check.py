@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 def command(scenario: str, settings: tuple[str, ...], connections: bool, isolation: str, sandbox: str | None) -> None:
     """Check SCENARIO without running it and print the expanded system.
 
-    SCENARIO is a JSON file or the name of a shipped scenario. Prints components, processes, stages, connections and unit conversions. Probable mistakes are warnings: a forgotten
-    connection, a missing reference, an event after the end. --isolation and --sandbox only affect the printed processes.
+    SCENARIO is a JSON file or the name of a shipped scenario. Prints components, processes, stages, connections and unit
+    conversions. Probable mistakes are warnings: a forgotten connection, a missing reference, an event after the end.
+    --isolation and --sandbox only affect the printed processes.
     """
     from ...api import load
     from ...scenario.nested_systems import parse_settings

@@ -86,16 +86,16 @@ def _package_findings() -> Iterator[Finding]:
     from packaging.requirements import Requirement
 
     try:
-        own = metadata.distribution(DISTRIBUTION)
+        distribution = metadata.distribution(DISTRIBUTION)
     except metadata.PackageNotFoundError:
         yield Finding("required packages", DISTRIBUTION, "not installed, so its requirements are unknown", "broken")
         return
-    requirements = [Requirement(text) for text in own.requires or ()]
+    requirements = [Requirement(text) for text in distribution.requires or ()]
     for requirement in requirements:
         if requirement.marker is None or requirement.marker.evaluate({"extra": ""}):
-            found, fits = _installed_version(requirement)
-            yield Finding("required packages", requirement.name, found, "ok" if fits else "broken")
-    for extra in own.metadata.get_all("Provides-Extra") or ():
+            version, fits = _installed_version(requirement)
+            yield Finding("required packages", requirement.name, version, "ok" if fits else "broken")
+    for extra in distribution.metadata.get_all("Provides-Extra") or ():
         yield _extra_finding(extra, requirements)
 
 

@@ -31,10 +31,10 @@ _MAX_PRINTED = 20
 def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, **study: Any) -> int:
     """Run a scenario at many points: parameter studies and Monte Carlo.
 
-    SWEEP is a JSON file or the name of a shipped sweep. Each run has its own child process. Writes table.csv (one row per run), aggregates.csv, success.csv, failures.csv,
-    sweep.json, sweep.html and success maps to the output directory. Called again, the command continues an interrupted sweep.
-    Exit code 0: all runs reached their end; 1: some failed; 2: the sweep was refused; 130: interrupted, the finished runs are
-    written.
+    SWEEP is a JSON file or the name of a shipped sweep. Each run has its own child process. Writes table.csv (one row per
+    run), aggregates.csv, success.csv, failures.csv, sweep.json, sweep.html and success maps to the output directory. Called
+    again, the command continues an interrupted sweep. Exit code 0: all runs reached their end; 1: some failed; 2: the sweep
+    was refused; 130: interrupted, the finished runs are written.
     """
     from ...results.parquet_files import require_parquet
     from ...studies.sweep import Sweep

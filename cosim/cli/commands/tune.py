@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 def command(tuning: str, output_dir: Path | None, **study: Any) -> int:
     """Find the parameters that minimise a KPI.
 
-    TUNE is a JSON file or the name of a shipped tuning. Writes trials.csv (all evaluated points) and best.json to the output directory. Called again, the command continues an
-    interrupted tuning. Exit code 0: a point was found; 1: a run failed at every point; 2: the tuning was refused; 3: no point
-    meets the constraints, or none has a value; 130: interrupted.
+    TUNE is a JSON file or the name of a shipped tuning. Writes trials.csv (all evaluated points) and best.json to the output
+    directory. Called again, the command continues an interrupted tuning. Exit code 0: a point was found; 1: a run failed at
+    every point; 2: the tuning was refused; 3: no point meets the constraints, or none has a value; 130: interrupted.
     """
     from ...studies.tune import Tuning
 

@@ -78,7 +78,7 @@ class CandidateInterface:
 
     def has_variables(self, name: str) -> bool:
         """Return whether `name` is a variable, an array, or a prefix of variables."""
-        return not name or any(own == name or own.startswith((f"{name}.", f"{name}[")) for own in self.names)
+        return not name or any(each == name or each.startswith((f"{name}.", f"{name}[")) for each in self.names)
 
 
 def read_interface(candidate: CandidateSource) -> CandidateInterface:
@@ -155,48 +155,48 @@ def _port_targets(root: Node, port: str, kind: str) -> list[Target]:
         raise InputError(str(error)) from None
 
 
-def interface_problems(role: Role, found: CandidateInterface, settings: Iterable[str] = ()) -> list[Problem]:
+def interface_problems(role: Role, interface: CandidateInterface, settings: Iterable[str] = ()) -> list[Problem]:
     """Return all problems for which a controller cannot take a role.
 
     Args:
         role: the role.
-        found: the controller's interface.
+        interface: the controller's interface.
         settings: names of the variables that are set.
     """
     expected = {**role.inputs, **role.outputs, **role.parameters}
     return [
-        *(_missing_output(name, role, found) for name in role.outputs if name not in found.outputs),
-        *(_unexpected_input(name, role, found) for name in found.inputs if name not in role.inputs),
+        *(_missing_output(name, role, interface) for name in role.outputs if name not in interface.outputs),
+        *(_unexpected_input(name, role, interface) for name in interface.inputs if name not in role.inputs),
         *(
             Problem(f'"{name}" has the unit "{variable.unit.name}", expected "{unit.name}" or a unit that converts to it')
-            for variables in (found.inputs, found.outputs, found.parameters)
+            for variables in (interface.inputs, interface.outputs, interface.parameters)
             for name, variable in variables.items()
             if (unit := expected.get(name) or role.parameters.get(name.partition("[")[0]))
             and variable.unit
             and not variable.unit.converts_to(unit)
         ),
         *(
-            Problem(f'the controller has no variable "{name}"{_name_hint(name, found)}')
+            Problem(f'the controller has no variable "{name}"{_name_hint(name, interface)}')
             for name in settings
-            if not found.has_variables(name)
+            if not interface.has_variables(name)
         ),
     ]
 
 
-def _name_hint(name: str, found: CandidateInterface) -> str:
-    return did_you_mean(name, {*found.parameters, *found.inner_variables, *found.inputs})
+def _name_hint(name: str, interface: CandidateInterface) -> str:
+    return did_you_mean(name, {*interface.parameters, *interface.inner_variables, *interface.inputs})
 
 
-def _missing_output(name: str, role: Role, found: CandidateInterface) -> Problem:
+def _missing_output(name: str, role: Role, interface: CandidateInterface) -> Problem:
     unit = role.outputs[name]
     expected = f'the output "{name}"' + (f" ({unit.name})" if unit else "")
-    if name in {*found.inputs, *found.parameters}:
-        causality = "an input" if name in found.inputs else "a parameter"
+    if name in {*interface.inputs, *interface.parameters}:
+        causality = "an input" if name in interface.inputs else "a parameter"
         return Problem(f'"{name}" is {causality}, expected an output')
-    others = [own for own in found.outputs if own not in role.outputs]
+    others = [output for output in interface.outputs if output not in role.outputs]
     return Problem(f"{expected} is missing{did_you_mean(name, others)}")
 
 
-def _unexpected_input(name: str, role: Role, found: CandidateInterface) -> Problem:
-    free = [own for own in role.inputs if own not in found.inputs]
-    return Problem(f'the role has no signal for the input "{name}"{did_you_mean(name, free)}')
+def _unexpected_input(name: str, role: Role, interface: CandidateInterface) -> Problem:
+    unused = [each for each in role.inputs if each not in interface.inputs]
+    return Problem(f'the role has no signal for the input "{name}"{did_you_mean(name, unused)}')

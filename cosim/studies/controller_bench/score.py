@@ -100,7 +100,9 @@ def compare_kpis(
     def row(name: str, value: Number) -> KpiComparison:
         of_shipped, of_last = (run.kpis.get(name) if run else None for run in (shipped, last))
         against_shipped, against_last = (compare_values(value, other, better.get(name)) for other in (of_shipped, of_last))
-        own = tuple(outcome for outcome in outcomes if outcome.check["kpi"] == name)
-        return KpiComparison(name, candidate.units.get(name, ""), value, of_shipped, of_last, against_shipped, against_last, own)
+        checked = tuple(outcome for outcome in outcomes if outcome.check["kpi"] == name)
+        return KpiComparison(
+            name, candidate.units.get(name, ""), value, of_shipped, of_last, against_shipped, against_last, checked
+        )
 
     return [row(name, value) for name, value in candidate.kpis.items()]

@@ -23,16 +23,16 @@ from ...scenario.schema import ComponentSpec
 def cosim_fingerprint() -> str:
     """Return the version of cosim and a hash of its sources and shipped FMUs; equal results require equal fingerprints."""
     package = resources.package_folder()
-    own = sorted(path for path in package.rglob("*.py") if "_bundle" not in path.parts)
+    sources = sorted(path for path in package.rglob("*.py") if "_bundle" not in path.parts)
     digest = sha256()
-    for path in (*own, *resources.root().glob("fmus/manifest.json")):
+    for path in (*sources, *resources.root().glob("fmus/manifest.json")):
         digest.update(path.name.encode() + path.read_bytes())
     return f"{__version__} ({digest.hexdigest()[:12]})"
 
 
 @dataclass(frozen=True)
 class Bundle:
-    """Files of a scenario below their common folder `root`; `scenario` is the path of the scenario's own file."""
+    """Files of a scenario below their common folder `root`; `scenario` is the path of the scenario's sources file."""
 
     root: Path
     scenario: PurePosixPath
@@ -50,8 +50,8 @@ class Bundle:
         Raises:
             InputError: if a file has changed since its hash was computed.
         """
-        wanted = set(hashes)
-        contents = {sha: (self.root / path).read_bytes() for path, sha in self.files.items() if sha in wanted}
+        requested = set(hashes)
+        contents = {sha: (self.root / path).read_bytes() for path, sha in self.files.items() if sha in requested}
         if changed := [sha for sha, content in contents.items() if sha256(content).hexdigest() != sha]:
             names = [path for path, sha in self.files.items() if sha in changed]
             raise InputError(f'"{self.root / names[0]}" was changed while the sweep was running')

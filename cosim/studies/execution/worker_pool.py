@@ -99,10 +99,10 @@ class _ForkServer:
         Raises:
             OSError: if the fork server has ended.
         """
-        own, other = socket.socketpair()
+        connection, other = socket.socketpair()
         with other:
             socket.send_fds(self._control, [FORK_REQUEST], [other.fileno()])
-        return Worker(own)
+        return Worker(connection)
 
     @property
     def pid(self) -> int:

@@ -20,9 +20,9 @@ _MAX_SIZE = 6.3, 8.2
 _MAX_CELL_SIZE = 0.9, 0.46
 #: smallest distance between two labels
 _PAD = 0.06
-#: by how much the titles of the axes may be longer than the panels: there are tick labels and the colour bar beside these
+#: length by which the titles of the axes x and y may exceed the panels; the margins have at least this size
 _TITLE_EXCESS = 0.6, 0.4
-#: a line may hold this many times the characters that fit by the average width of the text's characters
+#: safety factor of the number of characters per line estimated from their average width
 _WIDTH_VARIATION = 1.3
 
 
@@ -109,9 +109,9 @@ def _label_text(label: Any) -> str:
 def _wrap(text: str, width: float, size: float, weight: str = "normal", break_words: bool = False) -> str:
     """Break a text into lines of at most `width` between words, with `break_words` also between characters."""
     average = _text_width([text], size, weight) / max(1, len(text))
-    most = min(len(text), int(_WIDTH_VARIATION * width / average)) if average else 1
+    longest = min(len(text), int(_WIDTH_VARIATION * width / average)) if average else 1
     lines = [text]
-    for characters in range(most, 0, -1):
+    for characters in range(longest, 0, -1):
         lines = textwrap.wrap(text, characters, break_long_words=break_words, break_on_hyphens=False)
         if _text_width(lines, size, weight) <= width:
             break
