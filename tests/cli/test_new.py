@@ -6,7 +6,6 @@ import json
 import shlex
 import shutil
 import subprocess
-import sys
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from functools import cache
 from io import StringIO
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cosim_command import run_cosim
 
 from cosim.cli import main
 from cosim.core import resources
@@ -28,8 +28,7 @@ MADE = {
 
 
 def cosim(*arguments, cwd):
-    command = [sys.executable, "-m", "cosim", *map(str, arguments)]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+    return run_cosim(*arguments, cwd=cwd)
 
 
 def new(folder, name, language, *more):

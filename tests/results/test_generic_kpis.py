@@ -2,11 +2,10 @@
 
 import json
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from cosim_command import run_cosim
 
 from cosim import kpis
 from cosim.core.recording import Recording
@@ -181,8 +180,7 @@ def scenario(folder, **kpi):
         "        return True\n"
     )
     (folder / "saw.json").write_text(json.dumps(content))
-    command = [sys.executable, "-m", "cosim", "run", "saw.json", "--isolation", "none"]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    return run_cosim("run", "saw.json", "--isolation", "none", cwd=folder)
 
 
 def test_scenarios_name_them_by_their_module(tmp_path):

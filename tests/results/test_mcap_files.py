@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
 import sys
 
 import numpy as np
 import pytest
+from cosim_command import run_cosim
 
 from cosim.core.errors import InputError
 from cosim.core.recording import Recording
@@ -177,8 +177,8 @@ def test_the_package_is_asked_for_when_it_is_missing(tmp_path, monkeypatch):
 
 
 def test_a_run_writes_its_poses_and_its_scene(tmp_path):
-    command = [sys.executable, "-m", "cosim", "run", "demo1_box", "--stop-time", "0.5", "--no-report", "--mcap"]
-    done = subprocess.run([*command, "--output-dir", "out"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    words = ("run", "demo1_box", "--stop-time", "0.5", "--no-report", "--mcap", "--output-dir", "out")
+    done = run_cosim(*words, cwd=tmp_path)
     assert done.returncode == 3, done.stderr  # nothing has landed by then
     file = tmp_path / "out/result.mcap"
     assert {transform.child_frame_id for transform in messages(file, "/tf")[0][2].transforms} == {"plant.uav", "plant.usv"}

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ...core.component import Component
     from ...core.recording import Recording
     from ...core.system import System
-    from ...engine.run_loop import Settings
+    from ...engine.settings import Settings
 
 FMU_NAME, PROFILE_NAME = "fmu", "profile"
 
@@ -116,7 +116,7 @@ def _build_system(
     """Return a system of the FMU, and of the input file if there is one, with the settings of its simulation."""
     from ...components.fmi import FmuFile, create_component
     from ...core.system import Connection, Endpoint, System
-    from ...engine.run_loop import Settings
+    from ...engine.settings import Settings
 
     file = FmuFile(fmu)
     experiment = file.description.default_experiment

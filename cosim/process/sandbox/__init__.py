@@ -29,12 +29,12 @@ __all__ = [
     "ActiveRestrictions",
     "AvailableSandboxes",
     "SandboxSettings",
-    "probe_restrictions",
-    "find_available_sandboxes",
-    "find_bubblewrap",
     "bubblewrap_command",
     "enter_sandbox",
+    "find_available_sandboxes",
+    "find_bubblewrap",
     "interpreter_folders",
+    "probe_restrictions",
 ]
 
 GIBIBYTE = 1 << 30

@@ -7,7 +7,8 @@ import pytest
 from fakes import counter
 from systems import endpoint, make_system
 
-from cosim.engine.run_loop import Settings, simulate
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Settings
 from cosim.process.run_files.row_store import read_rows
 from cosim.results.csv_files import read_csv, write_csv
 

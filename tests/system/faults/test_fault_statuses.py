@@ -26,7 +26,7 @@ CASES = [
     Case("- 1 error", "", 0, STEP_COUNT + 1),
     Case("DoStep 6 warning", "WARNING lag: told to return warning", 0, STEP_COUNT + 1),
     Case("DoStep 6 discard", "lag: {f}" + T5 + "status 2 (discard): told to return discard"),
-    Case("DoStep 6 discard", "told to return discard; it says that it came to t = 0.05 s", versions=(2,)),
+    Case("DoStep 6 discard", "told to return discard; lastSuccessfulTime is 0.05 s", versions=(2,)),
     Case("DoStep 6 error", "lag: {f}" + T5 + "status 3 (error): told to return error"),
     Case("DoStep 6 fatal", "lag: {f}" + T5 + "status 4 (fatal): told to return fatal"),
     Case("DoStep 6 pending", "lag: {f}" + T5 + "status 5"),
