@@ -30,7 +30,7 @@ class Schedule:
         self.phases = [self._schedule_phase(phase) for phase in self._plan.phases]
 
     def add_step(self, step: Step, calls: Sequence[PreparedCall]) -> ScheduledStep:
-        """Number the calls of a step, after those of all earlier steps."""
+        """Append a step; its calls are numbered after those of all earlier steps."""
         first_call = self._steps[-1].first_call + len(self._steps[-1].calls) if self._steps else 0
         self._steps.append(ScheduledStep(step, calls, first_call))
         return self._steps[-1]
