@@ -158,7 +158,7 @@ def _read_profile(path: Path, component: Component) -> Component:
 
 def _check_start_values(component: Component, start_values: dict[str, Any]) -> dict[str, Any]:
     from ...core.errors import InputError, Problem
-    from ...scenario.name_resolution import UnknownName, check_assignment
+    from ...scenario.name_resolution import UnknownNameError, check_assignment
 
     variables = {variable.name: variable for variable in component.variables}
     values: dict[str, Any] = {}
@@ -166,7 +166,7 @@ def _check_start_values(component: Component, start_values: dict[str, Any]) -> d
     for name, value in start_values.items():
         try:
             values |= check_assignment(FMU_NAME, variables, name, value)
-        except (UnknownName, ValueError) as error:
+        except (UnknownNameError, ValueError) as error:
             problems.append(Problem(str(error), f"--start-value {name}"))
     if problems:
         raise InputError(problems)
