@@ -9,7 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, Field, StringConstraints, model_validator
 
 from ..core.errors import did_you_mean
-from ..scenario.schema import CheckSpec, NameList, Spec
+from ..scenario.schema import CheckSpec
+from ..scenario.schema_types import NameList, Spec
 from .setting_conflicts import check_conflicts
 
 #: distribution -> its arguments; `min` and `max` of truncated_normal may be left out
