@@ -7,7 +7,7 @@ from .native_executor import NativeExecutor, native_available
 from .plan import Plan, compile_plan
 from .python_executor import PythonExecutor
 from .recorder import Recorder
-from .step_runner import MARKER_SIZE, Termination
+from .step_runner import Termination
 
 ExecutorKind = Literal["auto", "native", "python"]
 
@@ -29,7 +29,6 @@ def executor_class(kind: ExecutorKind) -> type[Executor]:
 
 __all__ = [
     "EXECUTORS",
-    "MARKER_SIZE",
     "Executor",
     "ExecutorKind",
     "Plan",

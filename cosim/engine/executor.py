@@ -8,13 +8,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..core.errors import ComponentError
+from ..process.journal import MARKER_SIZE, ROW_COUNT
 from .finite_check import FiniteCheck
 from .initialization import initialize_components
 from .parallel import MEASURED_STEPS, ParallelSteps
 from .plan import Plan
 from .recorder import Recorder
 from .schedule import Schedule
-from .step_runner import MARKER_ROWS, MARKER_SIZE, StepRunner, Termination
+from .step_runner import StepRunner, Termination
 from .transfer_calls import DelayLine, TransferCall, compile_transfer
 from .transfer_plan import Transfer
 
@@ -26,7 +27,7 @@ class Executor(ABC):
         plan: the compiled system.
         recorder: stores the recorded outputs.
         marker: int64 array, shape (MARKER_SIZE,), updated before every call, so that a process which shares its memory can see
-            the current call; see MARKER_CALL, MARKER_STEPS and MARKER_ROWS in `step_runner`.
+            the current call; see CALL_NUMBER, STEP_COUNT and ROW_COUNT in `process.journal`.
         require_finite: a connected output that is NaN or infinite ends the run.
     """
 
@@ -69,7 +70,7 @@ class Executor(ABC):
         self._parallel_steps.find_candidates(self.plan.phases, self._schedule)
         self._prepare()
         self.recorder.record(0)
-        self.marker[MARKER_ROWS] = self.recorder.row_count
+        self.marker[ROW_COUNT] = self.recorder.row_count
 
     def run(self, end: int) -> None:
         """Run macro steps until communication point `end` is reached or a component requests termination.
@@ -94,7 +95,7 @@ class Executor(ABC):
             try:
                 self._run_macro_steps(self.completed_steps, min(end, self.recorder.last_point_in_chunk(self.completed_steps)))
             finally:
-                self.recorder.set_row_count(int(self.marker[MARKER_ROWS]))
+                self.recorder.set_row_count(int(self.marker[ROW_COUNT]))
 
     def close(self) -> None:
         """End the threads; no step may be run afterwards."""

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..core.component import Component, Ports
-from ..core.errors import ComponentError
+from ..core.errors import ComponentError, abbreviate_names
 from ..core.system import Endpoint
 from ..process.journal import calling_component
-from .convergence import abbreviate_names, exceeds_tolerance
+from .convergence import exceeds_tolerance
 from .layout import Dtype
 from .plan import Plan
 from .transfer_calls import compile_transfer

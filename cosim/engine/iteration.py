@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.component import Component
-from ..core.errors import ComponentError
+from ..core.errors import ComponentError, abbreviate_names
 from ..process.journal import calling_component
 from .component_step import ScheduledStep
-from .convergence import abbreviate_names, exceeds_tolerance
+from .convergence import exceeds_tolerance
 from .layout import Dtype, Layout
 from .plan import Loop
 from .transfer_calls import TransferCall

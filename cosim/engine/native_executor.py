@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ..core.component import NativeDoStep, NativeFlagCheck, NativeGetSet, PreparedCall
+from ..process.journal import ROW_COUNT
 from .component_step import ScheduledStep
 from .executor import Executor
-from .step_runner import MARKER_ROWS
 from .transfer_plan import Transfer
 
 try:
@@ -122,7 +122,7 @@ class NativeExecutor(Executor):
 
     def _record(self, n: int) -> None:
         self.recorder.record(n)
-        self.marker[MARKER_ROWS] = self.recorder.row_count
+        self.marker[ROW_COUNT] = self.recorder.row_count
 
     def _on_status(self, number: int, status: int) -> int:
         """Handle a status of call `number` that is not a success, and return how the simulation continues."""

@@ -13,12 +13,12 @@ import numpy as np
 
 from ..core.component import SUCCESS_STATUSES, NativeDoStep, PreparedCall
 from ..process import float_mode
+from ..process.journal import CALL_NUMBER, ROW_COUNT, STEP_COUNT
 from .component_step import ScheduledStep
 from .executor import Executor
 from .parallel import MEASURED_STEPS
 from .plan import Phase, Plan
 from .recorder import Recorder
-from .step_runner import MARKER_CALL, MARKER_ROWS, MARKER_STEPS
 from .transfer_calls import TransferCall, contiguous_views
 
 #: number of floats from which NumPy extracts the exponent bytes faster than Python
@@ -43,7 +43,7 @@ class _DueSteps:
         self._steps, self._divisors, self._marker = steps, divisors, marker
 
     def __iter__(self) -> Iterator[Sequence[NumberedCall]]:
-        n = self._marker[MARKER_STEPS]
+        n = self._marker[STEP_COUNT]
         return compress(self._steps, [n % divisor == 0 for divisor in self._divisors])
 
 
@@ -103,9 +103,9 @@ class PythonExecutor(Executor):
                 for transfer in transfers:
                     transfer()
                 for calls in steps:
-                    for marker[MARKER_CALL], function, arguments in calls:
+                    for marker[CALL_NUMBER], function, arguments in calls:
                         if (status := function(*arguments)) and status not in SUCCESS_STATUSES:
-                            runner.handle_status(*find_call(marker[MARKER_CALL]), status)
+                            runner.handle_status(*find_call(marker[CALL_NUMBER]), status)
                     if one + little != one - little or not least + least:
                         runner.raise_float_mode_changed(*find_call(calls[-1][0]))
             if (termination := runner.termination) and not termination.complete:
@@ -117,8 +117,8 @@ class PythonExecutor(Executor):
                 for write in row_writers:
                     write(row)
                 row += 1
-                marker[MARKER_ROWS] = row
-            marker[MARKER_STEPS] = n + 1
+                marker[ROW_COUNT] = row
+            marker[STEP_COUNT] = n + 1
             if termination:
                 return
 

@@ -18,9 +18,9 @@ from ..core.stopwatch import Stopwatch
 from ..core.system import System
 from ..core.time_grid import TimeGrid
 from ..process.float_mode import default_float_mode
-from ..process.journal import Phase, calling_component, current_journal, suspending_deadline
+from ..process.journal import MARKER_SIZE, Phase, calling_component, current_journal, suspending_deadline
 from ..process.process_state import restoring_process_state
-from . import MARKER_SIZE, Executor, Recorder, Termination, compile_plan, executor_class
+from . import Executor, Recorder, Termination, compile_plan, executor_class
 from .initialization import instantiate_components
 from .pacer import Pacer
 from .run_checks import find_problems

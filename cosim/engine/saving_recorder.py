@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ..core.json_values import encode_value
 from ..core.system import Endpoint
 from ..process.run_files.folder import HEADER_FILE, ROWS_FILE, TEXTS_FILE
 from . import Recorder
@@ -41,11 +42,7 @@ class SavingRecorder(Recorder):
         strings = {name: array[index] for name, array, index in self._strings}
         if changed := {name: value for name, value in strings.items() if value != self._saved_strings[name]}:
             self._saved_strings |= changed
-            os.write(self._file.fileno(), json.dumps([row, changed], default=_encode_bytes).encode() + b"\n")
-
-
-def _encode_bytes(value: bytes) -> dict[str, str]:
-    return {"bytes": value.hex()}
+            os.write(self._file.fileno(), json.dumps([row, changed], default=encode_value).encode() + b"\n")
 
 
 def write_header(folder: Path, executor: Executor) -> None:

@@ -10,12 +10,10 @@ import numpy as np
 from ..core.component import SUCCESS_STATUSES, PreparedCall, StepResult
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, describe_exception
 from ..process import float_mode
+from ..process.journal import CALL_NUMBER, STEP_COUNT
 from .component_step import ScheduledStep
 from .iteration import FixedPointIteration
 from .plan import Step
-
-#: indices into the marker: number of the current call, completed macro steps, recorded rows (also in _native.c)
-MARKER_CALL, MARKER_STEPS, MARKER_ROWS, MARKER_SIZE = 0, 1, 2, 3
 
 #: status of a call into Python during which a component requested termination; no FMU can return it
 _STATUS_TERMINATION = 1 << 32
@@ -48,7 +46,7 @@ class StepRunner:
     @property
     def completed_steps(self) -> int:
         """Number of macro steps completed so far, which is the number of the current one."""
-        return int(self._marker[MARKER_STEPS])
+        return int(self._marker[STEP_COUNT])
 
     @property
     def termination_status(self) -> int:
@@ -62,7 +60,7 @@ class StepRunner:
             ComponentError: a call failed or changed the floating-point mode.
         """
         for number, call in enumerate(step.calls[first:], start=step.first_call + first):
-            self._marker[MARKER_CALL] = number
+            self._marker[CALL_NUMBER] = number
             if (status := call.function(*call.arguments)) not in SUCCESS_STATUSES:
                 self.handle_status(step, call, status)
         if float_mode.is_changed():

@@ -11,6 +11,8 @@ import select
 from collections.abc import Iterable
 from typing import Any
 
+from ....core.json_values import decode_object, encode_value
+
 #: the command to execute a prepared step, and the answer that it succeeded without a result: the same empty line
 STEP_COMMAND = STEP_DONE = b"\n"
 
@@ -25,7 +27,7 @@ MAX_SPIN_BACKOFF = 512
 
 def encode_line(message: Any) -> bytes:
     """Return a message as one line of JSON; bytes and NumPy arrays are allowed in it."""
-    return json.dumps(message, default=_encode_value).encode() + b"\n"
+    return json.dumps(message, default=encode_value).encode() + b"\n"
 
 
 def decode_line(line: bytes) -> Any:
@@ -34,15 +36,7 @@ def decode_line(line: bytes) -> Any:
     Raises:
         ValueError: The line is not JSON.
     """
-    return json.loads(line, object_hook=_decode_bytes)
-
-
-def _encode_value(value: Any) -> Any:
-    return {"bytes": value.hex()} if isinstance(value, bytes) else value.tolist()
-
-
-def _decode_bytes(value: dict[str, Any]) -> Any:
-    return bytes.fromhex(value["bytes"]) if value.keys() == {"bytes"} else value
+    return json.loads(line, object_hook=decode_object)
 
 
 class SpinningPoller:

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import NoReturn
 
 from ....core import component_log
+from ....process.failure_attribution import describe_exit_status
 from ....process.journal import CALL_NUMBER, CHANGE_COUNT, Journal, suspending_deadline
-from ....process.supervisor import MAX_OUTPUT_SIZE, POLL_INTERVAL, describe_exit_status
+from ....process.supervisor import MAX_OUTPUT_SIZE, POLL_INTERVAL
 from .pipes import READ_SIZE, STEP_DONE, SpinningPoller, decode_line, write_line
 
 #: wait (ms) that still counts for the deadline of the run's own supervisor

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
+from ....core.errors import abbreviate_names
 from . import elf, macho, pe
 from .archive import Archive
 from .findings import Finding, Rule
@@ -119,8 +120,7 @@ def _check_library(archive: Archive, member: str, major: int, machine: FmuPlatfo
         yield FORMAT(f"the library cannot be loaded: it {error}", member)
         return
     if missing := sorted(REQUIRED_FUNCTIONS[major] - library.exports):
-        shown = ", ".join(missing[:5]) + (f" and {len(missing) - 5} more" if len(missing) > 5 else "")
-        yield FUNCTIONS(f"the library does not export {shown}", member)
+        yield FUNCTIONS(f"the library does not export {abbreviate_names(missing, limit=5)}", member)
     for name in library.needed_libraries:
         if not _is_library_found(name, library, archive, member):
             yield NEEDED(f"needs the library {name}, which was not found on this machine", member)
