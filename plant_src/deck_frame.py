@@ -1,7 +1,7 @@
-"""A vehicle seen from the landing deck of a vessel ("plant.usv.deck"), however the vessel heels and turns.
+"""Recorded motion of a vehicle relative to the landing deck of a vessel, in the axes of the deck.
 
 The deck's axes are those of the vessel: forward, left, and up along the normal of the deck. Arrays have one row per row of
-the result, shape (rows, 3).
+the result.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from cosim.results import Result
 
 
 def rotation_matrix(result: Result, vehicle: str) -> np.ndarray:
-    """The forward, left and up axis of a vehicle in the world's axes, as columns: Rz(yaw) Ry(pitch) Rx(roll); (rows, 3, 3)."""
+    """Return the rotation matrices Rz(yaw) Ry(pitch) Rx(roll) from body axes to world axes, shape (rows, 3, 3)."""
     roll, pitch, yaw = (result[f"{vehicle}.attitude.{angle}"] for angle in ("roll", "pitch", "yaw"))
     (cr, sr), (cp, sp), (cy, sy) = ((np.cos(angle), np.sin(angle)) for angle in (roll, pitch, yaw))
     matrix = [
@@ -24,12 +24,12 @@ def rotation_matrix(result: Result, vehicle: str) -> np.ndarray:
 
 
 def relative_position(result: Result, vehicle: str, deck: str) -> np.ndarray:
-    """The vehicle's centre of mass from the deck centre, in the deck's axes (m)."""
+    """Return the position of a vehicle's centre of mass relative to the deck centre (m), in deck axes, shape (rows, 3)."""
     return _to_deck_axes(result, deck, _world_offset(result, vehicle, deck))
 
 
 def relative_velocity(result: Result, vehicle: str, deck: str) -> np.ndarray:
-    """Velocity of the vehicle relative to the point of the deck where it is, in the deck's axes (m/s)."""
+    """Return the velocity of a vehicle relative to the point of the deck below it (m/s), in deck axes, shape (rows, 3)."""
     vessel = deck.removesuffix(".deck")
     rates_body = np.stack([result[f"{vessel}.rates.{axis}"] for axis in "pqr"], axis=1)
     rates = np.einsum("nij,nj->ni", rotation_matrix(result, vessel), rates_body)
@@ -38,17 +38,37 @@ def relative_velocity(result: Result, vehicle: str, deck: str) -> np.ndarray:
 
 
 def relative_tilt(result: Result, vehicle: str, deck: str) -> np.ndarray:
-    """Angle between the up axes of vehicle and deck (rad), shape (rows,)."""
+    """Return the angle between the up axes of vehicle and deck (rad), shape (rows,)."""
     up, normal = (rotation_matrix(result, name)[:, :, 2] for name in (vehicle, deck.removesuffix(".deck")))
-    return np.arctan2(np.linalg.norm(np.cross(up, normal), axis=1), np.sum(up * normal, axis=1))
+    angle: np.ndarray = np.arctan2(np.linalg.norm(np.cross(up, normal), axis=1), np.sum(up * normal, axis=1))
+    return angle
+
+
+def slide_distance(result: Result, vehicle: str, deck: str, row: int) -> float:
+    """Return the largest distance that a vehicle slides over a deck.
+
+    Args:
+        result: Recorded mission.
+        vehicle: Signal prefix of the vehicle ("plant.uav").
+        deck: Signal prefix of the landing deck ("plant.usv.deck").
+        row: Row of the touchdown.
+
+    Returns:
+        Largest distance in the plane of the deck from the position at `row`, over rows in contact from then on (m).
+    """
+    position = relative_position(result, vehicle, deck)[row:, :2]
+    contact = result[f"{vehicle}.contact.vessel"].astype(bool)[row:]
+    return float(np.linalg.norm(position - position[0], axis=1)[contact].max())
 
 
 def _to_deck_axes(result: Result, deck: str, vectors: np.ndarray) -> np.ndarray:
-    return np.einsum("nji,nj->ni", rotation_matrix(result, deck.removesuffix(".deck")), vectors)
+    rotated: np.ndarray = np.einsum("nji,nj->ni", rotation_matrix(result, deck.removesuffix(".deck")), vectors)
+    return rotated
 
 
 def _world_offset(result: Result, vehicle: str, deck: str) -> np.ndarray:
-    return _vector_signal(result, f"{vehicle}.position") - _vector_signal(result, f"{deck}.position")
+    offset: np.ndarray = _vector_signal(result, f"{vehicle}.position") - _vector_signal(result, f"{deck}.position")
+    return offset
 
 
 def _vector_signal(result: Result, name: str) -> np.ndarray:

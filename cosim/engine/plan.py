@@ -193,6 +193,6 @@ def _variables_to_bind(component: Component, used: Mapping[str, Variable], causa
 
 
 def _group_by_type(variables: Sequence[Variable]) -> list[Variable]:
-    """Sort variables by type, so that one FMI call sets or gets all of a type; enumerations count as integers."""
+    """Group variables by type, so that one FMI call sets or gets all of a type; enumerations count as integers."""
     types = [f"Int{8 * v.dtype.itemsize}" if v.type == "Enumeration" else v.type for v in variables]
     return [variable for kind in dict.fromkeys(types) for variable, type_ in zip(variables, types, strict=True) if type_ == kind]

@@ -46,13 +46,12 @@ class Schedule:
         return [(step.step.name, call.name) for step in self._steps for call in step.calls]
 
     def _schedule_phase(self, phase: Phase) -> list[ScheduledStep]:
-        steps = [self.add_step(step, self._step_calls(step)) for step in phase.steps]
+        steps = []
+        for step in phase.steps:
+            calls = step.component.prepare_step_calls(self._runner.current_time, step.step_size)
+            calls = calls or [PreparedCall(self._runner.run_python_component, (step,), "do_step")]
+            steps.append(self.add_step(step, calls))
         return [*steps, self._schedule_loop(phase.loop)] if phase.loop else steps
-
-    def _step_calls(self, step: Step) -> Sequence[PreparedCall]:
-        return step.component.prepare_step_calls(self._runner.current_time, step.step_size) or [
-            PreparedCall(self._runner.run_python_component, (step,), "do_step")
-        ]
 
     def _schedule_loop(self, loop: Loop) -> ScheduledStep:
         """Schedule all iterations of a loop as one call."""

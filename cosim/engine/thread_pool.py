@@ -35,8 +35,9 @@ class ThreadPool:
         futures = [self._executor.submit(function, item) for item in items[1:]]
         try:
             return [function(items[0]), *(future.result() for future in futures)]
-        finally:
+        except BaseException:
             _wait_for(futures)
+            raise
 
     def close(self) -> None:
         """End the threads."""

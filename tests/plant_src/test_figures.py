@@ -1,4 +1,4 @@
-"""What the figures of a mission show, read back from the drawn lines."""
+"""Figures of a mission, checked by reading the data back from the drawn lines."""
 
 import numpy as np
 import pytest

@@ -169,7 +169,7 @@ class FmuInstance(FunctionCaller, Component):
     # -- the stepping loop -----------------------------------------------------------------------------------------------
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
-        """Remember the arrays; `instantiate` prepares the calls that transfer them."""
+        """Store the arrays; `instantiate` prepares the calls that transfer them."""
         self._inputs, self._outputs = inputs, outputs
 
     def _set_object(self, name: str, array: np.ndarray, index: int) -> int:

@@ -17,7 +17,7 @@ _MAX_SHOWN = 100
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """Rule of the FMI standard, of a file format or of caution.
+    """Rule of the FMI standard, of a file format or for safety.
 
     Attributes:
         name: Rule id, such as "archive.name".

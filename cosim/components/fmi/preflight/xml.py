@@ -12,7 +12,7 @@ from .limits import PreflightLimits
 
 SIZE = Rule("xml.size", "limits")
 ENCODING = Rule("xml.encoding", "FMI 2.0.5 section 2.2, FMI 3.0.2 section 2.4")
-DOCTYPE = Rule("xml.doctype", "caution: entities")
+DOCTYPE = Rule("xml.doctype", "safety: entities")
 SYNTAX = Rule("xml.syntax", "XML 1.0")
 
 #: accepted encodings; FMI requires UTF-8, but exporters use the others too
