@@ -3,6 +3,7 @@
 The wheel carries scenarios, FMUs, plant and controller sources as cosim/_bundle/ in the layout of the checkout.
 """
 
+import os
 import shutil
 import sys
 from pathlib import Path
@@ -26,10 +27,11 @@ class BuildWithBundle(build_py):
 
 
 def native_executor() -> Extension:
-    """Optional: without a C compiler cosim installs all the same and runs the pure Python executor."""
+    """Extension that is optional unless COSIM_REQUIRE_NATIVE is set; without it cosim runs the pure Python executor."""
+    optional = not os.environ.get("COSIM_REQUIRE_NATIVE")
     flags = [] if sys.platform == "win32" else ["-std=c11", "-O2", "-ffp-contract=off"]
     return Extension(
-        "cosim.engine._native", ["cosim/engine/_native.c"], extra_compile_args=flags, py_limited_api=True, optional=True
+        "cosim.engine._native", ["cosim/engine/_native.c"], extra_compile_args=flags, py_limited_api=True, optional=optional
     )
 
 

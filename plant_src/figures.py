@@ -1,6 +1,6 @@
-"""Figures of a mission: the paths in the horizontal plane, the tracking error and the landing over time.
+"""Figures of a mission: horizontal paths, tracking error over time and landing over time (figures 14 to 16 of the paper).
 
-They show what figures 14 to 16 of the paper show. Every function takes a result and names of things in it, as the KPIs do.
+Every function takes a result and names of signals or signal prefixes, like the KPIs in `kpis.py`.
 """
 
 from __future__ import annotations
@@ -13,33 +13,27 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
-from matplotlib.patheffects import withStroke
-from matplotlib.text import Text
 
 from cosim.results import Result
 from cosim.results.kpi import Prefix, Signal
 
-from .kpis import horizontal_distance, touchdown_row, waypoints
+from .figure_style import (
+    COLUMN_WIDTH,
+    LEGEND_STYLE,
+    MULTIROTOR_COLOUR,
+    PHASE_COLOURS,
+    REFERENCE_COLOUR,
+    TOUCHDOWN_COLOUR,
+    TOUCHDOWN_MARKER,
+    VESSEL_COLOUR,
+    annotate,
+    fit_height,
+)
+from .kpis import waypoints
+from .recorded_motion import horizontal_distance, touchdown_row
 
-MULTIROTOR_COLOUR, VESSEL_COLOUR, REFERENCE_COLOUR, TOUCHDOWN_COLOUR = "#0072B2", "#D55E00", "#444444", "#111111"
-PHASE_COLOURS = ("#F4F4F4", "#FFF8E1", "#EAF2FA", "#EDF6E8", "#FDEFE7", "#F2EDF8")
-TOUCHDOWN_MARKER: Mapping[str, Any] = {
-    "color": TOUCHDOWN_COLOUR,
-    "linestyle": "",
-    "marker": "*",
-    "markersize": 9,
-    "markeredgecolor": "white",
-}
-LEGEND_STYLE: Mapping[str, Any] = {
-    "ncols": 4,
-    "columnspacing": 0.7,
-    "handlelength": 1.4,
-    "handletextpad": 0.4,
-    "borderaxespad": 0.2,
-}
-TIME_AFTER_TOUCHDOWN = 4.0  # s shown of the time after it
-MIN_PLOTTED_ERROR = 1e-3  # m; the axis is logarithmic
-COLUMN_WIDTH = 3.5  # in, width of a column in a two-column paper
+TIME_AFTER_TOUCHDOWN = 4.0  # s, shown by default
+MIN_PLOTTED_ERROR = 1e-3  # m, lower end of the logarithmic axis
 
 
 def paths(
@@ -51,10 +45,20 @@ def paths(
     radius: float = 0.0,
     platforms: Mapping[str, Mapping[str, Sequence[float]]] | None = None,
 ) -> Figure:
-    """Paths of `vehicle` ("plant.uav") and of the vessel with the landing deck `deck` ("plant.usv.deck"), seen from above.
+    """Draw the paths of a multirotor and a vessel in the horizontal plane; dots mark their first positions.
 
-    `x`, `y` (m, world) are the vessel's waypoints, `radius` (m) that of their circles of acceptance; `platforms` are those of
-    the plant: {"start": {"size": [x, y, z], "position": [x, y, z]}} in m, position of the centre. Dots mark the starts.
+    Args:
+        result: Recorded mission.
+        vehicle: Signal prefix of the multirotor ("plant.uav").
+        deck: Signal prefix of the vessel's landing deck ("plant.usv.deck").
+        x: East coordinates of the vessel's waypoints (m, world).
+        y: North coordinates of the vessel's waypoints (m, world).
+        radius: Radius of the circles of acceptance (m).
+        platforms: Platforms as in the arguments of the plant: {"start": {"size": [x, y, z], "position": [x, y, z]}},
+            edges and centre (m, world).
+
+    Returns:
+        Figure of column width, one metre equally long along both axes.
     """
     figure = Figure()
     axes = figure.add_subplot(aspect="equal", xlabel="x / m", ylabel="y / m")
@@ -67,7 +71,7 @@ def paths(
     if row is not None:
         axes.plot(*(result[f"{vehicle}.position.{axis}"][row] for axis in "xy"), **TOUCHDOWN_MARKER, label="touchdown", zorder=6)
     figure.legend(loc="upper center", **LEGEND_STYLE)
-    _fit_height(figure, axes)
+    fit_height(figure, axes)
     return figure
 
 
@@ -75,7 +79,7 @@ def _draw_platform(axes: Axes, name: str, platform: Mapping[str, Sequence[float]
     (width, height), (x, y) = platform["size"][:2], platform["position"][:2]
     corner = (x - width / 2, y - height / 2)
     axes.add_patch(Rectangle(corner, width, height, facecolor="#F0EAE0", edgecolor="#C8B89A", linewidth=0.6, zorder=1))
-    _annotate(axes, name, corner, offset=(3, 3), color="#8A7650")
+    annotate(axes, name, corner, offset=(3, 3), color="#8A7650")
 
 
 def _draw_waypoints(axes: Axes, x: Sequence[float], y: Sequence[float], radius: float) -> None:
@@ -83,25 +87,13 @@ def _draw_waypoints(axes: Axes, x: Sequence[float], y: Sequence[float], radius: 
         axes.plot(x, y, "+", color="#555555", markersize=5, label="waypoints", zorder=2)
     for number, (east, north) in enumerate(zip(x, y, strict=True), start=1):
         axes.add_patch(Circle((east, north), radius, fill=False, color="#888888", linestyle="--", linewidth=0.7, zorder=2))
-        _annotate(axes, str(number), (east + 0.7 * radius, north + 0.7 * radius), offset=(1, 1), color="#333333")
+        annotate(axes, str(number), (east + 0.7 * radius, north + 0.7 * radius), offset=(1, 1), color="#333333")
 
 
 def _draw_path(axes: Axes, result: Result, vehicle: str, **line: Any) -> None:
     x, y = (result[f"{vehicle}.position.{axis}"] for axis in "xy")
     axes.plot(x, y, **line, linewidth=1.4, zorder=3)
     axes.plot(x[:1], y[:1], "o", color=line["color"], markersize=4.5, markeredgecolor="white", zorder=4)
-
-
-def _fit_height(figure: Figure, axes: Axes) -> None:
-    """Give the figure the height that equal axes of column width need."""
-    left, right, below, above, most = 0.45, 0.08, 0.4, 0.27, 6.0  # in
-    axes.margins(0.05)
-    (x_first, x_last), (y_first, y_last) = axes.get_xlim(), axes.get_ylim()
-    width = COLUMN_WIDTH - left - right
-    height = min(most, max(1.0, width * (y_last - y_first) / (x_last - x_first)))
-    total = below + height + above
-    figure.set_size_inches(COLUMN_WIDTH, total)
-    axes.set_position((left / COLUMN_WIDTH, below / total, width / COLUMN_WIDTH, height / total))
 
 
 def landing(
@@ -115,10 +107,21 @@ def landing(
     start: float = 0.0,
     stop: float | None = None,
 ) -> Figure:
-    """Altitude of `vehicle` and of the deck it lands on, and their horizontal distance (logarithmic), over time.
+    """Draw the altitudes of a multirotor and the deck, and their horizontal distance on a logarithmic axis, over time.
 
-    `altitude_reference` names the commanded altitude (m), `mode` the signal whose values 1, 2, ... are called `phases`;
-    `limit` (m) marks a horizontal error. Shown are `start` to `stop` (s), without a stop until some seconds after touchdown.
+    Args:
+        result: Recorded mission.
+        vehicle: Signal prefix of the multirotor ("plant.uav").
+        deck: Signal prefix of the landing deck ("plant.usv.deck").
+        altitude_reference: Signal with the commanded altitude (m).
+        mode: Signal with the flight mode; each mode is drawn as a shaded time span.
+        phases: Names of the modes 1, 2, ...
+        limit: Horizontal error that is marked by a line (m).
+        start: First time shown (s).
+        stop: Last time shown (s); by default 4 s after touchdown, or the end of a run without touchdown.
+
+    Returns:
+        Figure of column width with two panels.
     """
     row = touchdown_row(result, vehicle)
     if stop is None:
@@ -160,7 +163,7 @@ def _draw_error(axes: Axes, time: np.ndarray, error: np.ndarray, limit: float | 
 
 
 def _shade_phases(figure: Figure, time: np.ndarray, mode: np.ndarray, phases: Sequence[str]) -> None:
-    """A tint per phase in all axes, and the phase's name above the first where there is room for it."""
+    """Shade each time span of constant mode in all axes and write its name above the first axes."""
     changes = [0, *(np.flatnonzero(np.diff(mode)) + 1), len(time) - 1]
     for first, last in pairwise(changes):
         value = int(mode[first])
@@ -171,13 +174,13 @@ def _shade_phases(figure: Figure, time: np.ndarray, mode: np.ndarray, phases: Se
 
 
 def _label_span(axes: Axes, first: float, last: float, name: str) -> None:
-    """Write `name` above a span of time: upright where it would not fit, not at all where not even that would."""
+    """Write `name` above a time span: rotated by 90 degrees if it is too long, omitted if the span is under 6 pt wide."""
     left, right = axes.get_xlim()
-    room = (last - first) / (right - left) * 0.78 * COLUMN_WIDTH * 72  # pt
-    if room < 6:
+    width = (last - first) / (right - left) * 0.78 * COLUMN_WIDTH * 72  # pt
+    if width < 6:
         return
     text = axes.text((first + last) / 2, 1.02, name, transform=axes.get_xaxis_transform(), fontsize=6.5, color="#444444")
-    text.set(ha="center", va="bottom", rotation=90 if room < 3.6 * len(name) else 0)
+    text.set(ha="center", va="bottom", rotation=90 if width < 3.6 * len(name) else 0)
 
 
 def _mark_touchdown(figure: Figure, time: float, altitude: float) -> None:
@@ -196,10 +199,22 @@ def tracking_error(
     limit: float | None = None,
     start: float = 0.0,
 ) -> Figure:
-    """Horizontal distance of `vehicle` from `target` ("plant.usv.deck"), logarithmic, over time from `start` (s) on.
+    """Draw the horizontal distance of a vehicle from its target over time, on a logarithmic axis.
 
-    Numbered lines mark the turns of the target's vessel: when it comes within `radius` (m) of its waypoints `x`, `y` (m, world).
-    `limit` (m) marks a distance.
+    Numbered lines mark the turns of the target's vessel: the times at which it reaches its waypoints.
+
+    Args:
+        result: Recorded mission.
+        vehicle: Signal prefix of the vehicle ("plant.uav").
+        target: Signal prefix of the target ("plant.usv.deck").
+        x: East coordinates of the vessel's waypoints (m, world).
+        y: North coordinates of the vessel's waypoints (m, world).
+        radius: Radius of the circles of acceptance (m).
+        limit: Distance that is marked by a line (m).
+        start: First time shown (s).
+
+    Returns:
+        Figure of column width.
     """
     figure = Figure(figsize=(COLUMN_WIDTH, 2.2), layout="constrained")
     axes = figure.add_subplot()
@@ -212,7 +227,7 @@ def tracking_error(
 
 
 def _mark_turns(axes: Axes, reached: Mapping[str, Any], count: int) -> None:
-    """A numbered line for every waypoint reached but the last, behind which there is no turn."""
+    """Draw a numbered line for every waypoint that was reached, except the last: no turn follows it."""
     first, last = axes.get_xlim()
     for number in range(1, count):
         time = reached[f"time[{number}]"]
@@ -221,11 +236,3 @@ def _mark_turns(axes: Axes, reached: Mapping[str, Any], count: int) -> None:
             axes.text(
                 time, 1.02, f"turn {number}", transform=axes.get_xaxis_transform(), ha="center", fontsize=6.5, color=VESSEL_COLOUR
             )
-
-
-def _annotate(axes: Axes, text: str, place: tuple[float, float], offset: tuple[float, float], color: str) -> Text:
-    """A small text beside a place (m), `offset` in pt, readable on top of lines."""
-    halo = withStroke(linewidth=2, foreground="white")
-    return axes.annotate(
-        text, place, offset, textcoords="offset points", fontsize=6.5, color=color, path_effects=[halo], zorder=5
-    )

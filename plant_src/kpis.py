@@ -1,25 +1,37 @@
-"""Figures of merit of a mission: how it landed, which waypoints it reached, how well it followed, whether it switched off.
+"""KPIs of a mission: landing, waypoints, path following and motor commands.
 
-Every function takes a result and names of things in it ("plant.uav", "plant.usv.deck") and returns its numbers by name; what
-did not happen in a run is NaN or False. SI units; horizontal distances are those in the x-y plane of the world. All values
-are those at recorded rows.
+Every function takes a result and names of signals or signal prefixes ("plant.uav", "plant.usv.deck") and returns values by
+name. All values are in SI units and belong to recorded rows; horizontal distances lie in the x-y plane of the world. A value
+that a run does not have is NaN or False.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from cosim.results import Result
 from cosim.results.checks import Number
-from cosim.results.kpi import Prefix, Signal, better, units
+from cosim.results.kpi import Prefix, Signal, better, declared_units, units
 
 from . import deck_frame
+from .recorded_motion import distance_from_line, horizontal_distance, touchdown_row
 
-#: A vehicle without any contact for this long (s) flies; a start some millimetres above its support or a bounce does not.
-MIN_FLIGHT_TIME = 0.1
+_TOUCHDOWN_UNITS: Mapping[str, str] = {
+    "forward_error": "m",
+    "left_error": "m",
+    "lateral_error": "m",
+    "normal_speed": "m/s",
+    "tangential_speed": "m/s",
+    "kinetic_energy": "J",
+    "tilt": "rad",
+    "deck_roll": "rad",
+    "deck_pitch": "rad",
+    "deck_heave": "m",
+    "peak_force": "N",
+}
 
 
 @better(
@@ -33,18 +45,27 @@ MIN_FLIGHT_TIME = 0.1
 )
 @units(time="s", lateral_error="m", touchdown_speed="m/s", tangential_speed="m/s", slide="m", final_lateral_error="m")
 def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, Number]:
-    """The landing of `vehicle` on a vessel whose landing deck is `deck` ("plant.usv.deck").
+    """Evaluate the landing of a multirotor on a vessel in the world frame.
 
-    Touchdown is the first row with contact between the vehicle and a vessel after the vehicle flew.
+    Touchdown is the first row with contact between the vehicle and a vessel after a flight of at least 0.1 s. The lateral
+    error at touchdown is the landing error of the paper (docs/paper.md).
 
-    time                 s    of the touchdown
-    lateral_error        m    horizontal distance of the vehicle's centre of mass from the deck centre at touchdown
-    touchdown_speed      m/s  speed of the vehicle towards the deck (relative, vertical, > 0 approaching), one row earlier
-    tangential_speed     m/s  horizontal speed relative to the deck centre, one row earlier
-    slide                m    largest distance from the touchdown point in the plane of the deck, while in contact
-    bounces              1    how often contact with the vessel was lost and regained after touchdown
-    landed_at_end             whether there was a touchdown and the last row is in contact with a vessel
-    final_lateral_error  m    as lateral_error, at the last row; NaN unless landed_at_end
+    Args:
+        result: Recorded mission.
+        vehicle: Signal prefix of the multirotor ("plant.uav").
+        deck: Signal prefix of the landing deck ("plant.usv.deck").
+
+    Returns:
+        Values by name:
+
+        - `time`: time of the touchdown (s)
+        - `lateral_error`: horizontal distance of the vehicle's centre of mass from the deck centre at touchdown (m)
+        - `touchdown_speed`: vertical speed relative to the deck centre, positive when approaching, one row before (m/s)
+        - `tangential_speed`: horizontal speed relative to the deck centre, one row before touchdown (m/s)
+        - `slide`: largest distance from the touchdown point in the plane of the deck, over rows in contact (m)
+        - `bounces`: number of times that contact with the vessel was lost and regained after touchdown
+        - `landed_at_end`: true if there was a touchdown and the last row is in contact with a vessel
+        - `final_lateral_error`: `lateral_error` at the last row (m); NaN unless `landed_at_end`
     """
     contact = result[f"{vehicle}.contact.vessel"].astype(bool)
     row = touchdown_row(result, vehicle)
@@ -58,7 +79,7 @@ def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, Number]:
         "lateral_error": float(distance[row]),
         "touchdown_speed": float(-w[row - 1]),
         "tangential_speed": math.hypot(u[row - 1], v[row - 1]),
-        "slide": _slide(result, vehicle, deck, row),
+        "slide": deck_frame.slide_distance(result, vehicle, deck, row),
         "bounces": int(np.count_nonzero(contact[row + 1 :] & ~contact[row:-1])),
         "landed_at_end": landed,
         "final_lateral_error": float(distance[-1]) if landed else math.nan,
@@ -70,28 +91,6 @@ def _values_without_landing() -> dict[str, Number]:
     return {**dict.fromkeys(unknown, math.nan), "bounces": 0, "landed_at_end": False, "final_lateral_error": math.nan}
 
 
-def touchdown_row(result: Result, vehicle: str) -> int | None:
-    """Row of the first contact of `vehicle` with a vessel after it flew (see FLIGHT_TIME), None when there is none."""
-    time, touching = result.time, result[f"{vehicle}.contact.touching"].astype(bool)
-    last_contact = np.maximum.accumulate(np.where(touching, time, time[:1]))
-    has_flown = np.logical_or.accumulate(time - last_contact >= MIN_FLIGHT_TIME - 1e-9)
-    rows = np.flatnonzero(has_flown & result[f"{vehicle}.contact.vessel"].astype(bool))
-    return int(rows[0]) if rows.size else None
-
-
-def horizontal_distance(result: Result, first: str, second: str) -> np.ndarray:
-    """Distance in m in the x-y plane between two things with a `position`, shape (rows,)."""
-    x, y = (result[f"{first}.position.{axis}"] - result[f"{second}.position.{axis}"] for axis in "xy")
-    return np.hypot(x, y)
-
-
-def _slide(result: Result, vehicle: str, deck: str, row: int) -> float:
-    """Largest distance from the place of row `row` in the plane of the deck, over rows in contact."""
-    place = deck_frame.relative_position(result, vehicle, deck)[row:, :2]
-    contact = result[f"{vehicle}.contact.vessel"].astype(bool)[row:]
-    return float(np.linalg.norm(place - place[0], axis=1)[contact].max())
-
-
 @better(
     lateral_error="lower",
     normal_speed="lower",
@@ -100,37 +99,35 @@ def _slide(result: Result, vehicle: str, deck: str, row: int) -> float:
     tilt="lower",
     peak_force="lower",
 )
-@units(
-    forward_error="m",
-    left_error="m",
-    lateral_error="m",
-    normal_speed="m/s",
-    tangential_speed="m/s",
-    kinetic_energy="J",
-    tilt="rad",
-    deck_roll="rad",
-    deck_pitch="rad",
-    deck_heave="m",
-    peak_force="N",
-)
+@units(**_TOUCHDOWN_UNITS)
 def touchdown(result: Result, vehicle: Prefix, deck: Prefix, mass: float) -> dict[str, Number]:
-    """How `vehicle` of `mass` (kg) meets the landing deck of a vessel ("plant.usv.deck"), seen from the deck.
+    """Evaluate a touchdown in the axes of a deck that may roll, pitch, heave and turn.
 
-    Touchdown is that of `landing`. Speeds are those one row earlier, relative to the point of the deck below the vehicle.
+    Touchdown is the row that `landing` finds. Speeds are those one row earlier, relative to the point of the deck below the
+    vehicle.
 
-    forward_error, left_error  m    place of the vehicle's centre of mass from the deck centre, along the deck's axes
-    lateral_error              m    distance of the two from each other in the plane of the deck
-    normal_speed               m/s  speed towards the deck along its normal, > 0 approaching
-    tangential_speed           m/s  speed in the plane of the deck
-    kinetic_energy             J    mass / 2 times the square of the relative speed
-    tilt                       rad  angle between the up axes of vehicle and deck
-    deck_roll, deck_pitch      rad  attitude of the vessel
-    deck_heave                 m    height of the deck centre above its mean over all rows
-    peak_force                 N    largest contact force from touchdown on, mean over a step
+    Args:
+        result: Recorded mission.
+        vehicle: Signal prefix of the multirotor ("plant.uav").
+        deck: Signal prefix of the landing deck ("plant.usv.deck").
+        mass: Mass of the multirotor (kg).
+
+    Returns:
+        Values by name, all NaN without a touchdown:
+
+        - `forward_error`, `left_error`: vehicle's centre of mass relative to the deck centre, along the deck's axes (m)
+        - `lateral_error`: distance between the two in the plane of the deck (m)
+        - `normal_speed`: speed along the normal of the deck, positive when approaching (m/s)
+        - `tangential_speed`: speed in the plane of the deck (m/s)
+        - `kinetic_energy`: mass / 2 times the squared relative speed (J)
+        - `tilt`: angle between the up axes of vehicle and deck (rad)
+        - `deck_roll`, `deck_pitch`: attitude of the vessel (rad)
+        - `deck_heave`: height of the deck centre above its mean over all rows (m)
+        - `peak_force`: largest contact force from touchdown on, each the mean over a step (N)
     """
     row = touchdown_row(result, vehicle)
     if row is None:
-        return dict.fromkeys(touchdown.units, math.nan)  # type: ignore[attr-defined]
+        return dict.fromkeys(_TOUCHDOWN_UNITS, math.nan)
     vessel = deck.removesuffix(".deck")
     forward, left, _ = deck_frame.relative_position(result, vehicle, deck)[row].tolist()
     u, v, w = deck_frame.relative_velocity(result, vehicle, deck)[row - 1].tolist()
@@ -153,10 +150,20 @@ def touchdown(result: Result, vehicle: Prefix, deck: Prefix, mass: float) -> dic
 @better(time_to_land="lower", aborts="lower")
 @units(time_to_land="s")
 def descent(result: Result, vehicle: Prefix, mode: Signal, descending: float) -> dict[str, Number]:
-    """How the way down went, told by the signal `mode`: `descending` is its value for that, lower ones come before it.
+    """Evaluate the descent to the deck from the flight mode.
 
-    time_to_land  s  from the first row in that mode to the touchdown of `landing`, aborted descents included
-    aborts        1  how often a lower mode followed upon it
+    Args:
+        result: Recorded mission.
+        vehicle: Signal prefix of the multirotor ("plant.uav").
+        mode: Signal with the flight mode ("uav.mode").
+        descending: Value of `mode` during the descent; lower values are modes before it.
+
+    Returns:
+        Values by name:
+
+        - `time_to_land`: time from the first row in the mode `descending` to the touchdown that `landing` finds, aborted
+          descents included (s)
+        - `aborts`: number of changes from the mode `descending` to a lower one
     """
     modes = result[mode]
     rows, row = np.flatnonzero(modes == descending), touchdown_row(result, vehicle)
@@ -170,11 +177,24 @@ def descent(result: Result, vehicle: Prefix, mode: Signal, descending: float) ->
 @better(reached="higher", all_reached="higher", time="lower")
 @units(time="s")
 def waypoints(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
-    """Whether `vehicle` came within `radius` (m) of the waypoints (`x`, `y`) (m, world), one after the other.
+    """Evaluate which waypoints a vehicle reached in their order.
 
-    reached      1  number of waypoints reached in order, from the first on
-    all_reached     whether these are all
-    time[1] ...  s  when each was reached (its circle entered, not before the waypoint ahead of it), NaN for the others
+    A waypoint is reached at the first row inside its circle of acceptance (Fossen (2021), chapter 12), not before the
+    waypoint ahead of it.
+
+    Args:
+        result: Recorded mission.
+        vehicle: Signal prefix of the vehicle ("plant.usv").
+        x: East coordinates of the waypoints (m, world).
+        y: North coordinates of the waypoints (m, world).
+        radius: Radius of the circles of acceptance (m).
+
+    Returns:
+        Values by name:
+
+        - `reached`: number of waypoints reached in order, counted from the first
+        - `all_reached`: true if that is the number of waypoints
+        - `time[1]`, `time[2]`, ...: time at which each waypoint was reached (s); NaN if it was not
     """
     times, row = [math.nan] * len(x), 0
     position_x, position_y = result[f"{vehicle}.position.x"], result[f"{vehicle}.position.y"]
@@ -195,44 +215,56 @@ def waypoints(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[f
 @better(rms="lower", max="lower", leg="lower")
 @units(rms="m", max="m", leg="m")
 def cross_track(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
-    """How far `vehicle` was from the straight legs between its place in the first row and the waypoints (see `waypoints`).
+    """Evaluate the cross-track error of a vehicle on the straight legs between waypoints.
 
-    A leg begins when the waypoint before it is reached, and ends when its own is, or with the last row; the distance is that
-    from the endless line through both ends of the leg, horizontally.
+    The first leg starts at the position in the first row. A leg begins when the previous waypoint is reached (see
+    `waypoints`) and ends when its own is reached or with the last row. The error is the horizontal distance from the infinite
+    line through both ends of the leg (Fossen (2021), chapter 12).
 
-    rms         m  over all rows of all legs
-    max         m  largest distance
-    leg[1] ...  m  largest distance on each leg, NaN for those that were not begun
+    Args:
+        result: Recorded mission.
+        vehicle: Signal prefix of the vehicle ("plant.usv").
+        x: East coordinates of the waypoints (m, world).
+        y: North coordinates of the waypoints (m, world).
+        radius: Radius of the circles of acceptance (m).
+
+    Returns:
+        Values by name:
+
+        - `rms`: root mean square over all rows of all legs (m)
+        - `max`: largest error (m)
+        - `leg[1]`, `leg[2]`, ...: largest error on each leg (m); NaN for a leg that was not begun
     """
     times = [value for key, value in waypoints(result, vehicle, x, y, radius).items() if key.startswith("time")]
-    place = result[f"{vehicle}.position.x"] + 1j * result[f"{vehicle}.position.y"]
-    corners = [place[0], *(east + 1j * north for east, north in zip(x, y, strict=True))]
-    begin, legs = float(result.time[0]), []
+    position = result[f"{vehicle}.position.x"] + 1j * result[f"{vehicle}.position.y"]
+    corners = [position[0], *(east + 1j * north for east, north in zip(x, y, strict=True))]
+    begin, errors_of_legs = float(result.time[0]), []
     for start, end, reached in zip(corners, corners[1:], times, strict=False):
-        rows = (result.time >= begin) & ~(result.time > reached)  # NaN: not reached, until the last row
-        legs.append(_distance_from_line(place[rows], start, end))
-        begin = reached  # NaN: the legs that follow have no rows
-    all_legs = np.concatenate(legs)
+        rows = (result.time >= begin) & ~(result.time > reached)  # no time is later than NaN: an unfinished leg has all rows
+        errors_of_legs.append(distance_from_line(position[rows], start, end))
+        begin = reached  # no time is at or after NaN: the legs that follow have no rows
+    errors = np.concatenate(errors_of_legs)
     return {
-        "rms": float(np.sqrt(np.mean(all_legs**2))),
-        "max": float(all_legs.max()),
-        **{f"leg[{i}]": float(leg.max()) if leg.size else math.nan for i, leg in enumerate(legs, start=1)},
+        "rms": float(np.sqrt(np.mean(errors**2))),
+        "max": float(errors.max()),
+        **{f"leg[{i}]": float(leg.max()) if leg.size else math.nan for i, leg in enumerate(errors_of_legs, start=1)},
     }
-
-
-def _distance_from_line(place: np.ndarray, start: complex, end: complex) -> np.ndarray:
-    """Distance (m) of places x + iy from the line through two points, or from the point when they are one."""
-    way = end - start
-    return np.abs(((place - start) * np.conj(way)).imag) / abs(way) if way else np.abs(place - start)
 
 
 @better(rms="lower", max="lower")
 @units(rms="m", max="m")
 def tracking(result: Result, vehicle: Prefix, target: Prefix, start: float, stop: float = math.inf) -> dict[str, Number]:
-    """How well `vehicle` stayed above `target` ("plant.usv" or "plant.usv.deck") over start <= time <= stop (s).
+    """Evaluate the horizontal distance between a vehicle and the target that it follows.
 
-    rms  m  root of the mean squared horizontal distance over the rows
-    max  m  largest horizontal distance
+    Args:
+        result: Recorded mission.
+        vehicle: Signal prefix of the vehicle ("plant.uav").
+        target: Signal prefix of the target ("plant.usv" or "plant.usv.deck").
+        start: First time that is evaluated (s).
+        stop: Last time that is evaluated (s).
+
+    Returns:
+        `rms`, the root mean square over the rows, and `max`, the largest distance (m); NaN without rows.
     """
     distance = horizontal_distance(result, vehicle, target)[(result.time >= start) & (result.time <= stop)]
     if not distance.size:
@@ -243,12 +275,20 @@ def tracking(result: Result, vehicle: Prefix, target: Prefix, start: float, stop
 @better(stopped_at_end="higher")
 @units(stop_time="s", final_speed="rad/s", max_speed="rad/s")
 def motors(result: Result, rotor_speed: Prefix, threshold: float = 1.0) -> dict[str, Number]:
-    """Whether the motors were switched off: the commands `rotor_speed`[1], [2], ... ("uav.mixer.rotor_speed"), in rad/s.
+    """Evaluate from the commanded rotor speeds if and when the motors were switched off.
 
-    stopped_at_end         whether the last row's commands are all below `threshold` (rad/s)
-    stop_time       s      from when on they all stay below it, NaN unless stopped_at_end
-    final_speed     rad/s  largest command in the last row
-    max_speed       rad/s  largest command of the run
+    Args:
+        result: Recorded mission.
+        rotor_speed: Prefix of the commands `rotor_speed[1]`, `rotor_speed[2]`, ... ("uav.mixer.rotor_speed").
+        threshold: Speed below which a rotor counts as stopped (rad/s).
+
+    Returns:
+        Values by name:
+
+        - `stopped_at_end`: true if all commands of the last row are below `threshold`
+        - `stop_time`: first time from which all commands stay below `threshold` (s); NaN unless `stopped_at_end`
+        - `final_speed`: largest command of the last row (rad/s)
+        - `max_speed`: largest command of the run (rad/s)
     """
     names = result.signals(f"{rotor_speed}[*]") or [f"{rotor_speed}[1]"]
     fastest = np.max([np.abs(result[name]) for name in names], axis=0)
@@ -265,5 +305,5 @@ def motors(result: Result, rotor_speed: Prefix, threshold: float = 1.0) -> dict[
 
 @units(value="{signal}")
 def final(result: Result, signal: Signal) -> dict[str, float]:
-    """`value`: the last value of one signal, in its own unit."""
+    """Return `value`, the last value of a signal in its own unit."""
     return {"value": result[signal][-1].item()}

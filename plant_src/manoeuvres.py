@@ -1,89 +1,31 @@
-"""Standard manoeuvres of ships: turning circle, zig-zag, initial turning and stopping of IMO resolution MSC.137(76), section 5.
+"""KPIs of standard ship manoeuvres after IMO resolution MSC.137(76): turning circle, zig-zag, initial turning and stopping.
 
-A manoeuvre begins with the order to rudder or engine at `start` (s); the original course is the heading at that time, `length`
-(m) the vessel's length, by which the resolution's criteria go. Places are those of the point `midships` (m, body frame, from the
-centre of mass; default: the centre of mass itself) in the x-y plane of the world. Between rows headings, speeds and places are
-straight lines; what was not reached is NaN.
+Definitions are those of section 5 of the annex. A manoeuvre begins with the order to rudder or engine; the original course is
+the heading at that time. Positions are those of one point of the vessel in the x-y plane of the world. Headings, speeds and
+positions are interpolated linearly between rows. A value that was not reached is NaN.
 
-The criteria, made for ships of 100 m and more: advance <= 4.5 lengths, tactical diameter <= 5, initial turning <= 2.5, track
-reach <= 15; first overshoot of the 10/10 zig-zag <= 10 deg at length/speed < 10 s, second <= 25 deg; of the 20/20 <= 25 deg.
+The criteria of the resolution are made for ships of at least 100 m:
+
+- advance at most 4.5 ship lengths, tactical diameter at most 5
+- initial turning: at most 2.5 ship lengths of track
+- track reach of the full astern stopping test at most 15 ship lengths
+- 10/10 zig-zag: first overshoot at most 10 deg if length / speed < 10 s, second at most 25 deg
+- 20/20 zig-zag: first overshoot at most 25 deg
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.core.errors import InputError
 from cosim.results import Result
 from cosim.results.checks import Number
 from cosim.results.kpi import Prefix, better, first_crossing_time, units
 
-DEGREE = math.pi / 180
+from .manoeuvre_track import CENTRE_OF_MASS, Point, Track, track
 
-Point = Sequence[float]
-CENTRE_OF_MASS: Point = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class Track:
-    """A motion from the order on, each array with shape (rows,), the first row at the order itself."""
-
-    #: s, of the result
-    time: np.ndarray
-    #: m, ahead + i * left, from the place of the order along the original course
-    position: np.ndarray
-    #: rad from the original course, counter-clockwise, beyond a full turn too
-    heading_change: np.ndarray
-    #: m, along the track
-    distance: np.ndarray
-
-    def interpolate(self, values: np.ndarray, time: float) -> complex:
-        return complex(np.interp(time, self.time, values)) if math.isfinite(time) else complex(math.nan, math.nan)
-
-    def time_of_heading_change(self, angle: float) -> float:
-        """When the heading is first off the original course by `angle` (rad), to whichever side it turns."""
-        return first_crossing_time(self.time, self.turn_direction(angle) * self.heading_change, angle)
-
-    def turn_direction(self, angle: float) -> int:
-        """1 when the heading is off by `angle` (rad) to the left first, -1 to the right."""
-        beyond = self.heading_change[np.abs(self.heading_change) >= angle]
-        return -1 if beyond.size and beyond[0] < 0 else 1
-
-
-def track(result: Result, vehicle: str, start: float, midships: Point = CENTRE_OF_MASS) -> Track:
-    """The motion of `vehicle` ("plant.usv") from `start` (s) on; not a number when the run ended before.
-
-    Raises InputError for a start before the first row.
-    """
-    time = result.time
-    if not time.size or start < time[0]:
-        raise InputError(f"the manoeuvre starts at {start:g} s, where nothing was recorded")
-    if start > time[-1]:
-        return Track(*(np.full(1, math.nan, dtype) for dtype in (float, complex, float, float)))
-    later = time > start
-    place = result[f"{vehicle}.position.x"] + 1j * result[f"{vehicle}.position.y"] + _point_offset(result, vehicle, midships)
-    place, heading = (
-        np.concatenate([[np.interp(start, time, values)], values[later]])
-        for values in (place, np.unwrap(result[f"{vehicle}.attitude.yaw"]))
-    )
-    travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(place)))])
-    ahead_and_left = (place - place[0]) * np.exp(-1j * heading[0])
-    return Track(np.concatenate([[start], time[later]]), ahead_and_left, heading - heading[0], travelled)
-
-
-def _point_offset(result: Result, vehicle: str, point: Point) -> np.ndarray:
-    """Where a point of the vehicle (body frame) is from its centre of mass, x + i * y in the world."""
-    if not any(point):
-        return np.zeros(len(result.time), complex)
-    w, x, y, z = (result[f"{vehicle}.orientation.{axis}"] for axis in "wxyz")
-    ahead = 1 - 2 * (y * y + z * z) + 2j * (x * y + w * z)
-    left = 2 * (x * y - w * z) + 1j * (1 - 2 * (x * x + z * z))
-    up = 2 * (x * z + w * y) + 2j * (y * z - w * x)
-    return np.asarray(point[0] * ahead + point[1] * left + point[2] * up)
+DEGREE = math.pi / 180  # rad
 
 
 @better(advance="lower", transfer="lower", tactical_diameter="lower", advance_lengths="lower", tactical_diameter_lengths="lower")
@@ -100,30 +42,39 @@ def _point_offset(result: Result, vehicle: str, point: Point) -> np.ndarray:
 def turning_circle(
     result: Result, vehicle: Prefix, start: float, length: float, midships: Point = CENTRE_OF_MASS
 ) -> dict[str, Number]:
-    """The turning circle of `vehicle`, to either side, rudder hard over from `start` on (MSC.137(76), 5.2.1).
+    """Evaluate a turning circle to port or starboard with the rudder hard over (IMO MSC.137(76), 5.2.1).
 
-    advance                     m    way made good along the original course until the heading has changed by 90 deg
-    transfer                    m    way made good to the side of the turn until then
-    tactical_diameter           m    way made good to the side of the turn until the heading has changed by 180 deg
-    steady_diameter             m    of the circle of the last full turn: length of its track over pi
-    advance_lengths             1    advance in lengths of the vessel
-    tactical_diameter_lengths   1    tactical diameter in lengths of the vessel
-    time_to_90, time_to_180     s    from the order until the heading has changed so far
-    period                      s    of the last full turn
-    steady_speed                m/s  mean speed over the last full turn
-    speed_loss                  1    share of the speed at the order that is lost by then
+    Args:
+        result: Recorded run.
+        vehicle: Signal prefix of the vessel ("plant.usv").
+        start: Time of the rudder order (s).
+        length: Length of the vessel (m).
+        midships: Point whose position is evaluated, relative to the centre of mass (m, body frame).
+
+    Returns:
+        Values by name:
+
+        - `advance`: distance along the original course until the heading has changed by 90 deg (m)
+        - `transfer`: distance perpendicular to the original course until then (m)
+        - `tactical_diameter`: distance perpendicular to the original course until the heading has changed by 180 deg (m)
+        - `steady_diameter`: diameter of the last full turn, its track length over pi (m)
+        - `advance_lengths`, `tactical_diameter_lengths`: the same in lengths of the vessel
+        - `time_to_90`, `time_to_180`: time from the order until the heading has changed by 90 and 180 deg (s)
+        - `period`: duration of the last full turn (s)
+        - `steady_speed`: mean speed over the last full turn (m/s)
+        - `speed_loss`: 1 - `steady_speed` / speed at the order
     """
-    own = track(result, vehicle, start, midships)
-    quarter, half = own.time_of_heading_change(math.pi / 2), own.time_of_heading_change(math.pi)
-    advance, transfer = own.interpolate(own.position, quarter).real, own.interpolate(own.position, quarter).imag
-    tactical = own.interpolate(own.position, half).imag
-    period, way = _last_full_turn(own)
-    speed = way / period
+    motion = track(result, vehicle, start, midships)
+    quarter, half = motion.time_of_heading_change(math.pi / 2), motion.time_of_heading_change(math.pi)
+    advance, transfer = motion.interpolate(motion.position, quarter).real, motion.interpolate(motion.position, quarter).imag
+    tactical = motion.interpolate(motion.position, half).imag
+    period, track_length = _last_full_turn(motion)
+    speed = track_length / period
     return {
         "advance": advance,
         "transfer": abs(transfer),
         "tactical_diameter": abs(tactical),
-        "steady_diameter": way / math.pi,
+        "steady_diameter": track_length / math.pi,
         "advance_lengths": advance / length,
         "tactical_diameter_lengths": abs(tactical) / length,
         "time_to_90": quarter - start,
@@ -134,17 +85,17 @@ def turning_circle(
     }
 
 
-def _last_full_turn(own: Track) -> tuple[float, float]:
-    """Time (s) and length of track (m) of the last full turn, NaN when there is none."""
-    turned = own.heading_change * math.copysign(1, own.heading_change[-1])
+def _last_full_turn(motion: Track) -> tuple[float, float]:
+    """Return duration (s) and track length (m) of the last full turn; NaN without a full turn."""
+    turned = motion.heading_change * math.copysign(1, motion.heading_change[-1])
     if not turned[-1] >= 2 * math.pi:
         return math.nan, math.nan
-    begin = first_crossing_time(own.time, turned, turned[-1] - 2 * math.pi)
-    return float(own.time[-1]) - begin, float(own.distance[-1]) - own.interpolate(own.distance, begin).real
+    begin = first_crossing_time(motion.time, turned, turned[-1] - 2 * math.pi)
+    return float(motion.time[-1]) - begin, float(motion.distance[-1]) - motion.interpolate(motion.distance, begin).real
 
 
 def _speed_over_ground(result: Result, vehicle: str, time: float) -> float:
-    """Speed over ground (m/s)."""
+    """Return the speed over ground (m/s) at `time` (s)."""
     u, v = (np.interp(time, result.time, result[f"{vehicle}.velocity.{axis}"]) for axis in "xy")
     return math.hypot(u, v)
 
@@ -152,52 +103,64 @@ def _speed_over_ground(result: Result, vehicle: str, time: float) -> float:
 @better(overshoot="lower", initial_turning_time="lower", reach="lower")
 @units(overshoot="rad", execute="s", initial_turning_time="s", reach="s", period="s")
 def zigzag(result: Result, vehicle: Prefix, start: float, angle: float = 10 * DEGREE, overshoots: int = 2) -> dict[str, Number]:
-    """The zig-zag of `vehicle` from `start` on: the rudder is reversed whenever the heading is `angle` (rad) off the original
-    course on the side to which the vessel turns (MSC.137(76), 5.2.3).
+    """Evaluate a zig-zag test (IMO MSC.137(76), 5.2.3).
 
-    overshoot[1] ... overshoot[`overshoots`]  rad  how far the heading goes on beyond `angle` after each reversal
-    execute[1] ...                            s    from the order until the heading was off by `angle`, one side after the other
-    initial_turning_time                      s    the first of them
-    reach                                     s    from the order until the heading first is back on the original course
-    period                                    s    from one reversal to the next but one, to the same side
+    The rudder is reversed whenever the heading differs by `angle` from the original course, alternately to both sides.
+
+    Args:
+        result: Recorded run.
+        vehicle: Signal prefix of the vessel ("plant.usv").
+        start: Time of the first rudder order (s).
+        angle: Heading change at which the rudder is reversed (rad).
+        overshoots: Number of overshoots and execute times that are returned.
+
+    Returns:
+        Values by name:
+
+        - `overshoot[1]`, `overshoot[2]`, ...: heading change beyond `angle` after each reversal (rad)
+        - `execute[1]`, `execute[2]`, ...: time from the first order until each reversal (s)
+        - `initial_turning_time`: `execute[1]` (s)
+        - `reach`: time from the first order until the heading is first back on the original course (s)
+        - `period`: time between the first and the third reversal (s)
     """
-    own = track(result, vehicle, start)
-    times, excesses = _reversals(own, angle, max(overshoots, 3))
+    motion = track(result, vehicle, start)
+    times, overshoot_angles = _reversals(motion, angle, max(overshoots, 3))
     executes = [time - start for time in times]
     return {
-        **{f"overshoot[{i}]": excess for i, excess in enumerate(excesses[:overshoots], 1)},
+        **{f"overshoot[{i}]": overshoot for i, overshoot in enumerate(overshoot_angles[:overshoots], 1)},
         **{f"execute[{i}]": time for i, time in enumerate(executes[:overshoots], 1)},
         "initial_turning_time": executes[0],
-        "reach": _time_back_on_course(own, times[0]) - start,
+        "reach": _time_back_on_course(motion, times[0]) - start,
         "period": executes[2] - executes[0],
     }
 
 
-def _reversals(own: Track, angle: float, count: int) -> tuple[list[float], list[float]]:
-    """When the heading passes `angle` on alternating sides (s), and how far it goes beyond until it does so on the other.
+def _reversals(motion: Track, angle: float, count: int) -> tuple[list[float], list[float]]:
+    """Return the times (s) at which the heading passes `angle` (rad) on alternating sides, and the overshoots after them (rad).
 
-    The excess is NaN where the heading had not begun to come back by the end.
+    An overshoot is NaN if the heading has not begun to return by the end of the track.
     """
-    times, excesses, rows = [], [], slice(0, None)
-    side = own.turn_direction(angle)
+    times, overshoots, rows = [], [], slice(0, None)
+    side = motion.turn_direction(angle)
     for _ in range(count):
-        when = first_crossing_time(own.time[rows], side * own.heading_change[rows], angle)
-        rows = slice(int(np.searchsorted(own.time, when)), None)
-        back = first_crossing_time(own.time[rows], -side * own.heading_change[rows], angle)
-        swing = side * own.heading_change[rows][own.time[rows] <= (back if math.isfinite(back) else math.inf)]
-        turned_back = swing.size > 0 and swing[-1] < swing.max()
-        times.append(when)
-        excesses.append(float(swing.max()) - angle if turned_back else math.nan)
+        reversal = first_crossing_time(motion.time[rows], side * motion.heading_change[rows], angle)
+        rows = slice(int(np.searchsorted(motion.time, reversal)), None)
+        following = first_crossing_time(motion.time[rows], -side * motion.heading_change[rows], angle)
+        swing = side * motion.heading_change[rows][motion.time[rows] <= (following if math.isfinite(following) else math.inf)]
+        is_returning = swing.size > 0 and swing[-1] < swing.max()
+        times.append(reversal)
+        overshoots.append(float(swing.max()) - angle if is_returning else math.nan)
         side = -side
-    return times, excesses
+    return times, overshoots
 
 
-def _time_back_on_course(own: Track, reversal: float) -> float:
-    rows = own.time > reversal
+def _time_back_on_course(motion: Track, reversal: float) -> float:
+    """Return the time (s) at which the heading is first back on the original course after `reversal` (s)."""
+    rows = motion.time > reversal
     if not rows.any():
         return math.nan
-    side = math.copysign(1, own.heading_change[rows][0])
-    return first_crossing_time(own.time[rows], -side * own.heading_change[rows], 0.0)
+    side = math.copysign(1, motion.heading_change[rows][0])
+    return first_crossing_time(motion.time[rows], -side * motion.heading_change[rows], 0.0)
 
 
 @better(distance="lower", distance_lengths="lower", time="lower")
@@ -205,16 +168,27 @@ def _time_back_on_course(own: Track, reversal: float) -> float:
 def initial_turning(
     result: Result, vehicle: Prefix, start: float, length: float, angle: float = 10 * DEGREE, midships: Point = CENTRE_OF_MASS
 ) -> dict[str, Number]:
-    """How quickly `vehicle` answers 10 deg of rudder from `start` on (MSC.137(76), 5.2.2).
+    """Evaluate the initial turning ability: the response to 10 deg of rudder (IMO MSC.137(76), 5.2.2).
 
-    distance          m  along the track until the heading has changed by `angle` (rad)
-    distance_lengths  1  the same in lengths of the vessel
-    time              s  from the order until then
+    Args:
+        result: Recorded run.
+        vehicle: Signal prefix of the vessel ("plant.usv").
+        start: Time of the rudder order (s).
+        length: Length of the vessel (m).
+        angle: Heading change until which the vessel is followed (rad).
+        midships: Point whose position is evaluated, relative to the centre of mass (m, body frame).
+
+    Returns:
+        Values by name:
+
+        - `distance`: track length until the heading has changed by `angle` (m)
+        - `distance_lengths`: the same in lengths of the vessel
+        - `time`: time from the order until then (s)
     """
-    own = track(result, vehicle, start, midships)
-    when = own.time_of_heading_change(angle)
-    distance = own.interpolate(own.distance, when).real
-    return {"distance": distance, "distance_lengths": distance / length, "time": when - start}
+    motion = track(result, vehicle, start, midships)
+    time = motion.time_of_heading_change(angle)
+    distance = motion.interpolate(motion.distance, time).real
+    return {"distance": distance, "distance_lengths": distance / length, "time": time - start}
 
 
 @better(track_reach="lower", track_reach_lengths="lower", head_reach="lower", lateral_deviation="lower", time="lower")
@@ -222,25 +196,34 @@ def initial_turning(
 def stopping(
     result: Result, vehicle: Prefix, start: float, length: float, speed: float = 0.0, midships: Point = CENTRE_OF_MASS
 ) -> dict[str, Number]:
-    """How `vehicle` stops after the engine's order at `start` (MSC.137(76), 5.2.4).
+    """Evaluate a stopping test (IMO MSC.137(76), 5.2.4).
 
-    It has stopped when its forward speed through `velocity_body.u` is first at `speed` (m/s) or below: more than zero for a
-    vessel that coasts.
+    Args:
+        result: Recorded run.
+        vehicle: Signal prefix of the vessel ("plant.usv").
+        start: Time of the engine order (s).
+        length: Length of the vessel (m).
+        speed: Forward speed `velocity_body.u` at or below which the vessel counts as stopped (m/s); positive for a vessel
+            that coasts.
+        midships: Point whose position is evaluated, relative to the centre of mass (m, body frame).
 
-    track_reach          m  along the track until then
-    track_reach_lengths  1  the same in lengths of the vessel
-    head_reach           m  way made good along the original course
-    lateral_deviation    m  from the line of the original course, to either side
-    time                 s  from the order until then
+    Returns:
+        Values by name:
+
+        - `track_reach`: track length until the vessel has stopped (m)
+        - `track_reach_lengths`: the same in lengths of the vessel
+        - `head_reach`: distance along the original course (m)
+        - `lateral_deviation`: distance from the line of the original course, to port or starboard (m)
+        - `time`: time from the order until the vessel has stopped (s)
     """
-    own = track(result, vehicle, start, midships)
-    forward = np.interp(own.time, result.time, result[f"{vehicle}.velocity_body.u"])
-    when = first_crossing_time(own.time, -forward, -speed)
-    place, reach = own.interpolate(own.position, when), own.interpolate(own.distance, when).real
+    motion = track(result, vehicle, start, midships)
+    forward = np.interp(motion.time, result.time, result[f"{vehicle}.velocity_body.u"])
+    time = first_crossing_time(motion.time, -forward, -speed)
+    position, reach = motion.interpolate(motion.position, time), motion.interpolate(motion.distance, time).real
     return {
         "track_reach": reach,
         "track_reach_lengths": reach / length,
-        "head_reach": place.real,
-        "lateral_deviation": abs(place.imag),
-        "time": when - start,
+        "head_reach": position.real,
+        "lateral_deviation": abs(position.imag),
+        "time": time - start,
     }

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from cosim_command import run_cosim
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -30,7 +31,7 @@ def commands():
 @pytest.mark.parametrize("command", list(commands()))
 def test_commands_run(command, tmp_path):
     words = [str(ROOT / word) if (ROOT / word).exists() else word for word in shlex.split(command)[1:]]
-    done = subprocess.run([sys.executable, "-m", "cosim", *words], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = run_cosim(*words, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
 
 
@@ -69,9 +70,7 @@ def test_the_example_scenario_runs(tmp_path, keeper):
     (tmp_path / "my_keeper.py").write_text(component)
     (tmp_path / "my_kpis.py").write_text(kpi)
     (tmp_path / "gust.csv").write_text("time,force\n0,0\n3,0.2\n4,0\n")
-    done = subprocess.run(
-        [sys.executable, "-m", "cosim", "run", "example.json"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = run_cosim("run", "example.json", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "course.value" in done.stdout
 

@@ -1,4 +1,4 @@
-"""Layers: imports point down only, between folders and between files, and what may not be imported early."""
+"""Layers: imports only point to lower layers, and light commands import no heavy packages."""
 
 import ast
 import subprocess
@@ -123,6 +123,11 @@ def test_cosim_knows_no_vehicle_and_no_bullet():
         modules = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
         modules |= {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
         assert not {"pybullet", "plant_src"} & {module.split(".")[0] for module in modules}, path
+
+
+def test_only_the_build_names_files_of_the_plant():
+    named = [path for path in sources("cosim") if "plant_src" in path.read_text()]
+    assert {module_name(path) for path in named} <= {"cosim.export.sources"}
 
 
 def test_only_fmi_components_and_export_use_fmpy():

@@ -1,1 +1,1 @@
-"""Controllers in Python: one PythonFMU class per file, which runs in process or becomes an FMU."""
+"""Controllers in Python: one PythonFMU class per file, run in process or exported as an FMU."""

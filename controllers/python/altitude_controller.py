@@ -11,7 +11,7 @@ from .fleet.sampled_controller import SampledController
 
 
 class AltitudeController(SampledController):
-    """PID from altitude error (m) to throttle (%); its integral starts at the throttle that carries the weight.
+    """PID from altitude error (m) to throttle (%); its integral starts at the hover throttle.
 
     Gains of the published simulator, the same in controllers/modelica/AltitudeController.mo.
     """
@@ -38,6 +38,7 @@ class AltitudeController(SampledController):
         self.climb = self.add_block("climb", Pid())
 
     def tick(self, time: float) -> None:
+        """Compute the throttle."""
         self.throttle = self.climb(
             self.altitude_reference - self.vehicle.position.z,
             reset=self.reset,
@@ -50,4 +51,5 @@ class AltitudeController(SampledController):
         )
 
     def _hover_throttle(self) -> float:
+        """Return the throttle (%) at which four rotors carry the weight."""
         return 100 / MAX_ROTOR_SPEED * math.sqrt(self.mass * GRAVITY / (4 * self.thrust_coefficient))

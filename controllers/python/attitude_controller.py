@@ -48,6 +48,7 @@ class AttitudeController(SampledController):
         self.parameter("yaw_limit", 10.0, "%", "Of the yaw difference")
 
     def tick(self, time: float) -> None:
+        """Compute the throttle differences."""
         attitude, tilt, yaw = self.vehicle.attitude, (-self.tilt_limit, self.tilt_limit), (-self.yaw_limit, self.yaw_limit)
         self.roll_difference = self._loop("roll", DEGREES_PER_RADIAN * (self.roll_command - attitude.roll), self.tilt_N, tilt)
         self.pitch_difference = self._loop("pitch", DEGREES_PER_RADIAN * (self.pitch_command - attitude.pitch), self.tilt_N, tilt)
@@ -55,4 +56,5 @@ class AttitudeController(SampledController):
 
     def _loop(self, axis: str, error: float, N: float, limits: tuple[float, float]) -> float:
         gains = {gain: getattr(self, f"{axis}_{gain}") for gain in "PID"}
-        return getattr(self, axis)(error, reset=self.reset, N=N, limits=limits, **gains)
+        pid: Pid = getattr(self, axis)
+        return pid(error, reset=self.reset, N=N, limits=limits, **gains)

@@ -1,4 +1,4 @@
-"""A vessel autopilot in Python that keeps a course and a speed; the smallest complete example of a Python controller."""
+"""Vessel autopilot for course and speed: a minimal complete example of a controller in Python."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
 
 class CourseKeeper(Fmi2Slave):
-    """Thrust proportional to the speed error; rudder by PD on the course error, with the yaw rate as its derivative.
+    """Proportional speed control by thrust and PD course control by rudder, with the yaw rate as derivative.
 
-    A positive rudder angle turns the bow to starboard and so reduces the yaw angle.
+    A positive rudder angle turns the bow to starboard and reduces the yaw angle. SI units, angles in rad.
     """
 
     description = "Keeps a course and a speed"
@@ -34,6 +34,7 @@ class CourseKeeper(Fmi2Slave):
             self.register_variable(Real(name, causality=Fmi2Causality.output))
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        """Compute thrust and rudder angle from the inputs at the start of the step."""
         error = self.vehicle.attitude.yaw - self.course_command
         error = math.atan2(math.sin(error), math.cos(error))
         rudder = self.course_P * error + self.course_D * self.vehicle.rates.r

@@ -17,4 +17,5 @@ class HeadingController(HeadingControl):
         self.input("heading_reference", 0.0, "rad", "Counter-clockwise from east")
 
     def tick(self, time: float) -> None:
+        """Compute the rudder angle."""
         self.control_heading(self.heading_reference)

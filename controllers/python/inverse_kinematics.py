@@ -1,4 +1,4 @@
-"""From horizontal acceleration and altitude commands to tilt commands and the common throttle of the rotors."""
+"""Inverse kinematics: from horizontal acceleration and altitude commands to tilt commands and common throttle."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from .fleet.sampled_controller import SampledController
 class InverseKinematics(SampledController):
     """Inverse kinematics of the thrust vector, equations 14 to 20 of the paper, in the world frame (east, north, up).
 
-    The vertical force is that of an altitude PID behind a low-pass, as in the published simulator; both start at hover.
-    The yaw angle is commanded to the attitude loops as it is: that of the wanted rotation differs from it in second order
-    of the tilt.
+    The vertical force is the output of an altitude PID behind a low-pass, as in the published simulator; both start at hover.
+    The attitude loops receive the yaw command unchanged: the yaw angle of the desired rotation differs from it only in second
+    order of the tilt.
     """
 
     description = "From horizontal acceleration and altitude commands to tilt commands and the common throttle of the rotors"
@@ -48,7 +48,7 @@ class InverseKinematics(SampledController):
         self.parameter("thrust_coefficient", 9.148e-6, "N.s2/rad2", "Thrust of a rotor over its squared speed")
 
     def tick(self, time: float) -> None:
-        """Equation 15 in the form of a force: t = m (x'', y'', z'' + g), of which the altitude PID gives the last."""
+        """Compute the commands from the force t = m (x'', y'', z'' + g) (equation 15), its z component from the altitude PID."""
         command, mass = self.acceleration_command, self.mass
         force_x, force_y = (0.0, 0.0) if self.reset else (mass * command.x, mass * command.y)
         force_z = self._vertical_force()
@@ -57,6 +57,7 @@ class InverseKinematics(SampledController):
         self.throttle = 100 / MAX_ROTOR_SPEED * math.sqrt(self.thrust / (4 * self.thrust_coefficient))
 
     def _vertical_force(self) -> float:
+        """Return the filtered vertical force (N)."""
         weight = self.mass * GRAVITY
         force = self.climb(
             self.altitude_command - self.vehicle.position.z,
@@ -71,7 +72,10 @@ class InverseKinematics(SampledController):
         return self.low_pass(force, self.reset, self.filter_frequency, weight)
 
     def _tilt(self, z_x: float, z_y: float, z_z: float) -> None:
-        """Equations 16 to 19: y across the heading, x = y cross z, and the ZYX angles of [x y z]; z is the thrust direction."""
+        """Set the tilt commands from the unit vector z of the thrust (equations 16 to 19).
+
+        y is perpendicular to the heading, x = y cross z, and roll and pitch are the ZYX angles of [x y z].
+        """
         c, s = math.cos(self.yaw_command), math.sin(self.yaw_command)
         y_x, y_y, y_z = -z_z * s, z_z * c, z_x * s - z_y * c
         across = math.sqrt(y_x * y_x + y_y * y_y + y_z * y_z)

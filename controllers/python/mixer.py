@@ -1,4 +1,4 @@
-"""Throttle and its differences to the rotor speeds of a "+" frame."""
+"""Control mixing: from throttle and its differences to the rotor speeds of a "+" frame."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .fleet.sampled_controller import SampledController
 
 
 class Mixer(SampledController):
-    """Rotors 1 front, 2 left, 3 rear, 4 right; front and rear turn the body counter-clockwise by reaction."""
+    """Mixer for rotors 1 front, 2 left, 3 rear, 4 right; the reaction of front and rear turns the body counter-clockwise."""
 
     description = "Throttle and its differences to the rotor speeds of a '+' frame"
 
@@ -23,6 +23,7 @@ class Mixer(SampledController):
         self.output("rotor_speed", [0.0] * 4, "rad/s", "Front, left, rear, right")
 
     def tick(self, time: float) -> None:
+        """Compute the rotor speeds."""
         throttle, roll, pitch, yaw = self.throttle, self.roll_difference, self.pitch_difference, self.yaw_difference
         rotors = (throttle - pitch + yaw, throttle + roll - yaw, throttle + pitch + yaw, throttle - roll - yaw)
         self.rotor_speed[:] = [self.motor_share * MAX_ROTOR_SPEED / 100 * limit(rotor, 0, 100) for rotor in rotors]

@@ -11,9 +11,9 @@ from .fleet.sampled_controller import SampledController
 
 
 class PositionController(SampledController):
-    """Position PIDs give velocity commands, velocity PIDs give tilt commands (degrees inside, rad outside).
+    """Cascade of position PIDs and velocity PIDs with tilt commands as outputs (degrees inside, rad outside).
 
-    World-frame errors are turned into the heading frame (forward, left). Gains of the published simulator, the same in
+    Errors in the world frame are rotated to the heading frame (forward, left). Gains of the published simulator, the same in
     controllers/modelica/PositionController.mo.
     """
 
@@ -40,6 +40,7 @@ class PositionController(SampledController):
             self.add_block(loop, Pid())
 
     def tick(self, time: float) -> None:
+        """Compute the tilt commands."""
         c, s = math.cos(self.vehicle.attitude.yaw), math.sin(self.vehicle.attitude.yaw)
         x = self.position_reference.x - self.vehicle.position.x
         y = self.position_reference.y - self.vehicle.position.y
@@ -50,9 +51,11 @@ class PositionController(SampledController):
         self.roll_command = -self._tilt("left", left - (c * velocity.y - s * velocity.x)) / DEGREES_PER_RADIAN
 
     def _speed(self, axis: str, error: float, feed_forward: float) -> float:
-        pid, limits = getattr(self, f"position_{axis}"), (-self.speed_limit, self.speed_limit)
+        pid: Pid = getattr(self, f"position_{axis}")
+        limits = (-self.speed_limit, self.speed_limit)
         return pid(error, feed_forward, self.reset, P=self.position_P, I=self.position_I, limits=limits)
 
     def _tilt(self, axis: str, error: float) -> float:
-        pid, limits = getattr(self, f"velocity_{axis}"), (-self.tilt_limit, self.tilt_limit)
+        pid: Pid = getattr(self, f"velocity_{axis}")
+        limits = (-self.tilt_limit, self.tilt_limit)
         return pid(error, reset=self.reset, P=self.velocity_P, D=self.velocity_D, N=self.velocity_N, limits=limits)

@@ -17,4 +17,5 @@ class SpeedController(SpeedControl):
         self.input("speed_reference", 0.0, "m/s", "Forward")
 
     def tick(self, time: float) -> None:
+        """Compute the thrust."""
         self.control_speed(self.speed_reference)

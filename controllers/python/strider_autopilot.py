@@ -8,10 +8,11 @@ from .fleet.waypoint_guidance import WaypointGuidanceBase
 
 
 class StriderAutopilot(WaypointGuidanceBase, SpeedControl, HeadingControl):
-    """Guidance gives both references of a tick, the two loops follow them, as in scenarios/systems/strider_autopilot.json."""
+    """Guidance, speed and heading control in one sample, equivalent to scenarios/systems/strider_autopilot.json."""
 
     description = "Waypoint guidance, speed and heading control of a vessel with thruster and rudder in one block"
 
     def tick(self, time: float) -> None:
+        """Update the guidance, then thrust and rudder angle."""
         self.control_speed(self.update_guidance())
         self.control_heading(self.heading_reference)

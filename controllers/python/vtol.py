@@ -9,11 +9,25 @@ from .fleet.sampled_controller import SampledController
 
 
 class Vtol(SampledController):
-    """A machine of six flight modes; table of modes in controllers/modelica/README.md, the same machine in Vtol.mo there."""
+    """State machine of six flight modes, the same as in controllers/modelica/Vtol.mo.
+
+    The table of modes is in controllers/modelica/README.md.
+    """
 
     description = "Path command of the quadcopter: take-off, pursuit of a vessel and landing on its deck"
     mode: int
+    altitude_command: float
+    altitude_reference: float
+    approach_height: float
+    clearance: float
+    climb_rate: float
+    descent_rate: float
+    home_z: float
+    horizontal_error: float
+    landing_error: float
     motor_share: float
+    press_depth: float
+    resting_height: float
     steady: float
     touching: float
 
@@ -71,9 +85,11 @@ class Vtol(SampledController):
         self.output("aborts", 0, description="Aborted descents")
 
     def exit_initialization_mode(self) -> None:
+        """Compute the initial horizontal error."""
         self.horizontal_error = self._horizontal_distance()
 
     def tick(self, time: float) -> None:
+        """Update the flight mode, then the references."""
         self.horizontal_error = self._horizontal_distance()
         if self.mode == FlightMode.IDLE:
             self._store_home_pose()
@@ -96,7 +112,8 @@ class Vtol(SampledController):
 
     @property
     def _landed_altitude(self) -> float:
-        return self.target.position.z + self.resting_height
+        deck_altitude: float = self.target.position.z
+        return deck_altitude + self.resting_height
 
     @property
     def _is_centred(self) -> bool:
@@ -137,7 +154,7 @@ class Vtol(SampledController):
         self.aborts += 1
         return FlightMode.APPROACH
 
-    # -- what the controllers get ----------------------------------------------------------------------------------------------
+    # -- outputs ---------------------------------------------------------------------------------------------------------------
 
     def _update_motor_share(self) -> None:
         direction = -1 if self.mode in (FlightMode.IDLE, FlightMode.LANDED) else 1
@@ -145,12 +162,12 @@ class Vtol(SampledController):
         self.motors_on, self.reset = self.motor_share > 0, self.motor_share < 1
 
     def _set_horizontal_references(self) -> None:
-        place, speed = self.position_reference, self.velocity_reference
+        position, speed = self.position_reference, self.velocity_reference
         if self.mode in (FlightMode.IDLE, FlightMode.TAKE_OFF):
-            place.x, place.y, self.yaw_reference = self.home_x, self.home_y, self.home_yaw
+            position.x, position.y, self.yaw_reference = self.home_x, self.home_y, self.home_yaw
             speed.x, speed.y = 0.0, 0.0
         else:
-            place.x, place.y, self.yaw_reference = self.target.position.x, self.target.position.y, self.yaw_command
+            position.x, position.y, self.yaw_reference = self.target.position.x, self.target.position.y, self.yaw_command
             velocity = self.target.velocity
             speed.x, speed.y = (velocity.x, velocity.y) if self.velocity_feed_forward else (0.0, 0.0)
 
@@ -159,8 +176,8 @@ class Vtol(SampledController):
             self.altitude_reference = self.vehicle.position.z
             return
         step = self._altitude_rate() * SAMPLE_PERIOD
-        missing = self._altitude_destination() - self.altitude_reference
-        self.altitude_reference = self.altitude_reference + limit(missing, -step, step)
+        difference = self._altitude_destination() - self.altitude_reference
+        self.altitude_reference = self.altitude_reference + limit(difference, -step, step)
 
     def _altitude_destination(self) -> float:
         match self.mode:
@@ -179,5 +196,5 @@ class Vtol(SampledController):
 
 
 def _has_elapsed(elapsed: float, duration: float) -> bool:
-    """Half a period lets sums of periods meet a duration in spite of rounding."""
+    """Return True if a sum of sample periods has reached a duration (s), with a tolerance of half a period for rounding."""
     return elapsed >= duration - SAMPLE_PERIOD / 2

@@ -1,4 +1,4 @@
-"""Line of sight to the active waypoint, which a circle of acceptance switches on."""
+"""Path command of the vessel: line-of-sight guidance with a speed reference."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from .fleet.waypoint_guidance import WaypointGuidanceBase
 
 
 class WaypointGuidance(WaypointGuidanceBase):
-    """Path command of the vessel: heading and speed reference from its position and a list of waypoints."""
+    """Heading and speed reference from the position of the vessel and a list of waypoints."""
 
     description = "Line of sight to the active waypoint, which a circle of acceptance switches on"
 
@@ -17,4 +17,5 @@ class WaypointGuidance(WaypointGuidanceBase):
         self.output("speed_reference", 0.0, "m/s", "Forward")
 
     def tick(self, time: float) -> None:
+        """Compute heading and speed reference."""
         self.speed_reference = self.update_guidance()

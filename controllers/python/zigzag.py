@@ -1,4 +1,4 @@
-"""The zig-zag test of a vessel with two propellers."""
+"""Zig-zag test of a vessel with two propellers."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from .fleet.sampled_controller import SampledController
 
 
 class Zigzag(SampledController):
-    """Straight ahead until `start_time`, then turns to starboard; whenever the heading is `angle` off the original course on the
-    side to which the vessel turns, it is ordered to turn to the other side (IMO resolution MSC.137(76), 5.2.3).
+    """Open-loop orders of a zig-zag test (IMO resolution MSC.137(76), 5.2.3).
+
+    The vessel goes straight ahead until `start_time`, then turns to starboard. The order is reversed whenever the heading
+    differs by `angle` from the original course on the side of the turn.
     """
 
     description = "Zig-zag test of a vessel with a port and a starboard propeller"
@@ -29,6 +31,7 @@ class Zigzag(SampledController):
     side: float
 
     def tick(self, time: float) -> None:
+        """Reverse the order if the heading has changed enough, and set the propeller speeds."""
         yaw = self.vehicle.attitude.yaw
         if self.side == 0.0:
             self.course = yaw
@@ -37,4 +40,4 @@ class Zigzag(SampledController):
         if self.side * turned >= self.angle:
             self.side = -self.side
         inner = {-1.0: 1, 1.0: 0}.get(self.side)
-        self.propeller_speed[:] = [self.inner_speed if place == inner else self.outer_speed for place in (0, 1)]
+        self.propeller_speed[:] = [self.inner_speed if index == inner else self.outer_speed for index in (0, 1)]

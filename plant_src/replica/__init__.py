@@ -1,1 +1,1 @@
-"""The published simulator rebuilt, with its conventions: signal interface, force models, controllers."""
+"""Replica of the published simulator with its conventions: signal interface, plant, force models and controllers."""

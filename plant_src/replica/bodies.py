@@ -1,4 +1,4 @@
-"""The two vehicles as bodies that Bullet integrates by itself, held by forces in the world frame."""
+"""Quadcopter and vessel as bodies that Bullet integrates; loads are constant in the world frame over a step."""
 
 from __future__ import annotations
 
@@ -16,29 +16,34 @@ from ..vehicles.common.shapes import quaternion_from_matrix
 from ..vehicles.strider import geometry as strider
 from ..vehicles.strider.parameters import RUDDER_ARM
 
-#: mass of each of the two links of the published joint rig (kg): 4.31 kg move in x, 4.21 kg in y
+#: mass of each of the two links of the published joint rig (kg); 4.31 kg move in x, 4.21 kg in y
 LINK_MASS = 0.1
 
-#: forward-right-down <-> forward-left-up
+#: rotation between forward-right-down and forward-left-up axes
 _FRD_TO_FLU = np.diag([1.0, -1.0, -1.0])
 
 _UP = np.array([0.0, 0.0, 1.0])
 
-#: (3, 8): four thrusts and four propeller torques -> torque about the centre of mass, forward-left-up
+#: maps four thrusts (N) and four propeller torques (N m) to the torque about the centre of mass, forward-left-up, (3, 8)
 _TORQUE_MATRIX = np.hstack((np.cross(ROTORS, _UP).T, np.outer(_UP, ROTOR_SENSES)))
 
-#: (3, 3): angular velocity -> velocity of the centre of mass as seen from the origin of the model frame
+#: maps the angular velocity to the velocity of the centre of mass relative to the origin of the model frame, (3, 3)
 _LEVER_MATRIX = np.cross(np.eye(3), CENTRE_OF_MASS).T
 
 
 class Quadcopter:
-    """A rigid body on which thrusts and propeller torques act; Bullet's frame of it has the principal axes of inertia."""
+    """Rigid body under rotor thrusts and propeller torques; its frame in Bullet has the principal axes of inertia.
+
+    Args:
+        client: Bullet client.
+        initial: Position (m, 3) of the origin of the model frame, yaw (rad), velocity (m/s, 3) and rates (rad/s, 3) in
+            forward-left-up body axes.
+    """
 
     def __init__(self, client: int, initial: Numbers):
-        """`initial`: position (3) of the model's origin, yaw, velocity (3) and rates (3) in forward-left-up body axes."""
         self._client, self._axes = client, AIRFRAME.principal_axes()[1]
-        turn = _about_z(initial[3])
-        centre = np.array(initial[0:3]) + turn @ CENTRE_OF_MASS
+        rotation = _rotation_about_z(initial[3])
+        centre = np.array(initial[0:3]) + rotation @ CENTRE_OF_MASS
         yaw = pybullet.getQuaternionFromEuler([0.0, 0.0, initial[3]])
         _, orientation = pybullet.multiplyTransforms([0, 0, 0], yaw, [0, 0, 0], quaternion_from_matrix(self._axes))
         self.body = pybullet.createMultiBody(
@@ -50,11 +55,11 @@ class Quadcopter:
             physicsClientId=client,
         )
         set_dynamics(client, self.body, -1, ar_drone.BODY)
-        linear, angular = turn @ (initial[4:7] + _LEVER_MATRIX @ initial[7:10]), turn @ initial[7:10]
+        linear, angular = rotation @ (initial[4:7] + _LEVER_MATRIX @ initial[7:10]), rotation @ initial[7:10]
         pybullet.resetBaseVelocity(self.body, linear.tolist(), angular.tolist(), physicsClientId=client)
 
     def apply(self, loads: np.ndarray) -> None:
-        """Four thrusts (N) and four propeller torques (N m), for the coming step of Bullet, fixed in the world frame."""
+        """Apply four thrusts (N) and four propeller torques (N m) in the next step of Bullet, fixed in the world frame."""
         centre, to_world = self._pose()
         force, torque = to_world[:, 2] * loads[0:4].sum(), to_world @ (_TORQUE_MATRIX @ loads)
         options = {"flags": pybullet.WORLD_FRAME, "physicsClientId": self._client}
@@ -62,9 +67,11 @@ class Quadcopter:
         pybullet.applyExternalTorque(self.body, -1, torque.tolist(), **options)
 
     def measure(self) -> tuple[np.ndarray, np.ndarray]:
-        """Position, attitude (phi, theta, psi) and velocity as published, shape (9,); and R v + position, shape (3,).
+        """Return the published quantities.
 
-        The difference quotient of the latter was published as acceleration.
+        Returns:
+            Position (m), attitude phi, theta, psi (rad) and velocity (m/s), shape (9,); and R v + position, shape (3,), whose
+            difference quotient was published as acceleration.
         """
         centre, to_world = self._pose()
         linear, angular = pybullet.getBaseVelocity(self.body, self._client)
@@ -73,21 +80,25 @@ class Quadcopter:
         return np.concatenate((position, attitude(from_original), velocity)), from_original @ velocity + position
 
     def _pose(self) -> tuple[np.ndarray, np.ndarray]:
-        """Centre of mass, and the rotation from the forward-left-up body frame to the world."""
+        """Return the centre of mass (m) and the rotation matrix from the forward-left-up body frame to the world."""
         centre, orientation = pybullet.getBasePositionAndOrientation(self.body, self._client)
         principal = np.array(pybullet.getMatrixFromQuaternion(orientation)).reshape(3, 3)
         return np.array(centre), principal @ self._axes.T
 
 
 class Vessel:
-    """The hull at the end of a chain of sliders in x and y and a yaw joint."""
+    """Hull on prismatic joints along x and y and a revolute joint about z.
+
+    Args:
+        client: Bullet client.
+        initial: x, y (m), yaw (rad), surge and sway velocity (m/s), yaw rate (rad/s).
+    """
 
     _JOINTS = (0, 1, 2)
 
     def __init__(self, client: int, initial: Numbers):
-        """`initial`: x, y, yaw, surge and sway velocity, yaw rate."""
         self._client, self.body = client, _create_jointed_hull(client)
-        velocity = (_about_z(initial[2])[:2, :2] @ np.array(initial[3:5])).tolist()
+        velocity = (_rotation_about_z(initial[2])[:2, :2] @ np.array(initial[3:5])).tolist()
         for joint, rate in zip(self._JOINTS, (*velocity, initial[5]), strict=True):
             pybullet.setJointMotorControl2(self.body, joint, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client)
             pybullet.resetJointState(self.body, joint, initial[joint], rate, physicsClientId=client)
@@ -97,17 +108,17 @@ class Vessel:
         set_dynamics(client, self.body, 2, strider.BODY)
 
     def apply(self, loads: np.ndarray) -> None:
-        """Propeller thrust, rudder X and Y, water X and Y (N) and water N (N m), for the coming step of Bullet."""
+        """Apply propeller thrust, rudder X and Y, water X and Y (N) and water N (N m) in the next step of Bullet."""
         thrust, rudder_x, rudder_y, water_x, water_y, moment = loads
         yaw = self._joints()[0][2]
-        force = _about_z(yaw)[:2, :2] @ [thrust + rudder_x + water_x, rudder_y + water_y]
+        force = _rotation_about_z(yaw)[:2, :2] @ [thrust + rudder_x + water_x, rudder_y + water_y]
         efforts = [*force.tolist(), float(moment - RUDDER_ARM * rudder_y)]
         pybullet.setJointMotorControlArray(
             self.body, self._JOINTS, pybullet.TORQUE_CONTROL, forces=efforts, physicsClientId=self._client
         )
 
     def measure(self) -> np.ndarray:
-        """Position, velocity, angular velocity and yaw as published, shape (10,)."""
+        """Return position (m), velocity (m/s), angular velocity (rad/s) and yaw (rad) as published, shape (10,)."""
         (x, y, yaw), (vx, vy, rate) = self._joints()
         wrapped = math.pi - (math.pi - yaw) % (2 * math.pi)
         return np.array([x, y, strider.BODY.height, vx, vy, 0.0, 0.0, 0.0, rate, wrapped])
@@ -118,9 +129,9 @@ class Vessel:
 
 
 def _create_jointed_hull(client: int) -> int:
-    """The hull at its height on joints for x, y and yaw."""
+    """Create the hull on its three joints and return its body number."""
     hull, origin, upright = strider.BODY, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]
-    return pybullet.createMultiBody(
+    body: int = pybullet.createMultiBody(
         0,
         -1,
         -1,
@@ -138,15 +149,16 @@ def _create_jointed_hull(client: int) -> int:
         linkJointAxis=[[1, 0, 0], [0, 1, 0], [0, 0, 1]],
         physicsClientId=client,
     )
+    return body
 
 
 def attitude(to_world: np.ndarray) -> np.ndarray:
-    """phi, theta, psi (rad) of a rotation matrix (3, 3) from the forward-right-down body frame to the world."""
+    """Return phi, theta, psi (rad) of a rotation matrix (3, 3) from the forward-right-down body frame to the world."""
     r = to_world
     theta = math.asin(max(-1.0, min(1.0, r[2, 0])))
     return np.array([math.atan2(-r[2, 1], -r[2, 2]), theta, math.atan2(-r[1, 0], r[0, 0])])
 
 
-def _about_z(angle: float) -> np.ndarray:
+def _rotation_about_z(angle: float) -> np.ndarray:
     cos, sin = math.cos(angle), math.sin(angle)
     return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])

@@ -1,4 +1,4 @@
-"""The wire from plant to controllers of the published simulator."""
+"""Connection from plant to controllers of the published simulator."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from .interface import OUTPUTS
 
 
 class Bus(ReplicaFmu):
-    """Emits the 22 signals of the sample before, and zeros at first: the published handshake sends what it stored.
+    """Delay of one sample for all 22 signals; the first outputs are zero, as in the published handshake.
 
-    Stepped ahead of the controllers it makes them see the plant of 10 ms ago. Without it, a connection with "delay": 1 does the
-    same but for the first sample.
+    It is stepped before the controllers, which therefore receive the plant's signals of 10 ms ago. A connection with "delay": 1
+    differs only in the first sample.
     """
 
     description = "Delay of one sample that starts at zero"
@@ -25,6 +25,7 @@ class Bus(ReplicaFmu):
         self.declare_outputs(*self._names)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        """Output the stored signals and store the present ones."""
         value = self.values
         for name in self._names:
             value[name] = value[f"stored.{name}"]

@@ -1,4 +1,4 @@
-"""What the replica's units in Python share: variables by name, and PID loops whose gains and states are variables."""
+"""Base class of the replica's PythonFMU classes: variables by name, and PID loops whose gains and states are variables."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ _STATE: dict[str, Any] = {"causality": Fmi2Causality.local}
 
 
 class ReplicaFmu(Fmi2Slave):
-    """A PythonFMU class that keeps its variables in `value`, by name."""
+    """PythonFMU class that stores its real variables in `values`, by name."""
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
         self.values: dict[str, float] = {}
 
     def declare_inputs(self, *names: str) -> None:
-        """Declare inputs, which start at zero."""
+        """Declare inputs with the start value 0."""
         self._register(names, causality=Fmi2Causality.input)
 
     def declare_outputs(self, *names: str) -> None:
-        """Declare outputs, which start at zero."""
+        """Declare outputs with the start value 0."""
         self._register(names, causality=Fmi2Causality.output)
 
     def declare_parameters(self, **values: float) -> None:
-        """Declare parameters with their values."""
+        """Declare tunable parameters with their start values."""
         self._register(values, **_PARAMETER)
         self.values |= values
 
     def declare_states(self, **values: float) -> None:
-        """Declare memory with its start values."""
+        """Declare internal states with their start values."""
         self._register(values, **_STATE)
         self.values |= values
 
     def register_pid(self, name: str, loop: Pid) -> Pid:
-        """Declare gains and states of a loop."""
+        """Declare gains and states of a loop as variables below `name` and return the loop."""
         for field in ("P", "I", "D", "N", "integral", "filtered"):
             kind = _PARAMETER if field.isupper() else _STATE
             access = {"getter": partial(getattr, loop, field), "setter": partial(setattr, loop, field)}

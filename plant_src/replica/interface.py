@@ -1,7 +1,9 @@
-"""The signals between controllers and plant of the published simulator, in its order and its frames.
+"""Signals between controllers and plant of the published simulator, in its order and its frames.
 
-World frame: z up. The quadcopter's body frame is x forward, y right, z down: phi > 0 right side down, theta > 0 nose up, psi
-clockwise as seen from above, all rad. The vessel's is x forward, y left, z up; its yaw is counter-clockwise.
+- World frame: z up.
+- Body frame of the quadcopter: x forward, y right, z down; phi > 0 right side down, theta > 0 nose up, psi clockwise seen from
+  above (rad).
+- Body frame of the vessel: x forward, y left, z up; yaw counter-clockwise (rad).
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from ..vehicles.common.interface import scalar_variable, vector_variables
 
 ROTORS = range(1, 5)
 
-#: equation 10 of the paper
+#: inputs of the plant (equation 10 of the paper)
 INPUTS: tuple[Variable, ...] = (
     *(scalar_variable(f"uav.thrust[{i}]", "N", "along the quadcopter's body up, at the rotor") for i in ROTORS),
     *(scalar_variable(f"uav.torque[{i}]", "N.m", "of the propeller; turns the body about its up: + - + -") for i in ROTORS),
@@ -22,7 +24,7 @@ INPUTS: tuple[Variable, ...] = (
     scalar_variable("usv.water.n", "N.m", "hydrodynamic moment about z"),
 )
 
-#: equation 11 of the paper
+#: outputs of the plant (equation 11 of the paper)
 OUTPUTS: tuple[Variable, ...] = (
     *vector_variables("uav.position", "xyz", "m", "origin of the quadcopter's model frame, world frame"),
     *vector_variables("uav.attitude", ("phi", "theta", "psi"), "rad", "forward-right-down body frame"),

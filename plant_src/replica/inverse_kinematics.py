@@ -1,7 +1,7 @@
-"""The published controller by inverse kinematics: attitude and throttle from commanded accelerations; and the demo's profiles.
+"""Published controller by inverse kinematics, and the acceleration profiles of its demo.
 
-Equations 14 to 20 of the paper as they were published in code: the accelerations act along the body's forward and right axes,
-whatever psi is, though the paper calls them inertial.
+Equations 14 to 20 of the paper as in the published code: accelerations are along the body's forward and right axes for every
+psi, although the paper calls them inertial.
 """
 
 from __future__ import annotations
@@ -15,18 +15,19 @@ from ..vehicles.ar_drone.parameters import THRUST_COEFFICIENT
 from .fmu_base import ReplicaFmu
 from .pid import Pid
 
-MASS = 0.441  # kg, as the controller has it
+MASS = 0.441  # kg, assumed by the controller
 MAX_SPEED = 5000.0  # 1/min
 
-FILTER_ORDER, CUT_OFF_FREQUENCY = 15, 2 * math.pi * 20.0  # of the Butterworth low-pass: rad/s
+#: order and cut-off frequency (rad/s) of the Butterworth low-pass
+FILTER_ORDER, CUT_OFF_FREQUENCY = 15, 2 * math.pi * 20.0
 _FILTER_STATES = [f"filter[{i}]" for i in range(1, FILTER_ORDER + 1)]
 
 
 class InverseKinematics(ReplicaFmu):
-    """Tilt commands (rad) and throttle (%) that point the thrust along the commanded acceleration (m/s2).
+    """Controller that computes tilt commands (rad) and throttle (%) from acceleration commands (m/s2).
 
-    The vertical force comes from an altitude loop through a low-pass. It starts at `initial_force` (N): 0 as published, so that
-    the first tilt commands are huge; the weight is a better start.
+    The vertical force is the output of an altitude loop behind a low-pass filter. It starts at `initial_force` (N): 0 as
+    published, which makes the first tilt commands very large. The weight is a better start value.
     """
 
     description = "Attitude and throttle from accelerations"
@@ -41,13 +42,15 @@ class InverseKinematics(ReplicaFmu):
         self._step_size, self._filter_matrix, self._filter_gain = math.nan, np.eye(FILTER_ORDER), np.zeros(FILTER_ORDER)
 
     def exit_initialization_mode(self) -> None:
+        """Start altitude loop and low-pass in the steady state of `initial_force`."""
         force = self._altitude.integral = self.values["initial_force"]
         self.values |= dict(zip(_FILTER_STATES, low_pass_steady_state(force).tolist(), strict=True))
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        """Compute the commands of this sample (equations 14 to 20 of the paper)."""
         value = self.values
-        wanted = self._altitude.step(value["altitude_command"] - value["vehicle.position.z"], step_size)
-        z = value["vertical_force"] = self._low_pass_step(wanted, step_size)
+        unfiltered = self._altitude.step(value["altitude_command"] - value["vehicle.position.z"], step_size)
+        z = value["vertical_force"] = self._low_pass_step(unfiltered, step_size)
         x, y = MASS * value["forward_acceleration"], MASS * value["right_acceleration"]
         force = math.hypot(x, y, z)
         value["phi_command"], value["theta_command"] = math.atan2(y, z), -math.asin(x / force) if force else 0.0
@@ -55,7 +58,7 @@ class InverseKinematics(ReplicaFmu):
         return True
 
     def _low_pass_step(self, force: float, step_size: float) -> float:
-        """The output of the low-pass at this sample; then its states advance."""
+        """Return the output of the low-pass at this sample, then advance its states."""
         if step_size != self._step_size:
             self._step_size, (self._filter_matrix, self._filter_gain) = step_size, low_pass_matrices(step_size)
         state = np.array([self.values[name] for name in _FILTER_STATES])
@@ -64,9 +67,15 @@ class InverseKinematics(ReplicaFmu):
 
 
 def low_pass_matrices(step_size: float) -> tuple[np.ndarray, np.ndarray]:
-    """M (15, 15) and g (15,) of x(k+1) = M x(k) + g u(k) for the Butterworth low-pass, by the published third-order method.
+    """Return the discretised Butterworth low-pass x(k+1) = M x(k) + g u(k) by the published third-order Runge-Kutta method.
 
-    It is a first-order section, then seven of second order with the states (derivative, output); the last state is the output.
+    The filter is a first-order section followed by seven second-order sections with the states (derivative, output).
+
+    Args:
+        step_size: Sample period (s).
+
+    Returns:
+        M, shape (15, 15), and g, shape (15,). The last state is the output.
     """
     a, b = np.zeros((FILTER_ORDER, FILTER_ORDER)), np.zeros(FILTER_ORDER)
     a[0, 0], b[0] = -CUT_OFF_FREQUENCY, CUT_OFF_FREQUENCY
@@ -79,12 +88,12 @@ def low_pass_matrices(step_size: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def low_pass_steady_state(value: float) -> np.ndarray:
-    """States (15,) of the low-pass that has always had this input."""
+    """Return the steady state (15,) of the low-pass for a constant input."""
     return np.array([value if i % 2 == 0 else 0.0 for i in range(FILTER_ORDER)])
 
 
 class AccelerationProfiles(ReplicaFmu):
-    """The demo's accelerations (m/s2): 5 m forth and back along `forward`, 25 m along `right`, in 20 s; zero afterwards."""
+    """Acceleration profiles of the demo (m/s2): 5 m forth and back along `forward`, 25 m along `right`, in 20 s; then zero."""
 
     description = "Acceleration profiles of the published demo"
 
@@ -93,20 +102,21 @@ class AccelerationProfiles(ReplicaFmu):
         self.declare_outputs("forward", "right")
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        """Set both accelerations at `current_time` (s)."""
         self.values["forward"] = return_move_acceleration(current_time) / 2
         self.values["right"] = stop_move_acceleration(current_time) / 4
         return True
 
 
 def return_move_acceleration(time: float) -> float:
-    """Acceleration (m/s2) of a minimum-jerk move of 10 m in 10 s and of the same move back."""
+    """Return the acceleration (m/s2) at `time` (s) of a minimum-jerk move of 10 m in 10 s and of the same move back."""
     s = time / 10 % 1
     forth = (60 * s - 180 * s**2 + 120 * s**3) / 10
     return forth if time < 10 else -forth if time < 20 else 0.0
 
 
 def stop_move_acceleration(time: float) -> float:
-    """Acceleration (m/s2) to 10 m/s within 10 s, and to rest again within 10 s: 100 m."""
+    """Return the acceleration (m/s2) at `time` (s) to 10 m/s within 10 s and back to rest within 10 s (100 m)."""
     s = time / 10 % 1
     faster = 30 * s**2 * (1 - s) ** 2
     return faster if time < 10 else -faster if time < 20 else 0.0

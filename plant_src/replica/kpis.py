@@ -1,4 +1,4 @@
-"""Figures of merit by which the replica is compared with the published simulator; SI units, values at recorded rows."""
+"""KPIs for the comparison of the replica with the published simulator, in SI units at recorded rows."""
 
 from __future__ import annotations
 
@@ -12,24 +12,34 @@ from cosim.results import Result
 from cosim.results.checks import Number
 from cosim.results.kpi import Prefix, units
 
-from ..kpis import horizontal_distance, waypoints
+from ..kpis import waypoints
+from ..recorded_motion import horizontal_distance
 
 
 @units(leg="m")
 def overshoots(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
-    """`leg[i]` (m): largest distance of `vehicle` from the straight line to waypoint i, while it heads there.
+    """Evaluate the largest distance from each leg between waypoints.
 
-    The lines start where the vehicle started and at the waypoints before (`x`, `y`, m); a leg ends when the circle of `radius`
-    (m) is entered. NaN for legs that are not finished.
+    The first leg starts at the position in the first row. A leg ends when its circle of acceptance is entered.
+
+    Args:
+        result: Recorded mission.
+        vehicle: Signal prefix of the vehicle ("plant.usv").
+        x: East coordinates of the waypoints (m, world).
+        y: North coordinates of the waypoints (m, world).
+        radius: Radius of the circles of acceptance (m).
+
+    Returns:
+        `leg[1]`, `leg[2]`, ...: largest distance from the straight line to each waypoint (m); NaN for unfinished legs.
     """
     switches = [result.time[0], *_waypoint_times(result, vehicle, x, y, radius)]
     position = np.column_stack([result[f"{vehicle}.position.{axis}"] for axis in "xy"])
     corners = [position[0], *np.column_stack([x, y])]
     legs = dict.fromkeys((f"leg[{i}]" for i in range(1, len(x) + 1)), math.nan)
     for i, ((begin, end), (a, b)) in enumerate(zip(pairwise(switches), pairwise(corners), strict=False), start=1):
-        along = (b - a) / np.hypot(*(b - a))
+        direction = (b - a) / np.hypot(*(b - a))
         offset = position[(result.time >= begin) & (result.time <= end)] - a
-        legs[f"leg[{i}]"] = float(np.abs(offset[:, 0] * along[1] - offset[:, 1] * along[0]).max())
+        legs[f"leg[{i}]"] = float(np.abs(offset[:, 0] * direction[1] - offset[:, 1] * direction[0]).max())
     return legs
 
 
@@ -37,11 +47,23 @@ def overshoots(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[
 def turns(
     result: Result, vehicle: Prefix, target: Prefix, x: Sequence[float], y: Sequence[float], radius: float, settling: float
 ) -> dict[str, Number]:
-    """How well `vehicle` follows `target`, which turns at the waypoints (`x`, `y`, m) when within `radius` (m) of them.
+    """Evaluate how a vehicle follows a target on straight legs and in turns at waypoints.
 
-    straight    m  largest horizontal distance, away from turns: but for `settling` (s) after the start and each waypoint
-    turn        m  largest peak within `settling` of a waypoint
-    least_turn  m  smallest of these peaks
+    Args:
+        result: Recorded mission.
+        vehicle: Signal prefix of the vehicle ("plant.uav").
+        target: Signal prefix of the target ("plant.usv").
+        x: East coordinates of the target's waypoints (m, world).
+        y: North coordinates of the target's waypoints (m, world).
+        radius: Radius of the circles of acceptance (m).
+        settling: Time after the start and after each waypoint that does not count as straight (s).
+
+    Returns:
+        Values by name:
+
+        - `straight`: largest horizontal distance outside the settling times (m)
+        - `turn`: largest of the peaks within `settling` after each waypoint (m)
+        - `least_turn`: smallest of these peaks (m)
     """
     switches = _waypoint_times(result, target, x, y, radius)
     distance, time = horizontal_distance(result, vehicle, target), result.time
@@ -56,7 +78,7 @@ def turns(
 
 
 def _waypoint_times(result: Result, vehicle: str, x: Sequence[float], y: Sequence[float], radius: float) -> list[float]:
-    """When the waypoints that were reached were reached (s)."""
+    """Return the times (s) at which waypoints were reached, without those that were not."""
     reached = waypoints(result, vehicle, x, y, radius)
     return [float(reached[f"time[{i}]"]) for i in range(1, int(reached["reached"]) + 1)]
 
@@ -65,12 +87,23 @@ def _waypoint_times(result: Result, vehicle: str, x: Sequence[float], y: Sequenc
 def touchdown(
     result: Result, vehicle: Prefix, target: Prefix, rest_height: float, start: float, margin: float = 0.005
 ) -> dict[str, Number]:
-    """The first landing after `start` (s): the origin of `vehicle` comes within `margin` (m) of `rest_height` (m, world).
+    """Evaluate the first touchdown after `start`, found by the altitude.
 
-    time    s    of the touchdown
-    error   m    horizontal distance to `target` at touchdown
-    speed   m/s  vertical speed one row earlier, downwards > 0
-    lowest  m    lowest altitude between `start` and half a second before the touchdown (the dip of the approach)
+    Args:
+        result: Recorded mission.
+        vehicle: Signal prefix of the quadcopter ("plant.uav").
+        target: Signal prefix of the vessel ("plant.usv").
+        rest_height: Altitude of the quadcopter's origin at rest on the deck (m, world).
+        start: First time that is evaluated (s).
+        margin: Altitude above `rest_height` that counts as touchdown (m).
+
+    Returns:
+        Values by name, all NaN without a touchdown:
+
+        - `time`: time of the touchdown (s)
+        - `error`: horizontal distance to the target at touchdown (m)
+        - `speed`: downward speed one row earlier (m/s)
+        - `lowest`: lowest altitude between `start` and 0.5 s before touchdown, the undershoot of the approach (m)
     """
     z = result[f"{vehicle}.position.z"]
     rows = np.flatnonzero((z <= rest_height + margin) & (result.time >= start))

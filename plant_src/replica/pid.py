@@ -1,4 +1,4 @@
-"""The controller of all loops: parallel PID with filtered derivative, integrated like the published one."""
+"""PID controller of all loops, with the integration method of the published simulator."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 @dataclass
 class Pid:
-    """u = P e + I int(e) + D N/(1 + N/s) e, limited; N in rad/s.
+    """Parallel PID controller u = P e + I int(e) + D N/(1 + N/s) e with output limits; N in rad/s.
 
-    Between samples e is constant and the filter is integrated by the third-order method of the published simulator. With
-    `clamping` the integral stops while the output is limited and e drives it further.
+    The error e is constant between samples. The derivative filter is integrated by the third-order Runge-Kutta method of the
+    published simulator. With `clamping` the integral stops while the output is limited and e would drive it further.
     """
 
     P: float
@@ -25,11 +25,11 @@ class Pid:
     filtered: float = 0.0
 
     def step(self, error: float, step_size: float) -> float:
-        """The limited output at this sample; then the states advance by `step_size` (s)."""
+        """Return the limited output at this sample, then advance the states by `step_size` (s)."""
         damped = self.D * error
-        wanted = self.P * error + self.integral + self.N * (damped - self.filtered)
-        limited = min(self.upper, max(self.lower, wanted))
-        if not (self.clamping and self.I * error * (wanted - limited) > 0):
+        unlimited = self.P * error + self.integral + self.N * (damped - self.filtered)
+        limited = min(self.upper, max(self.lower, unlimited))
+        if not (self.clamping and self.I * error * (unlimited - limited) > 0):
             self.integral += step_size * self.I * error
         h = self.N * step_size
         self.filtered = damped + (self.filtered - damped) * (1 - h + h**2 / 2 - h**3 / 6)

@@ -1,8 +1,8 @@
-"""The published cascaded controller of the quadcopter, block by block.
+"""Published cascaded controller of the quadcopter, one class per block.
 
-Conventions of the plant's signals (`interface.py`): psi clockwise, "left" velocities for roll commands. Between blocks angles are
-rad and throttles %, inside the loops angles are degrees, for which the gains hold. Two published flaws are kept: velocities are
-those of the world, taken for forward and left; and the yaw error is not wrapped.
+Signals have the conventions of `interface.py`. Angles between blocks are in rad and throttles in %; inside the loops angles are
+in degrees, as the published gains require. Two published errors are kept: world velocities are used as forward and left
+velocities, and the yaw error is not wrapped.
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ TARGET_INPUTS = ("target.position.x", "target.position.y")
 
 
 class Vtol(ReplicaFmu):
-    """Altitude reference (m, world): the command, from `landing_time` on the approach altitude, and 0 when well above the target.
+    """Altitude reference (m, world) of take-off, approach and landing.
 
-    It remembers nothing: the descent ends where the horizontal error exceeds `landing_error` (m), and motors never stop.
+    The reference is `altitude_command` before `landing_time`, then `approach_altitude`, and 0 while the quadcopter is low and
+    within `landing_error` (m) of the target. The logic has no state: a larger error ends the descent, and the motors never
+    stop.
     """
 
     description = "Switching logic of take-off, approach and landing"
@@ -33,6 +35,7 @@ class Vtol(ReplicaFmu):
         self.declare_outputs("altitude_reference", "horizontal_error")
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        """Compute horizontal error and altitude reference."""
         value = self.values
         position, target = ([value[name] for name in names] for names in (POSITION_INPUTS, TARGET_INPUTS))
         value["horizontal_error"] = math.dist(position, target)
@@ -48,7 +51,7 @@ class Vtol(ReplicaFmu):
 
 
 class PositionController(ReplicaFmu):
-    """Position and velocity loops: tilt commands phi (right side down) and theta (nose up) towards the target."""
+    """Position and velocity loops with the outputs phi (rad, right side down) and theta (rad, nose up)."""
 
     description = "Position and velocity loops"
 
@@ -64,6 +67,7 @@ class PositionController(ReplicaFmu):
         )
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        """Compute the tilt commands."""
         value = self.values
         forward, left = self._error()
         u_command, v_command = self._x.step(forward, step_size), self._y.step(left, step_size)
@@ -73,19 +77,19 @@ class PositionController(ReplicaFmu):
         return True
 
     def _error(self) -> tuple[float, float]:
-        """Distance to the target (m) forward and to the left."""
+        """Return the distance to the target forward and to the left (m)."""
         x, y = (self.values[target] - self.values[own] for target, own in zip(TARGET_INPUTS, POSITION_INPUTS, strict=True))
         cos, sin = math.cos(-self.values["vehicle.attitude.psi"]), math.sin(-self.values["vehicle.attitude.psi"])
         return x * cos + y * sin, y * cos - x * sin
 
 
 def _create_tilt_pid() -> Pid:
-    """Tilt (deg) from a velocity error (m/s)."""
+    """Return a loop from velocity error (m/s) to tilt (deg)."""
     return Pid(19.6600401691244, 0.0, 0.259478709550943, 3.0476144677615, lower=-15.0, upper=15.0)
 
 
 class AltitudeController(ReplicaFmu):
-    """Throttle (%) from the altitude error; there is no feed-forward of hovering, so the integral has to find it."""
+    """Altitude loop with the output throttle (%); it has no feed-forward of the hover throttle."""
 
     description = "Altitude loop"
 
@@ -97,13 +101,14 @@ class AltitudeController(ReplicaFmu):
         self._loop = self.register_pid("altitude", loop)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        """Compute the throttle."""
         error = self.values["altitude_reference"] - self.values["vehicle.position.z"]
         self.values["throttle"] = self._loop.step(error, step_size)
         return True
 
 
 class AttitudeController(ReplicaFmu):
-    """Throttle differences (%) from the attitude errors."""
+    """Attitude loops with the outputs roll, pitch and yaw throttle differences (%)."""
 
     description = "Roll, pitch and yaw loops"
 
@@ -122,6 +127,7 @@ class AttitudeController(ReplicaFmu):
         self._loops = [(a, n, self.register_pid(f"{n}_loop", loop)) for a, n, loop in zip(angles, names, loops, strict=True)]
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        """Compute the throttle differences."""
         for angle, name, loop in self._loops:
             error = self.values[f"{angle}_command"] - self.values[f"vehicle.attitude.{angle}"]
             self.values[name] = loop.step(math.degrees(error), step_size)
@@ -129,7 +135,7 @@ class AttitudeController(ReplicaFmu):
 
 
 class Mixer(ReplicaFmu):
-    """Throttle (%) of the rotors front, left, rear, right."""
+    """Control mixing with the output throttles (%) of the rotors front, left, rear, right."""
 
     description = "Control mixing"
 
@@ -139,6 +145,7 @@ class Mixer(ReplicaFmu):
         self.declare_outputs(*(f"throttle[{i}]" for i in ROTORS))
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        """Compute the throttles."""
         collective, roll, pitch, yaw = (self.values[name] for name in ("collective", "roll", "pitch", "yaw"))
         sums = (collective - yaw + pitch, collective + yaw + roll, collective - yaw - pitch, collective + yaw - roll)
         for i, throttle in zip(ROTORS, sums, strict=True):

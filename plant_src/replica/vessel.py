@@ -1,4 +1,4 @@
-"""The published guidance and control of the vessel."""
+"""Published guidance and autopilot of the vessel."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ MAX_WAYPOINTS = 32
 
 
 class Waypoints(ReplicaFmu):
-    """Course (rad, in [0, 2 pi)) straight to the current waypoint; the next one when `acceptance_radius` (m) is entered.
+    """Line-of-sight guidance: course (rad, in [0, 2 pi)) to the current waypoint.
 
-    The test of the radius is one sample old, as published. The last waypoint stays current (published: undefined).
+    The next waypoint follows one sample after the vessel enters `acceptance_radius` (m), as published. The last waypoint stays
+    current; in the published simulator its index becomes invalid.
     """
 
     description = "Line of sight to waypoints"
@@ -29,6 +30,7 @@ class Waypoints(ReplicaFmu):
         self.values["waypoint"] = 1.0
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        """Select the waypoint and compute the course."""
         value = self.values
         inside = float(value["old_distance"] <= value["acceptance_radius"])
         if inside > value["was_inside"] and value["waypoint"] < value["waypoint_count"]:
@@ -41,7 +43,7 @@ class Waypoints(ReplicaFmu):
 
 
 class Autopilot(ReplicaFmu):
-    """Thrust (N) proportional to the speed error, rudder angle (rad) by PD on the heading error taken the shorter way."""
+    """Autopilot: thrust (N) proportional to the speed error, rudder angle (rad) by PD on the wrapped heading error."""
 
     description = "Speed and heading control"
 
@@ -55,6 +57,7 @@ class Autopilot(ReplicaFmu):
         self._heading = self.register_pid("heading", Pid(0.5, 0.0, 0.6, 21.4165136740303, lower=-largest, upper=largest))
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        """Compute thrust and rudder angle."""
         value = self.values
         error = (value["vehicle.attitude.yaw"] - value["course_command"] + math.pi) % (2 * math.pi) - math.pi
         value["rudder_angle"] = self._heading.step(error, step_size)
@@ -62,6 +65,6 @@ class Autopilot(ReplicaFmu):
         return True
 
     def _surge(self) -> float:
-        """Velocity (m/s) along the heading."""
+        """Return the velocity along the heading (m/s)."""
         yaw = self.values["vehicle.attitude.yaw"]
         return math.cos(yaw) * self.values["vehicle.velocity.x"] + math.sin(yaw) * self.values["vehicle.velocity.y"]

@@ -1,7 +1,7 @@
-"""The plant of the published simulator: a physics engine that integrates the forces it is given.
+"""Plant of the published simulator: a physics engine that integrates given forces.
 
-Forces are held over a step and fixed in the world frame, like the published ones; Bullet divides the step into `sub_steps`
-(published: two of 5 ms) and has gravity. `plant_src/world.py` is the accurate plant; this one is there for comparison.
+Forces are constant over a step and fixed in the world frame, as published. Bullet divides a step into `sub_steps` (published:
+two of 5 ms) and applies gravity. This plant is for comparison only; `plant_src/world.py` is the accurate one.
 """
 
 from __future__ import annotations
@@ -17,18 +17,19 @@ from cosim.core.component import Component, Ports, Variable
 from cosim.core.errors import ComponentError, InputError, Problem, did_you_mean
 
 from .. import world_settings
-from ..physics.body import MAX_STATE_NORM, create_compound_shape, set_dynamics
+from ..physics.body import create_compound_shape, set_dynamics
 from ..physics.client import connect, pybullet
 from ..placement import Platform, VehiclePlacement
 from ..scene import replay
 from ..vehicles.ar_drone.parameters import GRAVITY
+from ..vehicles.common.alarms import MAX_STATE_NORM
 from ..vehicles.common.shapes import Box
 from .bodies import Quadcopter, Vessel
 from .interface import INPUTS, OUTPUTS
 
 VEHICLE_MODELS = {"uav": "ar_drone", "usv": "strider"}
 
-#: bodies may not overlap deeper than this at the start (m)
+#: largest allowed overlap of bodies at the start (m)
 MAX_INITIAL_OVERLAP = 1e-3
 
 _DISTANCE = 8  # field of Bullet's contact points
@@ -36,7 +37,7 @@ _DISTANCE = 8  # field of Bullet's contact points
 
 @dataclass(frozen=True)
 class ReplicaState:
-    """The state of a world: Bullet's, which Bullet keeps under a number, and ours."""
+    """State of a world: the number of a state saved in Bullet, the outputs, and the integral of the published acceleration."""
 
     bullet: int
     outputs: np.ndarray
@@ -44,12 +45,18 @@ class ReplicaState:
 
 
 class World(Component):
-    """The quadcopter `uav`, the vessel `usv` and fixed platforms in one PyBullet client: 14 inputs, 22 outputs (`interface.py`).
+    """Quadcopter `uav`, vessel `usv` and fixed platforms in one PyBullet client; 14 inputs, 22 outputs (`interface.py`).
 
-    `vehicles`: {"uav": {"position": [x, y, z]}, "usv": {"position": [x, y]}} (m; the origin of the quadcopter's model frame, the
-    vessel's centre of mass), each with "yaw" (rad, counter-clockwise), "velocity_body" (m/s) and "rates" (rad/s) in
-    forward-left-up body axes, as the other world reads them. `platforms`: name -> {"size", "position"} (m).
-    `sub_steps`: steps of Bullet per step of the component. Raises InputError with all problems.
+    Args:
+        instance_name: Name of the component.
+        vehicles: {"uav": {"position": [x, y, z]}, "usv": {"position": [x, y]}}: origin of the quadcopter's model frame and
+            centre of mass of the vessel (m). Each may have "yaw" (rad, counter-clockwise), "velocity_body" (m/s) and "rates"
+            (rad/s) in forward-left-up body axes, as in `plant_src/world.py`.
+        platforms: {NAME: {"size": [x, y, z], "position": [x, y, z]}}, edges and centre (m).
+        sub_steps: Steps of Bullet per step of the component.
+
+    Raises:
+        InputError: One or more arguments are invalid or bodies overlap at the start; lists all problems.
     """
 
     binds_everything = True
@@ -63,33 +70,34 @@ class World(Component):
         platforms: Mapping[str, Any] | None = None,
         sub_steps: int = 2,
     ):
-        spawns, boxes = _read_arguments(vehicles, {} if platforms is None else platforms, sub_steps)
+        placements, boxes = _read_arguments(vehicles, {} if platforms is None else platforms, sub_steps)
         self._name, self._sub_steps, self._step_size = instance_name, sub_steps, math.nan
         self._inputs, self._outputs = np.zeros(len(INPUTS)), np.zeros(len(OUTPUTS))
         self._bound_inputs, self._bound_outputs = np.zeros(len(INPUTS)), np.zeros(len(OUTPUTS))
         self._client, self._disconnect = connect(self)
         try:
-            self._populate(spawns, boxes)
+            self._populate(placements, boxes)
         except BaseException:
             self.free()
             raise
 
     @staticmethod
     def scene(name: str, scenario: Mapping[str, Any]) -> dict[str, Any]:
-        """What the 3-D replay draws of this world, see `scene.replay`."""
+        """Return the scene of the 3-D replay for the component `name` (`scene/replay.py`)."""
         return replay.published_simulator_scene(name, scenario)
 
-    def _populate(self, spawns: Mapping[str, VehiclePlacement], platforms: list[Platform]) -> None:
+    def _populate(self, vehicles: Mapping[str, VehiclePlacement], platforms: list[Platform]) -> None:
         pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)
         for platform in platforms:
             _add_platform(self._client, platform)
-        self._quadcopter = Quadcopter(self._client, spawns["uav"].parameters)
-        self._vessel = Vessel(self._client, spawns["usv"].parameters)
+        self._quadcopter = Quadcopter(self._client, vehicles["uav"].parameters)
+        self._vessel = Vessel(self._client, vehicles["usv"].parameters)
         self._check_overlaps()
         self._acceleration_integral = np.zeros(3)
-        self._publish(math.inf)
+        self._publish(math.inf)  # an infinite step makes the first difference quotient zero
 
     def _check_overlaps(self) -> None:
+        """Raise InputError if bodies overlap by more than `MAX_INITIAL_OVERLAP`."""
         pybullet.performCollisionDetection(self._client)
         depth = max((-point[_DISTANCE] for point in pybullet.getContactPoints(physicsClientId=self._client)), default=0.0)
         if depth > MAX_INITIAL_OVERLAP:
@@ -98,39 +106,48 @@ class World(Component):
     # -- values --------------------------------------------------------------------------------------------------------
 
     def set(self, name: str, value: Any) -> None:
-        array, place = self._find(name, "set")
+        """Set an input. Raises ComponentError for an output or an unknown name."""
+        array, index = self._find(name, "set")
         if array is self._outputs:
             raise ComponentError(self._name, "set", f"{name} is an output")
-        self._inputs[place] = self._bound_inputs[place] = value
+        self._inputs[index] = self._bound_inputs[index] = value
 
     def get(self, name: str) -> Any:
-        array, place = self._find(name, "get")
-        return array.item(place)
+        """Return the present value of a variable. Raises ComponentError for an unknown name."""
+        array, index = self._find(name, "get")
+        return array.item(index)
 
     def _find(self, name: str, function: str) -> tuple[np.ndarray, int]:
+        """Return the array and the index of a variable. Raises ComponentError for an unknown name."""
         for variables, array in ((INPUTS, self._inputs), (OUTPUTS, self._outputs)):
-            for place, variable in enumerate(variables):
+            for index, variable in enumerate(variables):
                 if variable.name == name:
-                    return array, place
+                    return array, index
         names = [variable.name for variable in self.variables]
         raise ComponentError(self._name, function, f'no variable "{name}"{did_you_mean(name, names)}')
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
+        """Take the arrays of the engine."""
         (self._bound_inputs,), (self._bound_outputs,) = inputs.arrays.values(), outputs.arrays.values()
 
     def set_inputs(self) -> None:
+        """Read the inputs."""
         self._inputs[:] = self._bound_inputs
 
     def get_outputs(self) -> None:
+        """Write the outputs."""
         self._bound_outputs[:] = self._outputs
 
     # -- life cycle ----------------------------------------------------------------------------------------------------
 
-    def enter_initialization_mode(self, start_time: float, stop_time: float) -> None: ...
+    def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
+        """Do nothing: the initial outputs follow from the arguments."""
 
-    def exit_initialization_mode(self) -> None: ...
+    def exit_initialization_mode(self) -> None:
+        """Do nothing."""
 
     def do_step(self, time: float, step_size: float) -> None:
+        """Advance from `time` (s) by `step_size` (s). Raises ComponentError if a signal is not finite."""
         if step_size != self._step_size:
             self._set_step_size(time, step_size)
         self._check_finite(INPUTS, self._inputs, time)
@@ -148,9 +165,10 @@ class World(Component):
         self._step_size = step_size
 
     def _publish(self, step_size: float) -> None:
-        motion, moved = self._quadcopter.measure()
-        self._outputs[:] = np.concatenate((motion, (moved - self._acceleration_integral) / step_size, self._vessel.measure()))
-        self._acceleration_integral = moved
+        motion, integral = self._quadcopter.measure()
+        acceleration = (integral - self._acceleration_integral) / step_size
+        self._outputs[:] = np.concatenate((motion, acceleration, self._vessel.measure()))
+        self._acceleration_integral = integral
 
     def _check_finite(self, variables: tuple[Variable, ...], values: np.ndarray, time: float) -> None:
         sizes = np.abs(values)
@@ -158,41 +176,47 @@ class World(Component):
             worst = int(np.nan_to_num(sizes, nan=np.inf).argmax())
             raise ComponentError(self._name, "do_step", f"{variables[worst].name} is {values[worst]:g}", time)
 
-    def terminate(self) -> None: ...
+    def terminate(self) -> None:
+        """Do nothing: there is nothing to end."""
 
     def free(self) -> None:
+        """Disconnect the Bullet client."""
         self._disconnect()
 
     # -- state ---------------------------------------------------------------------------------------------------------
 
     def get_state(self) -> ReplicaState:
+        """Return a copy of the state."""
         return ReplicaState(pybullet.saveState(self._client), self._outputs.copy(), self._acceleration_integral.copy())
 
     def set_state(self, state: ReplicaState) -> None:
+        """Restore a state; it stays valid."""
         pybullet.restoreState(state.bullet, physicsClientId=self._client)
         self._outputs[:], self._acceleration_integral = state.outputs, state.acceleration_integral.copy()
 
     def free_state(self, state: ReplicaState) -> None:
+        """Delete the state saved in Bullet."""
         pybullet.removeState(state.bullet, physicsClientId=self._client)
 
 
 def _read_arguments(vehicles: Any, platforms: Any, sub_steps: Any) -> tuple[dict[str, VehiclePlacement], list[Platform]]:
-    found = vehicles if isinstance(vehicles, Mapping) else {}
-    problems = [
-        Problem(f'expected the vehicles "uav" and "usv", found {sorted(found)}', "vehicles", ("arguments", "vehicles"))
-        for _ in range(found.keys() != VEHICLE_MODELS.keys())
-    ]
+    """Return the vehicles by name and the platforms. Raises InputError with all problems."""
+    names = vehicles.keys() if isinstance(vehicles, Mapping) else set()
+    problems = []
+    if names != VEHICLE_MODELS.keys():
+        expectation = f'expected the vehicles "uav" and "usv", found {sorted(names)}'
+        problems.append(Problem(expectation, "vehicles", ("arguments", "vehicles")))
     if not isinstance(sub_steps, int) or isinstance(sub_steps, bool) or sub_steps < 1:
         problems.append(
             Problem(f"found {sub_steps!r}, expected an integer of at least 1", "sub_steps", ("arguments", "sub_steps"))
         )
     if problems:
         raise InputError(problems)
-    modelled = {
+    specs = {
         name: {**spec, "model": VEHICLE_MODELS[name]} if isinstance(spec, Mapping) else spec for name, spec in vehicles.items()
     }
-    read = world_settings.read_world_settings(modelled, platforms, {})
-    return {spawn.name: spawn for spawn in read.vehicles}, list(read.platforms)
+    settings = world_settings.read_world_settings(specs, platforms, {})
+    return {vehicle.name: vehicle for vehicle in settings.vehicles}, list(settings.platforms)
 
 
 def _add_platform(client: int, platform: Platform) -> None:

@@ -1,1 +1,1 @@
-"""The lake where the missions happen, as pictures: rendered off screen without a graphics card or display."""
+"""Pictures and videos of a mission on a lake, rendered in software without a graphics card or display."""

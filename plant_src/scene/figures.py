@@ -16,9 +16,9 @@ from .cameras import UP
 from .mission import Mission, mission_of_result
 from .render import Scene, find_camera
 
-PAGE_WIDTH = 7.16  # in, width of a page with two columns
-IMAGE_SIZE = (960, 480)
-MIN_OPACITY = 0.3
+PAGE_WIDTH = 7.16  # in, page with two columns
+IMAGE_SIZE = (960, 480)  # pixels
+MIN_OPACITY = 0.3  # of the first vehicles in the sequence
 
 
 def ghosts(
@@ -29,10 +29,23 @@ def ghosts(
     interval: float = 1.0,
     pixels: Sequence[int] = IMAGE_SIZE,
 ) -> Figure:
-    """The vehicles every `interval` (s) in one picture, the later the more solid, as in figure 17 of the paper.
+    """Draw the vehicles at several times in one picture with increasing opacity (figure 17 of the paper).
 
-    `camera` is one of "overview", "chase", "deck" and "landing" as it stands at the end. Shown are `start` to `stop` (s); without
-    them, the seconds before the touchdown. `pixels` are width and height. The time (s) stands above each ghost.
+    The time is written above the first vehicle.
+
+    Args:
+        result: Recorded mission.
+        camera: View at the last time shown: "overview", "chase", "deck" or "landing".
+        start: First time shown (s); by default 8 s before touchdown.
+        stop: Last time shown (s); by default touchdown, or the end of a run without touchdown.
+        interval: Time between two positions (s).
+        pixels: Width and height of the picture, both even.
+
+    Returns:
+        Figure of page width.
+
+    Raises:
+        InputError: `camera` is unknown, the time span is empty or the result has no plant with vehicles.
     """
     mission = mission_of_result(result)
     rows = _ghost_rows(mission, start, stop, interval)
@@ -48,18 +61,18 @@ def ghosts(
 
 
 def _ghost_rows(mission: Mission, start: float | None, stop: float | None, interval: float) -> list[int]:
-    """Rows `interval` apart, counted back from the last."""
+    """Return rows every `interval` (s), counted back from the last time shown."""
     time, landing = mission.result.time, mission.landing_rows()
     last = time[landing[-1]] if stop is None else min(stop, time[-1])
     first = time[landing[0]] if start is None else start
     if not interval > 0 or last < first:
         raise InputError(f"nothing to show from {first:g} s to {last:g} s in steps of {interval:g} s")
-    moments = last - interval * np.arange(int((last - first) / interval + 1e-9) + 1)
-    return np.searchsorted(time, moments[::-1] - 1e-9).tolist()
+    times = last - interval * np.arange(int((last - first) / interval + 1e-9) + 1)
+    return [int(row) for row in np.searchsorted(time, times[::-1] - 1e-9)]
 
 
 def _write_times(axes: Axes, mission: Mission, rows: Sequence[int], camera: str, width: int, height: int) -> None:
-    """The time above each ghost of the first vehicle."""
+    """Write the time (s) above each position of the first vehicle."""
     view = find_camera(camera)(mission, rows[-1])
     vehicle = next(iter(mission.vehicles))
     above = np.array([mission.position(vehicle, row) for row in rows]) + 0.22 * UP

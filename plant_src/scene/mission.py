@@ -1,4 +1,4 @@
-"""A recorded mission as the scene needs it: which vehicles there are, and where they are when."""
+"""Poses of the vehicles of a recorded mission, as the scene draws them."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from cosim.core.errors import InputError
 from cosim.results import Result
 
 from ..catalogue import MODELS
-from ..kpis import touchdown_row
+from ..recorded_motion import touchdown_row
 from ..vehicles.common.shapes import Quaternion
 
-APPROACH_TIME = 8.0  # s before the touchdown that belong to the landing
+APPROACH_TIME = 8.0  # s before touchdown that belong to the landing
 
 
 @dataclass(frozen=True)
 class Mission:
-    """The result, its vehicles ("plant.uav": "ar_drone") and the platforms of its plant."""
+    """Result with its vehicles (signal prefix -> model, {"plant.uav": "ar_drone"}) and the platforms of its plant."""
 
     result: Result
     vehicles: Mapping[str, str]
     platforms: Mapping[str, Mapping[str, Sequence[float]]]
 
     def position(self, vehicle: str, row: int) -> list[float]:
-        """Position of a vehicle's centre of mass (m, world)."""
+        """Return the position of a vehicle's centre of mass (m, world)."""
         return [float(self.result[f"{vehicle}.position.{axis}"][row]) for axis in "xyz"]
 
     def orientation(self, vehicle: str, row: int) -> Quaternion:
-        """Orientation of a vehicle (x, y, z, w)."""
+        """Return the orientation of a vehicle as unit quaternion (x, y, z, w), body to world."""
         x, y, z, w = (float(self.result[f"{vehicle}.orientation.{part}"][row]) for part in "xyzw")
         return x, y, z, w
 
@@ -39,7 +39,7 @@ class Mission:
         return np.stack([self.result[f"{vehicle}.position.{axis}"] for axis in "xyz"], axis=1)
 
     def positions(self) -> np.ndarray:
-        """Positions of all vehicles (m, world), shape (vehicles, rows, 3)."""
+        """Return the positions of all vehicles (m, world), shape (vehicles, rows, 3)."""
         return np.stack([self._path(vehicle) for vehicle in self.vehicles])
 
     def _first_vehicle(self, is_vessel: bool) -> str:
@@ -47,15 +47,15 @@ class Mission:
         return names[0] if names else next(iter(self.vehicles))
 
     def vessel_positions(self) -> np.ndarray:
-        """Positions of the vessel, shape (rows, 3); those of the only vehicle where there is no vessel."""
+        """Return the positions of the first vessel, or of the first vehicle without a vessel (m, world), shape (rows, 3)."""
         return self._path(self._first_vehicle(is_vessel=True))
 
     def vessel_yaw(self, row: int) -> float:
-        """Heading of the vessel (rad)."""
+        """Return the heading of the first vessel (rad, counter-clockwise from east)."""
         return float(self.result[f"{self._first_vehicle(is_vessel=True)}.attitude.yaw"][row])
 
     def landing_rows(self) -> range:
-        """Rows of the last seconds before the touchdown; of the run's last seconds where there is none."""
+        """Return the rows of the last 8 s before touchdown, or of the last 8 s of a run without touchdown."""
         touchdown = touchdown_row(self.result, self._first_vehicle(is_vessel=False))
         last = len(self.result.time) - 1 if touchdown is None else touchdown
         first = int(np.searchsorted(self.result.time, self.result.time[last] - APPROACH_TIME))
@@ -63,11 +63,11 @@ class Mission:
 
 
 def mission_of_result(result: Result) -> Mission:
-    """The mission of a result whose scenario holds a plant of this package. Raises InputError where it holds none."""
+    """Return the mission of a result. Raises InputError if its scenario has no plant with vehicles."""
     components: Mapping[str, Any] = result.metadata.get("scenario", {}).get("components", {})
     for name, component in components.items():
         arguments = component.get("arguments", {})
         if vehicles := arguments.get("vehicles"):
-            models = {f"{name}.{vehicle}": about["model"] for vehicle, about in vehicles.items()}
+            models = {f"{name}.{vehicle}": spec["model"] for vehicle, spec in vehicles.items()}
             return Mission(result, models, arguments.get("platforms", {}))
     raise InputError("the scene needs a result whose scenario has a plant with vehicles")

@@ -1,6 +1,6 @@
-"""What things look like: vehicles, take-off decks and trees, made from boxes, cylinders and spheres.
+"""Visual shapes of vehicles, take-off platforms and trees, made from boxes, cylinders and spheres.
 
-Appearance only; the dynamics know none of it. The vehicles' dimensions are those of their geometry where that names them.
+The shapes have no influence on the dynamics. Dimensions come from the geometry of the vehicles where it defines them.
 """
 
 from __future__ import annotations
@@ -28,8 +28,12 @@ LEAVES = ((0.22, 0.42, 0.17), (0.28, 0.48, 0.19), (0.18, 0.36, 0.18), (0.36, 0.5
 
 
 class Part(NamedTuple):
-    """A coloured solid in the frame of what it belongs to (m): a box by its edges, a cylinder by radius and length along z,
-    a sphere by its radius. Only the 3-D replay draws what can be seen through (`opacity` below 1)."""
+    """Coloured solid in the frame of its object.
+
+    `size` (m) is: box: three edges; cylinder: radius and length along z; sphere: radius. `position` (m) is the centre,
+    `orientation` a unit quaternion (x, y, z, w), `colour` red, green, blue in 0 ... 1. Only the 3-D replay draws an `opacity`
+    below 1.
+    """
 
     shape: Literal["box", "cylinder", "sphere"]
     size: tuple[float, ...]
@@ -39,7 +43,7 @@ class Part(NamedTuple):
     opacity: float = 1.0
 
     def bounding_radius(self) -> float:
-        """Largest distance of its points from its centre (m)."""
+        """Return the radius of the bounding sphere about the centre (m)."""
         match self.shape:
             case "box":
                 return math.hypot(*self.size) / 2
@@ -50,7 +54,7 @@ class Part(NamedTuple):
 
 
 def ar_drone_parts() -> list[Part]:
-    """The quadcopter about its centre of mass: rotor arms along the body axes, the hull between front and right arm."""
+    """Return the parts of the AR.Drone relative to its centre of mass: arms along the body axes, hull between two arms."""
     body = [
         Part("box", (0.26, 0.075, 0.045), (0.0, 0.0, 0.0), ORANGE, BETWEEN_ARMS),
         Part("box", (0.12, 0.10, 0.055), (0.0, 0.0, 0.012), BLACK, BETWEEN_ARMS),
@@ -64,9 +68,9 @@ def ar_drone_parts() -> list[Part]:
 
 
 def _rotor_parts(x: float, y: float, z: float, colour: Vector) -> list[Part]:
-    leg, share = -FEET_HEIGHT, EDGE / math.sqrt(2) / ROTORS[0, 0]  # the feet stand a little inside the motors
+    leg, ratio = -FEET_HEIGHT, EDGE / math.sqrt(2) / ROTORS[0, 0]  # the feet are nearer to the centre than the motors
     return [
-        Part("cylinder", (0.012, leg), (share * x, share * y, -leg / 2), GREY),
+        Part("cylinder", (0.012, leg), (ratio * x, ratio * y, -leg / 2), GREY),
         Part("cylinder", (0.103, 0.004), (x, y, z + 0.012), BLACK, opacity=0.5),
         Part("cylinder", (0.095, 0.006), (x, y, z + 0.012), colour, opacity=0.6),
         Part("cylinder", (0.014, 0.02), (x, y, z + 0.01), BLACK),
@@ -74,7 +78,7 @@ def _rotor_parts(x: float, y: float, z: float, colour: Vector) -> list[Part]:
 
 
 def strider_parts() -> list[Part]:
-    """The catamaran about its centre of mass: two hulls, four struts, and the landing deck with its mark."""
+    """Return the parts of the Strider relative to its centre of mass: hulls, struts and landing deck."""
     x, y, _ = strider_geometry.DECK_CENTRE
     length, width = DECK_X[1] - DECK_X[0], DECK_Y[1] - DECK_Y[0]
     plate = strider_geometry.PLATE_THICKNESS
@@ -94,7 +98,7 @@ def strider_parts() -> list[Part]:
 
 
 def landing_mark(x: float, y: float, z: float) -> list[Part]:
-    """The landing mark: white ring, white H."""
+    """Return the landing mark: a white ring and a white H around (x, y) at the height z (m)."""
     disc = [Part("cylinder", (radius, 0.002), (x, y, z + rise), colour) for radius, rise, colour in _RINGS]
     bars = [Part("box", (0.20, 0.03, 0.002), (x, y + side * 0.06, z + 0.004), WHITE) for side in (-1.0, 1.0)]
     return [*disc, *bars, Part("box", (0.03, 0.12, 0.002), (x, y, z + 0.004), WHITE)]
@@ -113,7 +117,7 @@ def _hull_parts(y: float) -> list[Part]:
 
 
 def _strut(x: float, side: float, deck_edge: float) -> Part:
-    """A bar from a hull up to the edge of the deck."""
+    """Return a strut from a hull to the edge of the deck."""
     outer, low, inner, high = strider_geometry.HULL_OFFSET, -0.07, deck_edge - 0.02, DECK_TOP - 0.03
     run, rise = inner - outer, high - low
     angle = side * math.atan2(-run, rise)  # about x, from z towards the middle
@@ -122,13 +126,22 @@ def _strut(x: float, side: float, deck_edge: float) -> Part:
 
 
 def platform_parts(size: Sequence[float], position: Sequence[float], plank: float = 0.25) -> Iterator[Part]:
-    """A take-off deck of planks on posts, `size` and centre `position` in m as the plant has it."""
+    """Yield the parts of a take-off platform: planks on posts.
+
+    Args:
+        size: Edges (m).
+        position: Centre (m, world).
+        plank: Approximate width of a plank (m).
+
+    Yields:
+        Parts in the world frame.
+    """
     (length, width, thickness), (x, y, z) = size, position
     count = max(1, round(width / plank))
     pitch = width / count
     for i in range(count):
-        place = (x, y - width / 2 + (i + 0.5) * pitch, z)
-        yield Part("box", (length, pitch - 0.012, thickness), place, PLANKS[i * 7 % len(PLANKS)])
+        centre = (x, y - width / 2 + (i + 0.5) * pitch, z)
+        yield Part("box", (length, pitch - 0.012, thickness), centre, PLANKS[i * 7 % len(PLANKS)])
     post = z - thickness / 2
     for east in (-0.46, 0.0, 0.46):
         for north in (-0.46, 0.46):
@@ -136,7 +149,7 @@ def platform_parts(size: Sequence[float], position: Sequence[float], plank: floa
 
 
 def tree_parts(seed: int = 4) -> Iterator[Part]:
-    """The trees on the banks north and west of the lake."""
+    """Yield the parts of the trees on the banks north and west of the lake."""
     random = np.random.default_rng(seed)
     for x in np.arange(-44.0, 90.0, 3.4):
         yield from single_tree_parts(x + random.uniform(-1.2, 1.2), 37.5 + random.uniform(0.0, 9.0), random)
@@ -145,7 +158,7 @@ def tree_parts(seed: int = 4) -> Iterator[Part]:
 
 
 def single_tree_parts(x: float, y: float, random: np.random.Generator) -> Iterator[Part]:
-    """A trunk and a crown of a few balls, 4 to 7 m high."""
+    """Yield the trunk and the crown of a tree of 4 to 7 m at (x, y) (m, world)."""
     height = random.uniform(4.0, 7.0)
     leaves = LEAVES[random.integers(len(LEAVES))]
     yield Part("cylinder", (0.035 * height, 0.6 * height), (x, y, 0.3 * height), BARK)
@@ -156,6 +169,6 @@ def single_tree_parts(x: float, y: float, random: np.random.Generator) -> Iterat
 
 
 def static_parts(platforms: Mapping[str, Mapping[str, Sequence[float]]]) -> list[Part]:
-    """Everything that keeps still, but for land, water and sky (see `land` and `light`)."""
-    decks = [part for one in platforms.values() for part in platform_parts(one["size"], one["position"])]
+    """Return the parts of trees and platforms; `shores` and `sky_and_water` draw land, water and sky."""
+    decks = [part for platform in platforms.values() for part in platform_parts(platform["size"], platform["position"])]
     return [*tree_parts(), *decks]

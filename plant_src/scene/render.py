@@ -1,4 +1,4 @@
-"""Pictures of a mission at one moment, or of several moments in one picture."""
+"""Renderer for pictures of a mission at one time, or at several times in one picture."""
 
 from __future__ import annotations
 
@@ -28,57 +28,73 @@ from .vehicle_parts import vehicle_parts
 
 
 class Layer:
-    """A picture that ghosts are painted on: colour times cover (height, width, 3), cover in 0 ... 1 and depth (m)."""
+    """Picture with transparency, onto which vehicles are blended.
 
-    def __init__(self, colour: np.ndarray, cover: np.ndarray, depth: np.ndarray):
-        self.colour, self.alpha, self.depth = colour, cover, depth
+    Args:
+        colour: Colour premultiplied by alpha, shape (height, width, 3).
+        alpha: Opacity in 0 ... 1, shape (height, width).
+        depth: Depth (m), shape (height, width); not changed by blending.
+    """
+
+    def __init__(self, colour: np.ndarray, alpha: np.ndarray, depth: np.ndarray):
+        self.colour, self.alpha, self.depth = colour, alpha, depth
 
     @classmethod
     def from_solids(cls, solids: Picture) -> Layer:
-        """Solids in haze in front of nothing."""
-        seen = np.isfinite(solids.depth)
-        pixels = np.flatnonzero(seen)
+        """Return solids in haze before a transparent background."""
+        is_solid = np.isfinite(solids.depth)
+        pixels = np.flatnonzero(is_solid)
         haze = np.exp(-solids.depth.ravel()[pixels] / HAZE_DISTANCE)
-        own = solids.colour.reshape(-1, 3)[pixels].T * np.float32(1 / 255)
-        colour = np.zeros((*seen.shape, 3), np.float32)
-        colour.reshape(-1, 3)[pixels] = (FAR_HILLS_COLOUR + (own - FAR_HILLS_COLOUR) * haze).T
-        return cls(colour, seen.astype(np.float32), solids.depth)
+        clear = solids.colour.reshape(-1, 3)[pixels].T * np.float32(1 / 255)
+        colour = np.zeros((*is_solid.shape, 3), np.float32)
+        colour.reshape(-1, 3)[pixels] = (FAR_HILLS_COLOUR + (clear - FAR_HILLS_COLOUR) * haze).T
+        return cls(colour, is_solid.astype(np.float32), solids.depth)
 
     def copy(self) -> Layer:
-        """The same to paint on; ghosts leave the depth alone."""
+        """Return a copy whose colour and alpha can be changed; the depth is shared."""
         return Layer(self.colour.copy(), self.alpha.copy(), self.depth)
 
-    def blend(self, ghost: Picture, share: float) -> np.ndarray:
-        """Paint a ghost over what is behind it and not nearer than it; `share` 1 hides that, 0 is invisible.
+    def blend(self, picture: Picture, opacity: float) -> np.ndarray:
+        """Blend the pixels of `picture` that are nearer than the depth of the layer onto it.
 
-        Returns the pixels (flat indices) where it is seen.
+        Args:
+            picture: Solids of the same size.
+            opacity: 0 (invisible) to 1 (opaque).
+
+        Returns:
+            Flat indices of the changed pixels.
         """
-        pixels = np.flatnonzero(ghost.depth < self.depth)
-        colour, cover = self.colour.reshape(-1, 3), self.alpha.reshape(-1)
-        colour[pixels] += share * (ghost.colour.reshape(-1, 3)[pixels].astype(np.float32) / 255 - colour[pixels])
-        cover[pixels] += share * (1 - cover[pixels])
+        pixels = np.flatnonzero(picture.depth < self.depth)
+        colour, alpha = self.colour.reshape(-1, 3), self.alpha.reshape(-1)
+        colour[pixels] += opacity * (picture.colour.reshape(-1, 3)[pixels].astype(np.float32) / 255 - colour[pixels])
+        alpha[pixels] += opacity * (1 - alpha[pixels])
         return pixels
 
 
 class Background:
-    """All that keeps still, as a view shows it; `size`: width and height, even.
+    """Picture of the static objects, land, water and sky in a view.
 
-    Water has half the resolution: ripples blur what it reflects anyway.
+    Water is computed at half the resolution, because ripples blur its reflections.
+
+    Args:
+        static: Renderer of the static objects.
+        view: The view.
+        size: Width and height (pixels), both even.
     """
 
-    def __init__(self, still: SolidRenderer, view: View, size: tuple[int, int]):
+    def __init__(self, static: SolidRenderer, view: View, size: tuple[int, int]):
         self.view, self.size = view, size
         half, mirrored = (size[0] // 2, size[1] // 2), view.mirrored()
         light = pixel_rays(view, *size)
-        solids, depth = _static_solids(still, view, light), water_distance(view, light)
+        solids, depth = _static_solids(static, view, light), water_distance(view, light)
         self.water_mask, self.horizon = depth < solids.depth, horizon_row(light)
-        self.mirrored = Layer.from_solids(_static_solids(still, mirrored, pixel_rays(mirrored, *half)))
+        self.mirrored = Layer.from_solids(_static_solids(static, mirrored, pixel_rays(mirrored, *half)))
         self.surface = water_pixels(view, pixel_rays(view, *half), self.horizon // 2)
         solids.depth[self.water_mask] = np.inf
         self.picture = self._composite(Layer.from_solids(solids), light, np.minimum(solids.depth, depth))
 
     def _composite(self, solids: Layer, light: Rays, depth: np.ndarray) -> Layer:
-        """Solids in front of water and sky."""
+        """Return solids in front of water and sky."""
         width, height = self.size
         colour = np.empty((height, width, 3), np.float32)
         water = self.surface.colour(self.mirrored.colour, self.mirrored.alpha).reshape(3, -1, 1, width // 2, 1)
@@ -89,16 +105,24 @@ class Background:
         return Layer(colour, np.ones_like(depth), depth)
 
     def fits(self, view: View, size: tuple[int, int]) -> bool:
-        """Whether it is what that view shows."""
+        """Return True if the background belongs to this view and size."""
         same = np.array_equal(view.eye, self.view.eye) and np.array_equal(view.target, self.view.target)
         return same and view.field_of_view == self.view.field_of_view and size == self.size
 
     def with_reflections(self, below: Layer, changed: np.ndarray) -> Layer:
-        """The picture with what the water reflects from `below`, which has `changed` (height, width)."""
+        """Return a copy of the picture with new reflections.
+
+        Args:
+            below: Mirrored picture that the water reflects, at half the resolution.
+            changed: Mask of its pixels that differ from the background, shape (height / 2, width / 2).
+
+        Returns:
+            The picture with the reflections of the changed pixels.
+        """
         layer, width = self.picture.copy(), self.size[0]
-        touched = np.flatnonzero(changed.ravel()[self.surface.sources])
-        colour = self.surface.select(touched).colour(below.colour, below.alpha).T
-        rows, columns = np.divmod(touched, width // 2)
+        affected = np.flatnonzero(changed.ravel()[self.surface.sources])
+        colour = self.surface.select(affected).colour(below.colour, below.alpha).T
+        rows, columns = np.divmod(affected, width // 2)
         for i, j in np.ndindex(2, 2):
             pixels = (2 * (rows + self.horizon // 2) + i) * width + 2 * columns + j
             wet = self.water_mask.ravel()[pixels]
@@ -107,7 +131,7 @@ class Background:
 
 
 class Scene:
-    """A lake with the vehicles of a mission; to be used in a `with` block."""
+    """Lake with the vehicles of a mission; a context manager that disconnects its Bullet clients at the end."""
 
     def __init__(self, mission: Mission):
         self.mission = mission
@@ -119,62 +143,74 @@ class Scene:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.static.__exit__()
-        self.vehicles.__exit__()
+        self.static.close()
+        self.vehicles.close()
 
     def render(
         self, camera: str, rows: Sequence[int], opacities: Sequence[float], width: int, height: int, supersampling: int = 2
     ) -> np.ndarray:
-        """The mission at `rows` in one picture, seen by `camera` at the last of them; uint8 (height, width, 3).
+        """Render the mission at one or more rows in one picture.
 
-        `shares` says how opaque the vehicles of each row are. Every pixel is the mean of `fineness` by `fineness`; `width` and
-        `height` are even.
+        Args:
+            camera: Name of the camera; its view is that of the last row.
+            rows: Rows whose vehicles are drawn, in this order.
+            opacities: Opacity of the vehicles of each row.
+            width: Width of the picture (pixels), even.
+            height: Height of the picture (pixels), even.
+            supersampling: Samples per pixel along each axis; a pixel is their mean.
+
+        Returns:
+            Picture, uint8 (height, width, 3).
+
+        Raises:
+            InputError: `camera` is unknown.
         """
         view, size = find_camera(camera)(self.mission, rows[-1]), (supersampling * width, supersampling * height)
-        backdrop = self._background(view, size)
-        below = backdrop.mirrored.copy()
-        reflected = self._paint(below, view.mirrored(), rows, opacities)
-        picture = backdrop.with_reflections(below, reflected)
-        self._paint(picture, view, rows, opacities)
+        background = self._background(view, size)
+        below = background.mirrored.copy()
+        reflected = self._blend_vehicles(below, view.mirrored(), rows, opacities)
+        picture = background.with_reflections(below, reflected)
+        self._blend_vehicles(picture, view, rows, opacities)
         return _downsample(picture.colour, supersampling)
 
     def _background(self, view: View, size: tuple[int, int]) -> Background:
-        """What keeps still; the last one is kept for cameras that keep still as well."""
+        """Return the background of a view; the last one is reused for cameras that do not move."""
         if self._last_background is None or not self._last_background.fits(view, size):
             self._last_background = Background(self.static, view, size)
         return self._last_background
 
-    def _paint(self, layer: Layer, view: View, rows: Sequence[int], shares: Sequence[float]) -> np.ndarray:
-        """Paint the vehicles of each row, with the shadows that they cast on each other; returns where they are seen."""
+    def _blend_vehicles(self, layer: Layer, view: View, rows: Sequence[int], opacities: Sequence[float]) -> np.ndarray:
+        """Blend the vehicles of each row, with their shadows on each other; return the mask of changed pixels."""
         height, width = layer.depth.shape
-        seen = np.zeros((height, width), bool)
-        for row, share in zip(rows, shares, strict=True):
-            self._pose(row)
-            seen.reshape(-1)[layer.blend(self.vehicles.render(view, width, height, shadow=True), share)] = True
-        return seen
+        changed = np.zeros((height, width), bool)
+        for row, opacity in zip(rows, opacities, strict=True):
+            self._set_poses(row)
+            changed.reshape(-1)[layer.blend(self.vehicles.render(view, width, height, shadow=True), opacity)] = True
+        return changed
 
-    def _pose(self, row: int) -> None:
-        for thing, vehicle in enumerate(self.mission.vehicles):
-            self.vehicles.set_pose(thing, self.mission.position(vehicle, row), self.mission.orientation(vehicle, row))
+    def _set_poses(self, row: int) -> None:
+        for index, vehicle in enumerate(self.mission.vehicles):
+            self.vehicles.set_pose(index, self.mission.position(vehicle, row), self.mission.orientation(vehicle, row))
 
 
 def find_camera(name: str) -> Callable[[Mission, int], View]:
-    """The camera of a name; raises InputError with the nearest one."""
+    """Return the camera `name`. Raises InputError if it is unknown."""
     if name not in CAMERAS:
         raise InputError(f'no camera "{name}"{did_you_mean(name, CAMERAS)}')
     return CAMERAS[name]
 
 
-def _static_solids(still: SolidRenderer, view: View, light: Rays) -> Picture:
-    """What keeps still and is no water or sky."""
+def _static_solids(static: SolidRenderer, view: View, light: Rays) -> Picture:
+    """Return static objects and land."""
     height, width = light.along_axis.shape
-    picture = still.render(view, width, height)
+    picture = static.render(view, width, height)
     add_land(picture, view, light)
     return picture
 
 
-def _downsample(colour: np.ndarray, fineness: int) -> np.ndarray:
-    """Each `fineness` by `fineness` pixels to one, as bytes."""
+def _downsample(colour: np.ndarray, factor: int) -> np.ndarray:
+    """Return the mean of each block of `factor` by `factor` pixels, as uint8."""
     height, width, _ = colour.shape
-    mean = colour.reshape(height // fineness, fineness, width // fineness, fineness, 3).mean(axis=(1, 3))
-    return np.rint(np.clip(mean, 0, 1) * 255).astype(np.uint8)
+    mean = colour.reshape(height // factor, factor, width // factor, factor, 3).mean(axis=(1, 3))
+    picture: np.ndarray = np.rint(np.clip(mean, 0, 1) * 255).astype(np.uint8)
+    return picture

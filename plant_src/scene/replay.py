@@ -1,6 +1,6 @@
-"""What a world looks like, as data for the 3-D replay: bodies, what keeps still, water, waypoints and what to plot.
+"""Scene description for the 3-D replay: bodies, static parts, water, waypoints and plots.
 
-Everything follows from the scenario; nothing runs. Frame: world, z up, m; colours of parts: red, green, blue in 0 ... 1.
+The description follows from the scenario alone. World frame, z up, m; colours of parts are red, green, blue in 0 ... 1.
 """
 
 from __future__ import annotations
@@ -19,37 +19,54 @@ from .vehicle_parts import vehicle_parts
 
 Scene = dict[str, Any]
 
-#: trails of multirotors and vessels, as the figures draw the first of each
+#: colours of the paths of multirotors and vessels; the first of each is that of the figures
 MULTIROTOR_COLOURS, VESSEL_COLOURS = ("#0072b2", "#56b4e9", "#cc79a7", "#7a5fb5"), ("#d55e00", "#e69f00", "#009e73", "#b8860b")
 
-#: at most so many vessels have a camera on board
+#: largest number of vessels with an onboard camera
 MAX_VIEWS = 3
 
-#: from a vessel's centre of mass (m): where the camera on board stands, and what it looks at
+#: eye and target of an onboard camera relative to the vessel's centre of mass (m, body axes)
 ONBOARD_CAMERA = {"eye": (-2.6, 0.0, 1.5), "target": (0.2, 0.0, 0.45)}
 
 
 def world_scene(name: str, scenario: Mapping[str, Any], models: Mapping[str, str] | None = None) -> Scene:
-    """The scene of the world that is the component `name` of a scenario; `models`: those of its vehicles, if it names none."""
+    """Return the scene of a world.
+
+    Args:
+        name: Name of the component that is the world.
+        scenario: Scenario as a JSON object.
+        models: Vehicle of the catalogue by name, for a world whose arguments name no models.
+
+    Returns:
+        Scene description.
+    """
     arguments = scenario["components"][name].get("arguments", {})
-    models = models or {vehicle: about["model"] for vehicle, about in arguments["vehicles"].items()}
+    models = models or {vehicle: spec["model"] for vehicle, spec in arguments["vehicles"].items()}
     vehicles = {f"{name}.{vehicle}": model for vehicle, model in models.items()}
-    boxes = (platform_parts(one["size"], one["position"]) for one in arguments.get("platforms", {}).values())
+    platforms = arguments.get("platforms", {}).values()
     waves = _waves(sea(arguments.get("environment", {})))
     return {
         **_scene(vehicles, scenario),
-        "fixed": [part._asdict() for box in boxes for part in box],
+        "fixed": [part._asdict() for spec in platforms for part in platform_parts(spec["size"], spec["position"])],
         "water": {"waves": waves, "gain": f"{name}.environment.wave_gain"},
     }
 
 
 def free(scenario: Mapping[str, Any], vehicles: Mapping[str, str]) -> Scene:
-    """The scene of a scenario on plant FMUs alone; `vehicles`: component -> vehicle ("quadcopter": "ar_drone")."""
+    """Return the scene of a scenario with plant FMUs instead of a world.
+
+    Args:
+        scenario: Scenario as a JSON object.
+        vehicles: Vehicle of the catalogue by component ({"quadcopter": "ar_drone"}).
+
+    Returns:
+        Scene description.
+    """
     return {**_scene(vehicles, scenario), "fixed": [], "water": {"waves": [], "gain": 1}}
 
 
 def published_simulator_scene(name: str, scenario: Mapping[str, Any]) -> Scene:
-    """The scene of the published simulator's world (see `replica.interface`): the quadcopter's angles are turned to ours."""
+    """Return the scene of the replica's world, with its attitude angles converted to the conventions of the plant."""
     scene = world_scene(name, scenario, {"uav": "ar_drone", "usv": "strider"})
     uav, usv = (f"{name}.{vehicle}.attitude" for vehicle in ("uav", "usv"))
     attitudes: list[list[Any]] = [[f"{uav}.phi", f"-{uav}.theta", f"-{uav}.psi"], [0, 0, f"{usv}.yaw"]]
@@ -59,9 +76,9 @@ def published_simulator_scene(name: str, scenario: Mapping[str, Any]) -> Scene:
     return scene
 
 
-def _waves(found: Sea) -> list[Scene]:
+def _waves(components: Sea) -> list[Scene]:
     keys = ("amplitude", "frequency", "number", "direction", "phase")
-    return [dict(zip(keys, wave, strict=True)) for wave in np.stack(found, axis=1).tolist()]
+    return [dict(zip(keys, wave, strict=True)) for wave in np.stack(components, axis=1).tolist()]
 
 
 def _scene(vehicles: Mapping[str, str], scenario: Mapping[str, Any]) -> Scene:
@@ -106,7 +123,7 @@ def _body_scene(name: str, vehicle: str, colour: str) -> Scene:
 
 
 def _waypoint_markers(scenario: Mapping[str, Any]) -> Iterator[Scene]:
-    """Waypoints by the names of the vessel autopilots' parameters, those of nested systems too."""
+    """Yield the waypoints in the parameters `waypoint_x`, `waypoint_y` of all components and nested systems."""
     for component in scenario["components"].values():
         parameters = component.get("parameters", {})
         for key, x in parameters.items():
@@ -116,12 +133,12 @@ def _waypoint_markers(scenario: Mapping[str, Any]) -> Iterator[Scene]:
                 continue
             count = parameters.get(f"{prefix}waypoint_count", len(x))
             radius = parameters.get(f"{prefix}acceptance_radius", 0.5)
-            for number, place in enumerate(list(zip(x, y, strict=False))[:count], start=1):
-                yield {"position": (*place, 0.0), "radius": radius, "label": str(number)}
+            for number, position in enumerate(list(zip(x, y, strict=False))[:count], start=1):
+                yield {"position": (*position, 0.0), "radius": radius, "label": str(number)}
 
 
 def _plot_patterns(flying: Sequence[str], sailing: Sequence[str]) -> list[list[str]]:
-    """Height, path, force and attitude: patterns of signals, a list for each plot."""
+    """Return patterns of signal names, one list for each plot."""
     return [
         [*_signals_of(flying, "position.z"), *_signals_of(sailing, "deck.position.z")],
         [*_signals_of(flying, "velocity.*")],

@@ -1,6 +1,6 @@
-"""The banks of the lake as functions of where a ray goes: drawn as triangles they took most of the time of a picture.
+"""Banks of the lake, drawn by intersecting viewing rays with boxes of land.
 
-Frame: world, z up, the water at z = 0.
+This is several times faster than drawing them as triangles with TinyRenderer. World frame, z up, the water at z = 0.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ LAND_HEIGHT = 0.4  # m
 
 
 class LandBox(NamedTuple):
-    """A box of land, from corner to corner (m), and its colour."""
+    """Box of land between two corners (m, world) with a colour."""
 
     low: Sequence[float]
     high: Sequence[float]
@@ -27,7 +27,7 @@ class LandBox(NamedTuple):
 
 
 def bank(west: float, south: float, east: float, north: float, beach: float = 1.2) -> list[LandBox]:
-    """Grass on a rectangle, and sand around it, `beach` (m) wide."""
+    """Return a rectangle of grass with its bounds (m, world) and the sand around it, `beach` (m) wide."""
     sand = LandBox((west - beach, south - beach, 0.0), (east + beach, north + beach, 0.12), SAND)
     return [sand, LandBox((west, south, 0.0), (east, north, LAND_HEIGHT), GRASS)]
 
@@ -37,7 +37,7 @@ BANKS = (bank(-700.0, 34.0, 700.0, 634.0), bank(-720.0, -700.0, -20.0, 700.0))
 
 
 def add_land(picture: Picture, view: View, light: Rays) -> None:
-    """Draw the banks where they are the nearest."""
+    """Draw the banks into `picture` where they are nearer than its depth; `light` are the rays through its pixels."""
     for steps in BANKS:
         pixels = _candidate_pixels(view.eye, light.direction, steps[0])
         for step in steps:
@@ -45,21 +45,21 @@ def add_land(picture: Picture, view: View, light: Rays) -> None:
 
 
 def _candidate_pixels(eye: np.ndarray, direction: np.ndarray, step: LandBox) -> np.ndarray:
-    """Indices of the pixels whose rays are above a step where they cross the water or the height of the land.
+    """Return flat indices of the pixels whose rays are above `step` at the level of the water or of the land.
 
-    Only rays that cross a corner from side to side are missed.
+    Rays that cross only a corner of the box are missed.
     """
-    found = np.zeros(direction.shape[1:], bool)
+    candidates = np.zeros(direction.shape[1:], bool)
     for level in (0.0, LAND_HEIGHT):
         with np.errstate(divide="ignore", invalid="ignore"):
             reach = (level - float(eye[2])) / direction[2]
             x, y = (float(eye[i]) + reach * direction[i] for i in (0, 1))
-        found |= (reach > 0) & (x > step.low[0]) & (x < step.high[0]) & (y > step.low[1]) & (y < step.high[1])
-    return np.flatnonzero(found)
+        candidates |= (reach > 0) & (x > step.low[0]) & (x < step.high[0]) & (y > step.low[1]) & (y < step.high[1])
+    return np.flatnonzero(candidates)
 
 
 def _draw_box(picture: Picture, step: LandBox, eye: np.ndarray, light: Rays, pixels: np.ndarray) -> None:
-    """Draw a step into those of the `pixels` where it is the nearest; a ray enters a box where it has passed three planes."""
+    """Draw `step` into the `pixels` where it is nearest; a ray enters a box at the last of the three planes on its near side."""
     direction = light.direction.reshape(3, -1)[:, pixels]
     low, high = (np.asarray(corner - eye, np.float32)[:, None] for corner in (step.low, step.high))
     with np.errstate(divide="ignore"):

@@ -1,8 +1,8 @@
-"""Sky, far hills and water as functions of where a ray goes; they are painted per pixel, so that nothing in them flickers.
+"""Sky, far hills and water, computed per pixel from the viewing rays.
 
-Water reflects the sky and the solids (whose mirror image is drawn from below the surface), disturbed by small ripples that
-fade with distance. Colours are linear mixes of red, green and blue in 0 ... 1; frame: world, z up, the water at z = 0.
-Colours and directions of n pixels have the shape (3, n): NumPy is several times slower on (n, 3).
+Water reflects the sky and the solids, disturbed by small ripples that fade with distance. Colours are red, green and blue in
+0 ... 1. World frame, z up, the water at z = 0. Arrays of colours and directions of n pixels have the shape (3, n), on which
+NumPy is several times faster than on (n, 3).
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ def _colour(red: float, green: float, blue: float) -> np.ndarray:
 ZENITH_COLOUR, HORIZON_COLOUR = _colour(0.36, 0.58, 0.84), _colour(0.86, 0.91, 0.95)
 FAR_HILLS_COLOUR, NEAR_HILLS_COLOUR = _colour(0.62, 0.72, 0.80), _colour(0.45, 0.58, 0.60)
 WATER_COLOUR = _colour(0.10, 0.33, 0.40)
-HAZE_DISTANCE = 450.0  # m, distance at which a solid keeps 1/e of its colour
+HAZE_DISTANCE = 450.0  # m, distance at which haze leaves 1/e of a colour
 
 #: ripples: direction (rad), wave number (1/m), slope
 RIPPLES = ((0.4, 2.3, 0.016), (1.5, 3.7, 0.013), (2.6, 5.9, 0.010), (0.9, 9.7, 0.008))
 
 
 class Rays(NamedTuple):
-    """Unit vectors through the pixels (3, height, width), and how much of each is along the view's axis (height, width)."""
+    """Unit vectors through the pixels (3, height, width) and their components along the axis of the view (height, width)."""
 
     direction: np.ndarray
     along_axis: np.ndarray
 
 
 def pixel_rays(view: View, width: int, height: int) -> Rays:
-    """Rays through the centres of all pixels."""
+    """Return the rays through the centres of all pixels."""
     half = math.tan(view.field_of_view / 2)
     right = (2 * (np.arange(width, dtype=np.float32) + 0.5) / width - 1) * half * width / height
     up = (1 - 2 * (np.arange(height, dtype=np.float32) + 0.5) / height) * half
@@ -46,59 +46,73 @@ def pixel_rays(view: View, width: int, height: int) -> Rays:
 
 
 def sky_colour(direction: np.ndarray) -> np.ndarray:
-    """Colour (3, n) of the sky and of two ranges of far hills in a direction (3, n)."""
+    """Return the colours (3, n) of the sky and two ranges of hills in the directions (3, n)."""
     x, y, z = direction
     elevation = np.maximum(z, 0)
-    colour = HORIZON_COLOUR + (ZENITH_COLOUR - HORIZON_COLOUR) * np.sqrt(np.minimum(elevation * 1.4, 1))
-    place = (np.arctan2(y, x) * (AZIMUTHS.size / (2 * math.pi))).astype(np.int32)  # negative ones count from the end
+    colour: np.ndarray = HORIZON_COLOUR + (ZENITH_COLOUR - HORIZON_COLOUR) * np.sqrt(np.minimum(elevation * 1.4, 1))
+    index = (np.arctan2(y, x) * (AZIMUTHS.size / (2 * math.pi))).astype(np.int32)  # negative indices count from the end
     for ridge, tint in HILL_RANGES:
-        colour += (tint - colour) * np.clip((ridge[place] - elevation) * 700 + 0.5, 0, 1)
+        colour += (tint - colour) * np.clip((ridge[index] - elevation) * 700 + 0.5, 0, 1)
     return colour
 
 
 def _ridge(azimuth: np.ndarray, phase: float, height: float) -> np.ndarray:
-    """Elevation of a range of hills (sine of the angle)."""
+    """Return the sine of the elevation of a range of hills at each azimuth (rad)."""
     waves = np.sin(2 * azimuth + phase) + 0.5 * np.sin(5 * azimuth + 2 * phase) + 0.2 * np.sin(13 * azimuth + 3 * phase)
-    return height * (0.75 + 0.25 * waves)
+    elevation: np.ndarray = height * (0.75 + 0.25 * waves)
+    return elevation
 
 
-AZIMUTHS = np.linspace(0, 2 * math.pi, 8192, endpoint=False, dtype=np.float32)  # finer than pixels
+AZIMUTHS = np.linspace(0, 2 * math.pi, 8192, endpoint=False, dtype=np.float32)  # finer than the pixels
 HILL_RANGES = ((_ridge(AZIMUTHS, 3.0, 0.075), FAR_HILLS_COLOUR), (_ridge(AZIMUTHS, 7.0, 0.045), NEAR_HILLS_COLOUR))
 
 
 def horizon_row(light: Rays) -> int:
-    """The first row of a picture whose rays meet the water; a view is never tilted sideways."""
+    """Return the first row of a picture whose rays meet the water; views have no roll angle."""
     return int((light.direction[2, :, 0] >= 0).sum())
 
 
 def water_distance(view: View, light: Rays) -> np.ndarray:
-    """Depth of the water along the view's axis per pixel (m), infinite above the horizon."""
+    """Return the depth of the water along the axis of the view per pixel (m); infinite above the horizon."""
     down = light.direction[2]
     with np.errstate(divide="ignore"):
         distance = np.where(down < 0, -np.float32(view.eye[2]) / down, np.float32(np.inf))
-    return distance * light.along_axis
+    depth: np.ndarray = distance * light.along_axis
+    return depth
 
 
 class WaterPixels(NamedTuple):
-    """Water in n pixels of a picture: the pixels of the mirrored picture that they reflect (flat indices), the reflected sky
-    (3, n) and the share of reflected light (n,)."""
+    """Water in n pixels of a picture.
+
+    `sources` are flat indices (n,) of the reflected pixels of the mirrored picture, `sky` the reflected sky (3, n) and
+    `reflectance` the fraction of reflected light (n,).
+    """
 
     sources: np.ndarray
     sky: np.ndarray
     reflectance: np.ndarray
 
-    def select(self, which: np.ndarray) -> WaterPixels:
-        """Those of its pixels with these indices."""
-        return WaterPixels(*(values[..., which] for values in self))
+    def select(self, indices: np.ndarray) -> WaterPixels:
+        """Return the pixels at `indices`."""
+        return WaterPixels(*(values[..., indices] for values in self))
 
-    def colour(self, mirrored: np.ndarray, cover: np.ndarray) -> np.ndarray:
-        """Colour of the pixels (3, n) that reflect solids (height, width, 3), premultiplied by their cover (height, width)."""
-        solids, hidden = mirrored.reshape(-1, 3)[self.sources].T, cover.ravel()[self.sources]
-        return WATER_COLOUR + (solids + self.sky * (1 - hidden) - WATER_COLOUR) * self.reflectance
+    def colour(self, mirrored: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+        """Return the colours (3, n) with the reflections of a mirrored picture.
+
+        Args:
+            mirrored: Colour of the mirrored solids, premultiplied by alpha, shape (height, width, 3).
+            alpha: Opacity of the mirrored solids, shape (height, width).
+
+        Returns:
+            Colours, shape (3, n).
+        """
+        solids, hidden = mirrored.reshape(-1, 3)[self.sources].T, alpha.ravel()[self.sources]
+        colour: np.ndarray = WATER_COLOUR + (solids + self.sky * (1 - hidden) - WATER_COLOUR) * self.reflectance
+        return colour
 
 
 def water_pixels(view: View, light: Rays, horizon: int) -> WaterPixels:
-    """The water in all pixels of the rows from `horizon` on."""
+    """Return the water in all pixels of the rows from `horizon` on, with Schlick's approximation of the reflectance."""
     height, width = light.along_axis.shape
     x, y, z = light.direction[:, horizon:].reshape(3, -1)
     reach = -float(view.eye[2]) / np.minimum(z, -1e-4)
@@ -110,17 +124,18 @@ def water_pixels(view: View, light: Rays, horizon: int) -> WaterPixels:
 
 
 def _reflected_pixels(tilt: np.ndarray, height: int) -> np.ndarray:
-    """Where the mirrored picture, upside down, has what the water reflects: a little above or below, by its tilt.
+    """Return flat indices of the mirrored, upside-down picture that the water reflects, displaced by its tilt.
 
-    `tilt` is that of the lowest rows of the picture.
+    `tilt` belongs to the lowest rows of the picture, shape (rows, width).
     """
     count, width = tilt.shape
     rows = np.arange(height - count, height, dtype=np.int32)[:, None] + np.rint(tilt * (1.2 * height)).astype(np.int32)
-    return ((height - 1 - np.clip(rows, 0, height - 1)) * width + np.arange(width, dtype=np.int32)).ravel()
+    indices: np.ndarray = (height - 1 - np.clip(rows, 0, height - 1)) * width + np.arange(width, dtype=np.int32)
+    return indices.ravel()
 
 
 def _ripples(x: np.ndarray, y: np.ndarray, distance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Slopes of the surface at places (m); waves too short for the pixels of that distance are left out."""
+    """Return the slopes of the surface along x and y at positions (m); ripples too short for the pixels fade out."""
     slope_x, slope_y = np.zeros_like(x), np.zeros_like(x)
     for angle, number, slope in RIPPLES:
         wave = slope * np.exp(-((distance * number / 120) ** 2)) * np.cos(number * (x * math.cos(angle) + y * math.sin(angle)))

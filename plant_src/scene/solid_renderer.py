@@ -1,4 +1,4 @@
-"""Solids in a PyBullet client of their own, which draws them in memory by TinyRenderer. Physics never sees them."""
+"""Renderer for solids in a separate PyBullet client, drawn in memory by TinyRenderer."""
 
 from __future__ import annotations
 
@@ -12,33 +12,45 @@ from ..vehicles.common.shapes import Quaternion, Vector
 from .cameras import FAR, NEAR, View, Window
 from .parts import Part
 
-SUN: Vector = (-0.45, -0.6, 0.66)  # direction to it
-AMBIENT = DIFFUSE = 0.55  # light from everywhere, and from the sun
+SUN: Vector = (-0.45, -0.6, 0.66)  # direction to the sun, world axes
+AMBIENT = DIFFUSE = 0.55  # coefficients of ambient light and of light from the sun
 
 
 class Picture(NamedTuple):
-    """What a view shows of solids: colour (height, width, 3) in bytes and depth along the view's axis (height, width) in m,
-    infinite where there is nothing."""
+    """Solids in a view: `colour`, uint8 (height, width, 3), and `depth` along the axis of the view (m), shape (height, width).
+
+    The depth is infinite in pixels without a solid.
+    """
 
     colour: np.ndarray
     depth: np.ndarray
 
 
 class SolidRenderer:
-    """Things made of parts, each of which can be placed as one. To be used in a `with` block."""
+    """Renderer of rigid objects made of parts; a context manager that disconnects its Bullet client at the end.
 
-    def __init__(self, *things: Sequence[Part]):
-        self.client = pybullet.connect(pybullet.DIRECT)
-        self.objects = [[(self._create_body(part), part) for part in thing] for thing in things]
-        parts = [part for thing in self.objects for _, part in thing]
-        self._centres = np.array([part.position for part in parts]).reshape(-1, 3)  # in the order of Bullet's numbers: 0, 1, ...
+    Args:
+        objects: Parts of each object, in the frame of the object.
+    """
+
+    def __init__(self, *objects: Sequence[Part]):
+        self.client: int = pybullet.connect(pybullet.DIRECT)
+        self.objects = [[(self._create_body(part), part) for part in parts] for parts in objects]
+        parts = [part for bodies in self.objects for _, part in bodies]
+        self._centres = np.array([part.position for part in parts]).reshape(-1, 3)  # indexed by Bullet's body numbers 0, 1, ...
         self._bounding_radii = np.array([part.bounding_radius() for part in parts])
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        pybullet.disconnect(self.client)
+        self.close()
+
+    def close(self) -> None:
+        """Disconnect the Bullet client; further calls have no effect."""
+        if self.client >= 0:
+            pybullet.disconnect(self.client)
+            self.client = -1
 
     def _create_body(self, part: Part) -> int:
         sizes: dict[str, object]
@@ -59,17 +71,26 @@ class SolidRenderer:
             )
         )
 
-    def set_pose(self, thing: int, position: Sequence[float], orientation: Quaternion) -> None:
-        """Put the frame of a thing to `position` (m, world) with `orientation` (x, y, z, w)."""
-        for body, part in self.objects[thing]:
+    def set_pose(self, index: int, position: Sequence[float], orientation: Quaternion) -> None:
+        """Move object `index` to `position` (m, world) with `orientation` (x, y, z, w)."""
+        for body, part in self.objects[index]:
             pose = pybullet.multiplyTransforms(position, orientation, part.position, part.orientation)
             pybullet.resetBasePositionAndOrientation(body, *pose, physicsClientId=self.client)
             self._centres[body] = pose[0]
 
     def render(self, view: View, width: int, height: int, shadow: bool = False) -> Picture:
-        """What `view` sees, in pixels; `shadow` lets things cast shadows on each other.
+        """Render a view.
 
-        Drawn is only where things are: TinyRenderer takes its time for every pixel.
+        TinyRenderer draws only the window that contains solids, because its time grows with the number of pixels.
+
+        Args:
+            view: The view.
+            width: Width of the picture (pixels).
+            height: Height of the picture (pixels).
+            shadow: True if solids cast shadows on each other.
+
+        Returns:
+            Colour and depth of the solids.
         """
         whole = Picture(np.zeros((height, width, 3), np.uint8), np.full((height, width), np.inf, np.float32))
         window = view.bounding_window(self._centres, self._bounding_radii, width, height)
@@ -80,7 +101,7 @@ class SolidRenderer:
 
     def _render_window(self, view: View, width: int, height: int, window: Window, shadow: bool) -> Picture:
         columns, rows = window.right - window.left, window.bottom - window.top
-        _, _, colour, depth, found = pybullet.getCameraImage(
+        _, _, colour, depth, body = pybullet.getCameraImage(
             columns,
             rows,
             view.matrix(),
@@ -94,7 +115,7 @@ class SolidRenderer:
             renderer=pybullet.ER_TINY_RENDERER,
             physicsClientId=self.client,
         )
-        solid = np.asarray(found).reshape(rows, columns) >= 0
+        solid = np.asarray(body).reshape(rows, columns) >= 0
         metres = np.full((rows, columns), np.inf, np.float32)
         metres[solid] = FAR * NEAR / (FAR - (FAR - NEAR) * np.asarray(depth, np.float32).reshape(rows, columns)[solid])
         return Picture(np.asarray(colour, np.uint8).reshape(rows, columns, 4)[..., :3], metres)

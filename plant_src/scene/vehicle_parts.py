@@ -1,4 +1,4 @@
-"""What each vehicle looks like; those without a drawing of their own follow from their rotors or from their body in Bullet."""
+"""Visual parts of each vehicle: detailed models, or parts derived from the rotors or from the collision boxes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ AIRFRAMES: Mapping[str, Airframe] = {airframe.name: airframe for airframe in (CR
 
 
 def vehicle_parts(vehicle: str) -> list[Part]:
-    """The parts of a vehicle ("crazyflie") in its body frame."""
+    """Return the parts of a vehicle of the catalogue ("crazyflie") in its body frame."""
     if vehicle in DETAILED_MODELS:
         return DETAILED_MODELS[vehicle]()
     model = next(iter(CATALOGUE[vehicle].values()))
@@ -27,14 +27,14 @@ def vehicle_parts(vehicle: str) -> list[Part]:
 
 
 def box_parts(body: Body) -> Iterator[Part]:
-    """What Bullet knows of a vehicle."""
+    """Yield the collision boxes of a vehicle."""
     for box in body.boxes:
         x, y, z = box.half_extents
         yield Part("box", (2 * x, 2 * y, 2 * z), box.position, GREY, box.orientation)
 
 
 def catamaran_parts(body: Body) -> Iterator[Part]:
-    """Round hulls in the place of the lower boxes, and struts from them to the landing deck, the highest box."""
+    """Yield cylindrical hulls in place of the lower collision boxes, and struts to the landing deck, the highest box."""
     deck = max(body.boxes, key=lambda box: box.position[2])
     (length, width, thickness), (x, y, z) = deck.half_extents, deck.position
     yield Part("box", (2 * length, 2 * width, 2 * thickness), deck.position, GREY)
@@ -49,12 +49,12 @@ def _hull_parts(hull: Box, aft: float, fore: float, deck: float) -> Iterator[Par
     yield Part("cylinder", (beam, 2 * (length - beam)), hull.position, YELLOW, ALONG_X)
     for end in (-1.0, 1.0):
         yield Part("sphere", (beam,), (x + end * (length - beam), y, z), YELLOW)
-    for place in (aft, fore):
-        yield Part("cylinder", (0.16 * beam, deck - z), (place, y, (deck + z) / 2), SILVER)
+    for strut in (aft, fore):
+        yield Part("cylinder", (0.16 * beam, deck - z), (strut, y, (deck + z) / 2), SILVER)
 
 
 def multirotor_parts(airframe: Airframe, body: Body) -> Iterator[Part]:
-    """A hull in the middle, and for each rotor an arm, a motor and the disc of the propeller; red in front. It stands on legs."""
+    """Yield a hull, legs, and for each rotor an arm, a motor and a propeller disc; discs in front are red."""
     _, _, height = airframe.rotor_centre
     arm = max(math.hypot(*rotor.position[:2]) for rotor in airframe.rotors)
     hull = 0.42 * arm
@@ -78,7 +78,7 @@ def _arm_parts(rotor: Rotor, radius: float, arm: float) -> Iterator[Part]:
 
 
 def _leg_parts(body: Body, radius: float, top: float) -> Iterator[Part]:
-    """A leg at each lower corner of the body's boxes."""
+    """Yield a leg at each lower corner of the collision boxes."""
     for box in body.boxes:
         corners = sorted(box.corners().tolist(), key=lambda corner: corner[2])
         for x, y, z in corners[:4]:

@@ -1,1 +1,1 @@
-"""Sensors and signal faults: components between the plant and its controllers."""
+"""Sensors, state estimators and signal faults: components between the plant and its controllers."""

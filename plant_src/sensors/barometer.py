@@ -1,33 +1,43 @@
-"""Barometer: air pressure, and the altitude that follows from it in the standard atmosphere."""
+"""Barometer with the pressure altitude of the international standard atmosphere (ISO 2533)."""
 
 from __future__ import annotations
 
 from .counter_based_noise import gauss_markov_factors
 from .sampled_sensor import Measurement, SampledSensor, timing_variables
-from .signal_component import real_parameter, real_variable, seed_parameter
+from .variable_declarations import real_parameter, real_variable, seed_parameter
 
-#: international standard atmosphere, ISO 2533: p = p0 (1 - L z / T0)^EXPONENT
+#: p = p0 (1 - L z / T0)^EXPONENT with the lapse rate L and the temperature T0 at sea level (ISO 2533)
 STANDARD_PRESSURE = 101325.0  # Pa
 _LAPSE_PER_METRE = 0.0065 / 288.15  # 1/m
 _EXPONENT = 9.80665 * 0.0289644 / (8.31446 * 0.0065)
 
 
 def pressure_at(altitude: float, at_zero: float = STANDARD_PRESSURE) -> float:
-    """Pressure (Pa) at an altitude (m) when it is `at_zero` (Pa) on the water."""
-    return at_zero * (1 - _LAPSE_PER_METRE * altitude) ** _EXPONENT
+    """Return the pressure (Pa) at `altitude` (m) for the pressure `at_zero` (Pa) at z = 0 (ISO 2533)."""
+    return float(at_zero * (1 - _LAPSE_PER_METRE * altitude) ** _EXPONENT)
 
 
 def altitude_at(pressure: float, at_zero: float = STANDARD_PRESSURE) -> float:
-    """Altitude (m) at which there is a pressure (Pa)."""
-    return (1 - (pressure / at_zero) ** (1 / _EXPONENT)) / _LAPSE_PER_METRE
+    """Return the altitude (m) with the pressure `pressure` (Pa), the inverse of `pressure_at`."""
+    return float((1 - (pressure / at_zero) ** (1 / _EXPONENT)) / _LAPSE_PER_METRE)
 
 
 class Barometer(SampledSensor):
-    """`pressure` (Pa), `altitude` (m, what a reader makes of it with the standard pressure at zero), `time` (s).
+    """Barometer with white noise and a slow drift.
 
-    pressure = that of the true altitude + drift (Gauss-Markov) + white noise. The drift is the relative accuracy of 8 Pa of a
-    Bosch BMP388 (data sheet BST-BMP388-DS001); its time and the noise of 1.2 Pa, or 0.1 m, are typical. `pressure_at_zero` (Pa)
-    may change in time like the weather. Inputs: `vehicle.position.z`.
+    Error model: pressure = pressure of the true altitude + first-order Gauss-Markov drift + white noise. The drift has the
+    relative accuracy of a Bosch BMP388, 8 Pa (data sheet BST-BMP388-DS001). Its correlation time and the noise of 1.2 Pa
+    (0.1 m) are typical values. The parameter `pressure_at_zero` (Pa) models the weather; events may change it.
+
+    Inputs: `vehicle.position.z` (m, world). Outputs: `pressure` (Pa), `altitude` (m, from the pressure with 101325 Pa at
+    z = 0), `time` of the sample (s).
+
+    Args:
+        instance_name: Name of the component.
+        seed: Seed of all random numbers, together with the name of the component.
+
+    Raises:
+        InputError: `seed` is not an integer of at least 0.
     """
 
     state_attributes = (*SampledSensor.state_attributes, "_drift")
@@ -51,6 +61,7 @@ class Barometer(SampledSensor):
         )
 
     def measure(self, number: int, elapsed: float) -> Measurement:
+        """Return pressure (Pa) and pressure altitude (m); see `SampledSensor.measure`."""
         p, (white, slow) = self.parameters, self.noise[number]
         if elapsed:
             keep, drive = gauss_markov_factors(p["drift"], p["correlation_time"], elapsed)

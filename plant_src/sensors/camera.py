@@ -1,4 +1,4 @@
-"""A camera on a vehicle that writes what it sees as PNG files; drawn off screen, without graphics card or display."""
+"""Onboard camera that writes PNG files, rendered in software without a display."""
 
 from __future__ import annotations
 
@@ -21,21 +21,23 @@ from ..scene.vehicle_parts import vehicle_parts
 from .pinhole_camera import camera_attitude
 from .rotations import quaternion_product, to_world
 from .sampled_sensor import Measurement, SampledSensor, timing_variables
-from .signal_component import pose_inputs, raise_problems, real_parameter, real_variable
+from .variable_declarations import pose_inputs, raise_problems, real_parameter, real_variable
 
-_POSE_SIZE = 7  # numbers of a position and an orientation
+_POSE_SIZE = 7  # scalars of a position and an orientation
 
 
 @dataclass(frozen=True)
 class OrientedView(View):
-    """A view whose upward direction (world) is any."""
+    """View with an arbitrary upward direction `up` (world axes)."""
 
     up: np.ndarray = field(default_factory=lambda: UP)
 
     def matrix(self) -> list[float]:
+        """Return the view matrix, see `View.matrix`."""
         return list(pybullet.computeViewMatrix(self.eye.tolist(), self.target.tolist(), self.up.tolist()))
 
     def axes(self) -> np.ndarray:
+        """Return the axes of the camera, see `View.axes`."""
         ahead = (self.target - self.eye) / np.linalg.norm(self.target - self.eye)
         right = np.cross(ahead, self.up)
         right /= np.linalg.norm(right)
@@ -43,14 +45,25 @@ class OrientedView(View):
 
 
 class Camera(SampledSensor):
-    """Writes `folder`/NAME_0000.png, NAME_0001.png, ... at its rate; `frames` is how many there are, `time` (s) that of the last.
+    """Ideal pinhole camera on a vehicle; writes `folder`/NAME_0000.png, NAME_0001.png, ... at its rate.
 
-    `vehicles`: name -> vehicle of the catalogue ("uav": "ar_drone"), for each of which there are inputs `NAME.position` and
-    `NAME.orientation`; `carrier` is the one that carries the camera, which it does not see; `platforms` as in the world.
-    `size`: width and height (pixels). Vehicles and platforms are solids (`plant_src/scene`), water and sky plain colours. The
-    camera sits at `mounting` (m, body axes), tilted forward from straight down by `tilt` (rad), and opens by `angle` (rad) from
-    top to bottom. What is nearer than 0.4 m is not drawn. A picture of 320 by 240 pixels takes some ten milliseconds, so the
-    rate is low. A folder that is not absolute lies in the current one. Raises InputError with all problems.
+    Vehicles and platforms are drawn as solids (`plant_src/scene`), water and sky as plain colours. Objects nearer than 0.4 m
+    are not drawn. A picture of 320 by 240 pixels takes about 16 ms, so the default rate is 1 Hz.
+
+    Inputs: `NAME.position` (m, world) and `NAME.orientation` (unit quaternion, body to world) of each vehicle. Outputs:
+    `frames` (pictures written so far), `time` of the last one (s). Parameters: `mounting` (m, body axes), `tilt` (rad, from
+    straight down to ahead), `angle` (rad, vertical field of view).
+
+    Args:
+        instance_name: Name of the component and of the files.
+        vehicles: Vehicle of the catalogue by name ({"uav": "ar_drone"}).
+        carrier: Name of the vehicle that carries the camera; it is not drawn.
+        folder: Folder of the pictures, relative to the current directory.
+        platforms: Platforms as in the arguments of the plant.
+        size: Width and height (pixels).
+
+    Raises:
+        InputError: One or more arguments are invalid; lists all problems.
     """
 
     def __init__(
@@ -87,10 +100,11 @@ class Camera(SampledSensor):
             ],
         )
         self._folder, self._size, self._carrier = Path(folder), (int(size[0]), int(size[1])), list(kinds).index(carrier)
-        seen = [vehicle_parts(kind) if name != carrier else [] for name, kind in kinds.items()]
-        self._stage = SolidRenderer(*seen, [part for deck in decks for part in deck])
+        visible_parts = [vehicle_parts(kind) if name != carrier else [] for name, kind in kinds.items()]
+        self._renderer = SolidRenderer(*visible_parts, [part for deck in decks for part in deck])
 
     def measure(self, number: int, elapsed: float) -> Measurement:
+        """Write picture `number` and return the count of pictures."""
         from matplotlib.image import imsave
 
         self._folder.mkdir(parents=True, exist_ok=True)
@@ -98,12 +112,12 @@ class Camera(SampledSensor):
         return (number + 1.0,), ()
 
     def render(self) -> np.ndarray:
-        """What the camera sees now: uint8 (height, width, 3)."""
-        for thing in range(len(self.inputs) // _POSE_SIZE):
-            x, y, z, qw, qx, qy, qz = self.inputs[_POSE_SIZE * thing : _POSE_SIZE * (thing + 1)]
-            self._stage.set_pose(thing, (x, y, z), (qx, qy, qz, qw))
+        """Return the picture at the present inputs, uint8 (height, width, 3)."""
+        for index in range(len(self.inputs) // _POSE_SIZE):
+            x, y, z, qw, qx, qy, qz = self.inputs[_POSE_SIZE * index : _POSE_SIZE * (index + 1)]
+            self._renderer.set_pose(index, (x, y, z), (qx, qy, qz, qw))
         view = self._view()
-        solids, background = self._stage.render(view, *self._size, shadow=True), _render_background(view, *self._size)
+        solids, background = self._renderer.render(view, *self._size, shadow=True), _render_background(view, *self._size)
         return np.where(np.isfinite(solids.depth)[..., None], solids.colour, background)
 
     def _view(self) -> View:
@@ -114,19 +128,19 @@ class Camera(SampledSensor):
         return OrientedView(eye, eye + ahead, self.parameters["angle"], up)
 
     def free(self) -> None:
-        if self._stage.client >= 0:
-            self._stage.__exit__()
-            self._stage.client = -1
+        """Disconnect the Bullet client."""
+        self._renderer.close()
 
 
 def _render_background(view: View, width: int, height: int) -> np.ndarray:
-    """Water and sky, uint8 (height, width, 3): water that turns pale with distance, and the colours of the sky above it."""
+    """Return water in haze and sky, uint8 (height, width, 3)."""
     direction = pixel_rays(view, width, height).direction.reshape(3, -1)
     below = direction[2] < 0
     reach = np.where(below, float(view.eye[2]) / np.maximum(-direction[2], 1e-6), np.inf)
     clear = np.exp(-reach / HAZE_DISTANCE)
     colour = np.where(below, HORIZON_COLOUR + (WATER_COLOUR - HORIZON_COLOUR) * clear, sky_colour(direction))
-    return np.rint(255 * np.clip(colour, 0, 1)).astype(np.uint8).T.reshape(height, width, 3)
+    picture: np.ndarray = np.rint(255 * np.clip(colour, 0, 1)).astype(np.uint8).T.reshape(height, width, 3)
+    return picture
 
 
 def _platform_parts(reader: JsonReader, name: str, spec: Any) -> list[Part]:

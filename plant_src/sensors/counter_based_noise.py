@@ -1,4 +1,4 @@
-"""Random numbers as a function of a seed and a sample number: the same whoever asks, whenever and however often."""
+"""Counter-based random numbers: a pure function of a seed and a sample number."""
 
 from __future__ import annotations
 
@@ -12,11 +12,15 @@ _BLOCK_LENGTH = 256  # rows drawn at a time
 
 
 class CounterBasedNoise:
-    """Standard normal numbers in rows of `width`, all independent of each other.
+    """Rows of independent standard normal numbers; row n depends on the key and n only.
 
-    Row n follows from the key and n alone: numbers come from Philox (Salmon et al., "Parallel random numbers: as easy as
-    1, 2, 3", 2011), a function of a key and a counter. The key is hashed, so that neighbouring seeds and equal seeds of
-    differently named sensors have nothing in common.
+    The generator is Philox (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", 2011), a function of a key and a
+    counter. The key is hashed, so that neighbouring seeds, and equal seeds of sensors with different names, give independent
+    numbers.
+
+    Args:
+        width: Numbers per row.
+        key: Values whose `repr` identifies the sequence.
     """
 
     def __init__(self, width: int, *key: object):
@@ -34,14 +38,23 @@ class CounterBasedNoise:
 
 
 def normal_to_uniform(normal: float) -> float:
-    """A standard normal number as one that is uniform between 0 and 1."""
+    """Return the standard normal distribution function at `normal`: maps normal numbers to uniform ones in (0, 1)."""
     return 0.5 * math.erfc(-normal / math.sqrt(2))
 
 
 def gauss_markov_factors(sigma: float, correlation_time: float, elapsed: float) -> tuple[float, float]:
-    """Factors (keep, drive) of x <- keep x + drive n, n standard normal: a first-order Gauss-Markov process, sampled exactly.
+    """Return the factors of an exactly sampled first-order Gauss-Markov process.
 
-    Its standard deviation is `sigma` once it is stationary, its autocorrelation exp(-t / correlation_time).
+    The process is x <- keep x + drive n with standard normal n. Its stationary standard deviation is `sigma`, its
+    autocorrelation exp(-t / correlation_time).
+
+    Args:
+        sigma: Standard deviation.
+        correlation_time: Time constant of the autocorrelation (s).
+        elapsed: Time since the last sample (s).
+
+    Returns:
+        The factors keep and drive.
     """
     keep = math.exp(-elapsed / correlation_time)
     return keep, sigma * math.sqrt(-math.expm1(-2 * elapsed / correlation_time))

@@ -1,9 +1,13 @@
-"""Numbers of sensors that can be bought, SI units, and where they come from.
+"""Parameters of commercial sensors in SI units, each with its source.
 
-[BMI088] Bosch Sensortec BMI088, data sheet BST-BMI088-DS001 [ADIS] Analog Devices ADIS16448 as in the RotorS simulator (Furrer
-et al., "RotorS - A modular Gazebo MAV simulator framework", 2016; gazebo_imu_plugin.h), which doubles the densities of the data
-sheet [F9P] u-blox ZED-F9P, data sheet UBX-17051259, RTK fixed, short base line [M8N] u-blox NEO-M8N, data sheet UBX-15031086
-[typical] no data sheet says it: what is usual. The numbers of single-device sensors stand in their docstrings.
+- [BMI088] Bosch Sensortec BMI088, data sheet BST-BMI088-DS001
+- [ADIS] Analog Devices ADIS16448 as in the RotorS simulator (Furrer et al., "RotorS - A modular Gazebo MAV simulator
+  framework", 2016; gazebo_imu_plugin.h), which doubles the densities of the data sheet
+- [F9P] u-blox ZED-F9P, data sheet UBX-17051259, RTK fixed, short base line
+- [M8N] u-blox NEO-M8N, data sheet UBX-15031086
+- [typical] common value, not in a data sheet
+
+Sensors with a single set of parameters name their sources in the docstring of the class.
 """
 
 from __future__ import annotations
@@ -20,7 +24,7 @@ IMU_DEVICES: Mapping[str, Mapping[str, Numbers]] = {
     "bmi088": {
         "gyroscope": {
             "noise_density": 0.014 * _DEGREE,  # [BMI088]
-            # a Gauss-Markov bias of the bias stability of 2 deg/h [BMI088]: sigma sqrt(2 / time)
+            # sigma sqrt(2 / correlation_time) of a Gauss-Markov process with the bias stability of 2 deg/h [BMI088]
             "bias_walk": 2.0 * _DEGREE / _HOUR * math.sqrt(2 / 1000.0),
             "correlation_time": 1000.0,  # [ADIS]
             "turn_on_bias": 1.0 * _DEGREE,  # zero-rate offset [BMI088]
@@ -52,7 +56,7 @@ IMU_DEVICES: Mapping[str, Mapping[str, Numbers]] = {
     },
 }
 
-#: standard deviations along each axis: a CEP of R is R / 1.1774 along each of two
+#: standard deviation along each of two axes per CEP radius: 1 / 1.1774
 _CEP = 1 / math.sqrt(2 * math.log(2))
 
 #: white noise and slow error of the position (m), white noise of the velocity (m/s), correlation time (s), rate (Hz), latency (s)

@@ -1,4 +1,4 @@
-"""Faults of signals, actuators' and measurements' alike: a component that passes signals on, and spoils them when told to."""
+"""Fault injection for signals of actuators and sensors."""
 
 from __future__ import annotations
 
@@ -6,51 +6,52 @@ import math
 import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from cosim.core.component import Variable
 from cosim.core.errors import did_you_mean
 from cosim.core.units import parse_unit
 
 from ..json_reader import JsonReader
-from .signal_component import (
-    SignalComponent,
-    boolean_variable,
-    check_seed,
-    raise_problems,
-    real_parameter,
-    real_variable,
-    seed_parameter,
-)
+from .signal_component import SignalComponent
+from .variable_declarations import boolean_variable, check_seed, raise_problems, real_parameter, real_variable, seed_parameter
 
-#: what happens to the affected signals
+#: values of the parameter `mode`
 FAULT_MODES = ("normal", "frozen", "stuck", "missing")
 
-#: the factor of a signal by what its gain acts on: the signal itself, or its square
+#: factor of a signal from its gain, by the quantity that the gain multiplies: the signal itself or its square
 GAIN_FUNCTIONS: Mapping[str, Callable[[float], float]] = {
     "signal": lambda gain: gain,
     "square": lambda gain: math.copysign(math.sqrt(abs(gain)), gain),
 }
 
 _SIGNAL = re.compile(r"([A-Za-z_][\w.]*)(?:\[([1-9]\d*)\])?")
-_TIME_TOLERANCE = 1e-9  # s, by which a delay may seem not to be over
+_TIME_TOLERANCE = 1e-9  # s, rounding error of times
 
 
 class SignalFault(SignalComponent):
-    """Passes every signal NAME from its input `input.NAME` to its output `NAME`, without delay while nothing is wrong.
+    """Fault block: transparent from the inputs `input.NAME` to the outputs `NAME` until a parameter activates a fault.
 
-    `signals`: name -> unit ("" for none); "rotor_speed[4]" is an array of four. `gain_of`: what `gain.NAME` multiplies, the
-    "signal" or its "square": a rotor that keeps 0.7 of its thrust turns as if commanded sqrt(0.7) of its speed. `seed` is
-    that of the added noise, which depends on the component's name, the seed and the number of the step.
+    Error model, in this order: `delay` (s), factor `gain.NAME`, offset `bias.NAME`, white noise with the standard deviation
+    `noise.NAME`, then `mode` for the signals with `affected.NAME`:
 
-    Each step: `delay` (s), then `gain.NAME`, `bias.NAME` and noise of the standard deviation `noise.NAME`, then `mode` for
-    the signals with `affected.NAME`:
+    - normal: no further change
+    - frozen: holds the last value before the mode; `valid` stays true
+    - stuck: outputs `value.NAME`; `valid` stays true
+    - missing: like frozen, and `valid` is false
 
-    normal   pass on
-    frozen   keep the value from before the mode; `valid` stays true
-    stuck    have `value.NAME`; `valid` stays true
-    missing  as frozen, and `valid` is false
+    All parameters are tunable, so that events of a scenario can set them. A delay that grows holds the outputs until enough
+    samples are stored.
 
-    A delay that becomes longer holds the outputs until it is filled. Raises InputError for bad arguments.
+    Args:
+        instance_name: Name of the component.
+        signals: Unit of each signal by name, "" without unit; "rotor_speed[4]" declares an array of four.
+        gain_of: Quantity that the gain multiplies: "signal", or "square" for a gain of the thrust of a rotor speed (0.7 of
+            the thrust is sqrt(0.7) of the speed).
+        seed: Seed of the noise, together with the name of the component.
+
+    Raises:
+        InputError: One or more arguments are invalid; lists all problems.
     """
 
     state_attributes = ("_step", "_history")
@@ -67,11 +68,12 @@ class SignalFault(SignalComponent):
         self.random_number_count = len(self.inputs)
 
     def apply_parameters(self) -> None:
+        """Update the faults from the parameters."""
         mode = self.parameters["mode"]
         if mode not in FAULT_MODES:
             raise ValueError(f'unknown mode "{mode}"{did_you_mean(mode, FAULT_MODES)}')
         affected = self._parameters_of("affected")
-        self._is_held = [mode != "normal" and one for one in affected]
+        self._is_held = [mode != "normal" and is_affected for is_affected in affected]
         self._stuck = self._parameters_of("value") if mode == "stuck" else None
         self._factors = [self._factor(gain) for gain in self._parameters_of("gain")]
         self._biases, self._sigmas = self._parameters_of("bias"), self._parameters_of("noise")
@@ -80,17 +82,19 @@ class SignalFault(SignalComponent):
         self._is_inactive = not changed and not self._delay
         self.flags = (not (mode == "missing" and any(affected)),)
 
-    def _parameters_of(self, kind: str) -> list:
-        """The parameters of a kind of all signals, one after the other."""
+    def _parameters_of(self, kind: str) -> list[Any]:
+        """Return the parameters `kind.NAME` of all signals as a flat list."""
         values = (self.parameters[f"{kind}.{name}"] for name in self._names)
         return [x for value in values for x in (value if isinstance(value, list) else [value])]
 
     def initialise(self) -> None:
+        """Set the initial outputs."""
         self._step, self._history = 0, deque([(self.start_time, self.inputs)])
         self.outputs = self.inputs
         self._apply_faults(self.inputs)
 
     def advance(self, now: float, step_size: float) -> None:
+        """Set the outputs at `now` (s)."""
         self._step += 1
         if self._is_inactive:
             self.outputs = self.inputs
@@ -99,7 +103,7 @@ class SignalFault(SignalComponent):
         self._apply_faults(self._delayed(now))
 
     def _delayed(self, now: float) -> Sequence[float]:
-        """The inputs a delay ago, or the oldest that are known."""
+        """Return the inputs of one delay ago, or the oldest stored ones."""
         history = self._history
         history.append((now, self.inputs))
         while len(history) > 1 and history[1][0] <= now - self._delay + _TIME_TOLERANCE:
@@ -109,9 +113,9 @@ class SignalFault(SignalComponent):
     def _apply_faults(self, inputs: Sequence[float]) -> None:
         row = self.noise[self._step]
         changes = zip(inputs, self._factors, self._biases, self._sigmas, row, strict=True)
-        spoilt = [x * factor + bias + sigma * n for x, factor, bias, sigma, n in changes]
+        faulty = [x * factor + bias + sigma * n for x, factor, bias, sigma, n in changes]
         held = self.outputs if self._stuck is None else self._stuck
-        self.outputs = [old if hold else new for new, old, hold in zip(spoilt, held, self._is_held, strict=True)]
+        self.outputs = [old if hold else new for new, old, hold in zip(faulty, held, self._is_held, strict=True)]
 
 
 def _signal_variables(name: str, unit: str, shape: tuple[int, ...]) -> list[Variable]:
@@ -134,7 +138,7 @@ def _signal_variables(name: str, unit: str, shape: tuple[int, ...]) -> list[Vari
 
 
 def _read_signals(signals: Mapping[str, str], gain_of: str, seed: int) -> dict[str, tuple[str, tuple[int, ...]]]:
-    """Unit and shape of each signal. Raises InputError with all problems."""
+    """Return unit and shape of each signal. Raises InputError with all problems."""
     reader = JsonReader()
     shapes: dict[str, tuple[str, tuple[int, ...]]] = {}
     for text, unit in reader.mapping(signals, ("signals",)).items():

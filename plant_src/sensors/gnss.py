@@ -1,4 +1,4 @@
-"""Satellite navigation: position and velocity of the vehicle in the world frame, at a rate and with a latency of its own."""
+"""GNSS receiver with its own sample rate and latency."""
 
 from __future__ import annotations
 
@@ -8,16 +8,26 @@ from ..json_reader import JsonReader
 from .counter_based_noise import gauss_markov_factors
 from .device_data import GNSS_RECEIVERS
 from .sampled_sensor import Measurement, SampledSensor, timing_variables
-from .signal_component import boolean_variable, check_seed, raise_problems, real_parameter, seed_parameter, vector_variables
+from .variable_declarations import boolean_variable, check_seed, raise_problems, real_parameter, seed_parameter, vector_variables
 
 
 class Gnss(SampledSensor):
-    """`position.x|y|z` (m), `velocity.x|y|z` (m/s), `time` (s) of the sample, `valid`.
+    """GNSS receiver with white noise and a slow position drift.
 
-    position = true + drift + white noise, drift: Gauss-Markov; velocity = true + white noise. `receiver` names a set of
-    numbers ("standard", "rtk"), each of which can be changed as a parameter. While `available` is false nothing new comes and
-    `valid` is false. `seed` with the component's name determines all noise. Inputs: `vehicle.position`, `vehicle.velocity`
-    (of a vehicle or of a deck). Raises InputError for an unknown receiver.
+    Error model: position = true position + first-order Gauss-Markov drift + white noise; velocity = true velocity + white
+    noise. Default values are those of a data sheet (`device_data.py`); each is a parameter. While the parameter `available`
+    is false, `valid` is false and the last fix stays.
+
+    Inputs: `vehicle.position` (m, world), `vehicle.velocity` (m/s, world), of a vehicle or a deck. Outputs: `position.x|y|z`
+    (m), `velocity.x|y|z` (m/s), `time` of the sample (s), `valid`.
+
+    Args:
+        instance_name: Name of the component.
+        seed: Seed of all random numbers, together with the name of the component.
+        receiver: Set of default values: "standard" (u-blox NEO-M8N) or "rtk" (u-blox ZED-F9P).
+
+    Raises:
+        InputError: `receiver` is unknown or `seed` is not an integer of at least 0.
     """
 
     state_attributes = (*SampledSensor.state_attributes, "_drift")
@@ -50,6 +60,7 @@ class Gnss(SampledSensor):
         )
 
     def measure(self, number: int, elapsed: float) -> Measurement:
+        """Return a fix, or no values while `available` is false; see `SampledSensor.measure`."""
         p, row = self.parameters, self.noise[number]
         self._advance_drift(elapsed, row[6:])
         if not p["available"]:
@@ -60,7 +71,7 @@ class Gnss(SampledSensor):
         return [true + slow + sigma * n for true, slow, sigma, n in terms], (True,)
 
     def _advance_drift(self, elapsed: float, row: Sequence[float]) -> None:
-        """From the last sample to this one; the first one is as far off as any."""
+        """Advance the drift by `elapsed` (s), or draw it from its stationary distribution for the first sample (0 s)."""
         p = self.parameters
         time = p["correlation_time"]
         sigmas = (p["horizontal_drift"], p["horizontal_drift"], p["vertical_drift"])

@@ -1,9 +1,13 @@
-"""Inertial measurement unit: three gyroscopes and three accelerometers in the body axes, one sample a step.
+"""Inertial measurement unit: three gyroscopes and three accelerometers in body axes, one sample per step.
 
-Each axis: y = range(M x + c + b_0 + b + N / sqrt(h) n), with x the true value, M the matrix of scale and misalignment, c the
-constant bias, b_0 ~ turn-on bias, b a Gauss-Markov process driven by white noise of density K (bias walk), N the noise density
-and h the step: the model of IEEE Std 952 and of the kalibr and RotorS projects. Its Allan deviation is N / sqrt(tau) for short
-and K sqrt(tau / 3) for long averages well below the correlation time.
+Error model of each triad (IEEE Std 952-1997; also used by the kalibr and RotorS projects):
+
+    y = clip(M x + c + b_0 + b + N / sqrt(h) n, -range, range)
+
+with the true value x, the matrix M of scale and misalignment, the constant bias c, the turn-on bias b_0 (normal), the bias b (a
+first-order Gauss-Markov process driven by white noise of density K, the bias walk), the noise density N, the step size h and a
+standard normal n. The Allan deviation is N / sqrt(tau) for short averaging times and K sqrt(tau / 3) for long ones that are
+well below the correlation time.
 """
 
 from __future__ import annotations
@@ -18,22 +22,15 @@ from ..json_reader import JsonReader
 from .counter_based_noise import CounterBasedNoise, gauss_markov_factors
 from .device_data import IMU_DEVICES, Numbers
 from .rotations import Vector, midpoint_attitude, to_body
-from .signal_component import (
-    SignalComponent,
-    check_seed,
-    raise_problems,
-    real_parameter,
-    real_variable,
-    seed_parameter,
-    vector_variables,
-)
+from .signal_component import SignalComponent
+from .variable_declarations import check_seed, raise_problems, real_parameter, real_variable, seed_parameter, vector_variables
 
 GRAVITY = 9.81  # m/s2, as in the equations of the vehicles
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class _TriadCoefficients(NamedTuple):
-    """What three like axes need in a step."""
+    """Coefficients of the error model of three equal axes; `keep` and `drive` as in `gauss_markov_factors`."""
 
     matrix: Sequence[float] | None
     offset: Vector
@@ -44,12 +41,22 @@ class _TriadCoefficients(NamedTuple):
 
 
 class Imu(SignalComponent):
-    """`acceleration.x|y|z`: specific force (m/s2, body axes; +g upwards at rest, 0 in free fall), `rates.p|q|r` (rad/s).
+    """Inertial measurement unit with the error model of IEEE Std 952 (see the module).
 
-    The specific force is the mean over the step: the change of velocity, less that by gravity, in the attitude halfway. So
-    contact shows as it does in the published velocity. `device` names a set of numbers ("bmi088", "adis16448"), each of which
-    can be changed as a parameter; `seed` with the component's name determines all noise. Inputs: `vehicle.velocity`,
-    `vehicle.orientation`, `vehicle.rates`. Raises InputError for an unknown device.
+    The specific force is the mean over the step: the change of velocity minus that by gravity, divided by the step size, in
+    the attitude halfway. A contact therefore appears as it does in the published velocity.
+
+    Inputs: `vehicle.velocity` (m/s, world), `vehicle.orientation` (unit quaternion, body to world), `vehicle.rates` (rad/s,
+    body). Outputs: `acceleration.x|y|z` (specific force, m/s2, body; +g upwards at rest, 0 in free fall), `rates.p|q|r` (rad/s,
+    body).
+
+    Args:
+        instance_name: Name of the component.
+        seed: Seed of all random numbers, together with the name of the component.
+        device: Set of default values (`device_data.py`): "bmi088" or "adis16448". Each value is a parameter.
+
+    Raises:
+        InputError: `device` is unknown or `seed` is not an integer of at least 0.
     """
 
     random_number_count = 12
@@ -76,6 +83,7 @@ class Imu(SignalComponent):
         self._step_size = 0.01
 
     def apply_parameters(self) -> None:
+        """Compute the coefficients of both triads from the parameters."""
         turn_on = CounterBasedNoise(6, "turn-on", self.name, self.parameters["seed"])[0]
         self._accelerometer = self._coefficients("accelerometer", turn_on[:3])
         self._gyroscope = self._coefficients("gyroscope", turn_on[3:])
@@ -91,11 +99,13 @@ class Imu(SignalComponent):
         )
 
     def initialise(self) -> None:
+        """Set the initial outputs; the vehicle counts as unaccelerated."""
         self._step, self._last_inputs = 0, self.inputs
         self._biases: Sequence[float] = (0.0,) * 6
         self._set_outputs((0.0, 0.0, GRAVITY), self.inputs[3:7], self.noise[0])
 
     def advance(self, now: float, step_size: float) -> None:
+        """Set the outputs after a step of `step_size` (s)."""
         if step_size != self._step_size:
             self._step_size = step_size
             self.apply_parameters()
@@ -108,20 +118,21 @@ class Imu(SignalComponent):
         self._set_outputs(force, midpoint_attitude(last[3:7], new[3:7]), row)
 
     def _advance_biases(self, row: Sequence[float]) -> None:
-        """The biases from the last step to this one."""
+        """Advance the Gauss-Markov biases by one step."""
         _, _, _, keep, drive, _ = self._accelerometer
-        _, _, _, kept, driven, _ = self._gyroscope
         x, y, z, p, q, r = self._biases
         x, y, z = keep * x + drive * row[6], keep * y + drive * row[7], keep * z + drive * row[8]
-        self._biases = x, y, z, kept * p + driven * row[9], kept * q + driven * row[10], kept * r + driven * row[11]
+        _, _, _, keep, drive, _ = self._gyroscope
+        self._biases = x, y, z, keep * p + drive * row[9], keep * q + drive * row[10], keep * r + drive * row[11]
 
     def _set_outputs(self, force: Vector, attitude: Sequence[float], row: Sequence[float]) -> None:
-        """Outputs from the specific force in world axes and an attitude."""
+        """Set the outputs from the specific force (m/s2, world axes) and the attitude (quaternion, body to world)."""
         x, y, z = _measured_axes(self._accelerometer, to_body(attitude, force), self._biases[:3], row)
         self.outputs = (x, y, z, *_measured_axes(self._gyroscope, self.inputs[7:10], self._biases[3:], row[3:]))
 
 
 def _measured_axes(triad: _TriadCoefficients, true: Sequence[float], bias: Sequence[float], row: Sequence[float]) -> Vector:
+    """Apply the error model to the true values of three axes."""
     matrix, (offset_x, offset_y, offset_z), sigma, _, _, limit = triad
     x, y, z = true
     if matrix:
@@ -136,7 +147,7 @@ def _measured_axes(triad: _TriadCoefficients, true: Sequence[float], bias: Seque
 
 
 def _triad_parameters(kind: str, unit: str, numbers: Numbers) -> list[Variable]:
-    # densities are in unit/sqrt(Hz), which integer exponents of units cannot say
+    # densities have no declared unit: FMI units have integer exponents, unit/sqrt(Hz) does not
     return [
         real_parameter(f"{kind}.noise_density", "", numbers["noise_density"], f"of white noise, {unit}/sqrt(Hz)"),
         real_parameter(f"{kind}.bias_walk", "", numbers["bias_walk"], f"density that drives the bias, {unit}/s/sqrt(Hz)"),

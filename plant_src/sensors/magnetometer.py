@@ -1,4 +1,4 @@
-"""Magnetometer: the field of the Earth in the body axes, and the heading of a levelled compass."""
+"""Three-axis magnetometer with the heading of a levelled compass."""
 
 from __future__ import annotations
 
@@ -6,18 +6,29 @@ import math
 
 from .rotations import euler_angles, to_body
 from .sampled_sensor import Measurement, SampledSensor, timing_variables
-from .signal_component import real_parameter, real_variable, seed_parameter, vector_variables
+from .variable_declarations import real_parameter, real_variable, seed_parameter, vector_variables
 
-#: east, north and up (T): about 40 degrees north in Europe, from the World Magnetic Model 2025, rounded
+#: field of the Earth, east, north, up (T): rounded value of the World Magnetic Model 2025 at about 40 degrees north in Europe
 EARTH_FIELD = (0.5e-6, 25.5e-6, -37.0e-6)
 
 
 class Magnetometer(SampledSensor):
-    """`field.x|y|z` (T, body axes), `yaw` (rad, counter-clockwise from east), `time` (s).
+    """Magnetometer with hard iron, soft iron and white noise.
 
-    field = S R^T B + hard iron + white noise, with B the parameter `earth` (T, east, north, up), S the matrix `soft_iron` and
-    `hard_iron` fixed to the body. `yaw` is levelled with the true roll and pitch and knows the declination: a compass module
-    with a perfect level. The noise of 0.3 uT is typical of small sensors. Inputs: `vehicle.orientation`.
+    Error model: field = S R^T B + h + white noise, with the field of the Earth B (parameter `earth`), the rotation R from body
+    to world, the soft-iron matrix S and the hard-iron field h, both fixed to the body. The noise of 0.3 uT is typical of
+    small sensors. `yaw` is levelled with the true roll and pitch and corrected for the true declination, like the heading of
+    a compass module with a perfect level.
+
+    Inputs: `vehicle.orientation` (unit quaternion, body to world). Outputs: `field.x|y|z` (T, body axes), `yaw` (rad,
+    counter-clockwise from east), `time` of the sample (s).
+
+    Args:
+        instance_name: Name of the component.
+        seed: Seed of all random numbers, together with the name of the component.
+
+    Raises:
+        InputError: `seed` is not an integer of at least 0.
     """
 
     random_number_count = 3
@@ -40,6 +51,7 @@ class Magnetometer(SampledSensor):
         )
 
     def measure(self, number: int, elapsed: float) -> Measurement:
+        """Return the field (T, body axes) and the heading (rad); see `SampledSensor.measure`."""
         p, row = self.parameters, self.noise[number]
         x, y, z = to_body(self.inputs, p["earth"])
         a, b, c, d, e, f, g, h, i = p["soft_iron"]
@@ -48,6 +60,7 @@ class Magnetometer(SampledSensor):
         return (*field, self._heading(field)), ()
 
     def _heading(self, field: list[float]) -> float:
+        """Return the heading (rad) from the field in body axes, rotated by the true roll and pitch."""
         roll, pitch, _ = euler_angles(self.inputs)
         x, y, z = field
         left, up = y * math.cos(roll) - z * math.sin(roll), y * math.sin(roll) + z * math.cos(roll)

@@ -1,4 +1,4 @@
-"""A camera that finds the marker on a landing deck: where the deck is, seen from the vehicle."""
+"""Camera that measures the pose of a fiducial marker on a landing deck relative to the vehicle."""
 
 from __future__ import annotations
 
@@ -9,25 +9,41 @@ from .counter_based_noise import normal_to_uniform
 from .pinhole_camera import camera_attitude, project, to_camera_axes
 from .rotations import Vector, euler_angles, inverse_quaternion, quaternion_product, to_body, to_world
 from .sampled_sensor import Measurement, SampledSensor, timing_variables
-from .signal_component import boolean_variable, pose_inputs, real_parameter, real_variable, seed_parameter, vector_variables
+from .variable_declarations import boolean_variable, pose_inputs, real_parameter, real_variable, seed_parameter, vector_variables
+
+#: inputs by quantity
+_VEHICLE_ORIENTATION, _DECK_POSITION, _DECK_ORIENTATION = slice(3, 7), slice(7, 10), slice(10, 14)
 
 
 class MarkerCamera(SampledSensor):
-    """`position.x|y|z` (m): from the vehicle's centre of mass to the deck's centre, in the body axes of the vehicle;
-    `attitude.roll|pitch|yaw` (rad, ZYX): of the deck in these axes; `time` (s) of the picture; `valid`.
+    """Marker camera: pinhole geometry decides visibility, first-order error propagation gives the noise of the pose.
 
-    A square marker of edge `marker_size` (m) lies in the middle of the deck. It is found when its four corners are in the
-    picture (`width` by `height` pixels, pinhole of `focal_length` pixels), it is seen from above at no more than `incidence`
-    (rad) from its normal, and its edge seems at least `smallest` pixels long; then still a share `drop_out` of the pictures
-    fails. Otherwise `valid` is false and the last pose stays.
+    A square marker of edge `marker_size` (m) lies in the middle of the deck. A sample is valid under these conditions:
 
-    With `pixel_noise` s, focal length f, marker size m and depth z the errors are s z / f across the view, s z^2 / (f m) along
-    it, s z / (f m) in yaw and `tilt_ratio` times that in roll and pitch: what corners that are off by s pixels make of a pinhole
-    camera, to first order. Numbers: the camera below an AR.Drone, 320 by 240 pixels, 64 degrees across the diagonal; rate,
-    latency and drop-outs are typical of ArUco markers on small computers.
+    - all four corners are in the picture (`width` by `height` pixels, pinhole of `focal_length` pixels)
+    - the marker is seen from above, at most `incidence` (rad) from its normal
+    - its edge appears at least `smallest` pixels long
+    - it is not lost at random; this happens to the share `drop_out` of the pictures
 
-    The camera sits at `mounting` (m, body axes), tilted forward from straight down by `tilt` (rad). Inputs: `vehicle` and
-    `deck`, each `position` and `orientation` ("plant.usv.deck" has the position, "plant.usv.orientation" the other).
+    Otherwise `valid` is false and the last pose stays. Nothing occludes the marker.
+
+    Error model: for corners with the standard deviation s (`pixel_noise`), focal length f, marker size m and depth z, the
+    standard deviations are s z / f across the view, s z^2 / (f m) along it, s z / (f m) in yaw and `tilt_ratio` times that in
+    roll and pitch (linearised pinhole projection). Default values: downward camera of an AR.Drone (320 by 240 pixels, 64 degrees
+    across the diagonal); rate, latency and drop-outs are typical of ArUco markers on small computers.
+
+    Inputs: `vehicle` and `deck`, each with `position` (m, world) and `orientation` (unit quaternion, body to world); connect
+    `deck.position` to "plant.usv.deck.position" and `deck.orientation` to "plant.usv.orientation". Outputs: `position.x|y|z`
+    (m, body axes, from the vehicle's centre of mass to the deck centre), `attitude.roll|pitch|yaw` (rad, ZYX, of the deck
+    relative to the vehicle), `time` of the picture (s), `valid`. The camera is at `mounting` (m, body axes), tilted by `tilt`
+    (rad) from straight down to ahead.
+
+    Args:
+        instance_name: Name of the component.
+        seed: Seed of all random numbers, together with the name of the component.
+
+    Raises:
+        InputError: `seed` is not an integer of at least 0.
     """
 
     random_number_count = 7
@@ -58,46 +74,52 @@ class MarkerCamera(SampledSensor):
         )
 
     def apply_parameters(self) -> None:
+        """Update the attitude of the camera from the parameter `tilt`."""
         self._camera = camera_attitude(self.parameters["tilt"])
 
     def measure(self, number: int, elapsed: float) -> Measurement:
-        row, attitude = self.noise[number], self.inputs[3:7]
+        """Return the pose of the deck, or no values if the marker is not found; see `SampledSensor.measure`."""
+        row, attitude = self.noise[number], self.inputs[_VEHICLE_ORIENTATION]
         a, b, c = to_world(attitude, self.parameters["mounting"])
-        place = (self.inputs[0] + a, self.inputs[1] + b, self.inputs[2] + c)
+        eye = (self.inputs[0] + a, self.inputs[1] + b, self.inputs[2] + c)
         camera = quaternion_product(attitude, self._camera)
-        if normal_to_uniform(row[6]) < self.parameters["drop_out"] or not self._marker_visible(place, camera):
+        if normal_to_uniform(row[6]) < self.parameters["drop_out"] or not self._marker_visible(eye, camera):
             return (), (False,)
-        seen = to_camera_axes(place, camera, self.inputs[7:10])
-        return (*self._position(seen, row), *self._attitude(seen[2], row[3:])), (True,)
+        deck = to_camera_axes(eye, camera, self.inputs[_DECK_POSITION])
+        return (*self._position(deck, row), *self._attitude(deck[2], row[3:])), (True,)
 
-    def _marker_visible(self, place: Vector, camera: Sequence[float]) -> bool:
-        p, deck, attitude = self.parameters, self.inputs[7:10], self.inputs[10:14]
-        x, y, z = to_body(attitude, (place[0] - deck[0], place[1] - deck[1], place[2] - deck[2]))
+    def _marker_visible(self, eye: Vector, camera: Sequence[float]) -> bool:
+        """Return True if a camera at `eye` (m, world) with the attitude `camera` can find the marker."""
+        p, deck, attitude = self.parameters, self.inputs[_DECK_POSITION], self.inputs[_DECK_ORIENTATION]
+        x, y, z = to_body(attitude, (eye[0] - deck[0], eye[1] - deck[1], eye[2] - deck[2]))
         if z <= 0 or z < math.cos(p["incidence"]) * math.sqrt(x * x + y * y + z * z):
             return False
         half = p["marker_size"] / 2
         for side in ((half, half), (half, -half), (-half, -half), (-half, half)):
             a, b, c = to_world(attitude, (*side, 0.0))
-            corner = to_camera_axes(place, camera, (deck[0] + a, deck[1] + b, deck[2] + c))
+            corner = to_camera_axes(eye, camera, (deck[0] + a, deck[1] + b, deck[2] + c))
             if corner[2] <= 0 or not self._in_picture(*project(corner, p["focal_length"])):
                 return False
-        depth = to_camera_axes(place, camera, deck)[2]
-        return p["focal_length"] * p["marker_size"] >= p["smallest"] * depth
+        depth = to_camera_axes(eye, camera, deck)[2]
+        return bool(p["focal_length"] * p["marker_size"] >= p["smallest"] * depth)
 
     def _in_picture(self, right: float, down: float) -> bool:
-        return abs(right) <= self.parameters["width"] / 2 and abs(down) <= self.parameters["height"] / 2
+        return bool(abs(right) <= self.parameters["width"] / 2 and abs(down) <= self.parameters["height"] / 2)
 
-    def _position(self, seen: Vector, row: Sequence[float]) -> Vector:
-        """Body axes, from the place in camera axes."""
-        p, (x, y, z), mounting = self.parameters, seen, self.parameters["mounting"]
+    def _position(self, deck: Vector, row: Sequence[float]) -> Vector:
+        """Return the measured position (m, body axes) from the true one in camera axes."""
+        p, (x, y, z), mounting = self.parameters, deck, self.parameters["mounting"]
         across = p["pixel_noise"] * z / p["focal_length"]
         along = across * z / p["marker_size"]
         a, b, c = to_world(self._camera, (x + across * row[0], y + across * row[1], z + along * row[2]))
         return a + mounting[0], b + mounting[1], c + mounting[2]
 
     def _attitude(self, depth: float, row: Sequence[float]) -> Vector:
+        """Return the measured roll, pitch and yaw (rad) of the deck relative to the vehicle."""
         p = self.parameters
         sigma = p["pixel_noise"] * depth / (p["focal_length"] * p["marker_size"])
-        roll, pitch, yaw = euler_angles(quaternion_product(inverse_quaternion(self.inputs[3:7]), self.inputs[10:14]))
+        roll, pitch, yaw = euler_angles(
+            quaternion_product(inverse_quaternion(self.inputs[_VEHICLE_ORIENTATION]), self.inputs[_DECK_ORIENTATION])
+        )
         tilted = p["tilt_ratio"] * sigma
         return roll + tilted * row[0], pitch + tilted * row[1], yaw + sigma * row[2]

@@ -1,7 +1,7 @@
-"""A pinhole camera on a vehicle.
+"""Pinhole projection of a camera on a vehicle.
 
-Axes of the camera: x to the right of the picture, y down in it, z along the view. A camera with tilt 0 looks straight down, the
-nose of the vehicle at the top of the picture; with pi/2 it looks ahead.
+Camera axes: x to the right of the picture, y down, z along the view. A camera with tilt 0 looks straight down, the nose of the
+vehicle at the top of the picture; with tilt pi/2 it looks ahead.
 """
 
 from __future__ import annotations
@@ -11,20 +11,29 @@ from collections.abc import Sequence
 
 from .rotations import Quaternion, Vector, quaternion_product, to_body
 
-#: x right, y back, z down in body axes: half a turn about the axis between ahead and right
+#: quaternion of a camera that looks straight down: half a turn about the axis between forward and right
 _DOWNWARD_ATTITUDE = (0.0, math.sqrt(0.5), -math.sqrt(0.5), 0.0)
 
 
 def camera_attitude(tilt: float) -> Quaternion:
-    """From camera axes to body axes."""
+    """Return the quaternion from camera axes to body axes for a tilt (rad)."""
     return quaternion_product((math.cos(tilt / 2), 0.0, -math.sin(tilt / 2), 0.0), _DOWNWARD_ATTITUDE)
 
 
-def to_camera_axes(place: Sequence[float], attitude: Sequence[float], point: Sequence[float]) -> Vector:
-    """A point (m, world) in the axes of a camera at `place` whose axes `attitude` turns into the world's."""
-    return to_body(attitude, (point[0] - place[0], point[1] - place[1], point[2] - place[2]))
+def to_camera_axes(eye: Sequence[float], attitude: Sequence[float], point: Sequence[float]) -> Vector:
+    """Transform a point (m, world) to the axes of a camera.
+
+    Args:
+        eye: Position of the camera (m, world).
+        attitude: Unit quaternion from camera axes to world axes.
+        point: Position of the point (m, world).
+
+    Returns:
+        Position of the point relative to the camera (m, camera axes).
+    """
+    return to_body(attitude, (point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]))
 
 
 def project(point: Sequence[float], focal_length: float) -> tuple[float, float]:
-    """Where a point in camera axes appears: pixels to the right of and below the middle of the picture."""
+    """Return the image of a point in camera axes: pixels to the right of and below the centre of the picture."""
     return focal_length * point[0] / point[2], focal_length * point[1] / point[2]

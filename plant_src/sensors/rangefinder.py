@@ -1,4 +1,4 @@
-"""Rangefinder: the distance along a beam to the next deck, platform or the water, by Bullet's ray test."""
+"""Rangefinder: distance along a beam to the nearest deck, platform or the water, by ray casting in Bullet."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..physics.client import pybullet
 from ..vehicles.common.shapes import Box
 from .rotations import Vector, to_world
 from .sampled_sensor import Measurement, SampledSensor, timing_variables
-from .signal_component import (
+from .variable_declarations import (
     boolean_variable,
     check_seed,
     pose_inputs,
@@ -23,22 +23,33 @@ from .signal_component import (
     seed_parameter,
 )
 
-_POSE_SIZE = 7  # numbers of a position and an orientation
-_HIT_BODY, _HIT_FRACTION = 0, 2  # fields of what Bullet says of a ray
+_POSE_SIZE = 7  # scalars of a position and an orientation
+_HIT_BODY, _HIT_FRACTION = 0, 2  # fields of a result of pybullet.rayTest
 
 
 class Rangefinder(SampledSensor):
-    """`distance` (m) from the sensor along its beam, `valid`, `time` (s).
+    """Laser rangefinder with noise that grows with the distance.
 
-    distance = true + max(noise_floor, noise_share * true) * n; nothing between `nearest` and `farthest`: `distance` is
-    `farthest` and `valid` false. The sensor sits at `mounting` (m, body axes, from the centre of mass) and looks along
-    `direction` (body axes). Numbers: Benewake TFmini-S data sheet: 0.1 to 12 m, 100 Hz, 6 cm, 1 % beyond 6 m, taken for three
-    standard deviations.
+    Error model: distance = true + max(noise_floor, noise_share * true) * n with a standard normal n. Without an object between
+    `nearest` and `farthest`, `distance` is `farthest` and `valid` is false. Default values: Benewake TFmini-S data sheet, 0.1
+    to 12 m, 100 Hz; its accuracy of 6 cm, 1 % beyond 6 m, is taken as three standard deviations.
 
-    `vessels`: name -> vehicle of the catalogue ("usv": "strider"), for each of which there are inputs `NAME.deck.position`
-    and `NAME.orientation`; `platforms` as in the world; `water`: whether the plane z = 0 stops the beam. Vehicles' bodies and
-    platforms are copies in a Bullet client of its own: those of the world are put aside while nothing is near. Raises InputError
-    with all problems. Inputs: `vehicle.position`, `vehicle.orientation`.
+    Vessels and platforms are copies in a separate Bullet client, because the bodies of the world are parked while nothing is
+    near them. The water is the plane z = 0 without waves.
+
+    Inputs: `vehicle.position` (m, world) and `vehicle.orientation` (unit quaternion, body to world); `NAME.deck.position` and
+    `NAME.orientation` of each vessel. Outputs: `distance` (m, from the sensor along its beam), `time` of the sample (s),
+    `valid`. Parameters: `mounting` (m, body axes, from the centre of mass), `direction` of the beam (body axes).
+
+    Args:
+        instance_name: Name of the component.
+        vessels: Vessel of the catalogue by name ({"usv": "strider"}).
+        platforms: Platforms as in the arguments of the plant.
+        water: True if the plane z = 0 stops the beam.
+        seed: Seed of all random numbers, together with the name of the component.
+
+    Raises:
+        InputError: One or more arguments are invalid; lists all problems.
     """
 
     random_number_count = 1
@@ -84,19 +95,21 @@ class Rangefinder(SampledSensor):
         return int(pybullet.createMultiBody(0, shape, -1, position, physicsClientId=self._client))
 
     def apply_parameters(self) -> None:
+        """Normalise the direction of the beam."""
         length = math.hypot(*self.parameters["direction"])
         if not length:
-            raise ValueError("found a direction of length 0")
+            raise ValueError("found a direction of length 0, expected a nonzero vector")
         self._direction = [x / length for x in self.parameters["direction"]]
 
     def measure(self, number: int, elapsed: float) -> Measurement:
+        """Return the distance (m) and if it is valid; see `SampledSensor.measure`."""
         p, true = self.parameters, self._distance()
         if not p["nearest"] <= true <= p["farthest"]:
             return (p["farthest"],), (False,)
         return (true + max(p["noise_floor"], p["noise_share"] * true) * self.noise[number][0],), (True,)
 
     def _distance(self) -> float:
-        """True distance along the beam, infinite when nothing is in reach."""
+        """Return the true distance (m) along the beam; infinite without an object in reach."""
         x, y, z = self.inputs[:3]
         a, b, c = to_world(self.inputs[3:7], self.parameters["mounting"])
         start = (x + a, y + b, z + c)
@@ -104,35 +117,37 @@ class Rangefinder(SampledSensor):
         return min(self._to_solids(start, beam), self._to_water(start, beam))
 
     def _to_solids(self, start: Vector, beam: Vector) -> float:
+        """Return the distance (m) from `start` (m, world) along the unit vector `beam` to vessels and platforms."""
         for number, body in enumerate(self._bodies, 1):
             x, y, z, qw, qx, qy, qz = self.inputs[_POSE_SIZE * number : _POSE_SIZE * (number + 1)]
             pybullet.resetBasePositionAndOrientation(body, (x, y, z), (qx, qy, qz, qw), physicsClientId=self._client)
         reach = self.parameters["farthest"] * 1.01
-        end = [place + reach * part for place, part in zip(start, beam, strict=True)]
-        (found,) = pybullet.rayTest(start, end, physicsClientId=self._client)
-        return found[_HIT_FRACTION] * reach if found[_HIT_BODY] >= 0 else math.inf
+        end = [origin + reach * part for origin, part in zip(start, beam, strict=True)]
+        (hit,) = pybullet.rayTest(start, end, physicsClientId=self._client)
+        return hit[_HIT_FRACTION] * reach if hit[_HIT_BODY] >= 0 else math.inf
 
     def _to_water(self, start: Vector, beam: Vector) -> float:
         return -start[2] / beam[2] if self._water and start[2] > 0 > beam[2] else math.inf
 
     def free(self) -> None:
+        """Disconnect the Bullet client."""
         if self._client >= 0:
             pybullet.disconnect(self._client)
             self._client = -1
 
 
 def _read_vessels(reader: JsonReader, vessels: Any) -> dict[str, Sequence[Box]]:
-    """The shapes of each vessel in its axes, from the centre of its deck."""
-    known = {name: next(iter(models.values())) for name, models in VEHICLE_MODELS.items()}
-    valid = [name for name, model in known.items() if model.is_vessel]
+    """Return the boxes of each vessel, relative to the centre of its deck."""
+    models = {kind: next(iter(variants.values())) for kind, variants in VEHICLE_MODELS.items()}
+    valid = [kind for kind, model in models.items() if model.is_vessel]
     named = reader.read_named_objects(vessels, ("vessels",)).items()
-    return {name: _relative_to_deck(known[reader.choice(kind, ("vessels", name), valid)].body.boxes) for name, kind in named}
+    return {name: _relative_to_deck(models[reader.choice(kind, ("vessels", name), valid)].body.boxes) for name, kind in named}
 
 
 def _relative_to_deck(boxes: Sequence[Box]) -> Sequence[Box]:
-    """Shapes moved so that the middle of the top of the first one, which is the deck, is the origin.
+    """Move boxes so that the centre of the top of the first one, the deck, is the origin.
 
-    The deck is what all vessels publish; where their centre of mass is depends on the payload of some.
+    Poses refer to the deck because the centre of mass of some vessels depends on their payload.
     """
     a, b, c = boxes[0].position
     top = c + boxes[0].half_extents[2]
@@ -140,11 +155,11 @@ def _relative_to_deck(boxes: Sequence[Box]) -> Sequence[Box]:
 
 
 def _read_platforms(reader: JsonReader, platforms: Any) -> Sequence[tuple[Sequence[float], Sequence[float]]]:
-    """Edges and centre of each platform (m)."""
-    found = []
+    """Return edges and centre of each platform (m)."""
+    boxes = []
     for name, spec in reader.read_named_objects(platforms, ("platforms",)).items():
         path = ("platforms", name)
         spec = reader.read_object(spec, path, ("size", "position"), ())
         vectors = [reader.vector(spec.get(key, [1.0] * 3), (*path, key), "xyz") for key in ("size", "position")]
-        found.append((vectors[0], vectors[1]))
-    return found
+        boxes.append((vectors[0], vectors[1]))
+    return boxes

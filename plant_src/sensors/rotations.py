@@ -1,4 +1,7 @@
-"""Rotations in plain floats: NumPy takes longer for three numbers. Quaternions are (w, x, y, z), body to world, of length 1."""
+"""Rotations of three-component vectors in plain floats, which are faster than NumPy arrays of this size.
+
+Quaternions are (w, x, y, z), of unit length, and rotate body axes to world axes.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +13,12 @@ Quaternion = tuple[float, float, float, float]
 
 
 def to_world(q: Sequence[float], v: Sequence[float]) -> Vector:
-    """A vector in body axes as one in world axes."""
+    """Rotate a vector from body axes to world axes."""
     return _rotate(q[0], q[1], q[2], q[3], v)
 
 
 def to_body(q: Sequence[float], v: Sequence[float]) -> Vector:
-    """A vector in world axes as one in body axes."""
+    """Rotate a vector from world axes to body axes."""
     return _rotate(q[0], -q[1], -q[2], -q[3], v)
 
 
@@ -26,7 +29,7 @@ def _rotate(w: float, x: float, y: float, z: float, v: Sequence[float]) -> Vecto
 
 
 def quaternion_product(a: Sequence[float], b: Sequence[float]) -> Quaternion:
-    """The rotation b followed by a, in fixed axes."""
+    """Return the quaternion product a b: the rotation b followed by a, about fixed axes."""
     w, x, y, z = a
     o, p, q, r = b
     return (
@@ -38,19 +41,19 @@ def quaternion_product(a: Sequence[float], b: Sequence[float]) -> Quaternion:
 
 
 def inverse_quaternion(q: Sequence[float]) -> Quaternion:
-    """World to body."""
+    """Return the inverse rotation."""
     return q[0], -q[1], -q[2], -q[3]
 
 
 def normalised_quaternion(q: Sequence[float]) -> Quaternion:
-    """The same direction, of length 1."""
+    """Return the quaternion scaled to unit length."""
     w, x, y, z = q
     length = math.sqrt(w * w + x * x + y * y + z * z)
     return w / length, x / length, y / length, z / length
 
 
 def quaternion_from_rotation_vector(v: Sequence[float]) -> Quaternion:
-    """The quaternion of a rotation vector (rad)."""
+    """Return the quaternion of a rotation vector (rad)."""
     x, y, z = v
     angle = math.sqrt(x * x + y * y + z * z)
     share = math.sin(angle / 2) / angle if angle > 1e-9 else 0.5
@@ -58,7 +61,7 @@ def quaternion_from_rotation_vector(v: Sequence[float]) -> Quaternion:
 
 
 def midpoint_attitude(a: Sequence[float], b: Sequence[float]) -> Quaternion:
-    """The attitude in the middle of the shorter way from one to another."""
+    """Return the attitude halfway between two attitudes, along the shorter rotation."""
     w, x, y, z = a
     o, p, q, r = b
     if w * o + x * p + y * q + z * r >= 0:
@@ -67,7 +70,7 @@ def midpoint_attitude(a: Sequence[float], b: Sequence[float]) -> Quaternion:
 
 
 def euler_angles(q: Sequence[float]) -> Vector:
-    """Roll, pitch and yaw (rad, ZYX)."""
+    """Return roll, pitch and yaw (rad, ZYX) of a quaternion."""
     w, x, y, z = q
     roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
@@ -75,7 +78,7 @@ def euler_angles(q: Sequence[float]) -> Vector:
 
 
 def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """The quaternion of roll, pitch and yaw (rad, ZYX)."""
+    """Return the quaternion of roll, pitch and yaw (rad, ZYX)."""
     about_z, about_y, about_x = (
         quaternion_from_rotation_vector((0.0, 0.0, yaw)),
         quaternion_from_rotation_vector((0.0, pitch, 0.0)),
@@ -85,5 +88,5 @@ def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def cross(a: Sequence[float], b: Sequence[float]) -> Vector:
-    """The vector product."""
+    """Return the vector product a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

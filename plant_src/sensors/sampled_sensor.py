@@ -1,4 +1,4 @@
-"""Sensors that measure at a rate of their own and tell it some time later."""
+"""Base class of sensors with their own sample rate and latency."""
 
 from __future__ import annotations
 
@@ -7,35 +7,45 @@ from collections.abc import Sequence
 
 from cosim.core.component import Variable
 
-from .signal_component import SignalComponent, real_parameter, real_variable
+from .signal_component import SignalComponent
+from .variable_declarations import real_parameter, real_variable
 
-#: part of a sample, and s, by which a moment may seem to lie before its time
+#: rounding errors of a sample number and of a time (s)
 _SAMPLE_TOLERANCE, _TIME_TOLERANCE = 1e-6, 1e-9
 
+#: values of the real outputs without `time`, and of the Boolean outputs
 Measurement = tuple[Sequence[float], Sequence[bool]]
 
 
 class SampledSensor(SignalComponent):
-    """Sample n is taken at the first step that ends at or after start + n / rate, and is put out `latency` (s) later.
+    """Sensor with a sample rate and a latency; the last real output is the `time` (s) of the sample.
 
-    Sample 0 is there from the start. The last real output is the `time` (s) at which the sample that is shown was taken.
+    Sample n is taken at the end of the first step that reaches start + n / `rate` and is published `latency` (s) later.
+    Sample 0 is published at the start.
     """
 
     state_attributes: tuple[str, ...] = ("_number", "_sample_time", "_pending")
 
     def measure(self, number: int, elapsed: float) -> Measurement:
-        """Real outputs (without `time`) and flags of sample `number`, `elapsed` (s) after the last sample (0: the first one).
+        """Take a sample.
 
-        Without real outputs those of the last sample that had some stay, with their time.
+        Args:
+            number: Number of the sample; selects the row of random numbers.
+            elapsed: Time since the last sample (s), 0 for the first one.
+
+        Returns:
+            Real outputs without `time`, and Boolean outputs. Empty real outputs leave the last values and their time.
         """
         raise NotImplementedError
 
     def initialise(self) -> None:
+        """Take and publish sample 0."""
         self._number, self._sample_time, self._pending = 0, self.start_time, deque[tuple[float, float, Measurement]]()
         self.outputs = (0.0,) * len(self.outputs)
         self._publish(self.start_time, self.measure(0, 0.0))
 
     def advance(self, now: float, step_size: float) -> None:
+        """Take a sample that is due and publish those whose latency has passed."""
         number = int((now - self.start_time) * self.parameters["rate"] + _SAMPLE_TOLERANCE)
         if number > self._number:
             measurement = self.measure(number, now - self._sample_time)
@@ -52,7 +62,7 @@ class SampledSensor(SignalComponent):
 
 
 def timing_variables(rate: float, latency: float = 0.0) -> list[Variable]:
-    """The parameters of a sampled sensor, and its output `time`, which comes last."""
+    """Declare the parameters `rate` (Hz) and `latency` (s) and the output `time`, which must be the last real output."""
     return [
         real_variable("rate", "Hz", "parameter", rate, "samples per second", minimum=1e-3, variability="fixed"),
         real_parameter("latency", "s", latency, "from the sample to its output"),

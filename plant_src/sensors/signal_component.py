@@ -1,4 +1,4 @@
-"""Components of a few real inputs and outputs: what sensors, filters and faults have in common."""
+"""Base class of components with few real inputs and outputs: sensors, estimators and faults."""
 
 from __future__ import annotations
 
@@ -11,32 +11,34 @@ from typing import Any
 
 import numpy as np
 
-from cosim.core.component import DTYPES, Causality, Component, Ports, PreparedCall, Variability, Variable
-from cosim.core.errors import ComponentError, InputError, did_you_mean
-from cosim.core.units import parse_unit
+from cosim.core.component import DTYPES, Component, Ports, PreparedCall, Variable
+from cosim.core.errors import ComponentError, did_you_mean
 
-from ..json_reader import JsonReader
 from .counter_based_noise import CounterBasedNoise
 
 _FLOAT, _FLAG = DTYPES["Float64"], DTYPES["Boolean"]
 
 
 class SignalComponent(Component):
-    """Computes real and Boolean outputs from real inputs, once per step.
+    """Component that computes real and Boolean outputs from real inputs, once per step.
 
-    A subclass declares `variables`, names what changes while it runs in `memory`, and implements `begin` and `advance`, which
-    read `inputs` and fill `outputs` and `flags` (floats and Booleans in the order of the variables). Steps of a few
-    microseconds are why it is no PythonFMU class.
+    A subclass declares its variables, names its internal state in `state_attributes` and implements `initialise` and
+    `advance`. These read `inputs` and set `outputs` (floats) and `flags` (Booleans), each in the order of the variables. It
+    is not a PythonFMU class because a step takes a few microseconds only.
 
-    It belongs into a stage after those that feed it. What it computes in a step that ends at time t is then what its inputs
-    are at t, and what its readers see at t.
+    In a scenario the component belongs to a stage after the components that it is connected to: the outputs of a step that
+    ends at time t then belong to the inputs at t.
+
+    Args:
+        instance_name: Name of the component.
+        variables: Inputs, outputs and parameters. Inputs are Float64, outputs Float64 or Boolean.
     """
 
     binds_everything = True
     has_state = True
-    #: attributes that change while it runs, besides inputs, outputs and parameters
+    #: attributes that belong to the state, besides inputs, outputs, flags and parameters
     state_attributes: tuple[str, ...] = ()
-    #: random numbers that a sample needs; they follow from the class, the instance's name, the parameter `seed` and its number
+    #: random numbers per sample; they depend on the class, the name of the instance, the parameter `seed` and the sample number
     random_number_count = 0
     noise: CounterBasedNoise
 
@@ -62,24 +64,26 @@ class SignalComponent(Component):
     # -- for subclasses ------------------------------------------------------------------------------------------------
 
     def apply_parameters(self) -> None:
-        """Parameters have changed: compute what follows from them."""
+        """Compute values that depend on parameters; called after every change. Raises ValueError for an invalid parameter."""
 
     def initialise(self) -> None:
-        """The outputs at `start_time`, and the memory as it is then; called again when the inputs change before the start."""
+        """Set outputs and state at `start_time`; called again when inputs change in initialization mode."""
         raise NotImplementedError
 
     def advance(self, now: float, step_size: float) -> None:
-        """The outputs at `now` (s), one step after the last ones."""
+        """Set outputs and state at `now` (s), the end of a step of `step_size` (s)."""
         raise NotImplementedError
 
     # -- variables -----------------------------------------------------------------------------------------------------
 
     def _variable(self, name: str, function: str) -> Variable:
+        """Return the variable `name`. Raises ComponentError if it does not exist."""
         if name not in self._by_name:
             raise ComponentError(self.name, function, f'no variable "{name}"{did_you_mean(name, self._by_name)}')
         return self._by_name[name]
 
     def set(self, name: str, value: Any) -> None:
+        """Set an input or a parameter. Raises ComponentError for an output or an invalid value."""
         variable = self._variable(name, "set")
         if variable.causality == "output":
             raise ComponentError(self.name, "set", f"{name} is an output")
@@ -99,22 +103,25 @@ class SignalComponent(Component):
         struct.pack_into(f"{len(values)}d", self._input_data, 8 * first, *values)
 
     def get(self, name: str) -> Any:
+        """Return the present value of a variable, an array as a flat list."""
         variable = self._variable(name, "get")
         if variable.causality == "parameter":
             return deepcopy(self.parameters[name])
         first, end = self._ranges[variable.causality][name]
         values = self.inputs if variable.causality == "input" else self.flags if variable.dtype == _FLAG else self.outputs
-        found = list(values[first:end])
-        return found if variable.shape else found[0]
+        scalars = list(values[first:end])
+        return scalars if variable.shape else scalars[0]
 
     # -- life cycle ----------------------------------------------------------------------------------------------------
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
+        """Take the arrays of the engine."""
         self._input_data = inputs.arrays.get(_FLOAT, np.empty(0)).data
         self._output_data = outputs.arrays.get(_FLOAT, np.empty(0)).data
         self._flag_data = outputs.arrays.get(_FLAG, np.empty(0, _FLAG)).data
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
+        """Set the initial state and outputs."""
         self.start_time, self._initializing = start_time, True
         if self.random_number_count:
             self.noise = CounterBasedNoise(self.random_number_count, type(self).__name__, self.name, self.parameters["seed"])
@@ -122,62 +129,72 @@ class SignalComponent(Component):
         self.initialise()
 
     def exit_initialization_mode(self) -> None:
+        """End the repetition of `initialise`."""
         self._initializing = False
 
     def set_inputs(self) -> None:
+        """Read the inputs; in initialization mode the outputs follow them."""
         self.inputs = self._read(self._input_data)
         if self._initializing:
             self.initialise()
 
     def do_step(self, time: float, step_size: float) -> None:
+        """Advance from `time` (s) by `step_size` (s). Raises ComponentError if that fails."""
         try:
             self.advance(time + step_size, step_size)
         except (ArithmeticError, ValueError, OSError) as error:
             raise ComponentError(self.name, "do_step", f"{type(error).__name__}: {error}", time) from error
 
     def get_outputs(self) -> None:
+        """Write the outputs."""
         self._write(self._output_data, 0, *self.outputs)
         self._write_flags(self._flag_data, 0, *self.flags)
 
-    def prepare_step_calls(self, clock: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
-        return [PreparedCall(self._turn, (clock, step_size), "do_step")]
+    def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
+        """Return one call that reads the inputs, does a step and writes the outputs."""
+        return [PreparedCall(self._exchange_and_step, (current_time, step_size), "do_step")]
 
-    def _turn(self, clock: ctypes.c_double, step_size: float) -> int:
+    def _exchange_and_step(self, current_time: ctypes.c_double, step_size: float) -> int:
         self.inputs = self._read(self._input_data)
-        self.do_step(clock.value, step_size)
+        self.do_step(current_time.value, step_size)
         self._write(self._output_data, 0, *self.outputs)
         self._write_flags(self._flag_data, 0, *self.flags)
         return 0
 
     def get_state(self) -> Any:
+        """Return a copy of the state."""
         names = ("inputs", "outputs", "flags", "parameters", "start_time", "_initializing", *self.state_attributes)
         return {name: deepcopy(getattr(self, name)) for name in names}
 
     def set_state(self, state: Any) -> None:
+        """Restore a state; it stays valid."""
         for name, value in state.items():
             setattr(self, name, deepcopy(value))
         self.apply_parameters()
 
-    def free_state(self, state: Any) -> None: ...
+    def free_state(self, state: Any) -> None:
+        """Do nothing: a state holds no resources."""
 
-    def terminate(self) -> None: ...
+    def terminate(self) -> None:
+        """Do nothing: there is nothing to end."""
 
-    def free(self) -> None: ...
+    def free(self) -> None:
+        """Do nothing: there are no resources."""
 
 
 def _variable_ranges(variables: Sequence[Variable]) -> dict[str, tuple[int, int]]:
-    """Where the values of each variable lie among those of its dtype."""
-    filled = dict.fromkeys((v.dtype for v in variables), 0)
-    places = {}
+    """Return the range (first, end) of each variable among the scalars of its dtype."""
+    counts = dict.fromkeys((v.dtype for v in variables), 0)
+    ranges = {}
     for variable in variables:
-        first = filled[variable.dtype]
-        filled[variable.dtype] = first + len(variable.scalar_names)
-        places[variable.name] = (first, filled[variable.dtype])
-    return places
+        first = counts[variable.dtype]
+        counts[variable.dtype] = first + len(variable.scalar_names)
+        ranges[variable.name] = (first, counts[variable.dtype])
+    return ranges
 
 
 def _flat_value(variable: Variable, value: Any) -> Any:
-    """A value as a scalar or flat list of the variable's type. Raises ComponentError for what is no such value."""
+    """Return `value` as a scalar or flat list of the variable's type. Raises ComponentError if it is not such a value."""
     kind: type = {"Float64": float, "Boolean": bool, "String": str, "Int32": int}[variable.type]
     flat = np.ravel(value).tolist() if variable.shape else [value]
     try:
@@ -185,74 +202,7 @@ def _flat_value(variable: Variable, value: Any) -> Any:
     except (TypeError, ValueError):
         values = []
     if len(values) != len(variable.scalar_names):
-        expected = f"{math.prod(variable.shape)} values of type {variable.type}"
+        count = math.prod(variable.shape)
+        expected = f"{count} {'value' if count == 1 else 'values'} of type {variable.type}"
         raise ComponentError(variable.name, "set", f"found {value!r}, expected {expected}")
     return values if variable.shape else values[0]
-
-
-def check_seed(reader: JsonReader, seed: Any) -> None:
-    """Complain about a seed that is none."""
-    reader.integer(seed, ("seed",), 0, 2**31 - 1)
-
-
-def raise_problems(reader: JsonReader) -> None:
-    """Raises InputError with all problems that a reader of arguments has found."""
-    if reader.problems:
-        raise InputError(reader.problems)
-
-
-# -- declaring variables -----------------------------------------------------------------------------------------------
-
-
-def real_variable(
-    name: str,
-    unit: str,
-    causality: Causality,
-    start: Any = None,
-    description: str = "",
-    *,
-    shape: tuple[int, ...] = (),
-    minimum: float | None = None,
-    maximum: float | None = None,
-    variability: Variability | None = None,
-) -> Variable:
-    """A real variable; parameters are tunable unless `variability` says otherwise, inputs start at zero."""
-    kind = variability or ("tunable" if causality == "parameter" else "continuous")
-    if start is None and causality == "input":
-        start = (0.0,) * math.prod(shape) if shape else 0.0
-    known = parse_unit(unit) if unit else None
-    return Variable(name, "Float64", causality, kind, start, known, shape, description, minimum, maximum)
-
-
-def vector_variables(
-    name: str, axes: str, unit: str, causality: Causality, start: float | None = None, text: str = ""
-) -> list[Variable]:
-    """Real variables `name.axis`, one for each letter of `axes`."""
-    return [real_variable(f"{name}.{axis}", unit, causality, start, f"{text}: {axis}" if text else "") for axis in axes]
-
-
-def real_parameter(
-    name: str, unit: str, start: Any, description: str, minimum: float | None = 0.0, maximum: float | None = None
-) -> Variable:
-    """A tunable real parameter that may not be negative, unless `minimum` says otherwise."""
-    return real_variable(name, unit, "parameter", start, description, minimum=minimum, maximum=maximum)
-
-
-def seed_parameter(seed: int) -> Variable:
-    """The parameter `seed` of everything random in a component. Raises InputError for what is no such number."""
-    reader = JsonReader()
-    check_seed(reader, seed)
-    raise_problems(reader)
-    return Variable("seed", "Int32", "parameter", "fixed", seed, description="of all random numbers", minimum=0)
-
-
-def boolean_variable(name: str, causality: Causality, description: str, start: bool | None = None) -> Variable:
-    """A Boolean variable."""
-    kind: Variability = "tunable" if causality == "parameter" else "discrete"
-    return Variable(name, "Boolean", causality, kind, start, description=description)
-
-
-def pose_inputs(name: str, place: str = "position") -> list[Variable]:
-    """Inputs `name.position.x|y|z` (m, world) and `name.orientation.w|x|y|z` (unit quaternion, body to world), 7 numbers."""
-    orientation = [real_variable(f"{name}.orientation.{part}", "1", "input", float(part == "w")) for part in "wxyz"]
-    return [*vector_variables(f"{name}.{place}", "xyz", "m", "input"), *orientation]

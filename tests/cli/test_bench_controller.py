@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
-import sys
 
 import pytest
+from cosim_command import run_cosim
 from fault_fmu import FaultFmus, build_library
 
 from cosim.core import resources
@@ -84,8 +83,7 @@ def folder(tmp_path):
 
 
 def bench(folder, controller, *arguments, role="usv_autopilot"):
-    command = [sys.executable, "-m", "cosim", "bench-controller", str(controller), "--role", role, *arguments]
-    return subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
+    return run_cosim("bench-controller", controller, "--role", role, *arguments, cwd=folder)
 
 
 def words(done, name):

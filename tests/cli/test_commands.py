@@ -9,14 +9,14 @@ import time
 from pathlib import Path
 
 import pytest
+from cosim_command import run_cosim
 
 ROOT = Path(__file__).parents[2]
 BLOCKS = ROOT / "tests/scenario/pythonfmu_blocks.py"
 
 
 def cosim(*arguments, cwd=None, **more):
-    command = [sys.executable, "-m", "cosim", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False, **more)
+    return run_cosim(*arguments, cwd=cwd, **more)
 
 
 def scenario(folder, block="Gain", **more):

@@ -1,19 +1,17 @@
 """`cosim compare`, as a user meets it."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from cosim_command import run_cosim
 from matplotlib.image import imread
 
 from cosim.core import resources
 
 
 def cosim(*arguments):
-    command = [sys.executable, "-m", "cosim", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    return run_cosim(*arguments)
 
 
 def csv(path, offset=0.0, delay=0.0):

@@ -1,10 +1,9 @@
 """`cosim regress` on small scenarios: a cooling body, held against its reference and its checks."""
 
 import json
-import subprocess
-import sys
 
 import pytest
+from cosim_command import run_cosim
 from lxml import etree
 
 COOLING = """
@@ -54,8 +53,7 @@ def scenario(folder, name="cooling", rate=0.5, **more):
 
 
 def regress(folder, *arguments):
-    command = [sys.executable, "-m", "cosim", "regress", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
+    return run_cosim("regress", *arguments, cwd=folder)
 
 
 def test_a_reference_is_written_and_met(folder):

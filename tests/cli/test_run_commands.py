@@ -1,11 +1,10 @@
 """`cosim run` as a process: real time, components that step on threads, results as Parquet."""
 
 import json
-import subprocess
-import sys
 import time
 
 import pytest
+from cosim_command import run_cosim
 from slow_fmus import slow_fmu
 
 from cosim.results import Result
@@ -16,8 +15,7 @@ def cosim_run(folder, fmus, *options, **algorithm):
     components = {f"c{i}": {"fmu": str(fmu)} for i, fmu in enumerate(fmus)}
     document = {"name": "busy", "stop_time": 0.5, "step_size": 0.01, "components": components}
     (folder / "busy.json").write_text(json.dumps(document | {"algorithm": {"stages": [list(components)], **algorithm}}))
-    command = [sys.executable, "-m", "cosim", "run", "busy.json", "--output-dir", "out", *options]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    done = run_cosim("run", "busy.json", "--output-dir", "out", *options, cwd=folder)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -49,7 +47,7 @@ def test_a_crash_on_a_thread_names_the_suspects(tmp_path):
     fmus = [slow_fmu(tmp_path, "good", 2e-4, True), slow_fmu(tmp_path, "bad", 2e-4, True, "FATAL_TIME=0.105")]
     code, _, err = cosim_run(tmp_path, fmus, parallel=True)
     assert code == 1
-    assert "one of c0, c1: a step side by side failed at t = 0.11 s: the process was ended by signal 6 (SIGABRT" in err
+    assert "one of c0, c1: parallel step failed at t = 0.11 s: the process was ended by signal 6 (SIGABRT" in err
     assert "12 rows until t = 0.11 s kept in" in err
     err = cosim_run(tmp_path, fmus, "--set", "/algorithm/parallel=false")[2]
     assert "c1: fmi2DoStep failed at t = 0.11 s: the process was ended by signal 6" in err

@@ -6,6 +6,7 @@ import sys
 from zipfile import ZipFile
 
 import pytest
+from cosim_command import run_cosim
 
 from cosim.components.fmi.preflight.validation import validate_fmu as examine
 from cosim.core import resources
@@ -14,8 +15,7 @@ FMUS = sorted(resources.root().glob("fmus/**/*.fmu"))
 
 
 def validate(*arguments, cwd=None):
-    command = [sys.executable, "-m", "cosim", "validate", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
+    return run_cosim("validate", *arguments, cwd=cwd)
 
 
 @pytest.fixture

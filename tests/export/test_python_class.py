@@ -1,4 +1,4 @@
-"""PythonFMU classes as FMUs."""
+"""Export of PythonFMU classes."""
 
 from __future__ import annotations
 
@@ -88,6 +88,7 @@ def test_its_state_can_be_restored(python_fmu):
     component = create_component(FmuFile(python_fmu), "one")
     try:
         component.bind(Ports((), {}), Ports((), {}))
+        component.instantiate()
         component.enter_initialization_mode(0.0, 1.0)
         component.exit_initialization_mode()
         component.do_step(0.0, 0.1)

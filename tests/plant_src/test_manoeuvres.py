@@ -162,7 +162,7 @@ def test_a_vessel_that_coasts_has_stopped_at_a_speed():
 
 
 def test_an_order_before_the_run_is_refused():
-    with pytest.raises(InputError, match="starts at -99 s, where nothing was recorded"):
+    with pytest.raises(InputError, match="starts at -99 s, before the first recorded row"):
         turning_circle(circle(1), "usv", -99.0, LENGTH)
 
 

@@ -1,13 +1,13 @@
-"""Many components: what is done once, and where the time went."""
+"""Systems of many components: work that is done only once, and the timing of a run."""
 
 import json
 
 import cosim
-import cosim.components.fmi.file
+from cosim.components.fmi import file, instance
 
 
 def ring(folder, probe, size):
-    """`size` instances of one FMU, each reads the one before."""
+    """Write a scenario of `size` instances of one FMU in a ring, each connected to the one before."""
     names = [f"p{i}" for i in range(size)]
     scenario = folder / "ring.json"
     document = {
@@ -24,13 +24,9 @@ def ring(folder, probe, size):
 
 def test_one_file_is_extracted_and_loaded_once(tmp_path, probe, monkeypatch):
     extracted, loaded = [], []
-    extract, open_library = cosim.components.fmi.file.extract, cosim.components.fmi.instance.FmuInstance._load_library
-    monkeypatch.setattr(cosim.components.fmi.file, "extract", lambda *args: extracted.append(args) or extract(*args))
-    monkeypatch.setattr(
-        cosim.components.fmi.instance.FmuInstance,
-        "_load_library",
-        lambda self, *args: loaded.append(args) or open_library(self, *args),
-    )
+    extract, load_library = file.extract, instance.load_library
+    monkeypatch.setattr(file, "extract", lambda *args: extracted.append(args) or extract(*args))
+    monkeypatch.setattr(instance, "load_library", lambda *args: loaded.append(args) or load_library(*args))
     result = cosim.run(ring(tmp_path, probe, 20))
     assert (len(extracted), len(loaded)) == (1, 1)
     assert all(result[f"p{i}.y"][-1] == 1.0 for i in range(20))
@@ -47,7 +43,7 @@ def test_instances_of_one_library_keep_their_names_and_values(tmp_path, probe):
     assert result["p1.y"][1] == 1.0 + 0.01 * (5.0 - 1.0) / 0.5
 
 
-def test_the_time_of_a_run_is_told_part_by_part(tmp_path, probe):
+def test_the_timing_of_a_run_has_all_its_parts(tmp_path, probe):
     timing = cosim.run(ring(tmp_path, probe, 2)).timing
     parts = {"parse_seconds", "instantiate_seconds", "wiring_seconds", "initialize_seconds", "loop_seconds"}
     assert set(timing) >= parts

@@ -1,4 +1,4 @@
-"""A component of one's own is examined when it is loaded: what would fail later, or silently do nothing, is said at once."""
+"""Component classes of users are checked when they are loaded, so that mistakes are reported before the run."""
 
 import pytest
 from test_invalid_scenarios import refused
@@ -54,7 +54,7 @@ def own(folder):
     return write
 
 
-def test_a_sound_one_runs_with_what_it_does_not_need_left_out(folder, own):
+def test_a_valid_component_runs_without_the_optional_methods(folder, own):
     assert cosim.run(folder.scenario(own()))["a.y"].tolist() == [6.0] * 4
 
 
@@ -65,12 +65,12 @@ def test_a_sound_one_runs_with_what_it_does_not_need_left_out(folder, own):
         ("def get_outputs", "def outputs_of", 'it does not define "get_outputs"'),
         ("has_state = False", "has_state = True", 'it does not define "get_state"'),
         ("do_step(self, time, step_size)", "do_step(self, time)", '"do_step" does not take the arguments (time, step_size)'),
-        ('parse_unit("N")', '"N"', "variable \"u\": unit is 'N', expected a cosim.core.units.Unit, such as parse('N')"),
+        ('parse_unit("N")', '"N"', "variable \"u\": unit is 'N', expected a cosim.core.units.Unit, such as parse_unit('N')"),
         ('"output", v', '"outptu", v', 'variable "y": causality is "outptu"; did you mean "output"?'),
         ('"continuous"', '"continous"', 'variable "y": variability is "continous"; did you mean "continuous"?'),
-        ('Variable("y", ', 'Variable("u", ', 'variable "u" stands there 2 times'),
+        ('Variable("y", ', 'Variable("u", ', 'variable "u" is declared 2 times'),
         ('Variable("y", ', 'Variable("y", shape=3, ', 'variable "y": shape is 3, expected a tuple of sizes'),
-        ('Variable("y", causality="output", variability="continuous")', '"y"', "\"variables\" holds 'y', expected a cosim"),
+        ('Variable("y", causality="output", variability="continuous")', '"y"', "\"variables\" contains 'y', expected a cosim"),
         ("has_state = False", "", "it has no has_state; expected a component or an Fmi2Slave class"),
         (
             'Variable("y", ',
@@ -79,19 +79,20 @@ def test_a_sound_one_runs_with_what_it_does_not_need_left_out(folder, own):
         ),
     ],
 )
-def test_a_mistake_is_named(folder, own, before, after, line):
+def test_a_mistake_in_the_class_is_reported(folder, own, before, after, line):
     found = refused(folder, own(before, after))
     assert line in found[0]
-    assert found[0].startswith("scenario.json:1:") and "$.components.a: own.py:Own" in found[0]
+    assert found[0].startswith("scenario.json:1:")
+    assert "$.components.a: own.py:Own" in found[0]
 
 
-def test_all_mistakes_are_named_together(folder, own):
+def test_all_mistakes_in_the_class_are_reported_together(folder, own):
     own("def do_step", "def dostep")
     file = folder.path / "own.py"
     file.write_text(file.read_text().replace('"output", v', '"outptu", v'))
     assert len(refused(folder, {"a": {"python": "own.py:Own"}})) == 2
 
 
-def test_a_step_returns_nothing_or_how_it_ended(folder, own):
+def test_do_step_must_return_none_or_a_step_result(folder, own):
     with pytest.raises(ComponentError, match="a: do_step failed at t = 0 s: returned True, expected None or a StepResult"):
         cosim.run(folder.scenario(own("return None", "return True")))

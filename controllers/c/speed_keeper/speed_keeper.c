@@ -1,7 +1,7 @@
-/* A vessel autopilot in plain C against the headers of FMI 2.0: it keeps a speed and a course.
+/* Vessel autopilot for speed and course in C with the headers of FMI 2.0.
 
-   Thrust is PI on the speed error; the integral rests while the thrust is at its limit. The rudder angle is PD on the course
-   error with the yaw rate as its derivative; a positive angle turns the bow to starboard and so reduces the yaw angle.
+   Thrust: PI control of the speed error; the integral is held while the thrust is at its limit. Rudder angle: PD control of the
+   course error with the yaw rate as derivative. A positive rudder angle turns the bow to starboard and reduces the yaw angle.
    SI units, angles in rad, yaw counter-clockwise from east. */
 
 #include <math.h>
@@ -14,7 +14,7 @@
 
 #define GUID "speed_keeper, version 1"
 
-/* The value references of modelDescription.xml, in its order. */
+/* Value references, in the order of modelDescription.xml. */
 enum {
     YAW, SURGE_SPEED, YAW_RATE,
     SPEED_COMMAND, SPEED_P, SPEED_I, THRUST_LIMIT,
@@ -35,19 +35,19 @@ typedef struct {
 
 /* -- the controller -------------------------------------------------------------------------------------------------------- */
 
-static double limited(double value, double limit) { return fmax(-limit, fmin(limit, value)); }
+static double clamp(double value, double limit) { return fmax(-limit, fmin(limit, value)); }
 
-/* Outputs from the measurements at the start of a step, which hold until its end. */
+/* Computes the outputs from the measurements at the start of a step; they are constant until its end. */
 static void control(fmi2Real *v, double step_size)
 {
     double speed_error = v[SPEED_COMMAND] - v[SURGE_SPEED];
     double thrust = v[SPEED_P] * speed_error + v[SPEED_INTEGRAL];
-    v[THRUST] = limited(thrust, v[THRUST_LIMIT]);
+    v[THRUST] = clamp(thrust, v[THRUST_LIMIT]);
     if (fabs(thrust) < v[THRUST_LIMIT]) v[SPEED_INTEGRAL] += v[SPEED_I] * step_size * speed_error;
 
     double course_error = v[YAW] - v[COURSE_COMMAND];
     course_error = atan2(sin(course_error), cos(course_error));
-    v[RUDDER_ANGLE] = limited(v[COURSE_P] * course_error + v[COURSE_D] * v[YAW_RATE], v[RUDDER_LIMIT]);
+    v[RUDDER_ANGLE] = clamp(v[COURSE_P] * course_error + v[COURSE_D] * v[YAW_RATE], v[RUDDER_LIMIT]);
 }
 
 /* -- life cycle ------------------------------------------------------------------------------------------------------------ */
@@ -67,7 +67,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging)
 {
     if (type != fmi2CoSimulation || strcmp(guid, GUID) != 0) {
-        callbacks->logger(callbacks->componentEnvironment, name, fmi2Error, "error", "no Co-Simulation, or another GUID");
+        callbacks->logger(callbacks->componentEnvironment, name, fmi2Error, "error", "expected type Co-Simulation and GUID \"" GUID "\"");
         return NULL;
     }
     SpeedKeeper *keeper = malloc(sizeof *keeper);
@@ -147,7 +147,7 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
     return fmi2OK;
 }
 
-/* -- what FMI asks for and this FMU has not: other types, other states, derivatives, steps that go on in the background ---- */
+/* -- FMI functions without support: other types, serialized states, derivatives, asynchronous steps ------------------------ */
 
 #define ONLY_WITHOUT_VARIABLES(TYPE)                                                                                          \
     fmi2Status fmi2Get##TYPE(fmi2Component c, const fmi2ValueReference references[], size_t count, fmi2##TYPE values[])       \

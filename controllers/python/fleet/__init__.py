@@ -1,11 +1,11 @@
-"""What the controllers in Python share: the counterpart of the Modelica package Fleet."""
+"""Constants, enumerations and functions of the controllers in Python: the counterpart of the Modelica package Fleet."""
 
 from __future__ import annotations
 
 import math
 from enum import IntEnum
 
-SAMPLE_PERIOD = 0.01  # s, of every controller
+SAMPLE_PERIOD = 0.01  # s
 GRAVITY = 9.81  # m/s2
 DEGREES_PER_RADIAN = 180 / math.pi  # deg/rad
 MAX_ROTOR_SPEED = 5000 * 0.10471976  # rad/s, at full throttle: 5000 rpm
@@ -24,7 +24,7 @@ class FlightMode(IntEnum):
 
 
 class EndPolicy(IntEnum):
-    """What a vessel does after its last waypoint."""
+    """Behaviour of a vessel after its last waypoint."""
 
     STOP = 1
     REPEAT = 2
@@ -32,15 +32,15 @@ class EndPolicy(IntEnum):
 
 
 def limit(value: float, lower: float, upper: float) -> float:
-    """Value kept between two bounds."""
+    """Return `value` limited to the range from `lower` to `upper`."""
     return min(upper, max(lower, value))
 
 
 def wrap_angle(angle: float) -> float:
-    """The same angle (rad) between -pi and pi."""
+    """Return the angle (rad) wrapped to -pi ... pi."""
     return angle if abs(angle) <= math.pi else math.atan2(math.sin(angle), math.cos(angle))
 
 
 def horizontal_norm(x: float, y: float) -> float:
-    """Euclidean norm in the horizontal plane; rounds as the Modelica function does, which math.hypot does not."""
+    """Return the Euclidean norm with the rounding of the Modelica function, from which math.hypot differs."""
     return math.sqrt(x * x + y * y)

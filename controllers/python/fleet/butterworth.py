@@ -1,4 +1,4 @@
-"""Sampled low-pass of order 15, made by the bilinear transform: seven sections of order two, one of order one."""
+"""Sampled Butterworth low-pass of order 15 by the bilinear transform: seven second-order sections and one of first order."""
 
 from __future__ import annotations
 
@@ -11,14 +11,24 @@ ORDER, SECTION_COUNT = 15, 7
 
 
 class Butterworth:
-    """Gain -3 dB exactly at the cut-off frequency; its states are those of sections in transposed direct form II."""
+    """Low-pass with a gain of exactly -3 dB at the cut-off frequency; sections in transposed direct form II."""
 
     def __init__(self) -> None:
         self.running = False
         self.near, self.far, self.last = [0.0] * SECTION_COUNT, [0.0] * SECTION_COUNT, 0.0
 
     def __call__(self, u: float, reset: bool, frequency: float, start: float) -> float:
-        """The output of one tick; `frequency` in Hz below 50; `start` is the steady input before the start and in a reset."""
+        """Compute the output of one sample.
+
+        Args:
+            u: Input.
+            reset: True holds the start state and ignores the input.
+            frequency: Cut-off frequency (Hz), below 50.
+            start: Steady input before the start and during a reset.
+
+        Returns:
+            Output.
+        """
         K = math.tan(math.pi * frequency * SAMPLE_PERIOD)
         if reset or not self.running:
             self._set_steady_state(K, start)
@@ -44,7 +54,7 @@ class Butterworth:
 
 
 def _section_coefficients(K: float) -> Iterator[tuple[float, float, float]]:
-    """Coefficients b, a1, a2 of b (1 + 1/z)^2 / (1 + a1/z + a2/z^2), one section for each pair of complex poles."""
+    """Yield b, a1, a2 of b (1 + 1/z)^2 / (1 + a1/z + a2/z^2), one section for each pair of complex poles."""
     for i in range(1, SECTION_COUNT + 1):
         damping = 2 * math.cos(math.pi * i / ORDER)
         a0 = 1 + damping * K + K * K

@@ -10,7 +10,7 @@ from .sampled_controller import SampledController
 
 
 class HeadingControl(SampledController):
-    """Rudder angle by PD on the heading error, the short way round. Gains for the physical sign of the rudder."""
+    """PD control of the wrapped heading error by the rudder; gains for a rudder behind the centre of mass."""
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
@@ -23,10 +23,8 @@ class HeadingControl(SampledController):
         self.yaw = self.add_block("yaw", Pid())
 
     def control_heading(self, reference: float) -> None:
-        """Set the rudder angle for this tick; `reference` in rad, counter-clockwise from east.
-
-        A positive rudder angle reduces the yaw angle, hence measurement minus reference.
-        """
+        """Set the rudder angle of this sample for a heading `reference` (rad, counter-clockwise from east)."""
+        # a positive rudder angle reduces the yaw angle
         error = wrap_angle(self.vehicle.attitude.yaw - reference)
         limits = (-self.rudder_limit, self.rudder_limit)
         self.rudder_angle = self.yaw(error, P=self.heading_P, D=self.heading_D, N=self.heading_N, limits=limits)

@@ -6,9 +6,10 @@ from . import SAMPLE_PERIOD, limit
 
 
 class Pid:
-    """u = P e + I integral(e) + D N/(1 + N/s) e, limited; the integral stands still while it would drive u further into a limit.
+    """PID controller u = P e + I integral(e) + D N/(1 + N/s) e with output limits.
 
-    The derivative filter takes one third-order Runge-Kutta step per period, as in the published simulator.
+    The integral is held while it would drive u further beyond a limit. The derivative filter is integrated with one third-order
+    Runge-Kutta step per sample, as in the published simulator.
     """
 
     def __init__(self) -> None:
@@ -21,13 +22,28 @@ class Pid:
         reset: bool = False,
         *,
         P: float = 0.0,
-        I: float = 0.0,  # noqa: E741 - the letters of the equation
+        I: float = 0.0,  # noqa: E741 - name of the gain in the equation
         D: float = 0.0,
         N: float = 100.0,
         limits: tuple[float, float] = (-1e9, 1e9),
         start: float = 0.0,
     ) -> float:
-        """The limited output of one tick; `reset` holds the start state: integral `start`, the error ignored."""
+        """Compute the output of one sample.
+
+        Args:
+            error: Command minus measurement.
+            feed_forward: Value added before the limits.
+            reset: True holds the start state and ignores the error.
+            P: Proportional gain.
+            I: Integral gain (1/s).
+            D: Derivative gain (s).
+            N: Bandwidth of the derivative filter (rad/s).
+            limits: Lower and upper limit of the output.
+            start: Integral in the start state.
+
+        Returns:
+            Limited output.
+        """
         e = 0.0 if reset else error
         if reset or not self.running:
             self.integral, self.filtered = start, D * e
@@ -41,5 +57,6 @@ class Pid:
 
 
 def _filter_decay(N: float) -> float:
+    """Return the factor of a state of the derivative filter over one sample period."""
     h = N * SAMPLE_PERIOD
     return 1 - h + h * h / 2 - h**3 / 6

@@ -1,4 +1,4 @@
-"""The base of the sampled controllers: declares variables with their units and runs the ticks of a step."""
+"""Base class of sampled controllers: declaration of variables with units, and ticks within a communication step."""
 
 from __future__ import annotations
 
@@ -6,36 +6,39 @@ import math
 from collections.abc import Callable
 from functools import partial
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, TypeVar
 from xml.etree.ElementTree import Element
 
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
 
 from . import SAMPLE_PERIOD
 
-TIME_TOLERANCE = 1e-6  # part of a period by which a tick may seem to lie off the communication points
+TIME_TOLERANCE = 1e-6  # rounding error of a time, in sample periods
+
+BlockT = TypeVar("BlockT")
 
 
 class RealWithUnit(Real):
-    """A Real variable with a unit."""
+    """Real variable with a unit."""
 
     def __init__(self, name: str, unit: str, **attributes: Any):
         super().__init__(name, **attributes)
         self.unit = unit
 
     def to_xml(self) -> Element:
-        element = super().to_xml()
+        """Return the element of the model description, with the attribute `unit`."""
+        element: Element = super().to_xml()
         if self.unit:
             element[0].set("unit", self.unit)
         return element
 
 
 class SampledController(Fmi2Slave):
-    """A controller whose `tick` runs at every multiple of SAMPLE_PERIOD within a step, on the inputs of that step.
+    """PythonFMU class whose `tick` runs at every multiple of `SAMPLE_PERIOD` within a step, with the inputs of that step.
 
-    Constructors declare variables by dotted names: `self.input("vehicle.position.z", 0.0, "m")` makes the variable and
-    the attribute `self.vehicle.position.z`. The start value decides the type; a list declares name[1], name[2], ...
-    What is declared is the state, so that it can be saved.
+    Constructors declare variables by dotted names: `self.input("vehicle.position.z", 0.0, "m")` declares the variable and
+    creates the attribute `self.vehicle.position.z`. The start value defines the type; a list declares name[1], name[2], ...
+    All states must be declared, as local variables, because saved states consist of the declared variables.
     """
 
     def __init__(self, **arguments: Any):
@@ -43,13 +46,15 @@ class SampledController(Fmi2Slave):
         self.local("ticks", 0, description="Ticks since time 0")
 
     def tick(self, time: float) -> None:
-        """Compute the outputs at `time` (s) from the inputs."""
+        """Compute the outputs at `time` (s)."""
         raise NotImplementedError
 
     def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
+        """Set the number of the first tick at or after `start_time` (s)."""
         self.ticks = max(0, math.ceil(start_time / SAMPLE_PERIOD - TIME_TOLERANCE))
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        """Run all ticks from `current_time` (s) up to, but not at, the end of the step."""
         end = current_time + step_size - TIME_TOLERANCE * SAMPLE_PERIOD
         while (time := self.ticks * SAMPLE_PERIOD) < end:
             self.tick(time)
@@ -57,24 +62,28 @@ class SampledController(Fmi2Slave):
         return True
 
     def parameter(self, name: str, start: Any, unit: str = "", description: str = "") -> None:
+        """Declare a tunable parameter."""
         self._declare(name, start, unit, description, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable)
 
     def calculated_parameter(self, name: str, getter: Callable[[], float], unit: str = "", description: str = "") -> None:
-        """A value that follows from parameters; there is no attribute of that name."""
+        """Declare a calculated parameter; it has no attribute."""
         kind = {"causality": Fmi2Causality.calculatedParameter, "variability": Fmi2Variability.tunable}
         self.register_variable(RealWithUnit(name, unit, getter=getter, description=description, **kind))
 
     def input(self, name: str, start: Any, unit: str = "", description: str = "") -> None:
+        """Declare an input."""
         self._declare(name, start, unit, description, causality=Fmi2Causality.input)
 
     def output(self, name: str, start: Any, unit: str = "", description: str = "") -> None:
+        """Declare a discrete output."""
         self._declare(name, start, unit, description, causality=Fmi2Causality.output, variability=Fmi2Variability.discrete)
 
     def local(self, name: str, start: Any, unit: str = "", description: str = "") -> None:
+        """Declare a discrete local variable, for a state."""
         self._declare(name, start, unit, description, causality=Fmi2Causality.local, variability=Fmi2Variability.discrete)
 
-    def add_block(self, name: str, block: Any) -> Any:
-        """Declare the attributes of a shared block, which are its states, as local variables below `name`; returns the block."""
+    def add_block(self, name: str, block: BlockT) -> BlockT:
+        """Declare the attributes of a block, its states, as local variables below `name` and return the block."""
         setattr(self, name, block)
         for state, start in list(vars(block).items()):
             self.local(f"{name}.{state}", start)
@@ -91,6 +100,7 @@ class SampledController(Fmi2Slave):
             self.register_variable(_create_variable(f"{name}[{i + 1}]", element, unit, **access, **attributes), nested=False)
 
     def _create_owner(self, name: str) -> Any:
+        """Return the object that has the attribute of a dotted name; create it if necessary."""
         owner: Any = self
         for part in name.split(".")[:-1]:
             if not hasattr(owner, part):

@@ -9,7 +9,7 @@ from .sampled_controller import SampledController
 
 
 class SpeedControl(SampledController):
-    """Thrust proportional to the speed error. Gain of the published simulator."""
+    """Proportional control of the surge speed by thrust; gain of the published simulator."""
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
@@ -20,6 +20,6 @@ class SpeedControl(SampledController):
         self.surge = self.add_block("surge", Pid())
 
     def control_speed(self, reference: float) -> None:
-        """Set the thrust for this tick; `reference` in m/s, forward."""
+        """Set the thrust of this sample for a surge speed `reference` (m/s)."""
         limits = (-self.thrust_limit, self.thrust_limit)
         self.thrust = self.surge(reference - self.vehicle.velocity_body.u, P=self.speed_P, limits=limits)

@@ -1,4 +1,4 @@
-"""Line of sight to the active waypoint, which a circle of acceptance switches on."""
+"""Line-of-sight guidance through waypoints with circles of acceptance."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from .sampled_controller import SampledController
 
 
 class WaypointGuidanceBase(SampledController):
-    """Turns the position into heading reference and distance; a waypoint is reached within `acceptance_radius`."""
+    """Line-of-sight guidance: heading reference and distance to the active waypoint.
+
+    A waypoint is reached within `acceptance_radius` (circle of acceptance, Fossen (2021), chapter 12).
+    """
 
     active_waypoint: int
     finished: bool
@@ -31,7 +34,14 @@ class WaypointGuidanceBase(SampledController):
         self.output("finished", False, description="The last waypoint is reached and the list does not repeat")
 
     def update_guidance(self) -> float:
-        """Set the outputs for this tick; returns the speed reference in m/s, which is 0 after a list that ends with a stop."""
+        """Set the outputs of this sample.
+
+        Returns:
+            Speed reference (m/s); 0 after the last waypoint with the end policy `STOP`.
+
+        Raises:
+            ValueError: `waypoint_count` is out of range.
+        """
         if not 1 <= self.waypoint_count <= MAX_WAYPOINTS:
             raise ValueError(f"waypoint_count is not between 1 and {MAX_WAYPOINTS}")
         self.active_waypoint = min(self.active_waypoint, self.waypoint_count)
@@ -44,7 +54,7 @@ class WaypointGuidanceBase(SampledController):
         return 0.0 if self.finished and self.end_policy == EndPolicy.STOP else self.speed_command
 
     def _vector_to_waypoint(self) -> tuple[float, float]:
-        """From the vessel to the active waypoint."""
+        """Return the vector from the vessel to the active waypoint (m, east and north)."""
         position, active = self.vehicle.position, self.active_waypoint - 1
         return self.waypoint_x[active] - position.x, self.waypoint_y[active] - position.y
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ...core.component import Component
     from ...core.recording import Recording
     from ...core.system import System
-    from ...engine.run_loop import Settings
+    from ...engine.settings import Settings
 
 FMU_NAME, PROFILE_NAME = "fmu", "profile"
 
@@ -110,7 +110,7 @@ def _build_system(
     """The FMU, and the profile if there is one, as a system of their own."""
     from ...components.fmi import FmuFile, create_component
     from ...core.system import Connection, Endpoint, System
-    from ...engine.run_loop import Settings
+    from ...engine.settings import Settings
 
     file = FmuFile(fmu)
     experiment = file.description.default_experiment
@@ -152,7 +152,7 @@ def _read_profile(path: Path, component: Component) -> Component:
 
 def _check_start_values(component: Component, start_values: dict[str, Any]) -> dict[str, Any]:
     from ...core.errors import InputError, Problem
-    from ...scenario.name_resolution import UnknownName, check_assignment
+    from ...scenario.name_resolution import UnknownNameError, check_assignment
 
     variables = {variable.name: variable for variable in component.variables}
     values: dict[str, Any] = {}
@@ -160,7 +160,7 @@ def _check_start_values(component: Component, start_values: dict[str, Any]) -> d
     for name, value in start_values.items():
         try:
             values |= check_assignment(FMU_NAME, variables, name, value)
-        except (UnknownName, ValueError) as error:
+        except (UnknownNameError, ValueError) as error:
             problems.append(Problem(str(error), f"--start-value {name}"))
     if problems:
         raise InputError(problems)

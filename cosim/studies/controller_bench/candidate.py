@@ -14,7 +14,7 @@ from typing import cast
 from ...core.component import Component, Variable
 from ...core.errors import InputError, Problem, did_you_mean
 from ...scenario import prepare
-from ...scenario.name_resolution import SlotIndex, Target, UnknownName, resolve_name
+from ...scenario.name_resolution import SlotIndex, Target, UnknownNameError, resolve_name
 from ...scenario.nested_systems import Node, load_scenario
 from ...scenario.schema import NestedSpec
 from .role import Role
@@ -130,7 +130,7 @@ def _port_variables(root: Node, components: Mapping[str, Component], kind: str) 
 def _port_targets(root: Node, port: str, kind: str) -> list[Target]:
     try:
         return resolve_name(root, f"{_CANDIDATE}.{port}", (kind,))
-    except UnknownName as error:
+    except UnknownNameError as error:
         raise InputError(str(error)) from None
 
 

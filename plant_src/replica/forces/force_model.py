@@ -1,4 +1,4 @@
-"""What the force models have in common: how they become FMUs, and the vessel's motion."""
+"""Shared parts of the force models: inputs from the vessel's motion, parameters, outputs and the block of the FMU."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cosim.export.fmu.block import Block
 
 from ...vehicles.common.interface import scalar_variable, vector_variables
 
-#: inputs: the vessel's motion as the bus has it, the paper's equation 11
+#: inputs: motion of the vessel as published by the plant (equation 11 of the paper)
 VESSEL_INPUTS = (
     *vector_variables("vehicle.velocity", "xy", "m/s", "centre of mass, world frame", "input"),
     scalar_variable("vehicle.angular_velocity.z", "rad/s", "counter-clockwise"),
@@ -23,18 +23,18 @@ VESSEL_INPUTS = (
 
 
 def planar_velocity(motion: ca.SX) -> ca.SX:
-    """Surge u, sway v (m/s, body frame) and yaw rate r (rad/s) from the inputs `VESSEL`."""
+    """Return surge u, sway v (m/s, body frame) and yaw rate r (rad/s) from the inputs `VESSEL_INPUTS`."""
     x, y, rate, yaw = ca.vertsplit(motion)
     return ca.vertcat(ca.cos(yaw) * x + ca.sin(yaw) * y, ca.cos(yaw) * y - ca.sin(yaw) * x, rate)
 
 
 def tunable_parameter(name: str, start: float, unit: str, description: str) -> Variable:
-    """A number that can be changed between steps."""
+    """Declare a tunable real parameter."""
     return Variable(name, "Float64", "parameter", "tunable", start, parse_unit(unit), description=description)
 
 
 def load_outputs(what: str) -> tuple[Variable, ...]:
-    """Outputs X, Y (N) and N (N m) of a load on the vessel."""
+    """Declare the outputs X, Y (N) and N (N m) of a load on the vessel."""
     return (
         *vector_variables("load", "xy", "N", f"{what}, vessel body frame, at the centre of mass"),
         *vector_variables("load", "n", "N.m", f"{what}, moment about z"),
@@ -44,5 +44,15 @@ def load_outputs(what: str) -> tuple[Variable, ...]:
 def force_model(
     identifier: str, description: str, variables: Sequence[Variable], loads: Callable[[ca.SX, ca.SX], ca.SX]
 ) -> Block:
-    """The block of a force model; `loads` maps inputs and parameters to outputs, each in the order of `variables`."""
+    """Return the block of a force model.
+
+    Args:
+        identifier: Name of the FMU.
+        description: Description of the FMU.
+        variables: Inputs, parameters and outputs.
+        loads: Function from inputs and parameters to outputs, each in the order of `variables`.
+
+    Returns:
+        Block that `cosim build` exports as an FMU.
+    """
     return as_block(static_model(identifier, description, variables, loads))

@@ -85,5 +85,5 @@ def test_the_measures_are_those_of_the_independent_implementation(manoeuvre, mea
 
 
 def test_a_manoeuvre_before_the_recording_is_refused():
-    with pytest.raises(InputError, match="starts at -1 s, where nothing was recorded"):
+    with pytest.raises(InputError, match="starts at -1 s, before the first recorded row"):
         cosim.run(SCENARIOS / "otter_zigzag.json", parameters={"/kpis/0/arguments/start": -1.0, "/stop_time": 1.0})

@@ -7,6 +7,7 @@ from hashlib import sha256
 
 import numpy as np
 import pytest
+from cosim_command import run_cosim
 
 import cosim
 from cosim.api import evaluate_scenario_checks
@@ -63,8 +64,7 @@ def test_two_runs_give_the_same_bytes(tmp_path):
 
 
 def test_the_figures_are_drawn(tmp_path):
-    run = [sys.executable, "-m", "cosim", "run", "demo1_box", "--output-dir", str(tmp_path)]
-    subprocess.run(run, cwd=tmp_path, capture_output=True, check=True)
+    assert run_cosim("run", "demo1_box", "--output-dir", tmp_path, cwd=tmp_path).returncode == 0
     for name in ("paths.png", "landing.png"):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
 

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import csv
-import json
 import os
-import subprocess
-import sys
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fault_fmu import HERE, scenario
-
-#: `limit`: time limit of a command (s); `sandbox`: settings of `cosim.process.sandbox`; `executor`: its kind
-CONDITIONS = {"limit": 60, "stdin": os.devnull, "sandbox": None, "executor": "auto"}
+from cosim_command import ForkServer
+from fault_fmu import scenario
 
 
 @dataclass(frozen=True)
@@ -55,22 +50,20 @@ class CommandResult:
 
 
 class CommandRunner:
-    """Runs commands in processes forked from one that has imported everything; or anew, by `python -m cosim`."""
+    """Runs commands on misbehaving FMUs in forked processes."""
 
     def __init__(self) -> None:
-        command = [sys.executable, HERE / "fork_server.py"]
-        self._server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self._server = ForkServer()
 
     def close(self) -> None:
-        self._server.communicate()
+        self._server.close()
 
     def cosim(self, folder: Path, *arguments: object, **conditions: Any) -> CommandResult:
-        """A command in `folder`, with temporary files in folder/tmp, under conditions other than CONDITIONS."""
+        """Run a command in `folder`, with temporary files in folder/tmp; `conditions`: see `cosim_command.CONDITIONS`."""
         (folder / "tmp").mkdir(exist_ok=True)
-        request = {**CONDITIONS, **conditions, "arguments": [*map(str, arguments)], "folder": str(folder)}
-        assert self._server.stdin is not None and self._server.stdout is not None
-        print(json.dumps(request), file=self._server.stdin, flush=True)
-        return CommandResult(folder, **json.loads(self._server.stdout.readline()))
+        environment = {"TMPDIR": str(folder / "tmp")}
+        conditions = {"limit": 60, "observe": True, **conditions}
+        return CommandResult(folder, **self._server.run(folder, folder, arguments, environment, **conditions))
 
     def run(self, folder: Path, fmu: Path, deadlines: dict[str, float] | None = None, **conditions: Any) -> CommandResult:
         """`cosim run` of a scenario around the FMU; results in folder/out."""

@@ -1,4 +1,4 @@
-"""Drag of still air, added to the load of the water: the plant takes both in one, as equation 10 of the paper has it."""
+"""Drag of still air, added to the load of the water, because the plant has one input for both (equation 10 of the paper)."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ VARIABLES = (
 
 
 def loads(inputs: ca.SX, coefficient: ca.SX) -> ca.SX:
-    """X, Y (N) and N (N m)."""
+    """Return X, Y (N) and N (N m)."""
     u, v, _ = ca.vertsplit(planar_velocity(inputs[0:4]))
     return inputs[4:7] - coefficient * ca.vertcat(u * ca.fabs(u), v * ca.fabs(v), 0)
 
 
 def block() -> Block:
-    """The vessel above the water."""
+    """Return the block of the FMU `air_drag`."""
     return force_model("air_drag", "Drag of still air on a vessel, added to the load of the water", VARIABLES, loads)

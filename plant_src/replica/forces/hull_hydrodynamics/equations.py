@@ -1,4 +1,4 @@
-"""Equations 12 and 13 of the paper, once for each hull: the linear damping of sway and yaw. Surge meets no resistance."""
+"""Linear damping of sway and yaw, equations 12 and 13 of the paper, once for each hull; surge has no damping."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ VARIABLES = (
 
 
 def loads(motion: ca.SX, parameters: ca.SX) -> ca.SX:
-    """X, Y (N) and N (N m)."""
+    """Return X, Y (N) and N (N m)."""
     _, v, r = ca.vertsplit(planar_velocity(motion))
     hulls, y_v, y_r, n_v, n_r = ca.vertsplit(parameters)
     return ca.vertcat(0, hulls * (y_v * v + y_r * r), hulls * (n_v * v + n_r * r))
 
 
 def block() -> Block:
-    """The hulls of the catamaran."""
+    """Return the block of the FMU `hull_hydrodynamics`."""
     return force_model("hull_hydrodynamics", "Hydrodynamic load on the hulls of a vessel", VARIABLES, loads)

@@ -1,4 +1,4 @@
-"""T = CT w^2 and Q = CD w^2 of each rotor, whose speed w follows the throttle at once."""
+"""Rotor map: thrust T = CT w^2 and torque Q = CD w^2 of each rotor, whose speed w follows the throttle without delay."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ VARIABLES = (
 
 
 def loads(throttle: ca.SX, parameters: ca.SX) -> ca.SX:
-    """Four thrusts (N), then four torques (N m)."""
+    """Return four thrusts (N), then four torques (N m)."""
     thrust_coefficient, torque_coefficient, max_speed = ca.vertsplit(parameters)
     speed = ca.fmin(100, ca.fmax(0, throttle)) / 100 * max_speed
     return ca.vertcat(thrust_coefficient * speed**2, torque_coefficient * speed**2)
 
 
 def block() -> Block:
-    """Four rotors."""
+    """Return the block of the FMU `rotor_map`."""
     return force_model("rotor_map", "Thrust and torque of four rotors from their throttles", VARIABLES, loads)

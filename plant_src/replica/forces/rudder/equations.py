@@ -1,6 +1,6 @@
-"""Lift of the rudder: a sine of the angle of attack up to the stall angle, constant beyond.
+"""Lift of the rudder: proportional to a sine of the angle of attack up to the stall angle, constant beyond.
 
-`inflow_sign` is that of r in the inflow angle: +1 as published, -1 for a rudder behind the centre of mass as physics has it.
+`inflow_sign` is the sign of the yaw rate in the inflow angle: +1 as published, -1 for a rudder behind the centre of mass.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ VARIABLES = (
 
 
 def loads(inputs: ca.SX, parameters: ca.SX) -> ca.SX:
-    """X and Y (N)."""
+    """Return X and Y (N)."""
     u, v, r = ca.vertsplit(planar_velocity(inputs[0:4]))
     rudder_angle = inputs[4]
     sign, arm, area, max_lift_coefficient, stall_angle, density = ca.vertsplit(parameters)
@@ -41,5 +41,5 @@ def loads(inputs: ca.SX, parameters: ca.SX) -> ca.SX:
 
 
 def block() -> Block:
-    """One rudder."""
+    """Return the block of the FMU `rudder`."""
     return force_model("rudder", "Force of a rudder on a vessel", VARIABLES, loads)

@@ -1,8 +1,8 @@
-"""Runs commands of cosim in processes that have everything imported already: `python -m cosim` without its first second.
+"""Server process that forks `cosim` commands: `python -m cosim` without the time for its imports.
 
-Reads a JSON object a line (see `Runner.cosim`) and answers {"code", "seconds", "processes"}: the exit code as subprocess has it,
-the wall time, and the ids of processes that were left behind (they are ended; orphans fall to this process). Outside sandboxes
-the file "changes" of the folder says what the command changed in its process.
+Reads one JSON object per line (see `cosim_command.ForkServer.run`) and answers {"code", "seconds", "processes"}: the exit code
+as `subprocess` defines it, the wall time, and the ids of processes that outlived the command. Those are killed; this process is
+their subreaper. With "observe" the file "changes" in the working directory lists what the command changed in its process.
 """
 
 from __future__ import annotations
@@ -31,7 +31,10 @@ PRELOADED = (
     "components.input_table",
     "report.tables",
     "report.figures",
+    "report.run_page",
     "scenario.nested_systems",
+    "cli.commands.check",
+    "cli.commands.regress",
     "cli.commands.run",
     "cli.commands.simulate",
 )
@@ -53,13 +56,16 @@ def serve_requests() -> dict[str, Any] | None:
     return None
 
 
-def prepare_child(folder: str, stdin: str, executor: ExecutorKind, **_: Any) -> None:
+def prepare_child(folder: str, output: str, environment: dict[str, str], stdin: str, executor: ExecutorKind, **_: Any) -> None:
+    """Make this process like a new one: session, working directory, environment, standard streams, executor."""
     os.setsid()
     os.chdir(folder)
-    os.environ["TMPDIR"], tempfile.tempdir = str(Path(folder, "tmp")), None
-    run_loop.executor_class = lambda kind: executor_class(executor)
-    for number, name, flags in ((0, stdin, os.O_RDWR), (1, "stdout", os.O_WRONLY), (2, "stderr", os.O_WRONLY)):
-        file = os.open(name, flags | os.O_CREAT, 0o666)
+    os.environ.update(environment)
+    tempfile.tempdir = None
+    run_loop.executor_class = lambda kind: executor_class(executor if kind == "auto" else kind)
+    files = ((0, stdin, os.O_RDWR), (1, f"{output}/stdout", os.O_WRONLY), (2, f"{output}/stderr", os.O_WRONLY))
+    for number, name, flags in files:
+        file = os.open(name, flags | os.O_CREAT | os.O_TRUNC * (number > 0), 0o666)
         os.dup2(file, number)
         os.close(file)
 
@@ -96,7 +102,12 @@ def run_and_exit(request: dict[str, Any]) -> None:
     """Run the command and end like an interpreter, but for taking its modules apart, which takes longer than the command."""
     code = 0
     try:
-        run_sandboxed(**request) if request["sandbox"] else run_observed(request["arguments"])
+        if request["sandbox"]:
+            run_sandboxed(**request)
+        elif request["observe"]:
+            run_observed(request["arguments"])
+        else:
+            main(request["arguments"])
     except SystemExit as ended:
         code = ended.code if isinstance(ended.code, int) else 1
     atexit._run_exitfuncs()
