@@ -236,9 +236,9 @@ def refused(*options):
 @pytest.mark.parametrize(
     ("options", "error"),
     [
-        (["--isolation", "none"], "--view shows a supervised run"),
-        (["--sandbox", "strict"], "--view needs the network of this machine"),
-        (["--late", "fail"], "--late fail does not go with --view"),
+        (["--isolation", "none"], "--view requires a supervised run"),
+        (["--sandbox", "strict"], "--view requires a network connection"),
+        (["--late", "fail"], "--view cannot be combined with --late fail"),
     ],
 )
 def test_options_that_exclude_the_live_view_are_refused(options, error):
