@@ -1,4 +1,4 @@
-"""The hand-written C controller against its law in numpy, and in the place of the shipped autopilot."""
+"""The C controller against its control law in NumPy, and as a replacement of the shipped autopilot."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def stepped(keeper, measured):
 
 
 def expected_thrust(error):
-    """PI whose integral rests at the limit, tick by tick."""
+    """PI control whose integral is held at the limit, step by step."""
     integral, out = 0.0, []
     for e in error:
         demand = PARAMETERS["speed_P"] * e + integral
@@ -66,7 +66,8 @@ def test_rudder_takes_the_short_way_to_the_course(keeper, measured):
     error = np.angle(np.exp(1j * (measured["vehicle.attitude.yaw"] - PARAMETERS["course_command"])))
     demand = PARAMETERS["course_P"] * error + PARAMETERS["course_D"] * measured["vehicle.rates.r"]
     assert rudder == pytest.approx(np.clip(demand, -0.5, 0.5), abs=1e-12)
-    assert (np.abs(rudder) < 0.5).any() and (np.abs(rudder) == 0.5).any()
+    assert (np.abs(rudder) < 0.5).any()
+    assert (np.abs(rudder) == 0.5).any()
 
 
 def test_a_restored_state_repeats_the_future(keeper, measured):

@@ -33,7 +33,7 @@ def sailed(time, place, heading, speed):
 
 
 def circle(side, turns=2.5, radius=4.0, speed=1.5, later=1.5):
-    """On a circle all the time, with `later` as speed from a second after the order on."""
+    """Circle with the speed `speed` until one second after the order, then `later` (m/s)."""
     time = np.arange(round(100 * (6 + turns * 2 * math.pi * radius / later)) + 1) / 100
     run = np.where(time < 6, speed * (time - ORDER), speed * (6 - ORDER) + later * (time - 6))
     place = radius * np.sin(run / radius) + 1j * side * radius * (1 - np.cos(run / radius))
@@ -62,12 +62,12 @@ def test_a_circle_has_the_measures_of_a_circle(side):
     )
 
 
-def test_the_speed_that_is_lost_is_that_of_the_last_turn():
+def test_speed_loss_refers_to_the_last_full_turn():
     kpis = turning_circle(circle(1, later=0.6), "usv", ORDER, LENGTH)
     assert (kpis["steady_speed"], kpis["speed_loss"], kpis["advance"]) == pytest.approx((0.6, 0.6, 4.0), rel=1e-5)
 
 
-def test_what_was_not_reached_is_unknown():
+def test_values_that_were_not_reached_are_nan():
     kpis = turning_circle(circle(1, turns=0.2), "usv", ORDER, LENGTH)
     assert kpis["advance"] == pytest.approx(4.0, rel=1e-5)
     unknown = {"tactical_diameter", "tactical_diameter_lengths", "time_to_180"}
@@ -121,11 +121,12 @@ def test_a_wider_zig_zag_counts_its_own_angle():
 def test_an_overshoot_is_unknown_until_the_heading_comes_back():
     kpis = zigzag(zigzags([(0, 0), (4, 14), (9, -16)]), "usv", ORDER)
     assert kpis["overshoot[1]"] == pytest.approx(4 * DEGREE)
-    assert math.isnan(kpis["overshoot[2]"]) and math.isnan(kpis["period"])
+    assert math.isnan(kpis["overshoot[2]"])
+    assert math.isnan(kpis["period"])
     assert kpis["execute[2]"] == pytest.approx(4 + 5 * 24 / 30)
 
 
-def test_without_any_turn_everything_is_unknown():
+def test_zigzag_values_are_nan_without_a_turn():
     assert all(map(math.isnan, zigzag(zigzags([(0, 0), (20, 5)]), "usv", ORDER).values()))
 
 
@@ -166,7 +167,7 @@ def test_an_order_before_the_run_is_refused():
 
 
 @pytest.mark.parametrize("manoeuvre", [turning_circle, initial_turning, stopping])
-def test_after_an_order_that_never_came_nothing_was_reached(manoeuvre):
+def test_values_are_nan_for_an_order_after_the_end(manoeuvre):
     assert all(math.isnan(value) for value in manoeuvre(circle(1), "usv", 999.0, LENGTH).values())
 
 
@@ -191,5 +192,6 @@ def test_the_strider_turns_on_the_circle_of_its_speed_and_rate(tmp_path):
     kpis = {name.removeprefix("turn."): value for name, value in result.kpis.items()}
     assert kpis["steady_diameter"] == pytest.approx(2 * speed / rate, rel=1e-3)
     assert kpis["period"] == pytest.approx(2 * math.pi / rate, rel=1e-3)
-    assert 0 < kpis["speed_loss"] < 1 and kpis["tactical_diameter"] > kpis["transfer"] > 0
+    assert 0 < kpis["speed_loss"] < 1
+    assert kpis["tactical_diameter"] > kpis["transfer"] > 0
     assert result.metadata["kpi_units"]["turn.steady_diameter"] == "m"

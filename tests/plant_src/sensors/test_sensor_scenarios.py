@@ -1,4 +1,4 @@
-"""Sensors and faults in the shipped scenarios: what they do to a flight, and that both executors see the same."""
+"""Sensors and faults in the shipped scenarios and in both executors."""
 
 import numpy as np
 
@@ -51,7 +51,7 @@ class Rising(Component):
         self.variables = [v for v in Gnss("x").variables if v.causality == "output" and v.name.startswith(("pos", "vel"))]
         self._z = 0.0
 
-    def bind(self, inputs, outputs):
+    def bind(self, _inputs, outputs):
         self._names, (self._values,) = [v.name for v in outputs.variables], outputs.arrays.values()
 
     def enter_initialization_mode(self, start_time, stop_time): ...
@@ -85,7 +85,8 @@ def simulated(components, wires, record, stop, events=()):
     return outcome.recording
 
 
-def test_in_the_importer_a_sensor_after_the_plant_is_in_step_with_it(executor):
+@pytest.mark.usefixtures("executor")
+def test_a_sensor_in_a_later_stage_measures_the_same_time():
     gnss = Gnss("gnss", receiver="rtk")
     for name in gnss.parameters:
         if name.endswith(("_noise", "_drift")):
@@ -106,7 +107,7 @@ def test_in_the_importer_a_sensor_after_the_plant_is_in_step_with_it(executor):
     assert set(faulty[frozen]) == {0.5}
 
 
-def test_initial_outputs_pass_from_sensors_to_navigation():
+def test_initial_outputs_reach_navigation_through_the_sensors():
     components = {"plant": Rising(), "gnss": Gnss("gnss", seed=3), "navigation": Navigation("navigation")}
     wires = {"plant.position.z": "gnss.vehicle.position.z", "gnss.position.z": "navigation.gnss.position.z"}
     recording = simulated(components, wires, ["gnss.position.z", "navigation.position.z"], "0.01")
@@ -114,7 +115,7 @@ def test_initial_outputs_pass_from_sensors_to_navigation():
     assert passed == first != 0
 
 
-def test_on_sensors_it_lands_on_a_deck_in_waves_too():
+def test_landing_on_sensors_succeeds_on_a_deck_in_waves():
     waves = {"spectrum": "jonswap", "significant_height": 0.05, "peak_period": 2.0, "direction": 0.6, "spreading": 2}
     sea = {"vehicles/usv/motion": "6dof", "environment": {"seed": 1, "waves": waves}}
     settings = {f"/components/plant/arguments/{key}": value for key, value in sea.items()}
