@@ -1,8 +1,8 @@
-"""cosim: FMI co-simulation of controllers and plants in lockstep.
+"""FMI co-simulation of controllers and plants in lockstep.
 
-import cosim
-result = cosim.run("demo1_box")
-result["plant.uav.position.z"]
+>>> import cosim
+>>> result = cosim.run("demo1_box")
+>>> result["plant.uav.position.z"]
 """
 
 from importlib import import_module
@@ -17,8 +17,11 @@ if TYPE_CHECKING:
 
 __all__ = ["CheckError", "ComponentError", "CosimError", "InputError", "Result", "__version__", "load", "run"]
 
-_PUBLIC_NAMES = {"load": "api", "run": "api", "Result": "results"} | {
-    name: "core.errors" for name in ("CheckError", "ComponentError", "CosimError", "InputError")
+#: module of each name that is imported on first use, because `import cosim` must be fast
+_MODULES = {
+    **dict.fromkeys(("load", "run"), "api"),
+    **dict.fromkeys(("CheckError", "ComponentError", "CosimError", "InputError"), "core.errors"),
+    "Result": "results",
 }
 
 
@@ -27,7 +30,7 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str) -> Any:
-    """Import public names when they are first used, so that `import cosim` costs nothing."""
-    if name not in _PUBLIC_NAMES:
+    """Import a public name on first use."""
+    if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f".{_PUBLIC_NAMES[name]}", __name__), name)
+    return getattr(import_module(f".{_MODULES[name]}", __name__), name)

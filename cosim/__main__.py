@@ -1,4 +1,4 @@
-"""`python -m cosim`."""
+"""Entry point of `python -m cosim`."""
 
 from .cli import main
 

@@ -1,1 +1,1 @@
-"""The plant: the vehicles' equations of motion and geometry, and the PyBullet world in which they touch each other."""
+"""Plant models: vehicles with equations of motion and geometry, and the PyBullet world with contact between them."""

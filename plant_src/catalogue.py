@@ -1,4 +1,4 @@
-"""The vehicle models that a world can hold."""
+"""Catalogue of the vehicle models."""
 
 from __future__ import annotations
 
@@ -26,15 +26,14 @@ def _multirotor(airframe: Airframe, boxes: Boxes) -> Model:
     return Model(airframe.name, variables, states, airframe.body(boxes), constant_count=constants, airframe=airframe, boxes=boxes)
 
 
-_STRIDER = Model("strider", strider_interface.VARIABLES, strider_interface.STATES, strider.BODY, is_vessel=True, motion="planar")
-
+#: name -> model
 MODELS = {
     model.name: model
     for model in (
         _multirotor(AR_DRONE, ar_drone.boxes),
         _multirotor(CRAZYFLIE, crazyflie.boxes),
         _multirotor(SURVEY_HEXACOPTER, survey_hexacopter.boxes),
-        _STRIDER,
+        Model("strider", strider_interface.VARIABLES, strider_interface.STATES, strider.BODY, is_vessel=True, motion="planar"),
         Model(
             "strider_6dof",
             strider_6dof_interface.VARIABLES,
@@ -55,7 +54,7 @@ MODELS = {
     )
 }
 
-#: vehicle -> motion -> its model; the first motion is the usual one
+#: vehicle -> motion -> model; the first motion is the default
 VEHICLE_MODELS: dict[str, dict[str, Model]] = {}
 for _model in MODELS.values():
     VEHICLE_MODELS.setdefault(_model.vehicle or _model.name, {})[_model.motion] = _model

@@ -1,4 +1,4 @@
-"""Reading JSON: everything that is wrong is collected, and faulty values are replaced, so that reading goes on."""
+"""Reader of JSON values that collects all problems instead of stopping at the first one."""
 
 from __future__ import annotations
 
@@ -14,23 +14,31 @@ Numbers = tuple[float, ...]
 
 
 class JsonReader:
-    """Reads values and collects `problems`; their subject is the path of the setting in a component."""
+    """Reader of the JSON arguments of a component.
+
+    An invalid value is replaced by a valid one, so that reading continues. The path of a value is its place within the
+    arguments.
+
+    Attributes:
+        problems: All problems; the subject of each is ("arguments", *path).
+    """
 
     def __init__(self) -> None:
         self.problems: list[Problem] = []
 
     def add_problem(self, path: JsonPath, text: str) -> None:
+        """Record a problem of the value at `path`."""
         self.problems.append(Problem(text, ".".join(path), ("arguments", *path)))
 
     def read_named_objects(self, value: Any, path: JsonPath) -> Mapping[str, Any]:
-        """An object whose keys name things that variables are named after."""
+        """Read an object whose keys become parts of variable names."""
         for name in (found := self.mapping(value, path)):
             if not re.fullmatch(r"[A-Za-z_]\w*", name):
                 self.add_problem((*path, name), f'found the name "{name}", expected letters, digits and underscores')
         return found
 
     def read_object(self, value: Any, path: JsonPath, required: Sequence[str], optional: Sequence[str]) -> Mapping[str, Any]:
-        """An object with these keys and no others."""
+        """Read an object with these keys and no others."""
         found = self.mapping(value, path)
         for key in found:
             if key not in (*required, *optional):
@@ -42,19 +50,21 @@ class JsonReader:
         return found
 
     def mapping(self, value: Any, path: JsonPath) -> Mapping[str, Any]:
+        """Read an object with any keys."""
         if isinstance(value, Mapping):
             return value
         self.add_problem(path, f"found {value!r}, expected an object {{...}}")
         return {}
 
     def vector(self, value: Any, path: JsonPath, axes: Sequence[str]) -> Numbers:
+        """Read a list of finite numbers, one for each of `axes`."""
         if not isinstance(value, list | tuple) or len(value) != len(axes):
             self.add_problem(path, f"found {value!r}, expected a list of {len(axes)} numbers [{', '.join(axes)}]")
             return (1.0,) * len(axes)
         return tuple(self.number(number, path) for number in value)
 
     def number(self, value: Any, path: JsonPath, low: float = -math.inf, high: float = math.inf) -> float:
-        """A finite number from `low` to `high`."""
+        """Read a finite number from `low` to `high`."""
         if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
             self.add_problem(path, f"found {value!r}, expected a finite number")
         elif not low <= value <= high:
@@ -64,13 +74,14 @@ class JsonReader:
         return min(max(1.0, low), high)
 
     def positive(self, value: Any, path: JsonPath) -> float:
+        """Read a finite number greater than 0."""
         number = self.number(value, path)
         if number <= 0:
             self.add_problem(path, f"found {value!r}, expected a number greater than 0")
         return number if number > 0 else 1.0
 
     def integer(self, value: Any, path: JsonPath, low: int, high: int | None = None) -> int:
-        """An integer from `low` to `high`."""
+        """Read an integer from `low` to `high`."""
         if isinstance(value, int) and not isinstance(value, bool) and value >= low and (high is None or value <= high):
             return value
         expected = f"of at least {low}" if high is None else f"from {low} to {high}"
@@ -78,7 +89,7 @@ class JsonReader:
         return low
 
     def choice(self, value: Any, path: JsonPath, valid: Sequence[str]) -> str:
-        """One of these words."""
+        """Read one of the strings `valid`."""
         if isinstance(value, str) and value in valid:
             return value
         hint = did_you_mean(value, valid) if isinstance(value, str) else f", expected one of: {', '.join(valid)}"

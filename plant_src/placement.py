@@ -1,4 +1,4 @@
-"""Vehicles and platforms with their places in a world."""
+"""Vehicles and platforms of a world, with their initial positions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,14 @@ from .vehicles.model import Model
 
 @dataclass(frozen=True)
 class VehiclePlacement:
-    """A vehicle to place: `parameters` holds the values of its model's parameters, in order; `body` is its body in Bullet."""
+    """A vehicle to create in a world.
+
+    Attributes:
+        name: Name of the vehicle, the prefix of its variables.
+        model: Model of the vehicle.
+        parameters: Values of the model's scalar parameters in order; the initial state is among them.
+        body: Rigid body in Bullet, with the mass and inertia of these parameters.
+    """
 
     name: str
     model: Model
@@ -19,13 +26,19 @@ class VehiclePlacement:
     body: Body
 
     def parameter(self, name: str) -> float:
-        """The value of a scalar parameter."""
+        """Return the value of a scalar parameter."""
         return self.parameters[self.model.slots("parameter").index(name)]
 
 
 @dataclass(frozen=True)
 class Platform:
-    """A fixed box: edges and centre (m, world frame)."""
+    """A fixed box with axes parallel to those of the world.
+
+    Attributes:
+        name: Name of the platform.
+        size: Lengths of the edges along x, y and z (m).
+        position: Centre (m, world frame).
+    """
 
     name: str
     size: Numbers

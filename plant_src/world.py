@@ -1,4 +1,4 @@
-"""The PyBullet world as one component: all vehicles, the platforms, and contact between them."""
+"""The PyBullet world as one component: all vehicles, platforms and environment, with contact between them."""
 
 from __future__ import annotations
 
@@ -17,43 +17,46 @@ from cosim.core.errors import ComponentError, InputError, Problem, did_you_mean
 from . import world_settings
 from .catalogue import MODELS
 from .environment.environment_model import EnvironmentModel
-from .physics.body import InvalidStateError, create_compound_shape, set_dynamics
+from .physics.body import InvalidStateError, create_platform
 from .physics.client import connect, preconnect, pybullet
 from .physics.compiled_equations import library_path
+from .physics.contacts import overlap_depths
 from .physics.fleet import Fleet, FleetState
-from .placement import Platform
 from .scene import replay
-from .vehicles.common.shapes import Box
+from .variable_views import variable_views
 from .world_settings import WorldSettings
 
-#: a step of Bullet is at most this long (s); a longer do_step is split into equal ones
+#: upper limit of a Bullet step (s); a longer `do_step` is split into equal steps
 MAX_BULLET_STEP = 0.01
 
-#: vehicles and platforms may not overlap deeper than this at the start (m)
+#: tolerated initial overlap of vehicles and platforms (m)
 MAX_INITIAL_OVERLAP = 1e-3
 
 _FLOAT, _FLAG = DTYPES["Float64"], DTYPES["Boolean"]
-_BODY_A, _BODY_B, _DISTANCE = 1, 2, 8  # fields of Bullet's contact points
 
 
 class WorldState(NamedTuple):
-    """The state of a world: that of its vehicles, and what the environment was told and publishes."""
+    """Saved state of a world: vehicles, and inputs and outputs of the environment."""
 
     fleet: FleetState
     environment: np.ndarray
 
 
 class World(Component):
-    """Vehicles and fixed platforms in one PyBullet client, with wind, waves and current around them.
+    """Vehicles and fixed platforms in one PyBullet client, with wind, waves and current.
 
-    `vehicles`: name -> {"model": one of `catalogue.VEHICLES`, "motion": "planar" or "6dof", "position": [x, y, z] or for vessels
-    [x, y] (m, centre of mass), "yaw": rad, "velocity_body": [u, v, w] (m/s), "rates": [p, q, r] (rad/s), "parameters": name ->
-    value}; all but model and position may be left out.
-    `platforms`: name -> {"size": [x, y, z] (m, edges), "position": [x, y, z] (m, centre)}.
-    `environment`: as `environment/settings.py` has it; waves and gusts begin with the run.
+    The variables of a vehicle have its name as prefix, those of the environment the prefix "environment.".
 
-    The variables of vehicle V are those of its model with the prefix "V.", those of the environment have "environment.". Raises
-    InputError with all problems.
+    Args:
+        instance_name: Name of the component.
+        vehicles: Name to object with the keys "model" (in `catalogue.VEHICLE_MODELS`), "position" of the centre of mass
+            ([x, y, z], of vessels [x, y], m) and, optionally, "motion" ("planar" or "6dof"), "yaw" (rad), "velocity_body"
+            ([u, v, w], m/s), "rates" ([p, q, r], rad/s) and "parameters" (name to value).
+        platforms: Name to object with the keys "size" (edges [x, y, z], m) and "position" (centre [x, y, z], m).
+        environment: Object that `environment/settings.py` describes; waves and gusts start with the run.
+
+    Raises:
+        InputError: With all problems; their subjects are paths of the arguments.
     """
 
     binds_everything = True
@@ -66,17 +69,17 @@ class World(Component):
         platforms: Mapping[str, Any] | None = None,
         environment: Mapping[str, Any] | None = None,
     ):
-        read = world_settings.read_world_settings(
+        settings = world_settings.read_world_settings(
             vehicles, {} if platforms is None else platforms, {} if environment is None else environment
         )
         self._name = instance_name
-        self._step, self._step_size, self._step_count, self._start_time = np.zeros(1), math.nan, 1, 0.0
-        self._flags = np.zeros((len(read.vehicles), 2), _FLAG)
+        self._bullet_step, self._step_size, self._step_count, self._start_time = np.zeros(1), math.nan, 1, 0.0
+        self._flags = np.zeros((len(settings.vehicles), 2), _FLAG)
         self._flags_data = self._flags.reshape(-1).data
         self._bound_inputs: dict[str, np.ndarray] = {}
         self._client, self._disconnect = connect(self)
         try:
-            self._populate(read)
+            self._populate(settings)
         except BaseException:
             self.free()
             raise
@@ -85,68 +88,59 @@ class World(Component):
 
     @staticmethod
     def warm() -> None:
-        """The equations of all vehicles and a client of Bullet are made ready."""
+        """Unpack the equations of all vehicle models and preconnect a Bullet client."""
         for model in MODELS:
             library_path(model)
         preconnect()
 
     @staticmethod
     def scene(name: str, scenario: Mapping[str, Any]) -> dict[str, Any]:
-        """What the 3-D replay draws of a world, see `scene.replay`."""
+        """Return the scene of the 3-D replay, see `scene.replay`."""
         return replay.world_scene(name, scenario)
 
-    def _populate(self, read: WorldSettings) -> None:
-        names = {self._add_platform(platform): f"platforms.{platform.name}" for platform in read.platforms}
-        self._fleet = Fleet(self._client, read.vehicles, read.platforms, self._step, self._flags)
-        names |= {shadow.body_id: f"vehicles.{shadow.name}" for shadow in self._fleet.bodies}
+    def _populate(self, settings: WorldSettings) -> None:
+        names = {create_platform(self._client, platform): f"platforms.{platform.name}" for platform in settings.platforms}
+        self._fleet = Fleet(self._client, settings.vehicles, settings.platforms, self._bullet_step, self._flags)
+        names |= {body.body_id: f"vehicles.{body.name}" for body in self._fleet.bodies}
         self._check_overlaps(names)
-        self._environment = EnvironmentModel(read.environment, read.sea, read.vehicles, read.platforms, self._fleet.bodies)
-        self._has_environment = bool(self._environment.update_functions)  # a calm world pays nothing
+        self._environment = EnvironmentModel(
+            settings.environment, settings.sea, settings.vehicles, settings.platforms, self._fleet.bodies
+        )
+        self._has_environment = bool(self._environment.update_functions)
         for name in self._environment.vessels_without_wave_motion:
             component_log.log_message(self._name, component_log.WARNING, f"the planar vessel {name} does not move with the waves")
 
-    def _add_platform(self, platform: Platform) -> int:
-        x, y, z = platform.size
-        shape = create_compound_shape([Box((x / 2, y / 2, z / 2), (0.0, 0.0, 0.0))], self._client)
-        body = pybullet.createMultiBody(0, shape, -1, platform.position, physicsClientId=self._client)
-        set_dynamics(self._client, body, -1)
-        return body
-
     def _check_overlaps(self, names: Mapping[int, str]) -> None:
-        pybullet.performCollisionDetection(self._client)
-        depths: dict[tuple[str, str], float] = {}
-        for point in pybullet.getContactPoints(physicsClientId=self._client):
-            pair = names[point[_BODY_A]], names[point[_BODY_B]]
-            depths[pair] = max(depths.get(pair, 0.0), -point[_DISTANCE])
+        """Raise InputError if vehicles or platforms overlap initially."""
         problems = [
-            Problem(f"{b} overlaps {a} by {depth:.3g} m", subject=("arguments", *b.split("."), "position"))
-            for (a, b), depth in depths.items()
+            Problem(f"{names[b]} overlaps {names[a]} by {depth:.3g} m", subject=("arguments", *names[b].split("."), "position"))
+            for (a, b), depth in overlap_depths(self._client).items()
             if depth > MAX_INITIAL_OVERLAP
         ]
         if problems:
             raise InputError(problems)
 
-    # -- values --------------------------------------------------------------------------------------------------------
-
     def _variables_with_values(self) -> Iterator[tuple[Variable, np.ndarray]]:
-        """Every variable and where its values lie."""
-        for shadow, flags in zip(self._fleet.bodies, self._flags, strict=True):
-            prefixed = [replace(variable, name=f"{shadow.name}.{variable.name}") for variable in shadow.model.variables]
-            yield from _variable_views([v for v in prefixed if v.causality == "input"], {_FLOAT: shadow.inputs})
-            yield from _variable_views([v for v in prefixed if v.causality == "output"], {_FLOAT: shadow.outputs, _FLAG: flags})
-        around = self._environment
-        yield from _variable_views(around.input_variables, {_FLOAT: around.inputs})
-        yield from _variable_views(around.output_variables, {_FLOAT: around.outputs})
+        """Yield every variable with a view of its values."""
+        for body, flags in zip(self._fleet.bodies, self._flags, strict=True):
+            prefixed = [replace(variable, name=f"{body.name}.{variable.name}") for variable in body.model.variables]
+            yield from variable_views([v for v in prefixed if v.causality == "input"], {_FLOAT: body.inputs})
+            yield from variable_views([v for v in prefixed if v.causality == "output"], {_FLOAT: body.outputs, _FLAG: flags})
+        environment = self._environment
+        yield from variable_views(environment.input_variables, {_FLOAT: environment.inputs})
+        yield from variable_views(environment.output_variables, {_FLOAT: environment.outputs})
 
     def set(self, name: str, value: Any) -> None:
+        """Set an input."""
         variable, values = self._variable(name, "set")
         if variable.causality != "input":
-            raise ComponentError(self._name, "set", f"{name} is an output")
+            raise ComponentError(self._name, "set", f"{name} is an output, expected an input")
         values[:] = value
         if name in self._bound_inputs:
             self._bound_inputs[name][:] = value
 
     def get(self, name: str) -> Any:
+        """Return the value of a variable, a list for an array."""
         variable, values = self._variable(name, "get")
         return values.tolist() if variable.shape else values.item()
 
@@ -156,46 +150,51 @@ class World(Component):
         return self._variables_by_name[name]
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
-        self._bound_inputs = {variable.name: values for variable, values in _variable_views(inputs.variables, inputs.arrays)}
-        given, wanted = inputs.arrays[_FLOAT].data, outputs.arrays[_FLOAT].data
-        # memoryviews: numpy takes longer for so few numbers
+        """Bind the arrays from which inputs are read and to which outputs are written."""
+        self._bound_inputs = {variable.name: values for variable, values in variable_views(inputs.variables, inputs.arrays)}
+        bound_inputs, bound_outputs = inputs.arrays[_FLOAT].data, outputs.arrays[_FLOAT].data
+        # memoryviews: copying a few numbers is faster than with NumPy
         own_inputs, own_outputs = self._fleet.inputs.data, self._fleet.outputs.data
-        self._input_copies = [(own_inputs, given[: len(own_inputs)])]
+        self._input_copies = [(own_inputs, bound_inputs[: len(own_inputs)])]
         self._output_copies = [
-            (wanted[: len(own_outputs)], own_outputs),
+            (bound_outputs[: len(own_outputs)], own_outputs),
             (outputs.arrays[_FLAG].data, self._flags.reshape(-1).data),
         ]
         if self._has_environment:
-            self._input_copies.append((self._environment.inputs.data, given[len(own_inputs) :]))
-            self._output_copies.append((wanted[len(own_outputs) :], self._environment.outputs.data))
+            self._input_copies.append((self._environment.inputs.data, bound_inputs[len(own_inputs) :]))
+            self._output_copies.append((bound_outputs[len(own_outputs) :], self._environment.outputs.data))
 
     def set_inputs(self) -> None:
-        for own, given in self._input_copies:
-            own[:] = given
+        """Copy the bound inputs."""
+        for own, bound in self._input_copies:
+            own[:] = bound
 
     def get_outputs(self) -> None:
-        for wanted, own in self._output_copies:
-            wanted[:] = own
+        """Copy the outputs to the bound arrays."""
+        for bound, own in self._output_copies:
+            bound[:] = own
 
     def prepare_step_calls(self, clock: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
-        return [PreparedCall(self._turn, (clock, step_size), "do_step")]
+        """Return one call that copies inputs, makes a step and copies outputs."""
+        return [PreparedCall(self._step, (clock, step_size), "do_step")]
 
-    def _turn(self, clock: ctypes.c_double, step_size: float) -> int:
+    def _step(self, clock: ctypes.c_double, step_size: float) -> int:
         self.set_inputs()
         self.do_step(clock.value, step_size)
         self.get_outputs()
         return 0
 
-    # -- life cycle ----------------------------------------------------------------------------------------------------
-
-    def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
+    def enter_initialization_mode(self, start_time: float, _stop_time: float) -> None:
+        """Set the start time (s), at which waves and gusts start."""
         self._start_time = start_time
 
     def exit_initialization_mode(self) -> None:
+        """Compute the outputs of the environment at the start."""
         self._environment.update(0.0)
         self._environment.publish(0.0)
 
     def do_step(self, time: float, step_size: float) -> None:
+        """Advance from `time` (s) by `step_size` (s), in equal Bullet steps of at most MAX_BULLET_STEP."""
         if step_size != self._step_size:
             self._set_step_size(time, step_size)
         if self._fleet.contacts.has_contacts:
@@ -210,46 +209,38 @@ class World(Component):
             raise ComponentError(self._name, "do_step", str(error), time) from None
 
     def _advance_with_environment(self, time: float) -> None:
-        """The steps of Bullet in a world that is not calm, from a time since the start (s)."""
+        """Make the Bullet steps with environment, from a time since the start (s)."""
         for k in range(self._step_count):
-            self._environment.update(time + k * self._step[0])
+            self._environment.update(time + k * self._bullet_step[0])
             self._fleet.advance(1 / self._step_count)
         self._environment.publish(time + self._step_size)
 
     def _set_step_size(self, time: float, step_size: float) -> None:
-        """Split the component's step into equal steps of Bullet."""
+        """Split the component's step into equal Bullet steps."""
         if not 0 < step_size < math.inf:
             raise ComponentError(self._name, "do_step", f"found step size {step_size}, expected a positive number", time)
         self._step_count = max(1, math.ceil(step_size / MAX_BULLET_STEP - 1e-9))
-        self._step[0] = step_size / self._step_count
-        pybullet.setPhysicsEngineParameter(fixedTimeStep=self._step[0], physicsClientId=self._client)
+        self._bullet_step[0] = step_size / self._step_count
+        pybullet.setPhysicsEngineParameter(fixedTimeStep=self._bullet_step[0], physicsClientId=self._client)
         self._step_size = step_size
 
-    def terminate(self) -> None: ...
+    def terminate(self) -> None:
+        """Do nothing."""
 
     def free(self) -> None:
+        """Disconnect the Bullet client."""
         self._disconnect()
 
-    # -- state ---------------------------------------------------------------------------------------------------------
-
     def get_state(self) -> WorldState:
+        """Return a copy of the state, which also takes memory in Bullet until `free_state`."""
         return WorldState(self._fleet.get_state(), self._environment.values.copy())
 
     def set_state(self, state: WorldState) -> None:
+        """Restore a state."""
         self._fleet.set_state(state.fleet)
         self._environment.values[:] = state.environment
 
     def free_state(self, state: WorldState) -> None:
+        """Release the memory of a state in Bullet."""
         if self._disconnect.alive:
             self._fleet.free_state(state.fleet)
-
-
-def _variable_views(
-    variables: Sequence[Variable], arrays: Mapping[np.dtype[Any], np.ndarray]
-) -> Iterator[tuple[Variable, np.ndarray]]:
-    """Each variable with its part of the array of its dtype, in which the variables lie in order."""
-    filled = dict.fromkeys(arrays, 0)
-    for variable in variables:
-        first = filled[variable.dtype]
-        filled[variable.dtype] = first + len(variable.scalar_names)
-        yield variable, arrays[variable.dtype][first : filled[variable.dtype]]

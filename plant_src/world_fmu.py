@@ -1,7 +1,7 @@
-"""The world of one scenario as a PythonFMU class, for importers that know FMUs only.
+"""The world of one scenario as a PythonFMU class, for importers that support FMUs only.
 
-`world_fmu.json` beside this file holds the arguments of the world: Demo 1's plant. For another one write another file of that
-name and export again: `cosim build plant_src/world_fmu.py --output my_world.fmu`. The host needs Python with this project and
+`world_fmu.json` beside this file holds the arguments of the world, by default the plant of Demo 1. To export another world, edit
+this file and run `cosim build plant_src/world_fmu.py --output my_world.fmu`. The host requires Python with this project and
 PyBullet installed.
 """
 
@@ -19,27 +19,35 @@ from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
 from cosim.core.component import Ports, Variable
 
+from .variable_views import variable_views
 from .world import World, WorldState
 
 ARGUMENTS_FILE = "world_fmu.json"
 
 
 class RealWithUnit(Real):
-    """A Real variable with a unit."""
+    """A Real variable with a unit.
+
+    Args:
+        name: Name of the variable.
+        unit: Name of the unit, or "".
+        **attributes: Further arguments of `pythonfmu.Real`.
+    """
 
     def __init__(self, name: str, unit: str, **attributes: Any):
         super().__init__(name, **attributes)
         self.unit = unit
 
     def to_xml(self) -> Element:
-        element = super().to_xml()
+        """Return the element of modelDescription.xml."""
+        element: Element = super().to_xml()
         if self.unit:
             element[0].set("unit", self.unit)
         return element
 
 
 class SavedState:
-    """A state of the world with the bound values; Bullet forgets it together with this object."""
+    """A state of the world with its bound values; the memory in Bullet is released together with this object."""
 
     def __init__(self, world: World, ports: list[np.ndarray]):
         self.state: WorldState = world.get_state()
@@ -48,44 +56,39 @@ class SavedState:
 
 
 class WorldFmu(Fmi2Slave):
-    """Vehicles, platforms and environment in one PyBullet client; variables are those of `world.World`, arrays by elements."""
+    """The world as an FMI 2.0 slave; its variables are those of `world.World`, arrays as scalars."""
 
     description = "Quadcopter and vessel in one PyBullet world"
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        # every instance has resources of its own; the module may have been loaded from some that are gone by now
+        # the module may have been imported from the resources of an earlier instance, which no longer exist
         folder = Path(self.resources or Path(__file__).parent)
         self._world = World(self.instance_name, **json.loads((folder / ARGUMENTS_FILE).read_text()))
         weakref.finalize(self, self._world.free)
         inputs, outputs = (self._ports(causality) for causality in ("input", "output"))
-        for variable in inputs.variables:
-            self._view(inputs, variable)[:] = self._world.get(variable.name)
+        for variable, values in variable_views(inputs.variables, inputs.arrays):
+            values[:] = self._world.get(variable.name)
         self._world.bind(inputs, outputs)
         self._world.get_outputs()
         self._arrays = [*inputs.arrays.values(), *outputs.arrays.values()]
         self._start_time = 0.0
         for ports in (inputs, outputs):
-            for variable in ports.variables:
-                self._register(variable, self._view(ports, variable))
+            for variable, values in variable_views(ports.variables, ports.arrays):
+                self._register(variable, values)
 
     def _ports(self, causality: str) -> Ports:
+        """Return the variables of a causality with zeroed arrays."""
         variables = [variable for variable in self._world.variables if variable.causality == causality]
         counts: dict[np.dtype[Any], int] = {}
         for variable in variables:
             counts[variable.dtype] = counts.get(variable.dtype, 0) + len(variable.scalar_names)
         return Ports(variables, {dtype: np.zeros(count, dtype) for dtype, count in counts.items()})
 
-    @staticmethod
-    def _view(ports: Ports, variable: Variable) -> np.ndarray:
-        """The part of the ports where a variable lies."""
-        before = ports.variables[: ports.variables.index(variable)]
-        first = sum(len(other.scalar_names) for other in before if other.dtype == variable.dtype)
-        return ports.arrays[variable.dtype][first : first + len(variable.scalar_names)]
-
     def _register(self, variable: Variable, values: np.ndarray) -> None:
+        """Register the scalars of a variable."""
         data: Any = values.data
-        for index, slot in enumerate(variable.scalar_names):
+        for index, name in enumerate(variable.scalar_names):
             attributes: dict[str, Any] = {
                 "causality": Fmi2Causality[variable.causality],
                 "description": variable.description,
@@ -93,23 +96,27 @@ class WorldFmu(Fmi2Slave):
                 "setter": _create_setter(data, index),
             }
             if variable.type == "Boolean":
-                made = Boolean(slot, variability=Fmi2Variability.discrete, **attributes)
+                scalar = Boolean(name, variability=Fmi2Variability.discrete, **attributes)
             else:
-                made = RealWithUnit(slot, variable.unit.name if variable.unit else "", **attributes)
-            self.register_variable(made, nested=False)
+                scalar = RealWithUnit(name, variable.unit.name if variable.unit else "", **attributes)
+            self.register_variable(scalar, nested=False)
 
-    def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
+    def setup_experiment(self, start_time: float, _stop_time: float | None, _tolerance: float | None) -> None:
+        """Set the start time (s)."""
         self._start_time = start_time
 
     def enter_initialization_mode(self) -> None:
+        """Start the initialization of the world."""
         self._world.enter_initialization_mode(self._start_time, float("inf"))
 
     def exit_initialization_mode(self) -> None:
+        """Compute the initial outputs."""
         self._world.set_inputs()
         self._world.exit_initialization_mode()
         self._world.get_outputs()
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        """Advance from `current_time` (s) by `step_size` (s); return true for fmi2OK."""
         self._world.set_inputs()
         self._world.do_step(current_time, step_size)
         self._world.get_outputs()

@@ -1,4 +1,4 @@
-"""Reading the arguments of a world: JSON -> what to place where. All problems are reported together."""
+"""Reader of a world's arguments: JSON to vehicles, platforms and environment. All problems are reported together."""
 
 from __future__ import annotations
 
@@ -12,20 +12,21 @@ from cosim.core.component import Variable
 from cosim.core.errors import InputError, did_you_mean
 
 from .catalogue import VEHICLE_MODELS
-from .environment import CALM, Sea, realise_sea, settings
+from .environment import settings
+from .environment.sea import Sea
 from .environment.settings import EnvironmentSettings
 from .json_reader import JsonPath, JsonReader, Numbers
 from .placement import Platform, VehiclePlacement
 from .vehicles.common.shapes import Body
 from .vehicles.model import Model
 
-#: prefix of the parameters that hold the waves, and of those that say where a vehicle starts
+#: prefixes of the parameters of waves and of the initial state
 WAVE_PREFIX, INITIAL_PREFIX = "wave.", "initial."
 
 
 @dataclass(frozen=True)
 class WorldSettings:
-    """What a world consists of."""
+    """Vehicles, platforms and environment of a world, and the realisation of its waves."""
 
     vehicles: Sequence[VehiclePlacement]
     platforms: Sequence[Platform]
@@ -34,55 +35,70 @@ class WorldSettings:
 
 
 def read_world_settings(vehicles: Any, platforms: Any, environment: Any) -> WorldSettings:
-    """Read the three sections. Raises InputError with all problems; their subject is the path of the setting."""
+    """Read the arguments of a world.
+
+    Args:
+        vehicles: JSON object, name to vehicle.
+        platforms: JSON object, name to platform.
+        environment: JSON object, see `environment/settings.py`.
+
+    Raises:
+        InputError: With all problems; the subject of each is the path of the setting in the component.
+    """
     reader = _WorldSettingsReader()
-    spawns = [reader.read_vehicle(name, spec) for name, spec in reader.read_named_objects(vehicles, ("vehicles",)).items()]
+    placements = [reader.read_vehicle(name, spec) for name, spec in reader.read_named_objects(vehicles, ("vehicles",)).items()]
     boxes = [reader.read_platform(name, spec) for name, spec in reader.read_named_objects(platforms, ("platforms",)).items()]
-    surrounding = settings.read_environment(reader, environment)
+    environment_settings = settings.read_environment(reader, environment)
     if vehicles == {}:
         reader.add_problem(("vehicles",), "found no vehicle, expected at least one")
     if reader.problems:
         raise InputError(reader.problems)
-    sea = realise_sea(surrounding.waves, surrounding.seed) if surrounding.waves else CALM
-    return WorldSettings([_with_waves(sea, spawn) for spawn in spawns if spawn], boxes, surrounding, sea)
+    sea = environment_settings.sea()
+    return WorldSettings([_with_waves(sea, vehicle) for vehicle in placements if vehicle], boxes, environment_settings, sea)
 
 
 class _WorldSettingsReader(JsonReader):
     def read_vehicle(self, name: str, spec: Any) -> VehiclePlacement | None:
+        """Read one vehicle; return None if its model is unknown."""
         path = ("vehicles", name)
         spec = self.read_object(spec, path, ("model", "position"), ("motion", "yaw", "velocity_body", "rates", "parameters"))
         model = self.find_model(spec, path)
         if model is None:
             return None
-        axes = [slot.rpartition(".")[2] for slot in model.slots("parameter") if slot.startswith(f"{INITIAL_PREFIX}position.")]
+        initial = self.read_initial_state(model, spec, path)
+        problem_count = len(self.problems)
+        given = self.read_parameters(model, initial, spec.get("parameters", {}), (*path, "parameters"))
+        starts = zip(model.slots("parameter"), model.start_values("parameter"), strict=True)
+        parameters = {slot: (initial | given).get(slot, start) for slot, start in starts}
+        valid = len(self.problems) == problem_count
+        body = self.collision_body(model, parameters, (*path, "parameters")) if valid else model.body
+        return VehiclePlacement(name, model, tuple(parameters.values()), body)
+
+    def read_initial_state(self, model: Model, spec: Mapping[str, Any], path: JsonPath) -> dict[str, float]:
+        """Read position, yaw, velocity and rates; return the parameters `initial.*`."""
+        slots = model.slots("parameter")
+        axes = [slot.rpartition(".")[2] for slot in slots if slot.startswith(f"{INITIAL_PREFIX}position.")]
         values = {"yaw": self.number(spec.get("yaw", 0.0), (*path, "yaw"))}
         for key, letters in (("position", axes), ("velocity_body", "uvw"), ("rates", "pqr")):
             vector = self.vector(spec.get(key, [0.0] * len(letters)), (*path, key), letters)
             values |= {f"{key}.{letter}": value for letter, value in zip(letters, vector, strict=True)}
-        initial = {f"{INITIAL_PREFIX}{key}": value for key, value in values.items()}
-        for slot, value in initial.items():
-            if value and slot not in model.slots("parameter"):
-                key = slot.removeprefix(INITIAL_PREFIX)
+        for key, value in values.items():
+            if value and f"{INITIAL_PREFIX}{key}" not in slots:
                 self.add_problem((*path, key.partition(".")[0]), f"found {key} = {value}; a {model.name} does not move that way")
-        found = len(self.problems)
-        given = self.read_parameters(model, initial, spec.get("parameters", {}), (*path, "parameters"))
-        starts = zip(model.slots("parameter"), model.start_values("parameter"), strict=True)
-        parameters = {slot: (initial | given).get(slot, start) for slot, start in starts}
-        sound = len(self.problems) == found
-        body = self.collision_body(model, parameters, (*path, "parameters")) if sound else model.body
-        return VehiclePlacement(name, model, tuple(parameters.values()), body)
+        return {f"{INITIAL_PREFIX}{key}": value for key, value in values.items()}
 
     def collision_body(self, model: Model, parameters: Mapping[str, float], path: JsonPath) -> Body:
+        """Return the body with these parameters; a problem is reported at the first parameter of its subject."""
         try:
             return model.body_with(parameters)
         except InputError as error:
             for problem in error.problems:
-                group, _, text = problem.message.partition(": ")
-                first = next(slot for slot in parameters if slot.partition(".")[0] == group)
-                self.add_problem((*path, first), text)
+                first = next(slot for slot in parameters if slot.partition(".")[0] == problem.subject[0])
+                self.add_problem((*path, first), problem.message)
         return model.body
 
     def find_model(self, spec: Mapping[str, Any], path: JsonPath) -> Model | None:
+        """Return the model with the name and motion of `spec`, or None if it is unknown."""
         name, path = spec.get("model"), (*path, "model")
         if isinstance(name, str) and name not in VEHICLE_MODELS:
             self.add_problem(path, f'unknown vehicle model "{name}"{did_you_mean(name, VEHICLE_MODELS)}')
@@ -93,10 +109,13 @@ class _WorldSettingsReader(JsonReader):
             return None
         return motions[self.choice(spec.get("motion", next(iter(motions))), (*path[:-1], "motion"), tuple(motions))]
 
-    def read_parameters(self, model: Model, placed: Mapping[str, float], spec: Any, path: JsonPath) -> dict[str, float]:
-        """Values of the given parameters by slots; not those that the other keys or the environment set."""
+    def read_parameters(self, model: Model, initial: Mapping[str, float], spec: Any, path: JsonPath) -> dict[str, float]:
+        """Read the object "parameters"; return values of scalar parameters by name.
+
+        Parameters of the initial state and of the waves are refused: other keys set them.
+        """
         free = {
-            v.name: v for v in model.real_variables("parameter") if v.name not in placed and not v.name.startswith(WAVE_PREFIX)
+            v.name: v for v in model.real_variables("parameter") if v.name not in initial and not v.name.startswith(WAVE_PREFIX)
         }
         values: dict[str, float] = {}
         for name, value in self.mapping(spec, path).items():
@@ -108,7 +127,7 @@ class _WorldSettingsReader(JsonReader):
         return values
 
     def read_values(self, variable: Variable, value: Any, path: JsonPath) -> Numbers:
-        """A number, or a list of numbers for an array, in the range of the variable."""
+        """Read a number, or a list of numbers for an array, within the range of `variable`."""
         count = len(variable.scalar_names)
         if not variable.shape:
             value = [value]
@@ -120,6 +139,7 @@ class _WorldSettingsReader(JsonReader):
         return tuple(self.number(number, path, low, high) for number in value)
 
     def read_platform(self, name: str, spec: Any) -> Platform:
+        """Read one platform."""
         path = ("platforms", name)
         spec = self.read_object(spec, path, ("size", "position"), ())
         size = self.vector(spec.get("size", [1.0] * 3), (*path, "size"), "xyz")
@@ -128,12 +148,12 @@ class _WorldSettingsReader(JsonReader):
         return Platform(name, size, self.vector(spec.get("position", [0.0] * 3), (*path, "position"), "xyz"))
 
 
-def _with_waves(sea: Sea, spawn: VehiclePlacement) -> VehiclePlacement:
-    """The vehicle with the waves in its parameters, if it has such."""
-    parameters = dict(zip(spawn.model.slots("parameter"), spawn.parameters, strict=True))
+def _with_waves(sea: Sea, vehicle: VehiclePlacement) -> VehiclePlacement:
+    """Return the vehicle with its wave parameters set, if its model has any."""
+    parameters = dict(zip(vehicle.model.slots("parameter"), vehicle.parameters, strict=True))
     if f"{WAVE_PREFIX}count" not in parameters:
-        return spawn
+        return vehicle
     parameters[f"{WAVE_PREFIX}count"] = float(len(sea.amplitude))
     for name in ("amplitude", "frequency", "direction", "phase"):
         parameters |= {f"{WAVE_PREFIX}{name}[{k}]": value for k, value in enumerate(getattr(sea, name).tolist(), start=1)}
-    return replace(spawn, parameters=tuple(parameters.values()))
+    return replace(vehicle, parameters=tuple(parameters.values()))

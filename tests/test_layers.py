@@ -1,4 +1,4 @@
-"""Layers: imports point down only, between folders and between files, and what may not be imported early."""
+"""Layers: imports only point to lower layers, and light commands import no heavy packages."""
 
 import ast
 import subprocess

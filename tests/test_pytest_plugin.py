@@ -1,4 +1,4 @@
-"""Scenarios as tests of pytest."""
+"""Scenarios as pytest tests."""
 
 import json
 import os
@@ -42,7 +42,7 @@ def test_scenarios_with_expectations_are_tests(folder):
     assert "1 passed" in done.stdout
 
 
-def test_what_is_not_met_is_said_without_a_traceback(folder):
+def test_failures_are_reported_without_a_traceback(folder):
     scenario(folder, "low", checks=[{"kpi": "y.value", "min": 4.0}])
     scenario(folder, "broken", block="FailingBlock", checks=[{"kpi": "y.value", "min": 4.0}])
     done = run_pytest(folder)
@@ -60,7 +60,7 @@ def test_scenarios_are_chosen_by_name_and_run_in_parallel(folder):
     assert "3 passed" in run_pytest(folder, "-p", "xdist", "-n", "2").stdout
 
 
-def test_what_cannot_be_read_or_is_misspelt_fails_with_its_place(folder):
+def test_invalid_files_fail_with_the_location(folder):
     checks = [{"kpi": "y.value", "equals": 3.0}]
     scenario(folder, "misspelt", checks=checks, stop_time=None, stop_tme=3)
     (folder / "torn.json").write_text('{"components": {"a":')
@@ -72,7 +72,7 @@ def test_what_cannot_be_read_or_is_misspelt_fails_with_its_place(folder):
     assert "torn.json:1:" in done.stdout
 
 
-def test_scenarios_of_one_name_have_results_of_their_own(folder):
+def test_scenarios_with_equal_names_have_separate_results(folder):
     for calm, limit in (("calm", 3.0), ("storm", 4.0)):
         (folder / "scenarios" / calm).mkdir(parents=True)
         scenario(folder / "scenarios" / calm, "course", checks=[{"kpi": "y.value", "equals": limit}])
@@ -84,7 +84,7 @@ def test_scenarios_of_one_name_have_results_of_their_own(folder):
     ]
 
 
-def test_scenarios_outside_of_the_root_folder_leave_their_results_inside(folder, tmp_path_factory):
+def test_results_of_scenarios_outside_the_root_folder_are_inside_it(folder, tmp_path_factory):
     outside = tmp_path_factory.mktemp("outside")
     scenario(outside, "course", checks=[{"kpi": "y.value", "equals": 3.0}])
     assert "1 passed" in run_pytest(folder, f"--rootdir={folder}", str(outside)).stdout

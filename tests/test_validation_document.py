@@ -99,7 +99,7 @@ def test_what_does_not_agree_fails(stating: MeasurementCheck, found: object, exp
 
 
 def test_a_model_without_a_section_is_refused(stating: MeasurementCheck) -> None:
-    with pytest.raises(AssertionError, match="Ottter is none of"):
+    with pytest.raises(AssertionError, match="unknown model Ottter"):
         stating("Ottter", "speed", 1.0, 1.0, "m/s", "theory")
 
 

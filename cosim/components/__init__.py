@@ -1,1 +1,1 @@
-"""Sources of components: FMUs, Python classes, input tables."""
+"""Component types: FMUs, Python classes and input tables."""

@@ -1,4 +1,4 @@
-"""What a component that somebody wrote in Python has to be, examined once, when it is loaded."""
+"""Conformance check of user-written Python components, made once when a component is loaded."""
 
 from __future__ import annotations
 
@@ -17,15 +17,23 @@ _VALID_FIELD_VALUES = {"causality": get_args(Causality), "variability": get_args
 
 
 def find_violations(candidate: Any) -> Iterator[str]:
-    """Everything that keeps an object from being a component."""
+    """Find all violations of the `Component` protocol by an object.
+
+    Args:
+        candidate: The object that a user's class or function created.
+
+    Yields:
+        One message per violation; none for a valid component.
+    """
     expected = (name for name in {**Component.__annotations__, **vars(Component)} if not name.startswith("_"))
     if missing := [name for name in expected if not hasattr(candidate, name)]:
         yield f"it has no {', '.join(missing)}; expected a component or an Fmi2Slave class"
         return
-    variables = candidate.variables if isinstance(candidate.variables, Sequence) else [candidate.variables]
-    yield from _check_variables(variables)
-    known = [variable for variable in variables if isinstance(variable, Variable)]
-    for name in _required_methods({variable.causality for variable in known}, candidate.has_state):
+    entries = candidate.variables if isinstance(candidate.variables, Sequence) else [candidate.variables]
+    variables = [entry for entry in entries if isinstance(entry, Variable)]
+    yield from _check_entries(entries)
+    yield from _check_unique_names(variables)
+    for name in _required_methods({variable.causality for variable in variables}, candidate.has_state):
         if getattr(getattr(candidate, name), "__func__", None) is _METHODS[name]:
             yield f'it does not define "{name}"{_misnamed_method_hint(candidate, name)}'
     for name, method in _METHODS.items():
@@ -34,28 +42,31 @@ def find_violations(candidate: Any) -> Iterator[str]:
             yield f'"{name}" does not take the arguments ({", ".join(arguments)})'
 
 
-def _check_variables(variables: Sequence[Any]) -> Iterator[str]:
-    for variable in variables:
-        if isinstance(variable, Variable):
-            yield from (f'variable "{variable.name}": {text}' for text in _check_variable_fields(variable))
+def _check_entries(entries: Sequence[Any]) -> Iterator[str]:
+    for entry in entries:
+        if isinstance(entry, Variable):
+            yield from (f'variable "{entry.name}": {text}' for text in _check_variable_fields(entry))
         else:
-            yield f'"variables" holds {variable!r}, expected a cosim.core.component.Variable'
-    names = Counter(str(variable.name) for variable in variables if isinstance(variable, Variable))
-    yield from (f'variable "{name}" stands there {count} times' for name, count in names.items() if count > 1)
+            yield f'"variables" contains {entry!r}, expected a cosim.core.component.Variable'
+
+
+def _check_unique_names(variables: Sequence[Variable]) -> Iterator[str]:
+    names = Counter(str(variable.name) for variable in variables)
+    yield from (f'variable "{name}" is declared {count} times' for name, count in names.items() if count > 1)
 
 
 def _check_variable_fields(variable: Variable) -> Iterator[str]:
     for field, valid in _VALID_FIELD_VALUES.items():
-        if (found := getattr(variable, field)) not in valid:
-            yield f'{field} is "{found}"{did_you_mean(str(found), valid)}'
+        if (value := getattr(variable, field)) not in valid:
+            yield f'{field} is "{value}"{did_you_mean(str(value), valid)}'
     if not isinstance(variable.unit, Unit | None):
-        yield f"unit is {variable.unit!r}, expected a cosim.core.units.Unit, such as parse({str(variable.unit)!r})"
+        yield f"unit is {variable.unit!r}, expected a cosim.core.units.Unit, such as parse_unit({str(variable.unit)!r})"
     if not isinstance(variable.shape, tuple) or not all(isinstance(size, int) for size in variable.shape):
         yield f"shape is {variable.shape!r}, expected a tuple of sizes"
 
 
 def _required_methods(causalities: set[Causality], has_state: bool) -> Iterator[str]:
-    """The methods that a component with such variables cannot leave to the empty ones of `Component`."""
+    """Yield the methods that must override the empty ones of `Component`."""
     yield "do_step"
     if causalities & {"input", "output"}:
         yield "bind"
@@ -69,11 +80,11 @@ def _required_methods(causalities: set[Causality], has_state: bool) -> Iterator[
         yield from ("get_state", "set_state")
 
 
-def _misnamed_method_hint(made: Any, name: str) -> str:
-    """What may be the method under a wrong name, as the end of a message."""
-    own = [other for other in dir(type(made)) if not hasattr(Component, other)]
-    near = get_close_matches(name, own, n=1)
-    return f', but "{near[0]}"' if near else ""
+def _misnamed_method_hint(candidate: Any, name: str) -> str:
+    """Return a message suffix that names a similarly spelt method of the candidate, or an empty string."""
+    own_names = [other for other in dir(type(candidate)) if not hasattr(Component, other)]
+    similar = get_close_matches(name, own_names, n=1)
+    return f', but "{similar[0]}"' if similar else ""
 
 
 def _accepts_arguments(method: Any, arguments: list[str]) -> bool:
@@ -81,6 +92,6 @@ def _accepts_arguments(method: Any, arguments: list[str]) -> bool:
         inspect.signature(method).bind(*arguments)
     except TypeError:
         return False
-    except ValueError:  # of a method in C nothing is known
+    except ValueError:  # functions implemented in C may have no signature
         return True
     return True

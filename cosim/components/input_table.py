@@ -1,13 +1,13 @@
-"""Input profiles: a table over time as a component.
+"""Input profiles: a component whose outputs are read from a table over time.
 
-It stands in a last stage of its own, so the values of row n are those of the profile at communication point n and
-every other component reads, in its step from n, the profile at n.
+The scenario puts input tables into a last stage of their own. Row n of the results therefore contains the profile at
+communication point n, and every other component reads the profile at n in its step from n.
 """
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,74 +19,101 @@ from ..core.paths import open_text
 
 Interpolation = Literal["linear", "hold"]
 
-#: units in the last place by which a time and a sum of two others may differ
+#: units in the last place by which a row's time may exceed the computed end of a step
 _MAX_ULPS = 4
 
 
 class InputTable(Component):
-    """Columns over time (s); before the first and after the last row the nearest row holds.
+    """Component with one output per column of a table over time.
 
-    "linear" interpolates between rows; "hold" keeps each row's value until the next row's time, which already has the new one.
+    Before the first row and after the last row the nearest row applies.
     """
 
     binds_everything = False
     has_state = True
 
     def __init__(self, time: np.ndarray, columns: Mapping[str, np.ndarray], interpolation: Interpolation = "linear"):
+        """Create the component.
+
+        Args:
+            time: Increasing times of the rows (s), shape (rows,).
+            columns: Values of each output, shape (rows,).
+            interpolation: "linear" interpolates between rows; "hold" keeps a row's value until the time of the next row.
+        """
         self._time, self._columns, self._interpolation = time, columns, interpolation
         self._current_time = float(time[0])
         self._output_columns: Sequence[np.ndarray] = ()
         self.variables = [Variable(name, causality="output") for name in columns]
 
     def set(self, name: str, value: Any) -> None:
-        raise AttributeError(f"a profile has nothing to set, found {name}")
+        """Refuse the value: an input table has only outputs."""
+        raise AttributeError(f'an input profile has no settable variables, found "{name}" = {value!r}')
 
     def get(self, name: str) -> float:
+        """Return the present value of a column."""
         return self._value_at(self._current_time, self._columns[name])
 
-    def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
+    def enter_initialization_mode(self, start_time: float, _stop_time: float) -> None:
+        """Move to the start time (s)."""
         self._current_time = start_time
 
-    def exit_initialization_mode(self) -> None: ...
+    def exit_initialization_mode(self) -> None:
+        """Do nothing."""
 
-    def bind(self, inputs: Ports, outputs: Ports) -> None:
+    def bind(self, _inputs: Ports, outputs: Ports) -> None:
+        """Write the columns of the bound outputs to their Float64 array from now on."""
         self._output_columns = [self._columns[variable.name] for variable in outputs.variables]
         self._values = outputs.arrays.get(np.dtype(np.float64), np.empty(0))
 
-    def set_inputs(self) -> None: ...
+    def set_inputs(self) -> None:
+        """Do nothing: an input table has no inputs."""
 
     def do_step(self, time: float, step_size: float) -> None:
-        """To the end of the step; if only rounding keeps that from being a row's time, it is the row's."""
-        now = time + step_size
-        row = int(np.searchsorted(self._time, now + _MAX_ULPS * np.spacing(max(abs(time), abs(now))), side="right")) - 1
-        self._current_time = max(now, float(self._time[row])) if row >= 0 else now
+        """Move to the end of the step, or to a row's time that differs from it only by rounding."""
+        end = time + step_size
+        row = int(np.searchsorted(self._time, end + _MAX_ULPS * np.spacing(max(abs(time), abs(end))), side="right")) - 1
+        self._current_time = max(end, float(self._time[row])) if row >= 0 else end
 
     def get_outputs(self) -> None:
+        """Write the present values into the bound output array."""
         for i, column in enumerate(self._output_columns):
             self._values[i] = self._value_at(self._current_time, column)
 
-    def _value_at(self, now: float, column: np.ndarray) -> float:
+    def _value_at(self, time: float, column: np.ndarray) -> float:
         if self._interpolation == "linear":
-            return float(np.interp(now, self._time, column))
-        return float(column[max(0, int(np.searchsorted(self._time, now, side="right")) - 1)])
+            return float(np.interp(time, self._time, column))
+        return float(column[max(0, int(np.searchsorted(self._time, time, side="right")) - 1)])
 
     def get_state(self) -> float:
+        """Return the current time (s), which is the whole state."""
         return self._current_time
 
     def set_state(self, state: float) -> None:
+        """Return to a time (s) that `get_state` returned."""
         self._current_time = state
 
-    def free_state(self, state: float) -> None: ...
+    def free_state(self, state: float) -> None:
+        """Do nothing: a state is a number."""
 
-    def terminate(self) -> None: ...
+    def terminate(self) -> None:
+        """Do nothing."""
 
-    def free(self) -> None: ...
+    def free(self) -> None:
+        """Do nothing: an input table has no resources."""
 
 
 def read_input_table(path: Path, columns: Sequence[str], interpolation: Interpolation, where: str = "") -> InputTable:
-    """A CSV file with a header and a first column `time`; only the named columns are kept.
+    """Read an input table from a CSV file with a header and a first column `time` (s).
 
-    Raises InputError for a missing file or column, for cells that are no finite numbers and for time that does not increase.
+    Args:
+        path: The CSV file, in UTF-8.
+        columns: Names of the columns that become outputs; other columns are ignored.
+        interpolation: Interpolation between rows, see `InputTable`.
+        where: Place in the scenario that refers to the file, for messages.
+
+    Raises:
+        InputError: The file or a column is missing, a column occurs twice, a cell is not a finite number, or time does not
+            increase.
     """
     try:
         with open_text(path, encoding="utf-8-sig", newline="") as file:
@@ -94,21 +121,26 @@ def read_input_table(path: Path, columns: Sequence[str], interpolation: Interpol
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "no header row"
         raise InputError(Problem(f'cannot read profile "{path}": {reason}', where)) from None
-    problems = [
-        Problem(f'profile "{path}" has no column "{name}"{did_you_mean(name, header[1:])}', where)
-        for name in columns
-        if name not in header[1:]
-    ]
-    several = [name for name in columns if header[1:].count(name) > 1]
-    problems += [Problem(f'profile "{path}" has several columns "{name}"', where) for name in several]
-    if header[:1] != ["time"]:
-        problems.append(Problem(f'the first column of profile "{path}" must be "time", found "{(header or [""])[0]}"', where))
+    problems = [Problem(f'profile "{path}" {text}', where) for text in _header_violations(header, columns)]
     try:
         values = np.array([[float(cell) for cell in row] for row in rows]).reshape(len(rows), len(header))
     except ValueError:
-        raise InputError([*problems, Problem(f'profile "{path}" holds rows that are not {len(header)} numbers', where)]) from None
+        text = f'profile "{path}" has rows that are not {len(header)} numbers'
+        raise InputError([*problems, Problem(text, where)]) from None
     if not rows or not np.isfinite(values).all() or (np.diff(values[:, 0]) <= 0).any():
         problems.append(Problem(f'profile "{path}" needs rows of finite numbers with increasing time', where))
     if problems:
         raise InputError(problems)
     return InputTable(values[:, 0], {name: values[:, header.index(name)] for name in columns}, interpolation)
+
+
+def _header_violations(header: Sequence[str], columns: Sequence[str]) -> Iterator[str]:
+    names = header[1:]
+    for name in columns:
+        if name not in names:
+            yield f'has no column "{name}"{did_you_mean(name, names)}'
+    for name in columns:
+        if (count := names.count(name)) > 1:
+            yield f'has {count} columns "{name}", expected one'
+    if header[:1] != ["time"]:
+        yield f'has the first column "{(header or [""])[0]}", expected "time"'

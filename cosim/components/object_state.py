@@ -1,4 +1,4 @@
-"""What a Python object holds, remembered and brought back in place: who refers to a part of it still does so afterwards."""
+"""Snapshot and restore a Python object's state in place, so references into it stay valid."""
 
 from __future__ import annotations
 
@@ -12,18 +12,25 @@ import numpy as np
 
 Restore = Callable[[], object]
 
-#: what does not change, or is nobody's own
+#: types that are immutable or shared, so they are not traversed
 _OPAQUE_TYPES = (type, str, bytes, int, float, complex, FunctionType, BuiltinFunctionType, MethodType, ModuleType)
 
 
-def snapshot(thing: object, exclude: Collection[str] = ()) -> Restore:
-    """Everything that can be reached through attributes (`besides` some), lists, dicts, sets, arrays and random generators.
+def snapshot(root: object, exclude: Collection[str] = ()) -> Restore:
+    """Save the state of all objects reachable from `root`.
 
-    What is returned brings it back, as often as it is called. Files, iterators and whatever else does not show what it holds stay
-    as they are.
+    Attributes, lists, dicts, sets, deques, tuples, NumPy arrays and random generators are traversed. Objects that do not expose
+    their state, such as files and iterators, are not saved.
+
+    Args:
+        root: The object to save.
+        exclude: Names of attributes of `root` that are neither saved nor restored.
+
+    Returns:
+        A function that restores the saved state in place; it may be called repeatedly.
     """
     restores: list[Restore] = []
-    _snapshot_object(thing, restores, set(), exclude)
+    _snapshot_object(root, restores, set(), exclude)
 
     def restore_all() -> None:
         for restore in restores:
@@ -32,56 +39,57 @@ def snapshot(thing: object, exclude: Collection[str] = ()) -> Restore:
     return restore_all
 
 
-def _snapshot_object(thing: Any, restores: list[Restore], seen: set[int], exclude: Collection[str] = ()) -> None:
-    if id(thing) in seen or isinstance(thing, _OPAQUE_TYPES):
+def _snapshot_object(target: Any, restores: list[Restore], visited: set[int], exclude: Collection[str] = ()) -> None:
+    if id(target) in visited or isinstance(target, _OPAQUE_TYPES):
         return
-    seen.add(id(thing))
+    visited.add(id(target))
     parts: list[Any] = []
-    if isinstance(thing, np.ndarray):
-        if thing.flags.writeable:
-            values = thing.copy()
-            restores.append(lambda: thing.__setitem__(..., values))
-        parts = thing.ravel().tolist() if thing.dtype.hasobject else []
-    elif isinstance(thing, random.Random):
-        state = thing.getstate()
-        restores.append(lambda: thing.setstate(state))
-    elif isinstance(thing, np.random.Generator):
-        bits, drawn = thing.bit_generator, copy.deepcopy(thing.bit_generator.state)
-        restores.append(lambda: setattr(bits, "state", drawn))
-    elif isinstance(thing, tuple):
-        parts = list(thing)
-    elif hasattr(thing, "clear") and isinstance(thing, Collection):
-        parts = _snapshot_members(thing, restores)
-    parts += _snapshot_attributes(thing, restores, exclude)
+    if isinstance(target, np.ndarray):
+        if target.flags.writeable:
+            values = target.copy()
+            restores.append(lambda: target.__setitem__(..., values))
+        parts = target.ravel().tolist() if target.dtype.hasobject else []
+    elif isinstance(target, random.Random):
+        state = target.getstate()
+        restores.append(lambda: target.setstate(state))
+    elif isinstance(target, np.random.Generator):
+        bit_generator, bit_state = target.bit_generator, copy.deepcopy(target.bit_generator.state)
+        restores.append(lambda: setattr(bit_generator, "state", bit_state))
+    elif isinstance(target, tuple):
+        parts = list(target)
+    elif hasattr(target, "clear") and isinstance(target, Collection):
+        parts = _snapshot_members(target, restores)
+    parts += _snapshot_attributes(target, restores, exclude)
     for part in parts:
-        _snapshot_object(part, restores, seen)
+        _snapshot_object(part, restores, visited)
 
 
-def _snapshot_members(thing: Any, restores: list[Restore]) -> list[Any]:
-    """Of a dict, list, deque or set."""
-    refill = next((getattr(thing, name) for name in ("update", "extend") if hasattr(thing, name)), None)
+def _snapshot_members(container: Any, restores: list[Restore]) -> list[Any]:
+    """Save the members of a dict, list, deque or set, and return them."""
+    refill = next((getattr(container, name) for name in ("update", "extend") if hasattr(container, name)), None)
     if refill is None:
         return []
-    members = dict(thing) if hasattr(thing, "items") else list(thing)
+    members = dict(container) if hasattr(container, "items") else list(container)
 
     def restore() -> None:
-        thing.clear()
+        container.clear()
         refill(members)
 
     restores.append(restore)
     return [*members.values()] if isinstance(members, dict) else members
 
 
-def _snapshot_attributes(thing: Any, restores: list[Restore], exclude: Collection[str]) -> list[Any]:
-    if not hasattr(thing, "__dict__"):
+def _snapshot_attributes(target: Any, restores: list[Restore], exclude: Collection[str]) -> list[Any]:
+    """Save the attributes of an object, and return their values."""
+    if not hasattr(target, "__dict__"):
         return []
-    own = vars(thing)
-    held = {name: value for name, value in own.items() if name not in exclude}
+    attributes = vars(target)
+    saved = {name: value for name, value in attributes.items() if name not in exclude}
 
     def restore() -> None:
-        for name in own.keys() - held.keys() - set(exclude):
-            del own[name]
-        own.update(held)
+        for name in attributes.keys() - saved.keys() - set(exclude):
+            del attributes[name]
+        attributes.update(saved)
 
     restores.append(restore)
-    return list(held.values())
+    return list(saved.values())

@@ -1,15 +1,11 @@
-"""PythonFMU classes as components: the same file runs in process or exported as an FMU."""
+"""Components made from Python classes: PythonFMU slaves, or classes that implement `Component` themselves."""
 
 from __future__ import annotations
 
-import importlib.util
 import inspect
 import operator
-import sys
 from collections.abc import Callable, Mapping
-from hashlib import sha256
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -19,11 +15,11 @@ from pythonfmu.variables import Boolean, Integer, Real, ScalarVariable, String
 
 from ..core import component_log
 from ..core.component import Component, Ports, Variable
-from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, Problem, describe_exception, did_you_mean
-from ..core.paths import is_file, resolve_path
+from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, Problem, describe_exception
 from ..core.units import parse_unit
 from .conformance import find_violations
 from .object_state import snapshot
+from .python_import import load_object
 
 _TYPES = {Real: "Float64", Integer: "Int32", Boolean: "Boolean", String: "String"}
 _CASTS: Mapping[str, Callable[[Any], Any]] = {"Float64": float, "Int32": int, "Boolean": bool, "String": str}
@@ -49,7 +45,7 @@ def _to_str(value: Any) -> str:
     return value
 
 
-#: what an output of a type is as a rule, and what else becomes one without loss
+#: FMI type -> the usual Python type of an output, and a lossless conversion from other types
 _OUTPUT_TYPES: Mapping[str, tuple[type, Callable[[Any], Any]]] = {
     "Float64": (float, _to_float),
     "Int32": (int, operator.index),
@@ -59,10 +55,10 @@ _OUTPUT_TYPES: Mapping[str, tuple[type, Callable[[Any], Any]]] = {
 
 
 class PythonFmuComponent(Component):
-    """A `pythonfmu.Fmi2Slave` that runs in process, without export.
+    """Component that runs a `pythonfmu.Fmi2Slave` in the importer's process, without export as an FMU.
 
-    Its state is all that it holds (see `memento`), or what its own `_get_fmu_state` says. An exported FMU by PythonFMU saves the
-    registered variables alone.
+    Its state is the whole state of the Python object (see `object_state`), or the result of an overridden `_get_fmu_state`.
+    The state of an FMU exported by PythonFMU contains only the registered variables.
     """
 
     binds_everything = False
@@ -78,29 +74,35 @@ class PythonFmuComponent(Component):
         self._has_custom_state = type(slave)._get_fmu_state is not Fmi2Slave._get_fmu_state
 
     def set(self, name: str, value: Any) -> None:
+        """Set one variable by its PythonFMU setter."""
         registered = self._pythonfmu_variables[name]
         self._call_user_code("set", registered.setter, _CASTS[_fmi_type(registered)](value))
 
     def get(self, name: str) -> Any:
+        """Return the value of one variable by its PythonFMU getter."""
         registered = self._pythonfmu_variables[name]
         return _CASTS[_fmi_type(registered)](self._call_user_code("get", registered.getter))
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
+        """Call the slave's `setup_experiment` and `enter_initialization_mode`."""
         self._time = start_time
         self._call_user_code("setup_experiment", self._slave.setup_experiment, start_time, stop_time, None)
         self._call_user_code("enter_initialization_mode", self._slave.enter_initialization_mode)
 
     def exit_initialization_mode(self) -> None:
+        """Call the slave's `exit_initialization_mode`."""
         self._call_user_code("exit_initialization_mode", self._slave.exit_initialization_mode)
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
-        self._setters = [(self._pythonfmu_variables[v.name].setter, *place) for v, place in _array_positions(inputs)]
+        """Pair the slave's setters and getters with the elements of the bound arrays."""
+        self._setters = [(self._pythonfmu_variables[v.name].setter, *element) for v, element in _array_elements(inputs)]
         self._getters = [
-            (v.name, self._pythonfmu_variables[v.name].getter, *_OUTPUT_TYPES[v.type], *place)
-            for v, place in _array_positions(outputs)
+            (v.name, self._pythonfmu_variables[v.name].getter, *_OUTPUT_TYPES[v.type], *element)
+            for v, element in _array_elements(outputs)
         ]
 
     def set_inputs(self) -> None:
+        """Pass the bound input values to the slave's setters."""
         self._call_user_code("set_inputs", self._apply_setters)
 
     def _apply_setters(self) -> None:
@@ -108,37 +110,44 @@ class PythonFmuComponent(Component):
             setter(array.item(index))
 
     def do_step(self, time: float, step_size: float) -> None:
+        """Call the slave's `do_step`; any result but True is a ComponentError."""
         self._time = time
         returned = self._call_user_code("do_step", self._slave.do_step, time, step_size)
         if not returned:
             raise ComponentError(self._name, "do_step", f"returned {returned}, expected True", time)
 
     def get_outputs(self) -> None:
+        """Write the values of the slave's getters into the bound output arrays."""
         self._call_user_code("get_outputs", self._apply_getters)
 
     def _apply_getters(self) -> None:
-        for name, getter, kind, accept, array, index in self._getters:
+        for name, getter, usual_type, convert, array, index in self._getters:
             value = getter()
             try:
-                array[index] = value if value.__class__ is kind else accept(value)
+                array[index] = value if value.__class__ is usual_type else convert(value)
             except (TypeError, ValueError, OverflowError):
                 raise TypeError(f'output "{name}" is {value!r}, expected a value of type {self._types[name]}') from None
 
     def get_state(self) -> Any:
+        """Return the slave's own state, or a snapshot of its attributes."""
         return self._slave._get_fmu_state() if self._has_custom_state else snapshot(self._slave, {"vars", "log_queue"})
 
     def set_state(self, state: Any) -> None:
+        """Restore a state that `get_state` returned."""
         self._slave._set_fmu_state(state) if self._has_custom_state else state()
 
-    def free_state(self, state: Any) -> None: ...
+    def free_state(self, state: Any) -> None:
+        """Do nothing: states are garbage-collected."""
 
     def terminate(self) -> None:
+        """Call the slave's `terminate`."""
         self._call_user_code("terminate", self._slave.terminate)
 
-    def free(self) -> None: ...
+    def free(self) -> None:
+        """Do nothing: the slave is garbage-collected."""
 
     def _call_user_code(self, function: str, call: Callable[..., Any], *arguments: Any) -> Any:
-        """Call user code; what it raises becomes a ComponentError, what it logged reaches the log."""
+        """Call a method of the slave, convert its exceptions to ComponentError and forward its log messages."""
         try:
             return call(*arguments)
         except PASS_THROUGH_EXCEPTIONS:
@@ -176,85 +185,49 @@ def _to_variable(registered: ScalarVariable) -> Variable:
     )
 
 
-def _array_positions(ports: Ports) -> list[tuple[Variable, tuple[np.ndarray, int]]]:
-    filled = dict.fromkeys(ports.arrays, 0)
-    places = []
+def _array_elements(ports: Ports) -> list[tuple[Variable, tuple[np.ndarray, int]]]:
+    """Pair each scalar variable with its array and its index in it."""
+    next_index = dict.fromkeys(ports.arrays, 0)
+    elements = []
     for variable in ports.variables:
-        places.append((variable, (ports.arrays[variable.dtype], filled[variable.dtype])))
-        filled[variable.dtype] += 1
-    return places
+        elements.append((variable, (ports.arrays[variable.dtype], next_index[variable.dtype])))
+        next_index[variable.dtype] += 1
+    return elements
 
 
 def load_component(reference: str, folder: Path, instance_name: str, arguments: Mapping[str, Any]) -> Component:
-    """An instance of `file.py:Class`, a component or a PythonFMU class; relative paths start at `folder`.
+    """Import a class, construct it and return it as a component.
 
-    Raises InputError when the file, the class, its arguments or what it makes are not what they should be.
+    Args:
+        reference: File and class (or function) as "file.py:Class": a PythonFMU class, or one that creates a `Component`.
+        folder: Folder that a relative file path starts from.
+        instance_name: Name of the component.
+        arguments: Further keyword arguments of the class.
+
+    Raises:
+        InputError: The class cannot be imported, does not accept the arguments or cannot be constructed, or the constructed
+            object does not conform to `Component`.
     """
-    kind = load_object(reference, folder)
-    if inspect.isclass(kind) and issubclass(kind, Fmi2Slave):
+    factory = load_object(reference, folder)
+    if inspect.isclass(factory) and issubclass(factory, Fmi2Slave):
         if "instance_name" in arguments:
-            raise InputError(f'{reference} gets its "instance_name" from the scenario; it is no argument')
-        return PythonFmuComponent(_construct(kind, reference, instance_name=instance_name, **arguments), instance_name)
-    made = _construct(kind, reference, instance_name, **arguments)
-    if found := [Problem(f"{reference} makes a {type(made).__name__}: {text}") for text in find_violations(made)]:
-        raise InputError(found)
-    return made
+            raise InputError(f'{reference} receives its "instance_name" from the scenario; remove it from the arguments')
+        return PythonFmuComponent(_construct(factory, reference, instance_name=instance_name, **arguments), instance_name)
+    component: Component = _construct(factory, reference, instance_name, **arguments)
+    type_name = type(component).__name__
+    if problems := [Problem(f"{reference} creates a {type_name}: {text}") for text in find_violations(component)]:
+        raise InputError(problems)
+    return component
 
 
-def _construct(kind: Callable[..., Any], reference: str, /, *positional: Any, **named: Any) -> Any:
+def _construct(factory: Callable[..., Any], reference: str, /, *positional: Any, **named: Any) -> Any:
     try:
-        inspect.signature(kind).bind(*positional, **named)
+        inspect.signature(factory).bind(*positional, **named)
     except TypeError as error:
         raise InputError(f"{reference} does not accept these arguments: {error}") from None
     try:
-        return kind(*positional, **named)
+        return factory(*positional, **named)
     except (InputError, *PASS_THROUGH_EXCEPTIONS):
         raise
     except BaseException as error:
         raise InputError(f"{reference} cannot be constructed: {describe_exception(error)}") from error
-
-
-def load_object(reference: str, folder: Path) -> Any:
-    """What `file.py:name` refers to. Raises InputError with the nearest name when there is no such thing."""
-    file, separator, name = reference.rpartition(":")
-    if not separator or not file.endswith(".py") or not name.isidentifier():
-        raise InputError(f'expected "file.py:name", found "{reference}"')
-    path = resolve_path(folder / file)
-    if not is_file(path):
-        raise InputError(f'file "{file}" does not exist')
-    module = _import_file(path)
-    if not hasattr(module, name):
-        public = [key for key in vars(module) if not key.startswith("_")]
-        raise InputError(Problem(f'"{file}" defines no "{name}"{did_you_mean(name, public)}'))
-    return getattr(module, name)
-
-
-def package_root(path: Path) -> Path:
-    """The folder that holds a file's outermost package; the file's own folder when it is in no package."""
-    root = path.parent
-    while (root / "__init__.py").is_file():
-        root = root.parent
-    return root
-
-
-def package_files(path: Path) -> list[Path]:
-    """A Python file and everything it may import relatively: all modules of its outermost package."""
-    inside = path.resolve().relative_to(package_root(path.resolve())).parts
-    return [path] if len(inside) == 1 else sorted((package_root(path.resolve()) / inside[0]).rglob("*.py"))
-
-
-def _import_file(path: Path) -> ModuleType:
-    """Import a file, as a member of its package if it is in one, under a name made unique by the root's path."""
-    root = package_root(path)
-    unique = f"_cosim_{sha256(str(root).encode()).hexdigest()[:12]}"
-    if unique not in sys.modules:
-        namespace = ModuleType(unique)
-        namespace.__path__ = [str(root)]
-        sys.modules[unique] = namespace
-    name = ".".join((unique, *path.relative_to(root).with_suffix("").parts))
-    try:
-        return importlib.import_module(name)
-    except PASS_THROUGH_EXCEPTIONS:
-        raise
-    except BaseException as error:
-        raise InputError(f'"{path.name}" cannot be imported: {type(error).__name__}: {error}') from error

@@ -1,1 +1,1 @@
-"""Numbers, times, units, errors and the Component contract: no files, no JSON, no physics."""
+"""Basic types: component interface, system, time grid, units, recording, errors."""

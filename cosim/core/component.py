@@ -1,16 +1,16 @@
-"""The one contract of the importer: what an FMU, a Python class and the plant all are.
+"""Interface of everything that steps: FMUs, Python classes and the plant.
 
-A component lives through the FMI Co-Simulation life cycle:
+The methods of a component are called in the order of the FMI Co-Simulation life cycle:
 
-    bind                                            once: the arrays that carry its inputs and outputs
-    instantiate                                     once: foreign code is loaded here, not before
+    bind                                            once: pass the arrays for inputs and outputs
+    instantiate                                     once: load foreign code, not earlier
     set                                             parameters and start values
-    enter_initialization_mode                       { set_inputs, get_outputs } may be repeated here
-    exit_initialization_mode                        get_outputs: the initial outputs
-    { set_inputs, do_step, get_outputs }            once per step; set of tunable parameters between steps
-    terminate, free                                 free is always called, exactly once, also after a failure
+    enter_initialization_mode                       { set_inputs, get_outputs } may be repeated in this mode
+    exit_initialization_mode                        then get_outputs: the initial outputs
+    { set_inputs, do_step, get_outputs }            once per step; set tunable parameters between steps
+    terminate, free                                 free is always called exactly once, also after a failure
 
-Values travel in typed arrays ("ports") that the engine owns: on the hot path nothing is converted, allocated or looked up.
+Values are exchanged in typed arrays ("ports") that belong to the engine. A step converts, allocates and looks up nothing.
 """
 
 from __future__ import annotations
@@ -52,10 +52,20 @@ DTYPES: Mapping[str, np.dtype[Any]] = {
 class Variable:
     """One variable of a component as FMI describes it.
 
-    `type` is an FMI 3.0 type name (FMI 2.0 Real is Float64, Integer is Int32). `shape` is () for a scalar; an array
-    occupies consecutive slots in row-major order. `dtype` is how a value lies in memory; it differs from the usual one
-    of the type only where FMI 2.0 demands it (Boolean and Enumeration are C int there). `items` are the names and values of an
-    enumeration; a `relative` quantity is a difference, to which the offset of a unit does not apply.
+    Attributes:
+        name: Name as in the model description.
+        type: FMI 3.0 type name; FMI 2.0 Real is Float64, Integer is Int32.
+        causality: FMI causality.
+        variability: FMI variability.
+        start: Start value, an array as nested lists; None if unknown.
+        unit: Unit of the value; None if unknown.
+        shape: () for a scalar; an array occupies consecutive elements in row-major order.
+        description: Text of the model description.
+        minimum: Smallest permitted value; None if unlimited.
+        maximum: Largest permitted value; None if unlimited.
+        items: Names and values of an enumeration.
+        relative_quantity: The value is a difference, to which the offset of a unit does not apply.
+        dtype: NumPy type of a value in memory, by default that of `type`. FMI 2.0 stores Boolean and Enumeration as C int.
     """
 
     name: str
@@ -82,7 +92,7 @@ class Variable:
 
     @property
     def scalar_names(self) -> tuple[str, ...]:
-        """Names of the scalars this variable consists of: itself, or "name[1]", "name[2]" or "name[1,2]" for arrays."""
+        """Names of the elements: the name of a scalar, else "name[1]", "name[2]" or "name[1,2]"."""
         if not self.shape:
             return (self.name,)
         indices = product(*(range(1, n + 1) for n in self.shape))
@@ -90,7 +100,7 @@ class Variable:
 
 
 class StepResult(NamedTuple):
-    """How a step ended when it did not simply reach its end."""
+    """Outcome of a step that did not simply reach its end time; `time_reached` in s."""
 
     time_reached: float
     event_needed: bool = False
@@ -98,7 +108,7 @@ class StepResult(NamedTuple):
 
 
 class NativeGetSet(NamedTuple):
-    """A get or set of FMI in C: addresses of function, instance, value references and values, and how many there are."""
+    """Call of a C function fmiXGet... or fmiXSet...; all members but `version` (2 or 3) and the counts are addresses."""
 
     version: int
     function: int
@@ -110,7 +120,11 @@ class NativeGetSet(NamedTuple):
 
 
 class NativeDoStep(NamedTuple):
-    """A doStep of FMI in C; `flags` is where FMI 3.0 says event needed, terminate and early return, `reached` where how far."""
+    """Call of the C function fmiXDoStep.
+
+    `flags` is the address of the three Booleans eventHandlingNeeded, terminateSimulation and earlyReturn of FMI 3.0,
+    `last_successful_time` that of lastSuccessfulTime.
+    """
 
     version: int
     function: int
@@ -121,19 +135,24 @@ class NativeDoStep(NamedTuple):
 
 
 class NativeFlagCheck(NamedTuple):
-    """A look at the flags of a doStep: discard (2) when one of them is set."""
+    """Check of the three Booleans at the address `flags` after fmi3DoStep; yields the status 2 (discard) if one is set."""
 
     flags: int
 
 
-#: the FMI statuses OK and warning; whatever else an FMU returns is bad, numbers that are no status among them
+#: FMI statuses OK and warning; any other number that an FMU returns is a failure
 SUCCESS_STATUSES = (0, 1)
 
 
 class PreparedCall(NamedTuple):
-    """A call made ready beforehand: a function that returns an FMI status (0 OK, 1 warning), and its arguments.
+    """A function that returns an FMI status, with its arguments.
 
-    `native` is the same call for an executor in C, `kept` what has to live as long as the call.
+    Attributes:
+        function: Returns an FMI status (0 OK, 1 warning).
+        arguments: Arguments of the function.
+        name: Name of the function in messages.
+        native: The same call for the native executor; None if the executor has to call `function`.
+        keep_alive: Objects whose memory the native call uses.
     """
 
     function: Callable[..., int]
@@ -144,71 +163,99 @@ class PreparedCall(NamedTuple):
 
 
 class Ports(NamedTuple):
-    """Variables in order, and one contiguous array per dtype in which their values lie in that order."""
+    """Variables, and one contiguous array per dtype with their values in the same order."""
 
     variables: Sequence[Variable]
     arrays: Mapping[np.dtype[Any], np.ndarray]
 
 
 class Component(Protocol):
-    """One steppable part of a system.
+    """One steppable part of a system; every method raises `cosim.core.errors.ComponentError` when it fails.
 
-    `variables` is fixed after construction. Every method raises `cosim.core.errors.ComponentError` when it fails.
+    Attributes:
+        variables: All variables; fixed after construction.
+        binds_everything: `bind` gets all inputs and outputs, not only those that are connected or recorded.
+        shared_code: Components with an equal value other than None never step at the same time, because their common code may
+            have static variables.
+        has_state: `get_state` and `set_state` are supported (FMI: canGetAndSetFMUState).
     """
 
     variables: Sequence[Variable]
-    #: bound with all inputs and outputs, not only with those that are connected or recorded
     binds_everything: bool
-    #: what components have in common that may not step at the same time: the same code, which may have state of its own
     shared_code: object = None
-    #: get_state and set_state work (FMI: canGetAndSetFMUState)
     has_state: bool
 
     def set(self, name: str, value: Any) -> None:
-        """Set one variable (arrays whole, as nested lists) to a Python value: off the hot path."""
+        """Set a variable to a Python value, an array to nested lists; not called while stepping through a macro step."""
 
     def get(self, name: str) -> Any:
-        """The present value of one variable as Python value (arrays as flat lists): off the hot path."""
+        """Return the present value of a variable, an array as flat list; not called while stepping through a macro step."""
 
-    def enter_initialization_mode(self, start_time: float, stop_time: float) -> None: ...
+    def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
+        """Enter the initialization mode of FMI; times in s."""
 
-    def exit_initialization_mode(self) -> None: ...
+    def exit_initialization_mode(self) -> None:
+        """Exit the initialization mode of FMI and enter step mode."""
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
-        """From now on inputs are read from and outputs written to these arrays."""
+        """Read inputs from and write outputs to these arrays from now on."""
 
     def instantiate(self) -> None:
         """Create the instance and acquire its resources (FMI: fmi3InstantiateCoSimulation); called once, after `bind`."""
         return
 
     def set_inputs(self) -> None:
-        """Take over the values in the bound input arrays."""
+        """Read the values in the bound input arrays."""
 
     def do_step(self, time: float, step_size: float) -> StepResult | None:
-        """Advance from `time` (s) to `time + step_size`. None: reached, nothing else to report."""
+        """Advance from `time` (s) to `time + step_size`.
+
+        Args:
+            time: Start of the step (s).
+            step_size: Length of the step (s).
+
+        Returns:
+            None if the end was reached and nothing else is to be reported.
+        """
 
     def get_outputs(self) -> None:
         """Write the present values into the bound output arrays."""
 
-    def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall] | None:
-        """set_inputs, do_step and get_outputs as calls that need nothing but to be made, for a step from the time in `clock`.
+    def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall] | None:  # noqa: ARG002
+        """Return `set_inputs`, `do_step` and `get_outputs` of one step as prepared calls; called once, in step mode.
 
-        None: the component offers no such calls. Asked for once, in step mode.
+        Args:
+            current_time: Memory from which the calls read the start of the step (s).
+            step_size: Length of the step (s).
+
+        Returns:
+            None if the component only offers the three methods.
         """
         return None
 
     def interpret_status(self, function: str, status: int) -> StepResult:
-        """What a call of `turn` means that returned a status worse than a warning. Raises ComponentError for a failure."""
+        """Return the meaning of a status worse than a warning that a prepared call returned.
+
+        Args:
+            function: Name of the prepared call.
+            status: The returned status.
+
+        Raises:
+            ComponentError: The status is a failure.
+        """
         raise ComponentError(type(self).__name__, function, f"status {status}")
 
     def get_state(self) -> Any:
-        """A snapshot that only this component can read."""
+        """Return a snapshot that only this component can read."""
 
     def set_state(self, state: Any) -> None:
-        """Return to a snapshot, bit for bit; it stays valid and may be restored again."""
+        """Restore a snapshot bit for bit; it may be restored again."""
 
-    def free_state(self, state: Any) -> None: ...
+    def free_state(self, state: Any) -> None:
+        """Release the memory of a snapshot."""
 
-    def terminate(self) -> None: ...
+    def terminate(self) -> None:
+        """End the simulation (FMI: terminate)."""
 
-    def free(self) -> None: ...
+    def free(self) -> None:
+        """Free the instance and its resources."""

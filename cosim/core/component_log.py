@@ -1,4 +1,4 @@
-"""Messages of components on their way to the user, through Python's logging. A flood of them is cut and counted."""
+"""Log messages of components, passed to Python's logging with a limited rate."""
 
 from __future__ import annotations
 
@@ -7,14 +7,20 @@ import time
 
 INFO, WARNING, ERROR = logging.INFO, logging.WARNING, logging.ERROR
 
-#: messages per second that are passed on, and characters of one
+#: maximum number of messages per second, and of characters per message
 MAX_MESSAGES_PER_SECOND, MAX_MESSAGE_LENGTH = 1000, 4000
 
 _current_second, _passed_count, _dropped_count = 0, 0, 0
 
 
 def log_message(component: str, level: int, text: str) -> None:
-    """Pass on what a component said; control characters are made harmless."""
+    """Log a message of a component; characters that cannot be printed are replaced.
+
+    Args:
+        component: Name of the component.
+        level: `INFO`, `WARNING` or `ERROR`.
+        text: The message, which foreign code may have written.
+    """
     if not _is_within_rate_limit():
         return
     if len(text) > MAX_MESSAGE_LENGTH:
@@ -24,7 +30,7 @@ def log_message(component: str, level: int, text: str) -> None:
 
 
 def _is_within_rate_limit() -> bool:
-    """Whether one more message may pass in this second; tells how many were cut when the next second begins."""
+    """Return whether one more message is permitted in this second; report the dropped ones when a new second begins."""
     global _current_second, _passed_count, _dropped_count
     now = int(time.monotonic())
     if now != _current_second:
@@ -38,7 +44,7 @@ def _is_within_rate_limit() -> bool:
 
 
 def report_dropped_messages() -> None:
-    """Say how many messages were not passed on since it was said last."""
+    """Warn of the number of messages that were dropped since the last report."""
     global _dropped_count
     if _dropped_count:
         logging.getLogger("cosim.component").warning("%d messages of components were not shown", _dropped_count)

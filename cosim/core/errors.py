@@ -1,11 +1,11 @@
-"""Every failure that cosim reports on purpose.
+"""Exceptions for all failures that cosim reports.
 
 CosimError
-├── InputError        the user's input is refused: usage, scenario, FMU (exit code 2); carries all problems at once
-├── ComponentError    a component failed while it ran (exit code 1)
-├── LateError         a real-time run could not keep up (exit code 1)
-├── OutputError       a result could not be written, as on a full disk (exit code 1)
-└── CheckError        a check, comparison or `build --check` was not met (exit code 3)
+├── InputError        invalid input: usage, scenario, FMU (exit code 2); lists all problems at once
+├── ComponentError    a component failed during the run (exit code 1)
+├── LateError         a real-time run fell behind (exit code 1)
+├── OutputError       a result could not be written, for example to a full disk (exit code 1)
+└── CheckError        a check, comparison or `build --check` failed (exit code 3)
 """
 
 from __future__ import annotations
@@ -16,25 +16,35 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
-#: what passes through other people's code without being its failure; all else is, also what is no Exception (a library's panic)
+#: exceptions that are not a failure of the foreign code they pass through; all others are, even if not derived from Exception
 PASS_THROUGH_EXCEPTIONS = (KeyboardInterrupt, GeneratorExit)
-#: characters of an exception's text that are shown
+#: maximum number of characters shown of an exception's text
 _MAX_TEXT_LENGTH = 2000
 
 
 class CosimError(Exception):
-    """Base of all errors that are meant for the user; its text needs no traceback."""
+    """Base of all errors that are meant for the user; the text is complete without a traceback.
+
+    Attributes:
+        exit_code: Exit code of the command `cosim` for this class of error.
+        result: The `cosim.Result` recorded before the failure, if `cosim.run` raised the error after it began to simulate; else
+            None.
+    """
 
     exit_code = 70
+    result: Any = None
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One refused thing: what is wrong, and where it stands (file, line, JSON path) as far as that is known.
+    """One reason why input is refused; `str` gives it as one line.
 
-    `subject` names the setting that is wrong ("components", "usv", "period"); who knows where settings stand replaces `where`.
-    As text it is one line: what cannot be printed is escaped.
+    Attributes:
+        message: Description of the problem.
+        where: Location (file, line, JSON path); "" if unknown.
+        subject: Keys of the setting in the scenario ("components", "usv", "period"), from which a caller can find the location.
     """
 
     message: str
@@ -47,12 +57,16 @@ class Problem:
 
 
 def _escape_unprintable(text: str) -> str:
-    """One line; what cannot be printed, as what would control a terminal, is escaped."""
+    """Return a text with line breaks and control characters, which might control a terminal, as escape sequences."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
 
 
 class InputError(CosimError):
-    """Input was refused before anything ran; `problems` lists every reason, one line each."""
+    """Invalid input, detected before the run starts.
+
+    Attributes:
+        problems: All reasons, one line each.
+    """
 
     exit_code = 2
 
@@ -64,7 +78,14 @@ class InputError(CosimError):
 
 
 class ComponentError(CosimError):
-    """A component failed while it ran: says which one, in which function, at which time and why."""
+    """Failure of a component during the run.
+
+    Attributes:
+        component: Name of the component.
+        function: Function that failed, such as "fmi2DoStep".
+        reason: Description of the failure.
+        time: Simulation time of the failure (s); None if unknown.
+    """
 
     exit_code = 1
 
@@ -78,53 +99,64 @@ class ComponentError(CosimError):
 
 
 class LateError(CosimError):
-    """A run that was to keep up with real time did not."""
+    """Delay of a real-time run by more than one step, with `late="fail"`."""
 
     exit_code = 1
 
 
 class OutputError(CosimError):
-    """A result could not be written to a place that was good when the work began: the disk is full, or it failed."""
+    """Failure to write a result because the disk is full or defective."""
 
     exit_code = 1
 
 
 class CheckError(CosimError):
-    """A result does not meet a check, a reference or a manifest."""
+    """Violation of a check, a reference or a manifest."""
 
     exit_code = 3
 
 
 def describe_exception(error: BaseException) -> str:
-    """An exception of other people's code in one line: its kind, its text, and where it was raised."""
+    """Return class, text, file and line of an exception that foreign code raised.
+
+    >>> describe_exception(ValueError("no such mode"))
+    'ValueError: no such mode'
+    """
     try:
         text = str(error)
     except Exception:
         text = "(its text cannot be made)"
-    text = (
-        text
-        if len(text) <= _MAX_TEXT_LENGTH
-        else f"{text[:_MAX_TEXT_LENGTH]} ... and {len(text) - _MAX_TEXT_LENGTH} characters more"
-    )
-    places = traceback.extract_tb(error.__traceback__)
-    where = f" ({Path(places[-1].filename).name}:{places[-1].lineno})" if places else ""
+    if len(text) > _MAX_TEXT_LENGTH:
+        text = f"{text[:_MAX_TEXT_LENGTH]} ... and {len(text) - _MAX_TEXT_LENGTH} characters more"
+    frames = traceback.extract_tb(error.__traceback__)
+    where = f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
     return f"{type(error).__name__}: {text}{where}"
 
 
-def join_alternatives(names: Iterable[str]) -> str:
-    """Who a failure may be of, when it cannot be known: the name, or "one of a, b", of many not all.
+def abbreviate_names(names: Iterable[str], limit: int = 8) -> str:
+    """Return the names as a list in one line, each name once; after the first `limit` names only the number of the others.
 
-    >>> one_of(["uav"]), one_of(["uav", "usv"])
+    >>> abbreviate_names("abcdea", limit=3)
+    'a, b, c and 2 more'
+    """
+    different = list(dict.fromkeys(names))
+    return ", ".join(different[:limit]) + (f" and {len(different) - limit} more" if len(different) > limit else "")
+
+
+def join_alternatives(names: Iterable[str]) -> str:
+    """Return the name of the component a failure is attributed to, or "one of ..." if several come into question.
+
+    >>> join_alternatives(["uav"]), join_alternatives(["uav", "usv"])
     ('uav', 'one of uav, usv')
     """
-    some = list(names)
-    return some[0] if len(some) == 1 else f"one of {', '.join(some[:8])}{' ...' if len(some) > 8 else ''}"
+    different = dict.fromkeys(names)
+    return f"{'one of ' if len(different) > 1 else ''}{abbreviate_names(different)}"
 
 
 def did_you_mean(name: str, valid: Iterable[str]) -> str:
-    """The nearest valid name as the end of a message, or the list of valid names when it is short, or nothing.
+    """Return a hint for the end of a message: the most similar valid name, else up to 8 valid names, else "".
 
-    Nearest is a name with two neighbouring letters swapped.
+    A name that differs by two swapped neighbouring letters counts as the most similar one.
 
     >>> did_you_mean("stop_tme", ["start_time", "stop_time"])
     '; did you mean "stop_time"?'
@@ -134,7 +166,7 @@ def did_you_mean(name: str, valid: Iterable[str]) -> str:
     return _did_you_mean(name, tuple(valid))
 
 
-@lru_cache(16)  # a name that is wrong in one place often is so in the next ones
+@lru_cache(16)  # the same wrong name often occurs several times
 def _did_you_mean(name: str, names: tuple[str, ...]) -> str:
     swapped = {name[:i] + name[i + 1] + name[i] + name[i + 2 :] for i in range(len(name) - 1)}
     if near := [other for other in names if other in swapped] or difflib.get_close_matches(name, names, n=1):

@@ -1,4 +1,4 @@
-"""Paths that users name: anything may lie there."""
+"""Safe access to paths given by users, which may be pipes, devices or link loops."""
 
 from __future__ import annotations
 
@@ -6,27 +6,33 @@ import errno
 import os
 import stat
 from pathlib import Path
-from typing import IO, Any
+from typing import TextIO
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is such a file; no for names that no file can have, where `Path.is_file` raises."""
+    """Return whether the file exists; False for names that no file can have, for which `Path.is_file` raises."""
     return os.path.isfile(path)  # noqa: PTH113
 
 
 def resolve_path(path: Path) -> Path:
-    """Where a path leads, links followed; where they lead in a circle, as far as that goes."""
+    """Return the path with symbolic links resolved; a loop of links is left unresolved instead of raising."""
     return Path(os.path.realpath(path))
 
 
-def open_text(path: Path, **how: Any) -> IO[str]:
-    """A file opened to read its text, with `how` as in `open`.
+def open_text(path: Path, encoding: str, newline: str | None = None) -> TextIO:
+    """Open a regular file to read its text.
 
-    Raises OSError, for pipes and devices too: they could keep the reader waiting for ever, or never end.
+    Args:
+        path: The file.
+        encoding: As in `open`.
+        newline: As in `open`.
+
+    Raises:
+        OSError: The file cannot be opened, or is a pipe or a device, from which reading might never end.
     """
     number = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     mode = os.fstat(number).st_mode
     if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
         os.close(number)
         raise OSError(errno.EINVAL, "Not a regular file", str(path))
-    return os.fdopen(number, **how)
+    return os.fdopen(number, encoding=encoding, newline=newline)

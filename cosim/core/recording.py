@@ -1,4 +1,4 @@
-"""What the run loop hands over: the recorded signals of one run, column by column."""
+"""Recorded signals of one run."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ import numpy as np
 class Recording:
     """Signals sampled at the recorded communication points.
 
-    `time` (s) has shape (rows,); two rows may carry one time at an event. `columns` maps the name of each signal to its
-    values, shape (rows,), in recorded order and in the signal's own type: float64, integers, bool, object for strings.
-    `units` holds the unit of each signal in Modelica syntax, "" where it is unknown.
+    Attributes:
+        time: Time of each row (s), shape (rows,); at an event two rows may have the same time.
+        columns: Values of each signal by name, shape (rows,), in the type of the signal; strings have the dtype object.
+        units: Unit of each signal by name, in Modelica syntax; "" if unknown.
     """
 
     time: np.ndarray
@@ -23,5 +24,5 @@ class Recording:
 
     @classmethod
     def empty(cls) -> Recording:
-        """No rows and no columns."""
+        """Return a recording without rows and columns."""
         return cls(np.empty(0), {}, {})

@@ -18,6 +18,6 @@ def root() -> Path:
 
 
 def cache_directory() -> Path:
-    """The per-user folder for things that can be made again (XDG_CACHE_HOME/cosim, else ~/.cache/cosim)."""
+    """Return the cache folder of the user: XDG_CACHE_HOME/cosim, else ~/.cache/cosim."""
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path.home() / ".cache") / "cosim"

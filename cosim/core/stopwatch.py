@@ -1,4 +1,4 @@
-"""Where the wall time of a run goes."""
+"""Measurement of wall time."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from time import perf_counter
 
 
 class Stopwatch:
-    """Wall time (s) of the named parts of some work; a part that happens again is added up."""
+    """Accumulated wall time (s) by name of the measured part."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
 
     @contextmanager
     def measure(self, part: str) -> Iterator[None]:
-        """The time inside the block belongs to `part`, also when it ends with an error."""
+        """Add the duration of the block to `part`, also if the block raises."""
         began = perf_counter()
         try:
             yield

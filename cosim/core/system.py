@@ -1,7 +1,4 @@
-"""A system: components, the connections between their variables, and the order in which they step.
-
-Pure data, checked as a whole: `System.problems` finds everything that is wrong with the wiring in one go.
-"""
+"""Components, the connections between their variables, and the order in which they step."""
 
 from __future__ import annotations
 
@@ -32,7 +29,14 @@ class Endpoint(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """The value of an output goes to an input, `delay` macro steps late; `where` says who asked for it."""
+    """Connection of an output to an input.
+
+    Attributes:
+        source: The output.
+        target: The input.
+        delay: Number of macro steps by which the value is delayed.
+        where: Location in the scenario file, for messages.
+    """
 
     source: Endpoint
     target: Endpoint
@@ -40,16 +44,17 @@ class Connection:
     where: str = ""
 
 
-#: whether the components of a stage step at the same time, on threads: where it pays, always, or never
+#: parallel execution of the components of a stage on threads: if it is faster, always, or never
 Parallel = Literal["auto", True, False]
 
 
 @dataclass(frozen=True, slots=True)
 class Iteration:
-    """Stages are repeated from the same state until no connected output among them changes any more.
+    """Repetition of the stages of a group from the same state until their connected outputs converge.
 
-    A number y has stopped changing when it differs from its last value by at most tolerance * (1 + |y|). It is an error when
-    that takes more than `limit` rounds.
+    Attributes:
+        tolerance: A value y has converged if it differs from its previous value by at most tolerance * (1 + |y|).
+        max_rounds: Number of rounds without convergence after which the run fails.
     """
 
     tolerance: float
@@ -58,7 +63,7 @@ class Iteration:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Components that step in stages of their own inside one place of an outer stage (a nested system)."""
+    """Nested system: components with their own stages, which together are one member of an outer stage."""
 
     name: str
     stages: tuple[Stage, ...]
@@ -70,7 +75,7 @@ Stage = tuple["str | Group", ...]
 
 
 def component_names(stages: Iterable[Stage]) -> Iterator[str]:
-    """Names of all components in the stages, groups opened."""
+    """Yield the names of all components in the stages and the groups inside them."""
     for stage in stages:
         for member in stage:
             if isinstance(member, Group):
@@ -80,7 +85,7 @@ def component_names(stages: Iterable[Stage]) -> Iterator[str]:
 
 
 def iterate_groups(stages: Iterable[Stage]) -> Iterator[Group]:
-    """All groups in the stages, also those inside groups."""
+    """Yield all groups in the stages, also those inside groups."""
     for member in (member for stage in stages for member in stage):
         if isinstance(member, Group):
             yield member
@@ -88,7 +93,7 @@ def iterate_groups(stages: Iterable[Stage]) -> Iterator[Group]:
 
 
 class VariableElement(NamedTuple):
-    """The variable a slot belongs to, and the element's index in it (row-major)."""
+    """A variable and the index of one of its elements (row-major)."""
 
     variable: Variable
     element: int
@@ -96,11 +101,16 @@ class VariableElement(NamedTuple):
 
 @dataclass(frozen=True)
 class System:
-    """What is simulated. Stages step one after the other; the components of a stage step side by side.
+    """Components with their connections and stages.
 
-    `start_values` holds parameters and start values by component and variable name; `periods` the components that step
-    less often than every macro step (s); `aliases` further names under which outputs are recorded. `parallel`: whether the
-    components of a stage step at the same time, with the same result.
+    Attributes:
+        components: All components by name.
+        connections: Connections between their variables.
+        stages: Stages, which step one after the other. Outputs reach other components of the same stage in the next macro step.
+        periods: Periods (s) of components that step less often than every macro step.
+        start_values: Parameters and start values by component and variable name.
+        aliases: Additional names under which outputs are recorded.
+        parallel: Parallel execution of the components of a stage; does not change the results.
     """
 
     components: Mapping[str, Component]
@@ -113,7 +123,7 @@ class System:
 
     @cached_property
     def slots(self) -> Mapping[str, Mapping[str, VariableElement]]:
-        """Every slot of every component, by component and slot name."""
+        """Every scalar of every component, by component name and scalar name."""
         return {
             name: {
                 slot: VariableElement(variable, i)
@@ -124,10 +134,11 @@ class System:
         }
 
     def find_element(self, endpoint: Endpoint) -> VariableElement:
+        """Return the variable and element of an existing endpoint."""
         return self.slots[endpoint.component][endpoint.scalar]
 
     def problems(self) -> list[Problem]:
-        """Everything that is wrong with connections and stages; empty when the system can run."""
+        """Return all errors of connections and stages; empty if the system can run."""
         return [*self._find_stage_problems(), *self._find_connection_problems()]
 
     def _find_stage_problems(self) -> Iterator[Problem]:
@@ -137,7 +148,7 @@ class System:
             if name not in self.components:
                 yield Problem(f'unknown component "{name}"{did_you_mean(name, self.components)}', subject=subject)
             elif name in seen:
-                yield Problem(f'component "{name}" stands in the stages twice', subject=subject)
+                yield Problem(f'component "{name}" is in the stages twice', subject=subject)
             seen.add(name)
         for group in iterate_groups(self.stages):
             if group.iteration:
@@ -156,17 +167,17 @@ class System:
                 yield Problem(f'{repeated}, so "{name}" cannot have a period of its own', subject=("components", name, "period"))
 
     def _find_connection_problems(self) -> Iterator[Problem]:
-        fed: dict[Endpoint, Connection] = {}
+        by_target: dict[Endpoint, Connection] = {}
         for connection in self.connections:
             source = self._find_endpoint_problem(connection.source, "output")
             target = self._find_endpoint_problem(connection.target, "input")
             if source or target:
                 yield from (Problem(text, connection.where) for text in (source, target) if text)
                 continue
-            if connection.target in fed:
-                first = fed[connection.target].source
+            if connection.target in by_target:
+                first = by_target[connection.target].source
                 yield Problem(f"input {connection.target} is connected twice: it is already fed by {first}", connection.where)
-            fed.setdefault(connection.target, connection)
+            by_target.setdefault(connection.target, connection)
             if text := incompatibility(
                 self.find_element(connection.source).variable, self.find_element(connection.target).variable
             ):
@@ -177,17 +188,17 @@ class System:
             return f'unknown component "{end.component}"{did_you_mean(end.component, self.components)}'
         slots = self.slots[end.component]
         if end.scalar not in slots:
-            valid = (name for name, place in slots.items() if place.variable.causality == causality)
+            valid = (name for name, element in slots.items() if element.variable.causality == causality)
             return f'component "{end.component}" has no variable "{end.scalar}"{did_you_mean(end.scalar, valid)}'
-        if (found := slots[end.scalar].variable.causality) != causality:
-            return f"{end} is of causality {found}, expected an {causality}"
+        if (actual := slots[end.scalar].variable.causality) != causality:
+            return f"{end} is of causality {actual}, expected an {causality}"
         return ""
 
 
 def incompatibility(source: Variable, target: Variable) -> str:
-    """Why a value of `source` cannot become one of `target`; "" when it can, if necessary with conversion."""
+    """Return the reason why values of `source` cannot be converted to `target`; "" if they can."""
     if not _is_convertible(source, target):
-        return f"type {source.type} does not become {target.type}"
+        return f"type {source.type} cannot be converted to {target.type}"
     if source.unit and target.unit and not source.unit.converts_to(target.unit):
         return f'units "{source.unit.name}" and "{target.unit.name}" measure different quantities'
     return ""

@@ -1,4 +1,4 @@
-"""Exact time: communication points are integers on a grid, seconds are made from them with one rounding."""
+"""Exact communication points: integers on a grid that are converted to seconds with one rounding."""
 
 from __future__ import annotations
 
@@ -9,17 +9,22 @@ from math import lcm
 
 import numpy as np
 
-#: integers up to this one are exact as floats
+#: all integers up to this one are exact as float64
 _MAX_EXACT_INTEGER = 2**53
 
-#: a number of seconds in text, or a fraction of two; few digits, because Fraction would write 1e999999999 in full
+#: a decimal number or a fraction; the number of digits is limited because Fraction expands 1e999999999
 _SECONDS_PATTERN = re.compile(r"[-+]?(\d{1,400}/\d{1,400}|(\d{1,400}\.?\d{0,400}|\.\d{1,400})([eE][-+]?\d{1,3})?)", re.ASCII)
 
 
 def exact_fraction(value: float | int | str | Fraction) -> Fraction:
-    """The number a person wrote: 0.01 is 1/100, "1/60" is a sixtieth.
+    """Return a number exactly as written: 0.01 becomes 1/100, "1/60" one sixtieth.
 
-    Raises ValueError for what is no finite number or no time in seconds that anybody could mean, ZeroDivisionError for "1/0".
+    Args:
+        value: A number, or a text with a decimal number or a fraction.
+
+    Raises:
+        ValueError: The value is no finite number, or its magnitude exceeds 2**53.
+        ZeroDivisionError: The denominator is zero.
     """
     if isinstance(value, str) and not _SECONDS_PATTERN.fullmatch(value.strip()):
         raise ValueError(f'expected a number or a fraction, found "{value:.40}"')
@@ -42,7 +47,16 @@ class TimeGrid:
 
     @classmethod
     def from_times(cls, start: Fraction, stop: Fraction, step: Fraction) -> TimeGrid:
-        """The grid from start to stop. Raises ValueError unless step > 0 divides stop - start > 0."""
+        """Return the grid from `start` to `stop`.
+
+        Args:
+            start: Start time (s).
+            stop: Stop time (s).
+            step: Step size (s).
+
+        Raises:
+            ValueError: `stop` is less than `start`, or `stop - start` is no multiple of a positive `step`.
+        """
         if step <= 0:
             raise ValueError(f"the step size must be positive, found {float(step)!r}")
         if stop < start:
@@ -56,31 +70,42 @@ class TimeGrid:
         return cls(start, step, int(count), denominator, int(start * denominator), int(step * denominator))
 
     def time_at(self, n: int) -> float:
-        """Time of communication point n: correctly rounded, whatever n is."""
+        """Return the time of communication point n (s), correctly rounded."""
         return (self._origin + n * self._stride) / self._denominator
 
     @property
     def integer_coefficients(self) -> dict[str, int]:
-        """The grid in whole numbers: n is at (origin + n * stride) / denominator s."""
+        """Coefficients of the time of communication point n: (origin + n * stride) / denominator, in s."""
         return {"origin": self._origin, "stride": self._stride, "denominator": self._denominator}
 
     def times(self, points: range) -> np.ndarray:
-        """Times of many communication points, shape (points,): the same numbers that `seconds` gives."""
+        """Return the times of communication points (s), shape (points,), bit-identical to `time_at`."""
         if not self.float_coefficients(points.stop):
             return np.array([self.time_at(n) for n in points], np.float64)
         n = np.arange(points.start, points.stop, points.step, dtype=np.int64)
         return (self._origin + n * self._stride) / self._denominator
 
     def float_coefficients(self, last: int) -> tuple[float, float, float] | None:
-        """(origin, stride, denominator): n is at (origin + n * stride) / denominator, exact in floats but for the division.
+        """Return origin, stride and denominator of the formula (origin + n * stride) / denominator in float64 arithmetic.
 
-        None when that does not hold for all points until `last`.
+        Args:
+            last: The last communication point for which the formula is needed.
+
+        Returns:
+            None if some operation other than the division would be inexact up to `last`.
         """
         largest = max(abs(self._origin), abs(self._origin + last * self._stride), last * self._stride, self._denominator)
         return (self._origin, self._stride, self._denominator) if largest <= _MAX_EXACT_INTEGER else None
 
     def index(self, time: Fraction) -> int:
-        """The n whose time is exactly `time`; beyond `count` after the end. Raises ValueError off the grid and before it."""
+        """Return the communication point at exactly `time` (s); it exceeds `count` after the end.
+
+        Args:
+            time: Time (s).
+
+        Raises:
+            ValueError: The time lies between two communication points or before the start.
+        """
         n = (time - self.start) / self.step
         if n.denominator != 1:
             raise ValueError(f"{float(time)!r} s lies between two communication points ({float(self.step)!r} s apart)")

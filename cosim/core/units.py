@@ -1,7 +1,7 @@
 """Physical units as FMI defines them: exponents of the SI base units, a factor and an offset.
 
-A value in a unit becomes SI by `si = factor * value + offset` (FMI 2.0 section 2.2.2, FMI 3.0 section 2.4.3).
-FMUs bring their own definitions; `parse` reads the Modelica/FMI unit syntax ("kg.m2/s3") for everything else.
+A value is converted to SI by `si = factor * value + offset` (FMI 2.0 section 2.2.2, FMI 3.0 section 2.4.3).
+FMUs define their own units; `parse_unit` reads the Modelica/FMI unit syntax ("kg.m2/s3") of other texts.
 """
 
 from __future__ import annotations
@@ -16,7 +16,14 @@ BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A named unit; two units can be converted if and only if their exponents are equal."""
+    """Named unit.
+
+    Attributes:
+        name: Name in Modelica syntax.
+        exponents: Exponents of `BASE_UNITS`; units with equal exponents can be converted into each other.
+        factor: Factor of the conversion to SI.
+        offset: Offset of the conversion to SI, in SI units.
+    """
 
     name: str
     exponents: tuple[int, ...] = (0,) * len(BASE_UNITS)
@@ -24,11 +31,11 @@ class Unit:
     offset: float = 0.0
 
     def converts_to(self, other: Unit) -> bool:
-        """Whether both measure the same quantity."""
+        """Return whether both units measure the same quantity."""
         return self.exponents == other.exponents
 
     def conversion(self, other: Unit) -> tuple[float, float]:
-        """(factor, offset) with `value in other = factor * value in self + offset`; exactly (1.0, 0.0) for equal units."""
+        """Return (factor, offset) of other = factor * self + offset; exactly (1.0, 0.0) for equal units."""
         return self.factor / other.factor, (self.offset - other.offset) / other.factor
 
 
@@ -71,9 +78,13 @@ _FACTOR_PATTERN = re.compile(r"(1|[A-Za-z%]+)([+-]?\d+)?")
 
 
 def parse_unit(text: str) -> Unit:
-    """The unit written in `text` in Modelica syntax: "kg.m/s2", "m.s-1", "W/(m2.K)".
+    """Parse a unit in Modelica syntax such as "kg.m/s2", "m.s-1" or "W/(m2.K)".
 
-    Raises ValueError when the text cannot be read or holds an unknown unit.
+    Args:
+        text: The unit.
+
+    Raises:
+        ValueError: The syntax is wrong or a unit is unknown.
     """
     if text in KNOWN_UNITS:
         return KNOWN_UNITS[text]
@@ -85,17 +96,27 @@ def parse_unit(text: str) -> Unit:
 
 
 def _split_factors(text: str) -> list[tuple[str, int]]:
-    """The factors of a unit as they are written, and whether each stands above (1) or below the line (-1)."""
-    above, slash, below = text.partition("/")
-    if slash and below.startswith("(") and below.endswith(")"):
-        below = below[1:-1]
-    return [(part, 1) for part in above.split(".")] + [(part, -1) for part in below.split(".") if slash]
+    """Return the factors of a unit, each with 1 for the numerator or -1 for the denominator."""
+    numerator, slash, denominator = text.partition("/")
+    if slash and denominator.startswith("(") and denominator.endswith(")"):
+        denominator = denominator[1:-1]
+    return [(part, 1) for part in numerator.split(".")] + [(part, -1) for part in denominator.split(".") if slash]
 
 
 def multiply_units(units: Iterable[tuple[str, int]]) -> str:
-    """The product of units and their powers, in Modelica syntax: [("m/s", 2), ("s", 1)] is "m2/s", what cancels out "1".
+    """Return the product of units raised to powers, in Modelica syntax.
 
-    Raises ValueError for a unit whose syntax cannot be read.
+    >>> multiply_units([("m/s", 2), ("s", 1)])
+    'm2/s'
+
+    Args:
+        units: Pairs of unit and power.
+
+    Returns:
+        The product, "1" if all factors cancel out.
+
+    Raises:
+        ValueError: The syntax of a unit is wrong.
     """
     powers: dict[str, int] = {}
     for text, power in units:
@@ -105,13 +126,15 @@ def multiply_units(units: Iterable[tuple[str, int]]) -> str:
                 raise ValueError(f'cannot read the unit "{text}" at "{part}"')
             powers[match.group(1)] = powers.get(match.group(1), 0) + sign * power * int(match.group(2) or 1)
     powers.pop("1", None)
-    above, below = ([f"{unit}{abs(n) if abs(n) > 1 else ''}" for unit, n in powers.items() if sign * n > 0] for sign in (1, -1))
-    divisor = f"({'.'.join(below)})" if len(below) > 1 else "".join(below)
-    return (".".join(above) or "1") + (f"/{divisor}" if below else "")
+    numerator, denominator = (
+        [f"{unit}{abs(n) if abs(n) > 1 else ''}" for unit, n in powers.items() if sign * n > 0] for sign in (1, -1)
+    )
+    divisor = f"({'.'.join(denominator)})" if len(denominator) > 1 else "".join(denominator)
+    return (".".join(numerator) or "1") + (f"/{divisor}" if denominator else "")
 
 
 def _parse_factor(text: str, whole: str) -> tuple[Unit, int]:
-    """One factor of a unit, "m2", as known unit and power."""
+    """Return known unit and power of one factor such as "m2"; `whole` is the unit it belongs to, for messages."""
     match = _FACTOR_PATTERN.fullmatch(text)
     if match is None:
         raise ValueError(f'cannot read the unit "{whole}" at "{text}"')

@@ -1,12 +1,13 @@
-"""The flat plan of a system and its executors."""
+"""The flat plan of a system and the executors that run it."""
 
 from typing import Literal
 
-from .executor import MARKER_SIZE, Executor, Termination
+from .executor import Executor
 from .native_executor import NativeExecutor, native_available
 from .plan import Plan, compile_plan
 from .python_executor import PythonExecutor
 from .recorder import Recorder
+from .step_runner import Termination
 
 ExecutorKind = Literal["auto", "native", "python"]
 
@@ -14,21 +15,26 @@ EXECUTORS: dict[str, type[Executor]] = {"native": NativeExecutor, "python": Pyth
 
 
 def executor_class(kind: ExecutorKind) -> type[Executor]:
-    """The executor of that kind; "auto" is the native one where it was built. Raises ValueError where it was not."""
+    """Return the executor class of this kind; "auto" is the native executor if it was built.
+
+    Raises:
+        ValueError: the native executor is required but was not built.
+    """
     if kind == "native" and not native_available():
-        raise ValueError("the native executor was not built: install cosim where a C compiler is found")
-    return EXECUTORS["python" if kind == "auto" and not native_available() else "native" if kind == "auto" else kind]
+        raise ValueError("the native executor was not built: install cosim on a machine with a C compiler")
+    if kind == "auto":
+        return EXECUTORS["native" if native_available() else "python"]
+    return EXECUTORS[kind]
 
 
 __all__ = [
     "EXECUTORS",
-    "MARKER_SIZE",
     "Executor",
     "ExecutorKind",
     "Plan",
     "Recorder",
     "Termination",
-    "native_available",
     "compile_plan",
     "executor_class",
+    "native_available",
 ]

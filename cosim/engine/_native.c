@@ -1,7 +1,7 @@
-/* The native executor: runs macro steps of a plan that was laid out as a list of operations.
+/* The native executor: runs the macro steps of a plan that is given as a flat list of operations.
 
-   Nothing is looked up or allocated while it runs. Addresses come from cosim/engine/native_executor.py, which also keeps what they
-   point to alive. Values, order and rounding are those of the pure Python executor, bit for bit.                            */
+   The stepping loop does no lookup and no allocation. All addresses come from cosim/engine/native_executor.py, which keeps the
+   memory behind them alive. Results are bit-identical to those of the pure Python executor (values, order, rounding).        */
 
 #define PY_SSIZE_T_CLEAN
 #define Py_LIMITED_API 0x030B0000
@@ -14,101 +14,107 @@
 
 #if defined(__x86_64__) || defined(_M_X64)
 #include <xmmintrin.h>
-#define FLOAT_CONTROL 0xFFC0u /* rounding, flush to zero, denormals are zero, traps: all but the sticky flags */
-static unsigned float_state(void) { return _mm_getcsr() & FLOAT_CONTROL; }
-static void set_float_state(unsigned state) { _mm_setcsr((_mm_getcsr() & ~FLOAT_CONTROL) | state); }
+#define FLOAT_CONTROL_MASK 0xFFC0u /* MXCSR: rounding, flush to zero, denormals are zero, traps; not the sticky flags */
+static unsigned float_mode(void) { return _mm_getcsr() & FLOAT_CONTROL_MASK; }
+static void set_float_mode(unsigned mode) { _mm_setcsr((_mm_getcsr() & ~FLOAT_CONTROL_MASK) | mode); }
 #else
 #include <fenv.h>
-static unsigned float_state(void) { return (unsigned)fegetround(); }
-static void set_float_state(unsigned state) { fesetround((int)state); }
+static unsigned float_mode(void) { return (unsigned)fegetround(); }
+static void set_float_mode(unsigned mode) { fesetround((int)mode); }
 #endif
 
-enum { WARNING = 1, DISCARD = 2 };                      /* FMI statuses; OK is 0, everything else is bad */
-enum { AFTER_STEP = 1, WITHOUT_STEP = 2 };              /* the simulation ends with this macro step, or with the one before */
-/* what is reported beside FMI statuses, and an exception of Python: no FMU can return these, whatever it returns */
-static const int64_t FLOAT_STATE_CHANGED = INT64_C(1) << 33, NOT_FINITE = INT64_C(1) << 34, RAISED = INT64_MIN;
-enum { TRIALS = 3 };                                    /* so often the duration of a doStep is measured */
-enum { LOOK = 50000000, OPERATION = 20 };               /* ns between two looks for signals; of an operation, about */
+enum { WARNING = 1, DISCARD = 2 };                   /* FMI statuses; 0 is OK, everything but OK and WARNING is bad */
+/* Codes passed to `on_status` like an FMI status. They exceed 32 bits, so no FMU can return them. */
+#define FLOAT_MODE_CHANGED (INT64_C(1) << 33)
+#define NOT_FINITE (INT64_C(1) << 34)
+#define PYTHON_EXCEPTION INT64_MIN
+enum { CONTINUE = 0, END_AFTER_STEP = 1, END_BEFORE_STEP = 2 }; /* answers of `on_status`; the last one discards the macro step */
+enum { MARKER_CALL = 0, MARKER_STEPS = 1, MARKER_ROWS = 2 };    /* marker: number of the current call, completed steps, rows */
+enum { MEASURED_STEPS = 3 };                         /* the first doStep calls of each instance, whose durations are measured */
+enum { SIGNAL_CHECK_INTERVAL = 50000000, OPERATION_DURATION = 20 }; /* ns; estimated duration of one operation */
 
-/* The C functions of FMI 2.0 and 3.0 that a step calls; values are of any type. */
-typedef int Access2(void *instance, const uint32_t *references, size_t count, void *values);
-typedef int Access3(void *instance, const uint32_t *references, size_t count, void *values, size_t size);
-typedef int Step2(void *instance, double time, double step_size, int no_set_state);
-typedef int Step3(void *instance, double time, double step_size, bool no_set_state, bool *event, bool *terminate, bool *early,
-                  double *reached);
+/* C functions of FMI 2.0 and FMI 3.0; `values` has the element type of the function. */
+typedef int Fmi2GetSet(void *instance, const uint32_t *value_references, size_t count, void *values);
+typedef int Fmi3GetSet(void *instance, const uint32_t *value_references, size_t count, void *values, size_t value_count);
+typedef int Fmi2DoStep(void *instance, double time, double step_size, int no_set_state);
+typedef int Fmi3DoStep(void *instance, double time, double step_size, bool no_set_state, bool *event_needed, bool *terminate,
+                       bool *early_return, double *last_successful_time);
 
-typedef struct {                /* target[i] = factor[i] * source[i] + offset[i], late by `delay` macro steps */
+typedef struct {                /* target[i] = factor[i] * source[i] + offset[i], `delay` macro steps late */
     char *target, *source;
-    char target_kind, source_kind; /* as in Python's struct module */
-    const Py_ssize_t *target_indices, *source_indices; /* none: consecutive */
+    char target_kind, source_kind;                     /* format characters of Python's struct module */
+    const Py_ssize_t *target_indices, *source_indices; /* NULL: consecutive elements */
     Py_ssize_t count;
-    const double *factor, *offset; /* none: copied */
-    char *ring;
-    Py_ssize_t delay, oldest;
-} Move;
+    const double *factor, *offset;                     /* NULL: no unit conversion */
+    char *ring;                                        /* `delay` rows of source values */
+    Py_ssize_t delay, oldest;                          /* oldest: index of the oldest row */
+} Transfer;
 
 typedef struct {
-    bool *flags;                /* event, terminate, early return */
-    double *reached;
-    int64_t shortest;           /* ns */
-    int trials;
-} StepMemory;
+    bool *flags;                /* eventHandlingNeeded, terminateSimulation, earlyReturn */
+    double *last_successful_time;
+    int64_t shortest_ns;
+    int measurements_left;
+} DoStepData;
 
-typedef enum { COPY, MOVE, EVERY, TURNS, ACCESS2, ACCESS3, STEP2, STEP3, FLAGS, PYTHON } Kind;
+typedef enum {
+    INDEXED_COPY, TRANSFER, STEP_BEGIN, PACKED_STEPS, GET_SET2, GET_SET3, DO_STEP2, DO_STEP3, FLAG_CHECK, PYTHON_CALL
+} OperationKind;
 
-/* What nearly every turn is, packed: set, doStep, get of one FMU. */
+/* The most frequent step in compact form: set, doStep and get of one FMU. */
 typedef struct {
-    void *instance, *set, *step, *get, *set_values, *get_values;
+    void *instance, *set, *do_step, *get, *set_values, *get_values;
     const uint32_t *set_references, *get_references;
-    uint32_t set_count, get_count, set_size, get_size;
+    uint32_t set_reference_count, get_reference_count, set_value_count, get_value_count;
     double step_size;
-    const StepMemory *memory;
-    int version, number;        /* of FMI; of the first call */
-} UsualTurn;
+    const DoStepData *data;
+    int fmi_version, first_call;
+} PackedStep;
 
 typedef struct {
-    Kind kind;
-    int number;                 /* of the call, for marker and messages */
-    Py_ssize_t after;           /* of EVERY and TURNS: first operation after the turns */
+    OperationKind kind;
+    int call_number;
+    Py_ssize_t end;             /* STEP_BEGIN, PACKED_STEPS: index of the first operation after the step or steps */
     void *function, *instance;
     union {
-        struct { const uint32_t *references; size_t count; void *values; size_t size; } access;
-        struct { StepMemory *memory; double size; } step;
-        Move *move;
-        struct { const UsualTurn *first, *end; } turns;
+        struct { const uint32_t *references; size_t reference_count; void *values; size_t value_count; } get_set;
+        struct { DoStepData *data; double step_size; } do_step;
+        Transfer *transfer;
+        struct { const PackedStep *first, *end; } packed;
         struct { PyObject *callable, *arguments; } python;
         int64_t divisor;
     };
 } Operation;
 
-typedef struct { const char *source; const Py_ssize_t *indices; Py_ssize_t count, width, position; } Piece;
+typedef struct { const char *source; const Py_ssize_t *indices; Py_ssize_t count, item_size, position; } RowPart;
 
 typedef struct {
     PyObject_HEAD
     Operation *operations;
-    Py_ssize_t count, capacity, turn; /* turn: where the present turn began while building */
-    double *clock;
-    volatile int64_t *marker;   /* number of the present call, macro steps finished, rows recorded */
+    Py_ssize_t count, capacity;
+    Py_ssize_t step_start;      /* index of the STEP_BEGIN of the step that is being added */
+    double *current_time;
+    volatile int64_t *marker;
     PyObject *on_status, *record;
-    unsigned float_state;
-    const uint64_t *doubles;    /* bits of the values that must stay finite */
+    unsigned float_mode;
+    const uint64_t *doubles;    /* bit patterns of the monitored floats */
     const uint32_t *singles;
-    Py_ssize_t doubles_count, singles_count;
-    const char *block;          /* recorded as a whole, or in pieces */
-    Py_ssize_t block_size, every, row_size;
-    Piece *pieces;
-    Py_ssize_t piece_count;
-    char *row;
-    UsualTurn *turns;
-    uint32_t *references;       /* of the usual turns */
-    int packed;
-    PyThreadState *thread;      /* while the interpreter lock is released */
-    long end;                   /* whether a component asked to end the simulation, and when */
+    Py_ssize_t double_count, single_count;
+    const char *buffer;         /* copied whole into every row; NULL: rows consist of row parts */
+    Py_ssize_t buffer_size, record_every, row_size;
+    RowPart *row_parts;
+    Py_ssize_t row_part_count;
+    char *row;                  /* address of the next row */
+    PackedStep *packed_steps;
+    uint32_t *references;       /* value references of the packed steps */
+    int is_packed;
+    PyThreadState *thread_state; /* saved while the interpreter lock is released */
+    long end_request;           /* highest answer of `on_status` so far */
 } Program;
 
 /* ---- values ---------------------------------------------------------------------------------------------------------- */
 
-static Py_ssize_t width(char kind) {
+static Py_ssize_t item_size(char kind) {
     switch (kind) {
     case 'd': case 'q': case 'Q': return 8;
     case 'f': case 'i': case 'I': return 4;
@@ -137,11 +143,11 @@ static int64_t as_integer(const char *values, char kind, Py_ssize_t i) {
     switch (kind) {
     case 'q': return ((const int64_t *)values)[i];
     case 'Q': return (int64_t)((const uint64_t *)values)[i];
-    default: return (int64_t)as_double(values, kind, i); /* exact: 32 bits or fewer */
+    default: return (int64_t)as_double(values, kind, i); /* exact: at most 32 bits */
     }
 }
 
-static void put_integer(char *values, char kind, Py_ssize_t i, int64_t value) {
+static void store_integer(char *values, char kind, Py_ssize_t i, int64_t value) {
     switch (kind) {
     case 'b': ((int8_t *)values)[i] = (int8_t)value; break;
     case 'B': ((uint8_t *)values)[i] = (uint8_t)value; break;
@@ -155,352 +161,370 @@ static void put_integer(char *values, char kind, Py_ssize_t i, int64_t value) {
     }
 }
 
-static void copy_one(const Move *m, char *target, const char *source, Py_ssize_t i, Py_ssize_t to, Py_ssize_t from) {
-    if (m->target_kind == 'd' || m->target_kind == 'f') {
-        double value = as_double(source, m->source_kind, from);
-        if (m->factor) value = m->factor[i] * value + m->offset[i];
-        if (m->target_kind == 'd') ((double *)target)[to] = value;
+/* target[to] = source[from], converted by element `i` of factor and offset. */
+static void convert_value(const Transfer *transfer, char *target, const char *source, Py_ssize_t i, Py_ssize_t to,
+                          Py_ssize_t from) {
+    if (transfer->target_kind == 'd' || transfer->target_kind == 'f') {
+        double value = as_double(source, transfer->source_kind, from);
+        if (transfer->factor) value = transfer->factor[i] * value + transfer->offset[i];
+        if (transfer->target_kind == 'd') ((double *)target)[to] = value;
         else ((float *)target)[to] = (float)value;
     } else {
-        put_integer(target, m->target_kind, to, as_integer(source, m->source_kind, from));
+        store_integer(target, transfer->target_kind, to, as_integer(source, transfer->source_kind, from));
     }
 }
 
-static void convert(const Move *m, char *target, const Py_ssize_t *to, const char *source, const Py_ssize_t *from) {
-    for (Py_ssize_t i = 0; i < m->count; i++) copy_one(m, target, source, i, to ? to[i] : i, from ? from[i] : i);
+static void convert_values(const Transfer *transfer, char *target, const Py_ssize_t *target_indices, const char *source,
+                           const Py_ssize_t *source_indices) {
+    for (Py_ssize_t i = 0; i < transfer->count; i++)
+        convert_value(transfer, target, source, i, target_indices ? target_indices[i] : i,
+                      source_indices ? source_indices[i] : i);
 }
 
-static void move(Move *m) {
-    if (!m->delay) {
-        convert(m, m->target, m->target_indices, m->source, m->source_indices);
+static void run_transfer(Transfer *transfer) {
+    if (!transfer->delay) {
+        convert_values(transfer, transfer->target, transfer->target_indices, transfer->source, transfer->source_indices);
         return;
     }
-    Py_ssize_t size = width(m->source_kind);
-    char *oldest = m->ring + m->oldest * m->count * size;
-    convert(m, m->target, m->target_indices, oldest, NULL);
-    for (Py_ssize_t i = 0; i < m->count; i++)
-        memcpy(oldest + i * size, m->source + (m->source_indices ? m->source_indices[i] : i) * size, (size_t)size);
-    m->oldest = (m->oldest + 1) % m->delay;
+    Py_ssize_t size = item_size(transfer->source_kind);
+    char *oldest = transfer->ring + transfer->oldest * transfer->count * size;
+    convert_values(transfer, transfer->target, transfer->target_indices, oldest, NULL);
+    const Py_ssize_t *indices = transfer->source_indices;
+    for (Py_ssize_t i = 0; i < transfer->count; i++)
+        memcpy(oldest + i * size, transfer->source + (indices ? indices[i] : i) * size, (size_t)size);
+    transfer->oldest = (transfer->oldest + 1) % transfer->delay;
 }
 
 static bool all_finite(const Program *p) {
     const uint64_t exponent = UINT64_C(0x7FF0000000000000);
     const uint32_t exponent_single = UINT32_C(0x7F800000);
-    uint64_t found = 0;
-    for (Py_ssize_t i = 0; i < p->doubles_count; i++) found |= (p->doubles[i] & exponent) == exponent;
-    for (Py_ssize_t i = 0; i < p->singles_count; i++) found |= (p->singles[i] & exponent_single) == exponent_single;
-    return !found;
+    uint64_t not_finite = 0;
+    for (Py_ssize_t i = 0; i < p->double_count; i++) not_finite |= (p->doubles[i] & exponent) == exponent;
+    for (Py_ssize_t i = 0; i < p->single_count; i++) not_finite |= (p->singles[i] & exponent_single) == exponent_single;
+    return !not_finite;
 }
 
 /* ---- running --------------------------------------------------------------------------------------------------------- */
 
-/* Macro steps run without the interpreter lock: FMUs may take their time, and may call back from threads of their own. */
-static void enter_python(Program *p) { PyEval_RestoreThread(p->thread); }
-static void leave_python(Program *p) { p->thread = PyEval_SaveThread(); }
+/* Macro steps run without the interpreter lock: FMUs may log from their own threads, and other Python threads continue. */
+static void acquire_gil(Program *p) { PyEval_RestoreThread(p->thread_state); }
+static void release_gil(Program *p) { p->thread_state = PyEval_SaveThread(); }
 
 static inline int is_bad(int64_t status) { return status != 0 && status != WARNING; }
 
-/* Tell Python; returns -1 with an exception set when the run has failed. Otherwise the turn goes on. */
-static int report(Program *p, int number, int64_t status) {
-    enter_python(p);
-    PyObject *answer = PyObject_CallFunction(p->on_status, "iL", number, (long long)status);
-    long end = answer ? PyLong_AsLong(answer) : -1;
-    if (end > p->end) p->end = end;
+/* Pass a status to `on_status`. Returns -1 with a Python exception set if the run has failed; otherwise the step continues. */
+static int report_status(Program *p, int call_number, int64_t status) {
+    acquire_gil(p);
+    PyObject *answer = PyObject_CallFunction(p->on_status, "iL", call_number, (long long)status);
+    long end_request = answer ? PyLong_AsLong(answer) : -1;
+    if (end_request > p->end_request) p->end_request = end_request;
     Py_XDECREF(answer);
-    leave_python(p);
-    return end < 0 ? -1 : 0;
+    release_gil(p);
+    return end_request < 0 ? -1 : 0;
 }
 
-static int64_t nanoseconds(void) {
+static int64_t monotonic_ns(void) {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
     return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
 }
 
-static int step_once(const Operation *op, double time) {
-    StepMemory *m = op->step.memory;
-    if (op->kind == STEP2) return ((Step2 *)op->function)(op->instance, time, op->step.size, 1);
-    return ((Step3 *)op->function)(op->instance, time, op->step.size, true, m->flags, m->flags + 1, m->flags + 2, m->reached);
+static int call_do_step(const Operation *op, double time) {
+    DoStepData *data = op->do_step.data;
+    if (op->kind == DO_STEP2) return ((Fmi2DoStep *)op->function)(op->instance, time, op->do_step.step_size, 1);
+    return ((Fmi3DoStep *)op->function)(op->instance, time, op->do_step.step_size, true, data->flags, data->flags + 1,
+                                        data->flags + 2, data->last_successful_time);
 }
 
-static int step(const Operation *op, double time) {
-    StepMemory *m = op->step.memory;
-    if (!m->trials) return step_once(op, time);
-    int64_t began = nanoseconds();
-    int status = step_once(op, time);
-    int64_t took = nanoseconds() - began;
-    if (took < m->shortest) m->shortest = took;
-    m->trials--;
+static int measured_do_step(const Operation *op, double time) {
+    DoStepData *data = op->do_step.data;
+    if (!data->measurements_left) return call_do_step(op, time);
+    int64_t start = monotonic_ns();
+    int status = call_do_step(op, time);
+    int64_t duration = monotonic_ns() - start;
+    if (duration < data->shortest_ns) data->shortest_ns = duration;
+    data->measurements_left--;
     return status;
 }
 
-/* Returns a status, or RAISED. */
-static int64_t call_python(Program *p, const Operation *op) {
-    enter_python(p);
+/* Returns a status or PYTHON_EXCEPTION. */
+static int64_t run_python_call(Program *p, const Operation *op) {
+    acquire_gil(p);
     PyObject *result = PyObject_Call(op->python.callable, op->python.arguments, NULL);
-    int64_t status = result ? PyLong_AsLongLong(result) : RAISED;
-    if (PyErr_Occurred()) status = RAISED;
+    int64_t status = result ? PyLong_AsLongLong(result) : PYTHON_EXCEPTION;
+    if (PyErr_Occurred()) status = PYTHON_EXCEPTION;
     Py_XDECREF(result);
-    leave_python(p);
+    release_gil(p);
     return status;
 }
 
-static inline int access2(const Operation *op) {
-    return ((Access2 *)op->function)(op->instance, op->access.references, op->access.count, op->access.values);
+static inline int get_set2(const Operation *op) {
+    return ((Fmi2GetSet *)op->function)(op->instance, op->get_set.references, op->get_set.reference_count, op->get_set.values);
 }
 
-static inline int access3(const Operation *op) {
-    return ((Access3 *)op->function)(op->instance, op->access.references, op->access.count, op->access.values, op->access.size);
+static inline int get_set3(const Operation *op) {
+    return ((Fmi3GetSet *)op->function)(op->instance, op->get_set.references, op->get_set.reference_count, op->get_set.values,
+                                        op->get_set.value_count);
 }
 
-static inline int look_at(const Operation *op) {
-    const bool *flags = op->step.memory->flags;
+static inline int check_flags(const Operation *op) {
+    const bool *flags = op->do_step.data->flags;
     return flags[0] | flags[1] | flags[2] ? DISCARD : 0;
 }
 
-static int64_t call(Program *p, const Operation *op, double time) {
+static int64_t run_operation(Program *p, const Operation *op, double time) {
     switch (op->kind) {
-    case ACCESS2: return access2(op);
-    case ACCESS3: return access3(op);
-    case FLAGS: return look_at(op);
-    case PYTHON: return call_python(p, op);
-    default: return step(op, time);
+    case GET_SET2: return get_set2(op);
+    case GET_SET3: return get_set3(op);
+    case FLAG_CHECK: return check_flags(op);
+    case PYTHON_CALL: return run_python_call(p, op);
+    default: return measured_do_step(op, time);
     }
 }
 
-static int float_state_changed(Program *p, int number) {
-    set_float_state(p->float_state);
-    return report(p, number, FLOAT_STATE_CHANGED);
+static int report_float_mode_changed(Program *p, int call_number) {
+    set_float_mode(p->float_mode);
+    return report_status(p, call_number, FLOAT_MODE_CHANGED);
 }
 
-/* The operations of one turn, one after the other. */
-static int turn(Program *p, Operation *op, const Operation *end, double time) {
+/* Run the operations of one step, in order. */
+static int run_step(Program *p, Operation *op, const Operation *end, double time) {
     for (; op < end; op++) {
-        p->marker[0] = op->number;
-        int64_t status = call(p, op, time);
-        if (status == RAISED) return -1;
-        if (float_state() != p->float_state && float_state_changed(p, op->number) < 0) return -1;
-        if (is_bad(status) && report(p, op->number, status) < 0) return -1;
+        p->marker[MARKER_CALL] = op->call_number;
+        int64_t status = run_operation(p, op, time);
+        if (status == PYTHON_EXCEPTION) return -1;
+        if (float_mode() != p->float_mode && report_float_mode_changed(p, op->call_number) < 0) return -1;
+        if (is_bad(status) && report_status(p, op->call_number, status) < 0) return -1;
     }
     return 0;
 }
 
-static int bad(Program *p, int number, int64_t status) {
-    if (float_state() != p->float_state && float_state_changed(p, number) < 0) return -1;
-    return report(p, number, status);
+static int report_bad_status(Program *p, int call_number, int64_t status) {
+    if (float_mode() != p->float_mode && report_float_mode_changed(p, call_number) < 0) return -1;
+    return report_status(p, call_number, status);
 }
 
-/* As `turn`, without looking at each operation. */
-static inline int usual_turn(Program *p, const UsualTurn *t, double time) {
+/* Like `run_step`, but without a switch per operation, and with one check of the floating-point mode per step. */
+static inline int run_packed_step(Program *p, const PackedStep *s, double time) {
     volatile int64_t *marker = p->marker;
-    const int two = t->version == 2;
-    marker[0] = t->number;
-    int status = two ? ((Access2 *)t->set)(t->instance, t->set_references, t->set_count, t->set_values)
-                     : ((Access3 *)t->set)(t->instance, t->set_references, t->set_count, t->set_values, t->set_size);
-    if (is_bad(status) && bad(p, t->number, status) < 0) return -1;
-    marker[0] = t->number + 1;
-    if (two) {
-        status = ((Step2 *)t->step)(t->instance, time, t->step_size, 1);
+    const int fmi2 = s->fmi_version == 2;
+    marker[MARKER_CALL] = s->first_call;
+    int status = fmi2 ? ((Fmi2GetSet *)s->set)(s->instance, s->set_references, s->set_reference_count, s->set_values)
+                      : ((Fmi3GetSet *)s->set)(s->instance, s->set_references, s->set_reference_count, s->set_values,
+                                               s->set_value_count);
+    if (is_bad(status) && report_bad_status(p, s->first_call, status) < 0) return -1;
+    marker[MARKER_CALL] = s->first_call + 1;
+    if (fmi2) {
+        status = ((Fmi2DoStep *)s->do_step)(s->instance, time, s->step_size, 1);
     } else {
-        bool *flags = t->memory->flags;
-        status = ((Step3 *)t->step)(t->instance, time, t->step_size, true, flags, flags + 1, flags + 2, t->memory->reached);
-        if (!is_bad(status) && (flags[0] | flags[1] | flags[2]) && bad(p, t->number + 2, DISCARD) < 0) return -1;
+        bool *flags = s->data->flags;
+        status = ((Fmi3DoStep *)s->do_step)(s->instance, time, s->step_size, true, flags, flags + 1, flags + 2,
+                                            s->data->last_successful_time);
+        if (!is_bad(status) && (flags[0] | flags[1] | flags[2]) && report_bad_status(p, s->first_call + 2, DISCARD) < 0)
+            return -1;
     }
-    if (is_bad(status) && bad(p, t->number + 1, status) < 0) return -1;
-    const int last = t->number + (two ? 2 : 3);
-    marker[0] = last;
-    status = two ? ((Access2 *)t->get)(t->instance, t->get_references, t->get_count, t->get_values)
-                 : ((Access3 *)t->get)(t->instance, t->get_references, t->get_count, t->get_values, t->get_size);
-    if (is_bad(status) && bad(p, last, status) < 0) return -1;
-    return float_state() == p->float_state ? 0 : float_state_changed(p, t->number + 1);
+    if (is_bad(status) && report_bad_status(p, s->first_call + 1, status) < 0) return -1;
+    const int last_call = s->first_call + (fmi2 ? 2 : 3);
+    marker[MARKER_CALL] = last_call;
+    status = fmi2 ? ((Fmi2GetSet *)s->get)(s->instance, s->get_references, s->get_reference_count, s->get_values)
+                  : ((Fmi3GetSet *)s->get)(s->instance, s->get_references, s->get_reference_count, s->get_values,
+                                           s->get_value_count);
+    if (is_bad(status) && report_bad_status(p, last_call, status) < 0) return -1;
+    return float_mode() == p->float_mode ? 0 : report_float_mode_changed(p, s->first_call + 1);
 }
 
-static inline void copy(const Move *m) {
-    uint64_t *target = (uint64_t *)m->target;
-    const uint64_t *source = (const uint64_t *)m->source;
-    const Py_ssize_t *from = m->source_indices, count = m->count;
-    for (Py_ssize_t i = 0; i < count; i++) target[i] = source[from[i]];
+static inline void copy_indexed(const Transfer *transfer) {
+    uint64_t *target = (uint64_t *)transfer->target;
+    const uint64_t *source = (const uint64_t *)transfer->source;
+    const Py_ssize_t *indices = transfer->source_indices, count = transfer->count;
+    for (Py_ssize_t i = 0; i < count; i++) target[i] = source[indices[i]];
 }
 
-static int macro_step(Program *p, int64_t n, double time) {
+static int run_macro_step(Program *p, int64_t n, double time) {
     Operation *op = p->operations, *last = op + p->count;
     while (op < last) {
         switch (op->kind) {
-        case COPY: copy(op++->move); continue;
-        case MOVE: move(op++->move); continue;
-        case TURNS:
-            for (const UsualTurn *t = op->turns.first; t < op->turns.end; t++)
-                if (usual_turn(p, t, time) < 0) return -1;
+        case INDEXED_COPY: copy_indexed(op++->transfer); continue;
+        case TRANSFER: run_transfer(op++->transfer); continue;
+        case PACKED_STEPS:
+            for (const PackedStep *step = op->packed.first; step < op->packed.end; step++)
+                if (run_packed_step(p, step, time) < 0) return -1;
             break;
         default:
-            if (n % op->divisor == 0 && turn(p, op + 1, p->operations + op->after, time) < 0) return -1;
+            if (n % op->divisor == 0 && run_step(p, op + 1, p->operations + op->end, time) < 0) return -1;
         }
-        op = p->operations + op->after;
+        op = p->operations + op->end;
     }
     return 0;
 }
 
-static void copy_pieces(const Program *p) {
-    for (Py_ssize_t k = 0; k < p->piece_count; k++) {
-        const Piece *piece = p->pieces + k;
-        char *cells = p->row + piece->position;
-        if (piece->width == 8)
-            for (Py_ssize_t i = 0; i < piece->count; i++)
-                ((uint64_t *)cells)[i] = ((const uint64_t *)piece->source)[piece->indices[i]];
+static void copy_row_parts(const Program *p) {
+    for (Py_ssize_t k = 0; k < p->row_part_count; k++) {
+        const RowPart *part = p->row_parts + k;
+        char *cells = p->row + part->position;
+        if (part->item_size == 8)
+            for (Py_ssize_t i = 0; i < part->count; i++)
+                ((uint64_t *)cells)[i] = ((const uint64_t *)part->source)[part->indices[i]];
         else
-            for (Py_ssize_t i = 0; i < piece->count; i++)
-                memcpy(cells + i * piece->width, piece->source + piece->indices[i] * piece->width, (size_t)piece->width);
+            for (Py_ssize_t i = 0; i < part->count; i++)
+                memcpy(cells + i * part->item_size, part->source + part->indices[i] * part->item_size, (size_t)part->item_size);
     }
 }
 
-static int record(Program *p, int64_t n) {
-    if (p->every != 1 && n % p->every) return 0;
+static int record_row(Program *p, int64_t n) {
+    if (p->record_every != 1 && n % p->record_every) return 0;
     if (p->record) {
-        enter_python(p);
+        acquire_gil(p);
         PyObject *result = PyObject_CallFunction(p->record, "L", (long long)n);
         Py_XDECREF(result);
-        leave_python(p);
+        release_gil(p);
         return result ? 0 : -1;
     }
-    if (p->block) memcpy(p->row, p->block, (size_t)p->block_size);
-    copy_pieces(p);
+    if (p->buffer) memcpy(p->row, p->buffer, (size_t)p->buffer_size);
+    copy_row_parts(p);
     p->row += p->row_size;
-    p->marker[2]++;
+    p->marker[MARKER_ROWS]++;
     return 0;
 }
 
-/* ---- packing usual turns, once their steps have been measured -------------------------------------------------------- */
+/* ---- packing steps, after their durations have been measured --------------------------------------------------------- */
 
-static const Operation *get_of(const Operation *op) { return op[2].kind == STEP2 ? op + 3 : op + 4; }
+/* The get operation of a packable step that begins at `op`. */
+static const Operation *get_operation(const Operation *op) { return op[2].kind == DO_STEP2 ? op + 3 : op + 4; }
 
-static int is_usual(const Program *p, const Operation *op) {
-    Py_ssize_t calls = op->kind == EVERY && op->divisor == 1 ? op->after - (op - p->operations) - 1 : 0;
-    if (calls == 3) return op[1].kind == ACCESS2 && op[2].kind == STEP2 && op[3].kind == ACCESS2;
-    if (calls == 4) return op[1].kind == ACCESS3 && op[2].kind == STEP3 && op[4].kind == ACCESS3;
+static int is_packable(const Program *p, const Operation *op) {
+    Py_ssize_t calls = op->kind == STEP_BEGIN && op->divisor == 1 ? op->end - (op - p->operations) - 1 : 0;
+    if (calls == 3) return op[1].kind == GET_SET2 && op[2].kind == DO_STEP2 && op[3].kind == GET_SET2;
+    if (calls == 4) return op[1].kind == GET_SET3 && op[2].kind == DO_STEP3 && op[4].kind == GET_SET3;
     return 0;
 }
 
-static const uint32_t *keep(uint32_t **pool, const Operation *access) {
-    uint32_t *place = *pool;
-    memcpy(place, access->access.references, access->access.count * sizeof *place);
-    *pool += access->access.count;
-    return place;
+/* Copy the value references of a get or set into the pool and advance the pool; returns their new address. */
+static const uint32_t *append_references(uint32_t **pool, const Operation *op) {
+    uint32_t *copied = *pool;
+    memcpy(copied, op->get_set.references, op->get_set.reference_count * sizeof *copied);
+    *pool += op->get_set.reference_count;
+    return copied;
 }
 
-static UsualTurn packed(const Operation *op, uint32_t **pool) {
-    const Operation *set = op + 1, *step = op + 2, *get = get_of(op);
-    return (UsualTurn){
-        step->instance, set->function, step->function, get->function, set->access.values, get->access.values,
-        keep(pool, set), keep(pool, get), (uint32_t)set->access.count, (uint32_t)get->access.count,
-        (uint32_t)set->access.size, (uint32_t)get->access.size, step->step.size, step->step.memory,
-        step->kind == STEP2 ? 2 : 3, set->number,
+static PackedStep pack_step(const Operation *op, uint32_t **pool) {
+    const Operation *set = op + 1, *do_step = op + 2, *get = get_operation(op);
+    return (PackedStep){
+        .instance = do_step->instance, .set = set->function, .do_step = do_step->function, .get = get->function,
+        .set_values = set->get_set.values, .get_values = get->get_set.values,
+        .set_references = append_references(pool, set), .get_references = append_references(pool, get),
+        .set_reference_count = (uint32_t)set->get_set.reference_count,
+        .get_reference_count = (uint32_t)get->get_set.reference_count,
+        .set_value_count = (uint32_t)set->get_set.value_count, .get_value_count = (uint32_t)get->get_set.value_count,
+        .step_size = do_step->do_step.step_size, .data = do_step->do_step.data,
+        .fmi_version = do_step->kind == DO_STEP2 ? 2 : 3, .first_call = set->call_number,
     };
 }
 
-static int all_measured(const Program *p) {
+static int all_steps_measured(const Program *p) {
     for (const Operation *op = p->operations; op < p->operations + p->count; op++)
-        if (is_usual(p, op) && op[2].step.memory->trials) return 0;
+        if (is_packable(p, op) && op[2].do_step.data->measurements_left) return 0;
     return 1;
 }
 
-/* Neighbouring usual turns become one operation. */
-static int pack(Program *p) {
+/* Replace each sequence of packable steps by one PACKED_STEPS operation. */
+static int pack_steps(Program *p) {
     Operation *op, *end = p->operations + p->count;
-    size_t turns = 0, references = 0;
+    size_t step_count = 0, reference_count = 0;
     for (op = p->operations; op < end; op++)
-        if (is_usual(p, op)) {
-            turns++;
-            references += op[1].access.count + get_of(op)->access.count;
+        if (is_packable(p, op)) {
+            step_count++;
+            reference_count += op[1].get_set.reference_count + get_operation(op)->get_set.reference_count;
         }
-    p->turns = PyMem_Calloc(turns + 1, sizeof *p->turns);
-    p->references = PyMem_Calloc(references + 1, sizeof *p->references);
-    if (!p->turns || !p->references) return PyErr_NoMemory(), -1;
-    UsualTurn *turn = p->turns;
+    p->packed_steps = PyMem_Calloc(step_count + 1, sizeof *p->packed_steps);
+    p->references = PyMem_Calloc(reference_count + 1, sizeof *p->references);
+    if (!p->packed_steps || !p->references) return PyErr_NoMemory(), -1;
+    PackedStep *next = p->packed_steps;
     uint32_t *pool = p->references;
     for (op = p->operations; op < end;) {
         Operation *first = op;
-        UsualTurn *begin = turn;
-        for (; op < end && is_usual(p, op); op = p->operations + op->after) *turn++ = packed(op, &pool);
-        if (turn > begin) {
-            first->kind = TURNS;
-            first->after = op - p->operations;
-            first->turns.first = begin;
-            first->turns.end = turn;
+        PackedStep *begin = next;
+        for (; op < end && is_packable(p, op); op = p->operations + op->end) *next++ = pack_step(op, &pool);
+        if (next > begin) {
+            first->kind = PACKED_STEPS;
+            first->end = op - p->operations;
+            first->packed.first = begin;
+            first->packed.end = next;
         } else {
             op++;
         }
     }
-    p->packed = 1;
+    p->is_packed = 1;
     return 0;
 }
 
-static int64_t macro_steps_per_look(const Program *p) {
-    int64_t duration = OPERATION * p->count;
+static int64_t macro_steps_per_signal_check(const Program *p) {
+    int64_t duration = OPERATION_DURATION * p->count;
     for (const Operation *op = p->operations; op < p->operations + p->count; op++)
-        if (op->kind == STEP2 || op->kind == STEP3)
-            duration += op->step.memory->trials ? LOOK : op->step.memory->shortest;
-    return 1 + LOOK / (duration + 1);
+        if (op->kind == DO_STEP2 || op->kind == DO_STEP3)
+            duration += op->do_step.data->measurements_left ? SIGNAL_CHECK_INTERVAL : op->do_step.data->shortest_ns;
+    return 1 + SIGNAL_CHECK_INTERVAL / (duration + 1);
 }
 
-static int look_for_signals(Program *p) {
-    enter_python(p);
+static int check_signals(Program *p) {
+    acquire_gil(p);
     int interrupted = PyErr_CheckSignals();
-    leave_python(p);
+    release_gil(p);
     return interrupted;
 }
 
-static int run_steps(Program *p, int64_t first, int64_t count, double origin, double stride, double denominator) {
-    const int64_t per_look = macro_steps_per_look(p);
-    int64_t left = per_look;
-    for (int64_t n = first; n < first + count && !p->end; n++) {
+static int run_macro_steps(Program *p, int64_t first, int64_t count, double origin, double stride, double denominator) {
+    const int64_t steps_per_check = macro_steps_per_signal_check(p);
+    int64_t left = steps_per_check;
+    for (int64_t n = first; n < first + count && !p->end_request; n++) {
         double time = (origin + (double)n * stride) / denominator;
-        *p->clock = time;
-        if (macro_step(p, n, time) < 0) return -1;
-        if (p->end == WITHOUT_STEP) return 0;
-        if (!all_finite(p) && report(p, -1, NOT_FINITE) < 0) return -1;
-        if (record(p, n + 1) < 0) return -1;
-        p->marker[1] = n + 1;
+        *p->current_time = time;
+        if (run_macro_step(p, n, time) < 0) return -1;
+        if (p->end_request == END_BEFORE_STEP) return 0;
+        if (!all_finite(p) && report_status(p, -1, NOT_FINITE) < 0) return -1;
+        if (record_row(p, n + 1) < 0) return -1;
+        p->marker[MARKER_STEPS] = n + 1;
         if (--left < 0) {
-            left = per_look;
-            if (look_for_signals(p) < 0) return -1;
+            left = steps_per_check;
+            if (check_signals(p) < 0) return -1;
         }
     }
     return 0;
 }
 
-/* Macro steps first, first + 1, ... Step n begins at (origin + n * stride) / denominator: rounded once, since the numbers are
-   integers that a double holds exactly. */
+/* Run macro steps first, first + 1, ... Step n begins at (origin + n * stride) / denominator. These numbers and n * stride are
+   integers that a double represents exactly, so the division is the only rounding. */
 static PyObject *run(Program *p, PyObject *arguments) {
     long long first, count;
     double origin, stride, denominator;
     if (!PyArg_ParseTuple(arguments, "LLddd", &first, &count, &origin, &stride, &denominator)) return NULL;
-    p->end = 0;
-    p->float_state = float_state();
-    if (!p->packed && all_measured(p) && pack(p) < 0) return NULL;
-    leave_python(p);
-    int failed = run_steps(p, first, count, origin, stride, denominator);
-    enter_python(p);
+    p->end_request = CONTINUE;
+    p->float_mode = float_mode();
+    if (!p->is_packed && all_steps_measured(p) && pack_steps(p) < 0) return NULL;
+    release_gil(p);
+    int failed = run_macro_steps(p, first, count, origin, stride, denominator);
+    acquire_gil(p);
     if (failed) return NULL;
     Py_RETURN_NONE;
 }
 
-/* (number of the call, ns of the shortest so far) of every doStep. */
-static PyObject *durations(Program *p, PyObject *unused) {
+/* List of (call number, shortest duration in ns) of all doStep operations. */
+static PyObject *step_durations(Program *p, PyObject *unused) {
     PyObject *list = PyList_New(0);
     for (const Operation *op = p->operations; list && op < p->operations + p->count; op++) {
-        if (op->kind != STEP2 && op->kind != STEP3) continue;
-        PyObject *pair = Py_BuildValue("iL", op->number, (long long)op->step.memory->shortest);
+        if (op->kind != DO_STEP2 && op->kind != DO_STEP3) continue;
+        PyObject *pair = Py_BuildValue("iL", op->call_number, (long long)op->do_step.data->shortest_ns);
         if (!pair || PyList_Append(list, pair) < 0) Py_CLEAR(list);
         Py_XDECREF(pair);
     }
     return list;
 }
 
-/* ---- building -------------------------------------------------------------------------------------------------------- */
+/* ---- adding operations ----------------------------------------------------------------------------------------------- */
 
 static void *pointer(unsigned long long address) { return (void *)(uintptr_t)address; }
 
-static Operation *append(Program *p, Kind kind, int number) {
+static Operation *append_operation(Program *p, OperationKind kind, int call_number) {
     if (p->count == p->capacity) {
         Py_ssize_t capacity = p->capacity ? 2 * p->capacity : 64;
         Operation *operations = PyMem_Realloc(p->operations, (size_t)capacity * sizeof *operations);
@@ -511,118 +535,125 @@ static Operation *append(Program *p, Kind kind, int number) {
     Operation *op = p->operations + p->count++;
     memset(op, 0, sizeof *op);
     op->kind = kind;
-    op->number = number;
+    op->call_number = call_number;
     return op;
 }
 
-static PyObject *add_move(Program *p, PyObject *arguments) {
-    unsigned long long target, to, source, from, factor, offset, ring;
+static PyObject *add_transfer(Program *p, PyObject *arguments) {
+    unsigned long long target, target_indices, source, source_indices, factor, offset, ring;
     int target_kind, source_kind;
     Py_ssize_t count, delay;
-    if (!PyArg_ParseTuple(arguments, "KCKKCKnKKKn", &target, &target_kind, &to, &source, &source_kind, &from, &count, &factor,
-                          &offset, &ring, &delay))
+    if (!PyArg_ParseTuple(arguments, "KCKKCKnKKKn", &target, &target_kind, &target_indices, &source, &source_kind,
+                          &source_indices, &count, &factor, &offset, &ring, &delay))
         return NULL;
-    Operation *op = append(p, MOVE, -1);
-    if (!op || !(op->move = PyMem_Calloc(1, sizeof(Move)))) return PyErr_NoMemory();
-    *op->move = (Move){pointer(target), pointer(source), (char)target_kind, (char)source_kind, pointer(to), pointer(from),
-                       count, pointer(factor), pointer(offset), pointer(ring), delay, 0};
-    if (target_kind == source_kind && width((char)target_kind) == 8 && !to && !factor && !delay) op->kind = COPY;
+    Operation *op = append_operation(p, TRANSFER, -1);
+    if (!op || !(op->transfer = PyMem_Calloc(1, sizeof(Transfer)))) return PyErr_NoMemory();
+    *op->transfer = (Transfer){
+        .target = pointer(target), .source = pointer(source), .target_kind = (char)target_kind, .source_kind = (char)source_kind,
+        .target_indices = pointer(target_indices), .source_indices = pointer(source_indices), .count = count,
+        .factor = pointer(factor), .offset = pointer(offset), .ring = pointer(ring), .delay = delay,
+    };
+    bool is_plain = target_kind == source_kind && !target_indices && !factor && !delay;
+    if (is_plain && item_size((char)target_kind) == 8) op->kind = INDEXED_COPY;
     Py_RETURN_NONE;
 }
 
-static PyObject *begin_turn(Program *p, PyObject *arguments) {
+static PyObject *begin_step(Program *p, PyObject *arguments) {
     long long divisor;
     if (!PyArg_ParseTuple(arguments, "L", &divisor)) return NULL;
-    p->turn = p->count;
-    Operation *op = append(p, EVERY, -1);
+    p->step_start = p->count;
+    Operation *op = append_operation(p, STEP_BEGIN, -1);
     if (!op) return NULL;
     op->divisor = divisor;
     Py_RETURN_NONE;
 }
 
-static PyObject *end_turn(Program *p, PyObject *unused) {
-    p->operations[p->turn].after = p->count;
+static PyObject *end_step(Program *p, PyObject *unused) {
+    p->operations[p->step_start].end = p->count;
     Py_RETURN_NONE;
 }
 
-static PyObject *add_access(Program *p, PyObject *arguments) {
-    int number, version;
+static PyObject *add_get_set(Program *p, PyObject *arguments) {
+    int call_number, fmi_version;
     unsigned long long function, instance, references, values;
-    Py_ssize_t count, size;
-    if (!PyArg_ParseTuple(arguments, "iiKKKnKn", &number, &version, &function, &instance, &references, &count, &values, &size)) return NULL;
-    Operation *op = append(p, version == 2 ? ACCESS2 : ACCESS3, number);
+    Py_ssize_t reference_count, value_count;
+    if (!PyArg_ParseTuple(arguments, "iiKKKnKn", &call_number, &fmi_version, &function, &instance, &references, &reference_count,
+                          &values, &value_count))
+        return NULL;
+    Operation *op = append_operation(p, fmi_version == 2 ? GET_SET2 : GET_SET3, call_number);
     if (!op) return NULL;
     op->function = pointer(function);
     op->instance = pointer(instance);
-    op->access.references = pointer(references);
-    op->access.count = (size_t)count;
-    op->access.values = pointer(values);
-    op->access.size = (size_t)size;
+    op->get_set.references = pointer(references);
+    op->get_set.reference_count = (size_t)reference_count;
+    op->get_set.values = pointer(values);
+    op->get_set.value_count = (size_t)value_count;
     Py_RETURN_NONE;
 }
 
-static PyObject *add_step_like(Program *p, PyObject *arguments, Kind kind) {
-    int number;
-    unsigned long long function, instance, flags, reached;
-    double size;
-    if (!PyArg_ParseTuple(arguments, "iKKdKK", &number, &function, &instance, &size, &flags, &reached)) return NULL;
-    Operation *op = append(p, kind, number);
-    if (!op || !(op->step.memory = PyMem_Calloc(1, sizeof(StepMemory)))) return PyErr_NoMemory();
+static PyObject *append_do_step(Program *p, PyObject *arguments, OperationKind kind) {
+    int call_number;
+    unsigned long long function, instance, flags, last_successful_time;
+    double step_size;
+    if (!PyArg_ParseTuple(arguments, "iKKdKK", &call_number, &function, &instance, &step_size, &flags, &last_successful_time))
+        return NULL;
+    Operation *op = append_operation(p, kind, call_number);
+    if (!op || !(op->do_step.data = PyMem_Calloc(1, sizeof(DoStepData)))) return PyErr_NoMemory();
     op->function = pointer(function);
     op->instance = pointer(instance);
-    op->step.size = size;
-    *op->step.memory = (StepMemory){pointer(flags), pointer(reached), INT64_MAX, TRIALS};
+    op->do_step.step_size = step_size;
+    *op->do_step.data = (DoStepData){pointer(flags), pointer(last_successful_time), INT64_MAX, MEASURED_STEPS};
     Py_RETURN_NONE;
 }
 
-static PyObject *add_step2(Program *p, PyObject *arguments) { return add_step_like(p, arguments, STEP2); }
-static PyObject *add_step3(Program *p, PyObject *arguments) { return add_step_like(p, arguments, STEP3); }
-static PyObject *add_flags(Program *p, PyObject *arguments) { return add_step_like(p, arguments, FLAGS); }
+static PyObject *add_do_step2(Program *p, PyObject *arguments) { return append_do_step(p, arguments, DO_STEP2); }
+static PyObject *add_do_step3(Program *p, PyObject *arguments) { return append_do_step(p, arguments, DO_STEP3); }
+static PyObject *add_flag_check(Program *p, PyObject *arguments) { return append_do_step(p, arguments, FLAG_CHECK); }
 
-static PyObject *add_python(Program *p, PyObject *arguments) {
-    int number;
-    PyObject *callable, *positional;
-    if (!PyArg_ParseTuple(arguments, "iOO!", &number, &callable, &PyTuple_Type, &positional)) return NULL;
-    Operation *op = append(p, PYTHON, number);
+static PyObject *add_python_call(Program *p, PyObject *arguments) {
+    int call_number;
+    PyObject *callable, *argument_tuple;
+    if (!PyArg_ParseTuple(arguments, "iOO!", &call_number, &callable, &PyTuple_Type, &argument_tuple)) return NULL;
+    Operation *op = append_operation(p, PYTHON_CALL, call_number);
     if (!op) return NULL;
     op->python.callable = Py_NewRef(callable);
-    op->python.arguments = Py_NewRef(positional);
+    op->python.arguments = Py_NewRef(argument_tuple);
     Py_RETURN_NONE;
 }
 
-static PyObject *set_watched(Program *p, PyObject *arguments) {
+static PyObject *set_monitored_floats(Program *p, PyObject *arguments) {
     unsigned long long doubles, singles;
-    if (!PyArg_ParseTuple(arguments, "KnKn", &doubles, &p->doubles_count, &singles, &p->singles_count)) return NULL;
+    if (!PyArg_ParseTuple(arguments, "KnKn", &doubles, &p->double_count, &singles, &p->single_count)) return NULL;
     p->doubles = pointer(doubles);
     p->singles = pointer(singles);
     Py_RETURN_NONE;
 }
 
-/* Rows are the whole block (block_size > 0), or pieces; or Python's `record` does it. */
+/* A row is a copy of the whole buffer if buffer_size > 0, else the row parts. A callable `record` replaces both. */
 static PyObject *set_recording(Program *p, PyObject *arguments) {
-    unsigned long long block;
+    unsigned long long buffer;
     PyObject *record;
-    if (!PyArg_ParseTuple(arguments, "nnKnO", &p->every, &p->row_size, &block, &p->block_size, &record)) return NULL;
-    p->block = p->block_size ? pointer(block) : NULL;
+    if (!PyArg_ParseTuple(arguments, "nnKnO", &p->record_every, &p->row_size, &buffer, &p->buffer_size, &record)) return NULL;
+    p->buffer = p->buffer_size ? pointer(buffer) : NULL;
     Py_CLEAR(p->record);
     if (record != Py_None) p->record = Py_NewRef(record);
     Py_RETURN_NONE;
 }
 
-static PyObject *add_piece(Program *p, PyObject *arguments) {
+static PyObject *add_row_part(Program *p, PyObject *arguments) {
     unsigned long long source, indices;
-    Piece piece;
-    if (!PyArg_ParseTuple(arguments, "KKnnn", &source, &indices, &piece.count, &piece.width, &piece.position)) return NULL;
-    piece.source = pointer(source);
-    piece.indices = pointer(indices);
-    Piece *pieces = PyMem_Realloc(p->pieces, (size_t)(p->piece_count + 1) * sizeof piece);
-    if (!pieces) return PyErr_NoMemory();
-    p->pieces = pieces;
-    p->pieces[p->piece_count++] = piece;
+    RowPart part;
+    if (!PyArg_ParseTuple(arguments, "KKnnn", &source, &indices, &part.count, &part.item_size, &part.position)) return NULL;
+    part.source = pointer(source);
+    part.indices = pointer(indices);
+    RowPart *row_parts = PyMem_Realloc(p->row_parts, (size_t)(p->row_part_count + 1) * sizeof part);
+    if (!row_parts) return PyErr_NoMemory();
+    p->row_parts = row_parts;
+    p->row_parts[p->row_part_count++] = part;
     Py_RETURN_NONE;
 }
 
-static PyObject *set_row(Program *p, PyObject *arguments) {
+static PyObject *set_row_address(Program *p, PyObject *arguments) {
     unsigned long long row;
     if (!PyArg_ParseTuple(arguments, "K", &row)) return NULL;
     p->row = pointer(row);
@@ -632,21 +663,21 @@ static PyObject *set_row(Program *p, PyObject *arguments) {
 /* ---- the type -------------------------------------------------------------------------------------------------------- */
 
 static int initialize(Program *p, PyObject *arguments, PyObject *named) {
-    unsigned long long clock, marker;
+    unsigned long long current_time, marker;
     PyObject *on_status;
-    if (!PyArg_ParseTuple(arguments, "KKO", &clock, &marker, &on_status)) return -1;
-    p->clock = pointer(clock);
+    if (!PyArg_ParseTuple(arguments, "KKO", &current_time, &marker, &on_status)) return -1;
+    p->current_time = pointer(current_time);
     p->marker = pointer(marker);
     p->on_status = Py_NewRef(on_status);
-    p->every = 1;
+    p->record_every = 1;
     return 0;
 }
 
-static void release(Operation *op) {
+static void free_operation(Operation *op) {
     switch (op->kind) {
-    case COPY: case MOVE: PyMem_Free(op->move); break;
-    case STEP2: case STEP3: case FLAGS: PyMem_Free(op->step.memory); break;
-    case PYTHON:
+    case INDEXED_COPY: case TRANSFER: PyMem_Free(op->transfer); break;
+    case DO_STEP2: case DO_STEP3: case FLAG_CHECK: PyMem_Free(op->do_step.data); break;
+    case PYTHON_CALL:
         Py_CLEAR(op->python.callable);
         Py_CLEAR(op->python.arguments);
         break;
@@ -657,7 +688,7 @@ static void release(Operation *op) {
 static int clear(Program *p) {
     Py_ssize_t count = p->count;
     p->count = 0;
-    for (Py_ssize_t i = 0; i < count; i++) release(p->operations + i);
+    for (Py_ssize_t i = 0; i < count; i++) free_operation(p->operations + i);
     Py_CLEAR(p->on_status);
     Py_CLEAR(p->record);
     return 0;
@@ -668,7 +699,7 @@ static int traverse(Program *p, visitproc visit, void *arg) {
     Py_VISIT(p->on_status);
     Py_VISIT(p->record);
     for (Py_ssize_t i = 0; i < p->count; i++)
-        if (p->operations[i].kind == PYTHON) {
+        if (p->operations[i].kind == PYTHON_CALL) {
             Py_VISIT(p->operations[i].python.callable);
             Py_VISIT(p->operations[i].python.arguments);
         }
@@ -680,34 +711,40 @@ static void deallocate(Program *p) {
     PyObject_GC_UnTrack(p);
     clear(p);
     PyMem_Free(p->operations);
-    PyMem_Free(p->pieces);
-    PyMem_Free(p->turns);
+    PyMem_Free(p->row_parts);
+    PyMem_Free(p->packed_steps);
     PyMem_Free(p->references);
     ((freefunc)PyType_GetSlot(type, Py_tp_free))(p);
     Py_DECREF(type);
 }
 
 static PyMethodDef methods[] = {
-    {"add_transfer", (PyCFunction)add_move, METH_VARARGS, "Values go from outputs to inputs."},
-    {"begin_step", (PyCFunction)begin_turn, METH_VARARGS, "What follows happens every `divisor` macro steps."},
-    {"end_step", (PyCFunction)end_turn, METH_NOARGS, "The component's turn is complete."},
-    {"add_get_set", (PyCFunction)add_access, METH_VARARGS, "One get or set of FMI 2.0 or 3.0."},
-    {"add_do_step2", (PyCFunction)add_step2, METH_VARARGS, "fmi2DoStep."},
-    {"add_do_step3", (PyCFunction)add_step3, METH_VARARGS, "fmi3DoStep."},
-    {"add_flag_check", (PyCFunction)add_flags, METH_VARARGS, "Whether fmi3DoStep ended in a special way."},
-    {"add_python_call", (PyCFunction)add_python, METH_VARARGS, "A call that returns a status."},
-    {"set_monitored_floats", (PyCFunction)set_watched, METH_VARARGS, "Values that must stay finite."},
-    {"set_recording", (PyCFunction)set_recording, METH_VARARGS, "What a row is."},
-    {"add_row_part", (PyCFunction)add_piece, METH_VARARGS, "One piece of a row."},
-    {"set_row_address", (PyCFunction)set_row, METH_VARARGS, "Where the next row goes."},
-    {"step_durations", (PyCFunction)durations, METH_NOARGS, "The shortest of every doStep."},
-    {"run", (PyCFunction)run, METH_VARARGS, "Macro steps from the times at an address."},
+    {"add_transfer", (PyCFunction)add_transfer, METH_VARARGS, "Add a transfer of output values to inputs."},
+    {"begin_step", (PyCFunction)begin_step, METH_VARARGS,
+     "Begin a component's step, which runs in every `divisor`-th macro step."},
+    {"end_step", (PyCFunction)end_step, METH_NOARGS, "End the component's step that `begin_step` began."},
+    {"add_get_set", (PyCFunction)add_get_set, METH_VARARGS, "Add one call of an FMI get or set function."},
+    {"add_do_step2", (PyCFunction)add_do_step2, METH_VARARGS, "Add one call of fmi2DoStep."},
+    {"add_do_step3", (PyCFunction)add_do_step3, METH_VARARGS, "Add one call of fmi3DoStep."},
+    {"add_flag_check", (PyCFunction)add_flag_check, METH_VARARGS,
+     "Add a check of the flags that fmi3DoStep sets; its status is discard if one is set."},
+    {"add_python_call", (PyCFunction)add_python_call, METH_VARARGS, "Add one call of a Python function that returns a status."},
+    {"set_monitored_floats", (PyCFunction)set_monitored_floats, METH_VARARGS,
+     "Set the floats that are checked for finiteness after each macro step."},
+    {"set_recording", (PyCFunction)set_recording, METH_VARARGS,
+     "Set the recording interval (macro steps) and the content of a row."},
+    {"add_row_part", (PyCFunction)add_row_part, METH_VARARGS, "Add indexed values of one type to each row."},
+    {"set_row_address", (PyCFunction)set_row_address, METH_VARARGS, "Set the address at which the next row is written."},
+    {"step_durations", (PyCFunction)step_durations, METH_NOARGS,
+     "Return (call number, shortest duration in ns) of all doStep calls."},
+    {"run", (PyCFunction)run, METH_VARARGS,
+     "Run `count` macro steps from number `first`; step n begins at (origin + n * stride) / denominator s."},
     {NULL, NULL, 0, NULL},
 };
 
 static PyType_Slot slots[] = {
     {Py_tp_init, initialize}, {Py_tp_dealloc, deallocate}, {Py_tp_traverse, traverse}, {Py_tp_clear, clear},
-    {Py_tp_methods, methods}, {Py_tp_doc, "Operations of a plan, in order."}, {0, NULL},
+    {Py_tp_methods, methods}, {Py_tp_doc, "The operations of a plan in execution order."}, {0, NULL},
 };
 
 static PyType_Spec specification = {
@@ -716,14 +753,23 @@ static PyType_Spec specification = {
 
 static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "_native", "The native executor.", 0, NULL, NULL, NULL, NULL, NULL};
 
+static const struct { const char *name; int64_t value; } constants[] = {
+    {"FLOAT_MODE_CHANGED", FLOAT_MODE_CHANGED}, {"NOT_FINITE", NOT_FINITE}, {"CONTINUE", CONTINUE},
+    {"END_AFTER_STEP", END_AFTER_STEP}, {"END_BEFORE_STEP", END_BEFORE_STEP}, {"MARKER_CALL", MARKER_CALL},
+    {"MARKER_STEPS", MARKER_STEPS}, {"MARKER_ROWS", MARKER_ROWS}, {"MEASURED_STEPS", MEASURED_STEPS},
+};
+
+static int add_object(PyObject *self, const char *name, PyObject *object) {
+    int failed = PyModule_AddObjectRef(self, name, object); /* fails with the pending exception if `object` is NULL */
+    Py_XDECREF(object);
+    return failed;
+}
+
 PyMODINIT_FUNC PyInit__native(void) {
     PyObject *self = PyModule_Create(&module);
-    PyObject *type = PyType_FromSpec(&specification);
-    if (!self || !type || PyModule_AddObjectRef(self, "Program", type) < 0) {
-        Py_XDECREF(type);
-        Py_XDECREF(self);
-        return NULL;
-    }
-    Py_DECREF(type);
+    int failed = !self || add_object(self, "Program", PyType_FromSpec(&specification)) < 0;
+    for (size_t i = 0; !failed && i < sizeof constants / sizeof *constants; i++)
+        failed = add_object(self, constants[i].name, PyLong_FromLongLong(constants[i].value)) < 0;
+    if (failed) Py_CLEAR(self);
     return self;
 }

@@ -1,28 +1,17 @@
-"""One component's turn in a macro step, and how it may end."""
+"""One component's step within a macro step, as a sequence of prepared calls."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from ..core.component import SUCCESS_STATUSES, PreparedCall
 from ..process import float_mode
 from .plan import Step
 
-#: components or outputs shown in messages about several
-MAX_NAMES_SHOWN = 8
-
-
-def abbreviate_names(names: Iterable[str]) -> str:
-    """The names, each once; of many the first ones and how many there are."""
-    different = list(dict.fromkeys(names))
-    return ", ".join(different[:MAX_NAMES_SHOWN]) + (
-        f", ... ({len(different)} in all)" if len(different) > MAX_NAMES_SHOWN else ""
-    )
-
 
 class ScheduledStep(NamedTuple):
-    """One component's turn as calls that return an FMI status; `first` is the number of the first call."""
+    """A component's step as calls that return an FMI status; `first_call` is the number of the first call."""
 
     step: Step
     calls: Sequence[PreparedCall]
@@ -30,7 +19,7 @@ class ScheduledStep(NamedTuple):
 
 
 class StepFailure(NamedTuple):
-    """A turn that stopped: after which of its calls, and its status; None: the floating-point mode was changed."""
+    """A step that stopped at call `call_index` with `status`; None: the floating-point mode was changed."""
 
     step: ScheduledStep
     call_index: int
@@ -38,19 +27,20 @@ class StepFailure(NamedTuple):
 
     @property
     def call(self) -> PreparedCall:
+        """The call that failed."""
         return self.step.calls[self.call_index]
 
 
-def run_due(turns: Sequence[ScheduledStep], n: int) -> list[StepFailure]:
-    """Take the turns that are due in macro step n, one after the other; those that stopped are returned."""
-    return [ending for turn in turns if n % turn.step.divisor == 0 for ending in _run_calls(turn)]
+def run_due(steps: Sequence[ScheduledStep], n: int) -> list[StepFailure]:
+    """Run the steps that are due in macro step `n`, in order, and return those that stopped early."""
+    return [failure for step in steps if n % step.step.divisor == 0 for failure in _run_calls(step)]
 
 
-def _run_calls(turn: ScheduledStep) -> Iterator[StepFailure]:
-    for place, call in enumerate(turn.calls):
+def _run_calls(step: ScheduledStep) -> Iterator[StepFailure]:
+    for index, call in enumerate(step.calls):
         status = call.function(*call.arguments)
         if status not in SUCCESS_STATUSES:
-            yield StepFailure(turn, place, status)
+            yield StepFailure(step, index, status)
             break
     if float_mode.is_changed():
-        yield StepFailure(turn, -1, None)
+        yield StepFailure(step, -1, None)

@@ -1,4 +1,4 @@
-"""Initialization mode: outputs go to inputs until they agree."""
+"""From new components to step mode; in initialization mode, outputs are passed to inputs until they converge."""
 
 from __future__ import annotations
 
@@ -7,48 +7,98 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..core.component import Component, Ports
-from ..core.errors import ComponentError
+from ..core.errors import ComponentError, abbreviate_names
 from ..core.system import Endpoint
 from ..process.journal import calling_component
-from .component_step import abbreviate_names
+from .convergence import exceeds_tolerance
 from .layout import Dtype
 from .plan import Plan
 from .transfer_calls import compile_transfer
 
-#: a loop may take so many rounds more than a chain, until outputs change by no more than this, relative to 1 + their size
+#: iterations allowed beyond one per component, for algebraic loops that converge; relative tolerance of their outputs
 EXTRA_ITERATIONS, TOLERANCE = 100, 1e-12
 
 PortValues = Mapping[Dtype, np.ndarray]
 
 
-def propagate_initial_values(plan: Plan, time: float) -> None:
-    """Hand outputs to inputs again and again until nothing changes, which takes a round per component at most.
+def instantiate_components(plan: Plan) -> None:
+    """Bind all components to their arrays and instantiate them.
 
-    An algebraic loop may settle by itself later, as contractions do. Raises ComponentError for one that does not.
+    Raises:
+        ComponentError: a component failed.
     """
-    moves = [compile_transfer(gather) for phase in plan.all_phases for gather in phase.transfers]
+    for name, component in plan.system.components.items():
+        with calling_component(name, "bind", "load"):
+            component.bind(plan.inputs.ports[name], plan.outputs.ports[name])
+        with calling_component(name, "instantiate", "load"):
+            component.instantiate()
+
+
+def initialize_components(plan: Plan) -> None:
+    """Bring instantiated components to step mode: start values, initialization mode, consistent initial outputs.
+
+    Raises:
+        ComponentError: a component failed, or an algebraic loop did not converge.
+    """
+    start, stop = plan.grid.time_at(0), plan.grid.time_at(plan.grid.count)
+    components = plan.system.components
+    for name, component in components.items():
+        with calling_component(name, "set", "initialization"):
+            for variable, value in plan.system.start_values.get(name, {}).items():
+                component.set(variable, value)
+    for name, component in components.items():
+        with calling_component(name, "enter_initialization_mode", "initialization", start):
+            component.enter_initialization_mode(start, stop)
+            component.get_outputs()
+            copy_start_values(component, plan.inputs.ports[name])
+    propagate_initial_values(plan, start)
+    for name, component in components.items():
+        with calling_component(name, "exit_initialization_mode", "initialization", start):
+            component.exit_initialization_mode()
+            component.get_outputs()
+
+
+def copy_start_values(component: Component, ports: Ports) -> None:
+    """Fill the bound inputs with the component's start values; inputs without a connection keep them."""
+    filled = dict.fromkeys(ports.arrays, 0)
+    for variable in ports.variables:
+        begin = filled[variable.dtype]
+        filled[variable.dtype] += len(variable.scalar_names)
+        ports.arrays[variable.dtype][begin : filled[variable.dtype]] = component.get(variable.name)
+
+
+def propagate_initial_values(plan: Plan, time: float) -> None:
+    """Pass outputs to inputs repeatedly until no value changes; without algebraic loops one iteration per component suffices.
+
+    Args:
+        plan: its components must be in initialization mode.
+        time: start time (s), for messages.
+
+    Raises:
+        ComponentError: a component failed, or an algebraic loop did not converge.
+    """
+    transfers = [compile_transfer(transfer) for phase in plan.all_phases for transfer in phase.transfers]
     components, inputs, outputs = plan.system.components, plan.inputs.ports, plan.outputs.ports
-    given: dict[str, PortValues] = {}
-    found = {name: _copy_values(outputs[name]) for name in components}
-    for number in range(len(components) + 1 + EXTRA_ITERATIONS):
-        for move in moves:
-            move()
-        tolerance = TOLERANCE if number > len(components) else 0.0
+    last_inputs: dict[str, PortValues] = {}
+    last_outputs = {name: _copy_values(outputs[name]) for name in components}
+    for iteration in range(len(components) + 1 + EXTRA_ITERATIONS):
+        for transfer in transfers:
+            transfer()
+        tolerance = TOLERANCE if iteration > len(components) else 0.0
         changing: list[Endpoint] = []
         for name, component in components.items():
             now = _copy_values(inputs[name])
-            if name in given and not _changed_scalars(inputs[name], given[name], now):
+            if name in last_inputs and not _changed_scalars(inputs[name], last_inputs[name], now):
                 continue
             with calling_component(name, "set_inputs and get_outputs", "initialization", time):
                 component.set_inputs()
                 component.get_outputs()
-            before, given[name], found[name] = found[name], now, _copy_values(outputs[name])
-            changing += [Endpoint(name, slot) for slot in _changed_scalars(outputs[name], before, found[name], tolerance)]
+            before, last_inputs[name], last_outputs[name] = last_outputs[name], now, _copy_values(outputs[name])
+            changing += [Endpoint(name, s) for s in _changed_scalars(outputs[name], before, last_outputs[name], tolerance)]
         if not changing:
             return
-    raise ComponentError(
-        abbreviate_names(end.component for end in changing), "initialization", _algebraic_loop_message(plan, changing), time
-    )
+    names = abbreviate_names(endpoint.component for endpoint in changing)
+    raise ComponentError(names, "initialization", _algebraic_loop_message(plan, changing), time)
 
 
 def _copy_values(ports: Ports) -> PortValues:
@@ -56,19 +106,18 @@ def _copy_values(ports: Ports) -> PortValues:
 
 
 def _changed_scalars(ports: Ports, old: PortValues, new: PortValues, tolerance: float = 0.0) -> list[str]:
-    """The slots whose values differ, without a tolerance in any bit."""
+    """Return the names of the scalars whose values differ; with tolerance 0, in any bit."""
     if all(_bit_pattern(old[dtype]) == _bit_pattern(new[dtype]) for dtype in new):
         return []
-    moved = {dtype: iter(_changed_elements(old[dtype], new[dtype], tolerance).tolist()) for dtype in new}
-    return [slot for variable in ports.variables for slot in variable.scalar_names if next(moved[variable.dtype])]
+    changed = {dtype: iter(_changed_elements(old[dtype], new[dtype], tolerance).tolist()) for dtype in new}
+    return [name for variable in ports.variables for name in variable.scalar_names if next(changed[variable.dtype])]
 
 
 def _changed_elements(old: np.ndarray, new: np.ndarray, tolerance: float) -> np.ndarray:
     if old.dtype.hasobject:
         return np.asarray(old != new)
     if old.dtype.kind == "f" and tolerance:
-        with np.errstate(invalid="ignore"):  # what is not finite never stands still
-            return ~(np.abs(new - old) <= tolerance * (1 + np.abs(new)))
+        return exceeds_tolerance(old, new, tolerance)
     bits = f"u{old.dtype.itemsize}"
     return np.asarray(old.view(bits) != new.view(bits))
 
@@ -78,16 +127,9 @@ def _bit_pattern(array: np.ndarray) -> object:
 
 
 def _algebraic_loop_message(plan: Plan, changing: Sequence[Endpoint]) -> str:
-    wires = [f"{c.source} -> {c.target}" for c in plan.system.connections if c.source in changing]
-    advice = "a component in the loop has to answer in a step instead of at once, or the answers have to become smaller"
-    rounds = len(plan.system.components) + EXTRA_ITERATIONS
-    return f"an algebraic loop does not settle in {rounds} rounds, {abbreviate_names(wires)}; {advice}"
-
-
-def copy_start_values(component: Component, ports: Ports) -> None:
-    """Fill the bound inputs with the component's own values, which those keep that no connection feeds."""
-    filled = dict.fromkeys(ports.arrays, 0)
-    for variable in ports.variables:
-        begin = filled[variable.dtype]
-        filled[variable.dtype] += len(variable.scalar_names)
-        ports.arrays[variable.dtype][begin : filled[variable.dtype]] = component.get(variable.name)
+    connections = [f"{c.source} -> {c.target}" for c in plan.system.connections if c.source in changing]
+    iterations = len(plan.system.components) + EXTRA_ITERATIONS
+    return (
+        f"an algebraic loop does not converge in {iterations} iterations: {abbreviate_names(connections)};"
+        " remove the direct feedthrough of one component in the loop, or reduce the loop gain below 1"
+    )

@@ -1,7 +1,7 @@
-"""Macro steps that are repeated until the components agree (fixed-point iteration with rollback).
+"""Fixed-point iteration of macro steps, with rollback of the components' states.
 
-In every round all components of a loop step from the same state; what they read is what the round before gave them, or this
-round where a stage before theirs gave it. The last round's inputs therefore belong to the end of the step, not to its start.
+All components of a loop step from the same state in every iteration. Their inputs are the outputs of the previous iteration, or
+of this iteration if the source is in an earlier stage. After convergence the inputs belong to the end of the macro step.
 """
 
 from __future__ import annotations
@@ -9,55 +9,73 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core.component import Component
-from ..core.errors import ComponentError
+from ..core.errors import ComponentError, abbreviate_names
 from ..process.journal import calling_component
-from .component_step import ScheduledStep, abbreviate_names
+from .component_step import ScheduledStep
+from .convergence import exceeds_tolerance
 from .layout import Dtype, Layout
 from .plan import Loop
 from .transfer_calls import TransferCall
 
-#: the moves of a phase, those that are made in the first round only, and its turns
-IterationPhase = tuple[Sequence[TransferCall], Sequence[TransferCall], Sequence[ScheduledStep]]
+
+class IterationPhase(NamedTuple):
+    """A phase of a loop; delayed transfers run in the first iteration of a macro step only."""
+
+    transfers: Sequence[TransferCall]
+    delayed_transfers: Sequence[TransferCall]
+    steps: Sequence[ScheduledStep]
 
 
 class FixedPointIteration:
-    """The rounds of a loop's macro step; `take` takes a turn."""
+    """Iteration of a loop's macro steps.
 
-    def __init__(self, loop: Loop, signals: Layout, phases: Sequence[IterationPhase], run_step: Callable[[ScheduledStep], None]):
+    Args:
+        loop: its components and connections.
+        outputs: layout of the outputs of the system.
+        phases: the phases of the loop in order.
+        run_step: runs one scheduled step.
+    """
+
+    def __init__(self, loop: Loop, outputs: Layout, phases: Sequence[IterationPhase], run_step: Callable[[ScheduledStep], None]):
         self._loop, self._phases, self._run_step = loop, phases, run_step
         self._components = loop.components
-        outputs: dict[Dtype, dict[int, str]] = defaultdict(dict)
+        sources: dict[Dtype, dict[int, str]] = defaultdict(dict)
         for connection in loop.connections:
-            slot = signals.positions[connection.source]
-            outputs[slot.dtype][slot.offset] = str(connection.source)
-        self._coupled_outputs = [(signals.arrays[dtype], list(found)) for dtype, found in outputs.items()]
-        self._output_names = [list(found.values()) for found in outputs.values()]
+            position = outputs.positions[connection.source]
+            sources[position.dtype][position.offset] = str(connection.source)
+        self._coupled_outputs = [(outputs.arrays[dtype], list(names)) for dtype, names in sources.items()]
+        self._output_names = [list(names.values()) for names in sources.values()]
 
     def step(self, time: float, discard_requests: Callable[[], None]) -> None:
-        """The macro step from `time`; `try_again` forgets what components asked for in a round that is not the last one.
+        """Iterate the macro step that begins at `time` (s) until the connected outputs converge.
 
-        Raises ComponentError when the outputs still change after the last round that is allowed.
+        Args:
+            time: start of the macro step (s).
+            discard_requests: discards the termination requests of a rejected iteration.
+
+        Raises:
+            ComponentError: a component failed, or the outputs did not converge within the allowed iterations.
         """
         with ExitStack() as stack:
             states = {name: self._get_state(name, component, time, stack) for name, component in self._components.items()}
-            for number in range(self._loop.iteration.max_rounds):
-                if number:
+            for iteration in range(self._loop.iteration.max_rounds):
+                if iteration:
                     discard_requests()
                     self._restore_states(states, time)
                 before = self._output_values()
-                self._iterate_once(first=number == 0)
-                moved = [self._not_converged(old, new) for old, new in zip(before, self._output_values(), strict=True)]
-                if not any(flags.any() for flags in moved):
+                self._iterate_once(first=iteration == 0)
+                changed = [self._changed(old, new) for old, new in zip(before, self._output_values(), strict=True)]
+                if not any(mask.any() for mask in changed):
                     return
-        raise ComponentError(self._loop.name, "iteration", self._divergence_message(moved), time)
+        raise ComponentError(self._loop.name, "iteration", self._divergence_message(changed), time)
 
     def _get_state(self, name: str, component: Component, time: float, stack: ExitStack) -> Any:
-        """The component's state, which is freed with the stack."""
+        """Return the component's state, which is freed when `stack` is closed."""
         with calling_component(name, "get_state", "step", time):
             state = component.get_state()
 
@@ -74,23 +92,24 @@ class FixedPointIteration:
                 self._components[name].set_state(state)
 
     def _iterate_once(self, first: bool) -> None:
-        for moves, once, turns in self._phases:
-            for move in (*moves, *once) if first else moves:
-                move()
-            for turn in turns:
-                self._run_step(turn)
+        for transfers, delayed_transfers, steps in self._phases:
+            for transfer in (*transfers, *delayed_transfers) if first else transfers:
+                transfer()
+            for step in steps:
+                self._run_step(step)
 
     def _output_values(self) -> list[np.ndarray]:
-        return [array[places] for array, places in self._coupled_outputs]
+        return [array[offsets] for array, offsets in self._coupled_outputs]
 
-    def _not_converged(self, old: np.ndarray, new: np.ndarray) -> np.ndarray:
+    def _changed(self, old: np.ndarray, new: np.ndarray) -> np.ndarray:
         if old.dtype.kind != "f":
-            return old != new
-        with np.errstate(invalid="ignore"):  # what is not finite never stands still
-            return ~(np.abs(new - old) <= self._loop.iteration.tolerance * (1 + np.abs(new)))
+            return np.asarray(old != new)
+        return exceeds_tolerance(old, new, self._loop.iteration.tolerance)
 
-    def _divergence_message(self, moved: Sequence[np.ndarray]) -> str:
-        changing = [name for names, flags in zip(self._output_names, moved, strict=True) for name in np.array(names)[flags]]
+    def _divergence_message(self, changed: Sequence[np.ndarray]) -> str:
+        changing = [name for names, mask in zip(self._output_names, changed, strict=True) for name in np.array(names)[mask]]
         iteration = self._loop.iteration
-        names = abbreviate_names(changing)
-        return f"after {iteration.max_rounds} rounds these outputs still change by more than {iteration.tolerance:g}: {names}"
+        return (
+            f"no convergence after {iteration.max_rounds} iterations; outputs that still change by more than "
+            f"{iteration.tolerance:g}: {abbreviate_names(changing)}"
+        )

@@ -1,4 +1,4 @@
-"""The native executor: the same plan, laid out for `_native.c`, which runs many macro steps per call."""
+"""The native executor: passes the plan to `_native.c`, which runs many macro steps per call."""
 
 from __future__ import annotations
 
@@ -8,78 +8,75 @@ from collections.abc import Callable
 import numpy as np
 
 from ..core.component import NativeDoStep, NativeFlagCheck, NativeGetSet, PreparedCall
+from ..process.journal import ROW_COUNT
 from .component_step import ScheduledStep
-from .executor import MARKER_ROWS, Executor
-from .parallel import MEASURED_STEPS
+from .executor import Executor
 from .transfer_plan import Transfer
 
 try:
     from . import _native
-except ImportError:  # installed without a compiler
-    _native = None  # type: ignore[assignment]
+except ImportError:  # installed without a C compiler
+    _native = None  # type: ignore[assignment]  # a module cannot be declared optional
 
-#: macro steps per call at most, but for the first call, which measures the steps of the components
+#: most macro steps per call; the first call is shorter, because it measures the durations of the steps
 MAX_STEPS_PER_CALL = 1 << 16
-
-#: what is reported beside FMI statuses, as in _native.c
-_FLOAT_STATE_CHANGED, _NOT_FINITE = 1 << 33, 1 << 34
 
 
 def native_available() -> bool:
-    """Whether the native executor was built."""
+    """Return whether the native executor was built."""
     return _native is not None
 
 
 class NativeExecutor(Executor):
-    """Runs everything but Python components in C."""
+    """Executor that runs everything except Python components in C."""
 
     def _prepare(self) -> None:
-        self._program = _native.Program(ctypes.addressof(self._current_time), self.marker.ctypes.data, self._on_status)
+        current_time = ctypes.addressof(self._runner.current_time)
+        self._program = _native.Program(current_time, self.marker.ctypes.data, self._on_status)
         self._program_start = self.completed_steps
-        for gather in (gather for phase in self.plan.phases for gather in phase.transfers):
-            if gather.delay and not gather.source.dtype.hasobject:
-                self._delay_lines[gather].align_ring(self.completed_steps)
-        for phase, turns in zip(self.plan.phases, self._phase_steps, strict=True):
-            for gather in phase.transfers:
-                self._add_transfer(gather)
-            for turn in turns:
-                self._add_step(turn)
-        watched = {array.dtype.itemsize: array for array in self.monitored_floats}
-        self._program.set_monitored_floats(
-            *(part for size in (8, 4) for part in _address_and_length(watched.get(size, np.zeros(0))))
-        )
+        for transfer in (transfer for phase in self.plan.phases for transfer in phase.transfers):
+            if transfer.delay and not transfer.source.dtype.hasobject:
+                self._delay_lines[transfer].align_ring(self.completed_steps)
+        for phase, steps in zip(self.plan.phases, self._schedule.phases, strict=True):
+            for transfer in phase.transfers:
+                self._add_transfer(transfer)
+            for step in steps:
+                self._add_step(step)
+        by_item_size = {array.dtype.itemsize: array for array in self._finite_check.monitored_floats}
+        doubles, singles = (_address_and_length(by_item_size.get(size, np.zeros(0))) for size in (8, 4))
+        self._program.set_monitored_floats(*doubles, *singles)
         self._add_recording()
 
-    # -- laying out ----------------------------------------------------------------------------------------------------
+    # -- adding operations ---------------------------------------------------------------------------------------------
 
-    def _add_transfer(self, gather: Transfer) -> None:
-        if gather.source.dtype.hasobject:
-            self._add_object_transfer(self._transfer_call(gather))
+    def _add_transfer(self, transfer: Transfer) -> None:
+        if transfer.source.dtype.hasobject:
+            self._add_object_transfer(self._transfer_call(transfer))
             return
-        first, count = int(gather.target_indices[0]), len(gather.target_indices)
-        together = np.array_equal(gather.target_indices, np.arange(first, first + count))
+        first, count = int(transfer.target_indices[0]), len(transfer.target_indices)
+        is_contiguous = np.array_equal(transfer.target_indices, np.arange(first, first + count))
         self._program.add_transfer(
-            _address(gather.target[first:] if together else gather.target),
-            gather.target.dtype.char.translate(_STRUCT_CODES),
-            0 if together else _address(gather.target_indices),
-            _address(gather.source),
-            gather.source.dtype.char.translate(_STRUCT_CODES),
-            _address(gather.source_indices),
+            _address(transfer.target[first:] if is_contiguous else transfer.target),
+            transfer.target.dtype.char.translate(_STRUCT_CODES),
+            0 if is_contiguous else _address(transfer.target_indices),
+            _address(transfer.source),
+            transfer.source.dtype.char.translate(_STRUCT_CODES),
+            _address(transfer.source_indices),
             count,
-            _address(gather.factor),
-            _address(gather.offset),
-            _address(self._delay_lines[gather].ring) if gather.delay else 0,
-            gather.delay,
+            _address(transfer.factor),
+            _address(transfer.offset),
+            _address(self._delay_lines[transfer].ring) if transfer.delay else 0,
+            transfer.delay,
         )
 
-    def _add_object_transfer(self, move: Callable[[], object]) -> None:
+    def _add_object_transfer(self, transfer_call: Callable[[], object]) -> None:
         self._program.begin_step(1)
-        self._program.add_python_call(-1, _call_and_return_ok, (move,))
+        self._program.add_python_call(-1, _call_and_return_ok, (transfer_call,))
         self._program.end_step()
 
-    def _add_step(self, turn: ScheduledStep) -> None:
-        self._program.begin_step(turn.step.divisor)
-        for number, call in enumerate(turn.calls, start=turn.first_call):
+    def _add_step(self, step: ScheduledStep) -> None:
+        self._program.begin_step(step.step.divisor)
+        for number, call in enumerate(step.calls, start=step.first_call):
             self._add_call(number, call)
         self._program.end_step()
 
@@ -95,13 +92,12 @@ class NativeExecutor(Executor):
             program.add_python_call(number, call.function, call.arguments)
 
     def _add_recording(self) -> None:
-        recorder, block = self.recorder, self.plan.outputs.buffer
-        record = self._record if recorder.has_strings else None
+        recorder, buffer = self.recorder, self.plan.outputs.buffer
         self._program.set_recording(
             recorder.every,
             recorder.row_store.dtype.itemsize,
-            *(_address_and_length(block) if recorder.whole_buffer else (0, 0)),
-            record,
+            *(_address_and_length(buffer) if recorder.whole_buffer else (0, 0)),
+            self._record if recorder.has_strings else None,
         )
         for source, indices, position in recorder.row_parts:
             self._program.add_row_part(_address(source), _address(indices), len(indices), source.itemsize, position)
@@ -110,42 +106,44 @@ class NativeExecutor(Executor):
 
     def _run_macro_steps(self, first: int, end: int) -> None:
         grid = self.plan.grid
-        formula = grid.float_coefficients(end)
-        count = min(end - first, self._steps_per_call(first)) if formula else 1
+        coefficients = grid.float_coefficients(end)
+        count = min(end - first, self._steps_per_call(first)) if coefficients else 1
         self._program.set_row_address(self.recorder.chunk.ctypes.data + self.recorder.chunk_bytes_used)
-        self._program.run(first, count, *(formula or (grid.time_at(first), 0.0, 1.0)))
+        self._program.run(first, count, *(coefficients or (grid.time_at(first), 0.0, 1.0)))
 
     def _steps_per_call(self, first: int) -> int:
-        """The first call of a program is short: it measures steps, and the next one packs the turns."""
-        return MAX_STEPS_PER_CALL if first >= self._program_start + MEASURED_STEPS else MEASURED_STEPS
+        """Return the most macro steps of a call; the first call only measures, then the next one packs the steps."""
+        measured = first >= self._program_start + _native.MEASURED_STEPS
+        return MAX_STEPS_PER_CALL if measured else _native.MEASURED_STEPS
 
     def _step_durations(self) -> dict[int, float]:
-        return {
-            self._find_call(number)[0].first_call: nanoseconds * 1e-9 for number, nanoseconds in self._program.step_durations()
-        }
+        durations = self._program.step_durations()
+        return {self._schedule.find_call(number)[0].first_call: nanoseconds * 1e-9 for number, nanoseconds in durations}
 
     def _record(self, n: int) -> None:
         self.recorder.record(n)
-        self.marker[MARKER_ROWS] = self.recorder.row_count
+        self.marker[ROW_COUNT] = self.recorder.row_count
 
     def _on_status(self, number: int, status: int) -> int:
-        """What a bad status means; returns 1 when the simulation shall end after this macro step, 2 when it was not finished."""
-        if status == _NOT_FINITE:
-            self._check_finite()
-            return 0
-        turn, call = self._find_call(number)
-        if status == _FLOAT_STATE_CHANGED:
-            self._raise_float_mode_changed(turn, call)
-        self._handle_status(turn, call, status)
-        return 0 if self.termination is None else 1 if self.termination.complete else 2
+        """Handle a status of call `number` that is not a success, and return how the simulation continues."""
+        if status == _native.NOT_FINITE:
+            self._finite_check.run()
+            return _native.CONTINUE
+        step, call = self._schedule.find_call(number)
+        if status == _native.FLOAT_MODE_CHANGED:
+            self._runner.raise_float_mode_changed(step, call)
+        self._runner.handle_status(step, call, status)
+        if self.termination is None:
+            return _native.CONTINUE
+        return _native.END_AFTER_STEP if self.termination.complete else _native.END_BEFORE_STEP
 
 
-#: numpy's characters for dtypes -> those of the struct module
+#: NumPy's dtype characters -> format characters of the struct module
 _STRUCT_CODES = str.maketrans({"l": "q", "L": "Q"})
 
 
 def _address(array: np.ndarray | None) -> int:
-    """Where the values lie, one after the other."""
+    """Return the address of a C-contiguous array; 0 for None."""
     assert array is None or array.flags.c_contiguous
     return 0 if array is None else array.ctypes.data
 
@@ -154,9 +152,6 @@ def _address_and_length(array: np.ndarray) -> tuple[int, int]:
     return array.ctypes.data, len(array)
 
 
-def _call_and_return_ok(move: Callable[[], object]) -> int:
-    move()
+def _call_and_return_ok(transfer_call: Callable[[], object]) -> int:
+    transfer_call()
     return 0
-
-
-__all__ = ["NativeExecutor", "native_available"]

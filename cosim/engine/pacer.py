@@ -1,4 +1,4 @@
-"""Real time: macro steps that wait for the clock on the wall."""
+"""Pacing of a run to real time."""
 
 from __future__ import annotations
 
@@ -13,16 +13,21 @@ from ..core import component_log
 from ..core.errors import LateError
 from ..core.time_grid import TimeGrid
 
-#: what happens when a step is ready more than one step too late
+#: reaction to a step that is more than one step late: one warning, or a LateError
 LatePolicy = Literal["warn", "fail"]
 
 
 class Pacer:
-    """Lets communication point n come no earlier than n * step / factor after the start.
+    """Delays communication point n until n * step / factor after the start.
 
-    Deadlines are absolute and computed from whole nanoseconds, so nothing adds up: a step that was late makes the following
-    ones begin at once until the clock is met again. Waiting is sleeping, which an interrupt ends. Lateness is how long after
-    its deadline a step was ready, 0 when it was in time.
+    Deadlines are absolute and computed in whole nanoseconds, so errors do not accumulate: after a late step the following ones
+    start immediately until the run has caught up. Lateness is the time from a step's deadline to its completion, 0 if it was
+    completed in time. Waiting can be interrupted.
+
+    Args:
+        grid: the communication points.
+        factor: simulated seconds per second of wall time.
+        late: reaction to a step that is more than one step late.
     """
 
     def __init__(self, grid: TimeGrid, factor: float, late: LatePolicy):
@@ -34,11 +39,15 @@ class Pacer:
         self._start = 0
 
     def start(self, n: int = 0) -> None:
-        """Communication point n is now."""
+        """Set the deadline of communication point `n` to the current time."""
         self._start = time.monotonic_ns() - n * self._numerator // self._denominator
 
     def wait(self, n: int) -> None:
-        """Until communication point n is due. Raises LateError when it was due more than one step ago and late steps fail."""
+        """Wait until communication point `n` is due.
+
+        Raises:
+            LateError: the point was due more than one step ago and `late` is "fail".
+        """
         ahead = self._start + n * self._numerator // self._denominator - time.monotonic_ns()
         self._lateness.append(max(0, -ahead))
         if ahead > 0:
@@ -54,11 +63,11 @@ class Pacer:
         if not self._warned:
             self._warned = True
             component_log.log_message(
-                "real time", component_log.WARNING, f"{text}; said once, the number of late steps stands at the end"
+                "real time", component_log.WARNING, f"{text}; reported once, the summary of the run counts all late steps"
             )
 
     def statistics(self) -> dict[str, Any]:
-        """How late the steps were (s), and how many were late at all."""
+        """Return the factor, the number of steps and of late steps, and the lateness (s): maximum, mean, 99 % quantile."""
         lateness = np.array(self._lateness, np.float64) * 1e-9 if self._lateness else np.zeros(1)
         return {
             "factor": self._factor,

@@ -1,132 +1,144 @@
-"""Components of one stage that step at the same time, on threads.
+"""FMUs of one stage that step at the same time, on threads.
 
-A stage has read everything before its first component steps, so the order in which its components step has no influence on any
-value; neither has stepping them at once. Python components take no part: they would only wait for each other.
+All inputs of a stage are set before its first component steps, so neither the order of the steps nor running them concurrently
+changes a value. Python components are excluded, since they would wait for each other's interpreter lock.
 """
 
 from __future__ import annotations
 
 import os
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from queue import SimpleQueue
-from threading import Event, Thread
-from typing import Generic, TypeVar
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
 
-from ..core.component import NativeDoStep
+from ..core.component import NativeDoStep, PreparedCall
+from ..core.errors import join_alternatives
 from ..core.system import Parallel
-from .component_step import ScheduledStep
+from .component_step import ScheduledStep, run_due
+from .plan import Phase, Step
+from .schedule import Schedule
+from .step_runner import StepRunner
 
-#: macro steps in which the steps of components are measured before anything runs on threads
+if TYPE_CHECKING:
+    from .thread_pool import ThreadPool
+
+#: macro steps whose durations are measured before any step runs on a thread (also in _native.c)
 MEASURED_STEPS = 3
-#: a component whose step takes as long as this (s) is worth a thread: handing over takes some 50 us
+#: shortest step (s) for which a thread pays off: passing a step to a thread takes about 50 us
 MIN_PARALLEL_DURATION = 100e-6
-
-Item = TypeVar("Item")
-Result = TypeVar("Result")
 
 
 @dataclass(eq=False)
 class ParallelGroup:
-    """The turns of one stage that may be taken at the same time, and the lanes in which they are once that was decided."""
+    """Steps of one stage that may run at the same time, and their partition onto threads once it is chosen."""
 
     steps: Sequence[ScheduledStep]
     parallel: Parallel
     partitions: Sequence[Sequence[ScheduledStep]] = ()
 
     def exclusive_groups(self) -> Mapping[object, list[ScheduledStep]]:
-        """Turns that may not be taken at the same time, together."""
+        """Return the steps in groups; steps of one group must not run at the same time."""
         groups: dict[object, list[ScheduledStep]] = defaultdict(list)
-        for turn in self.steps:
-            groups[turn.first_call if self.parallel is True else turn.step.component.shared_code].append(turn)
+        for step in self.steps:
+            groups[step.first_call if self.parallel is True else step.step.component.shared_code].append(step)
         return groups
 
-    def partition(self, seconds: Mapping[int, float], processors: int) -> None:
-        """Choose the lanes from the measured step of each turn, by the turn's first number.
+    def partition(self, durations: Mapping[int, float], processors: int) -> None:
+        """Choose the partitions from measured durations; none if threads do not pay off.
 
-        "auto" asks for two lanes of long steps at least, and puts instances of one FMU file into one lane, for their code may
-        have state in common; True takes every component as independent and worth a thread.
+        "auto" requires at least two exclusive groups of long steps. It keeps instances of one FMU file in one partition, since
+        their code may share state. True treats every component as independent and worth a thread.
+
+        Args:
+            durations: measured doStep durations (s) by the number of the step's first call.
+            processors: number of available processors.
         """
         groups = self.exclusive_groups()
-        costs = {key: sum(seconds[turn.first_call] for turn in group) for key, group in groups.items()}
-        worthy = [key for key, cost in costs.items() if self.parallel is True or cost >= MIN_PARALLEL_DURATION]
-        count = min(max(2, processors) if self.parallel is True else processors, len(worthy))
+        costs = {key: sum(durations[step.first_call] for step in group) for key, group in groups.items()}
+        long_groups = [key for key, cost in costs.items() if self.parallel is True or cost >= MIN_PARALLEL_DURATION]
+        count = min(max(2, processors) if self.parallel is True else processors, len(long_groups))
         self.partitions = _balance_load(groups, costs, count) if count > 1 else ()
 
 
 def _balance_load(
     groups: Mapping[object, Sequence[ScheduledStep]], costs: Mapping[object, float], count: int
 ) -> list[list[ScheduledStep]]:
-    """The groups in `count` lanes of about equal cost: the longest first, each to the lane that has least to do."""
-    lanes: list[list[ScheduledStep]] = [[] for _ in range(count)]
+    """Distribute groups over `count` partitions of similar cost: each group, longest first, to the least loaded partition."""
+    partitions: list[list[ScheduledStep]] = [[] for _ in range(count)]
     loads = [0.0] * count
     for key in sorted(groups, key=lambda key: -costs[key]):
-        least = loads.index(min(loads))
-        lanes[least] += groups[key]
-        loads[least] += costs[key]
-    return [sorted(lane, key=lambda turn: turn.first_call) for lane in lanes if lane]
+        least_loaded = loads.index(min(loads))
+        partitions[least_loaded] += groups[key]
+        loads[least_loaded] += costs[key]
+    return [sorted(partition, key=lambda step: step.first_call) for partition in partitions if partition]
 
 
-def releases_gil(turn: ScheduledStep) -> bool:
-    """Whether the turn steps in C, without the interpreter."""
-    return any(isinstance(call.native, NativeDoStep) for call in turn.calls)
+def releases_gil(step: ScheduledStep) -> bool:
+    """Return whether the step runs in C without the interpreter lock."""
+    return any(isinstance(call.native, NativeDoStep) for call in step.calls)
 
 
 def available_processors() -> int:
-    """Processors that this process may use."""
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-@dataclass(eq=False)
-class _Task(Generic[Item, Result]):
-    work: Item
-    result: Result | None = None
-    error: BaseException | None = None
-    done: Event = field(default_factory=Event)
+class ParallelSteps:
+    """The stages that may step on threads, and the decision which of them do, taken after the first macro steps."""
 
-    def run(self, function: Callable[[Item], Result]) -> None:
-        try:
-            self.result = function(self.work)
-        except BaseException as error:
-            self.error = error
-        self.done.set()
+    def __init__(self, runner: StepRunner):
+        self._runner = runner
+        #: by the index of the phase: the steps that may run at the same time, and the one step that replaces them
+        self._candidates: dict[int, tuple[ParallelGroup, ScheduledStep]] = {}
+        self._threads: ThreadPool | None = None
 
+    @property
+    def has_candidates(self) -> bool:
+        """A phase has steps that may run at the same time."""
+        return bool(self._candidates)
 
-class ThreadPool(Generic[Item, Result]):
-    """Threads that do pieces of work at the same time as the calling thread."""
+    def find_candidates(self, phases: Sequence[Phase], schedule: Schedule) -> None:
+        """Find the phases with independent steps in C, and schedule a step that stands for them."""
+        for index, (phase, steps) in enumerate(zip(phases, schedule.phases, strict=True)):
+            group = ParallelGroup([step for step in steps if releases_gil(step)], phase.parallel)
+            if phase.parallel and len(group.exclusive_groups()) > 1:
+                name = join_alternatives(step.step.name for step in group.steps)
+                step = Step(name, group.steps[0].step.component, 1, 0.0)
+                call = PreparedCall(self._run_group, (group,), "parallel step")
+                self._candidates[index] = group, schedule.add_step(step, [call])
 
-    def __init__(self, size: int, function: Callable[[Item], Result]):
-        self._function = function
-        self._tasks: SimpleQueue[_Task[Item, Result] | None] = SimpleQueue()
-        self._threads = [Thread(target=self._run_tasks, name=f"cosim-{i}", daemon=True) for i in range(size)]
-        for thread in self._threads:
-            thread.start()
+    def decide(self, schedule: Schedule, durations: Mapping[int, float]) -> None:
+        """Replace the steps of each phase that pays off by their parallel step, and create the threads.
 
-    def _run_tasks(self) -> None:
-        while task := self._tasks.get():
-            task.run(self._function)
+        Args:
+            schedule: its phases are changed in place.
+            durations: measured doStep durations (s) by the number of the step's first call.
+        """
+        largest = 1
+        for index, (group, parallel_step) in self._candidates.items():
+            group.partition(durations, available_processors())
+            if group.partitions:
+                schedule.phases[index] = [parallel_step, *(s for s in schedule.phases[index] if not releases_gil(s))]
+            largest = max(largest, len(group.partitions))
+        if largest > 1:
+            from .thread_pool import ThreadPool
 
-    def map(self, items: Sequence[Item]) -> list[Result]:
-        """The outcomes, in order; raises the first error. Returns, and is interrupted, only when nobody works any more."""
-        tasks: list[_Task[Item, Result]] = [_Task(work) for work in items]
-        for task in tasks[1:]:
-            self._tasks.put(task)
-        tasks[0].run(self._function)
-        interrupt = None
-        for task in tasks:
-            while not task.done.is_set():
-                try:
-                    task.done.wait()
-                except KeyboardInterrupt as error:
-                    interrupt = error
-        if failure := interrupt or next((task.error for task in tasks if task.error), None):
-            raise failure
-        return [task.result for task in tasks]  # type: ignore[misc]
+            self._threads = ThreadPool(largest - 1)
+
+    def _run_group(self, group: ParallelGroup) -> int:
+        assert self._threads is not None
+        run_partition = partial(run_due, n=self._runner.completed_steps)
+        failures = [failure for found in self._threads.map(run_partition, group.partitions) for failure in found]
+        for failure in sorted(failures, key=lambda failure: failure.step.first_call):
+            if failure.status is None:
+                self._runner.raise_float_mode_changed(failure.step, failure.call)
+            self._runner.handle_status(failure.step, failure.call, failure.status)
+            self._runner.run_step(failure.step, failure.call_index + 1)
+        return self._runner.termination_status
 
     def close(self) -> None:
-        """Let the threads end."""
-        for _ in self._threads:
-            self._tasks.put(None)
-        for thread in self._threads:
-            thread.join()
+        """End the threads."""
+        if self._threads:
+            self._threads.close()

@@ -1,8 +1,8 @@
-"""A system compiled once into flat arrays: who steps when, and which value goes where before that.
+"""Compilation of a system into a flat plan: phases of transfers and steps on shared arrays.
 
-Stages become phases: first the whole stage reads what comes from outside, then its components step; since everything was
-read before, the order inside a stage has no influence (Jacobi), and one component per stage is Gauss-Seidel. A group (nested
-system) reads its outside values with its stage and then runs phases of its own.
+A stage becomes a phase: all its inputs are set first, then its components step. The order within a stage therefore has no
+influence (Jacobi); one component per stage is Gauss-Seidel. A group (nested system) gets its inputs from outside with its stage
+and then runs phases of its own.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .transfer_plan import Transfer, TransferPlanner
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One component's turn: every `divisor` macro steps it advances by `step_size` (s)."""
+    """A component's step: in every `divisor`-th macro step it advances by `step_size` (s)."""
 
     name: str
     component: Component
@@ -31,7 +31,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Phase:
-    """Gathers, then steps, then a loop."""
+    """Transfers, then steps, then a loop."""
 
     transfers: tuple[Transfer, ...]
     steps: tuple[Step, ...]
@@ -41,7 +41,7 @@ class Phase:
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """Phases that are repeated within a macro step until what their components tell each other stands still."""
+    """Phases iterated within a macro step until their connected outputs converge."""
 
     name: str
     iteration: Iteration
@@ -50,13 +50,21 @@ class Loop:
 
     @property
     def components(self) -> dict[str, Component]:
-        """The components that step in it, by name."""
+        """Components of the loop, by name."""
         return {step.name: step.component for phase in _flatten_phases(self.phases) for step in phase.steps}
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Everything an executor needs."""
+    """A compiled system.
+
+    Attributes:
+        system: the components and their connections.
+        grid: the communication points.
+        inputs: layout of the connected inputs.
+        outputs: layout of the connected and recorded outputs.
+        phases: the phases of a macro step, in order.
+    """
 
     system: System
     grid: TimeGrid
@@ -66,28 +74,34 @@ class Plan:
 
     @property
     def all_phases(self) -> Iterator[Phase]:
-        """The phases, each followed by those of its loop."""
+        """All phases, each followed by the phases of its loop."""
         return _flatten_phases(self.phases)
 
 
 def compile_plan(system: System, grid: TimeGrid, recorded_outputs: Iterable[Endpoint] = ()) -> Plan:
-    """Lay out the arrays and order the work. The system must have no problems, its periods must fit the grid."""
+    """Compile a system into a plan.
+
+    Args:
+        system: a system without problems; its periods must be multiples of the step size.
+        grid: the communication points.
+        recorded_outputs: outputs that are read by the recorder.
+    """
     phases = list(_split_into_phases(system))
     connections = [connection for phase in phases for connection in _connections_of(phase)]
-    inputs, signals = _input_layout(system, connections), _output_layout(system, connections, recorded_outputs)
-    gathering = TransferPlanner(system, inputs, signals)
+    inputs, outputs = _input_layout(system, connections), _output_layout(system, connections, recorded_outputs)
+    planner = TransferPlanner(system, inputs, outputs)
 
-    def phase_of(raw: _PhaseDraft) -> Phase:
-        steps = tuple(_make_step(system, grid, name) for name in raw.names)
-        return Phase(tuple(gathering.plan_transfers(raw.connections)), steps, raw.parallel, loop_of(raw.group, raw.inner))
+    def make_phase(draft: _PhaseDraft) -> Phase:
+        steps = tuple(_make_step(system, grid, name) for name in draft.names)
+        return Phase(tuple(planner.plan_transfers(draft.connections)), steps, draft.parallel, make_loop(draft.group, draft.inner))
 
-    def loop_of(group: Group | None, inner: Sequence[_PhaseDraft]) -> Loop | None:
+    def make_loop(group: Group | None, inner: Sequence[_PhaseDraft]) -> Loop | None:
         if not group or not group.iteration:
             return None
         connections = [connection for phase in inner for connection in _connections_of(phase)]
-        return Loop(group.name, group.iteration, tuple(map(phase_of, inner)), connections)
+        return Loop(group.name, group.iteration, tuple(map(make_phase, inner)), connections)
 
-    return Plan(system, grid, inputs, signals, list(map(phase_of, phases)))
+    return Plan(system, grid, inputs, outputs, list(map(make_phase, phases)))
 
 
 def _flatten_phases(phases: Iterable[Phase]) -> Iterator[Phase]:
@@ -103,7 +117,7 @@ def _make_step(system: System, grid: TimeGrid, name: str) -> Step:
 
 
 class _PhaseDraft(NamedTuple):
-    """Connections to read, components to step and whether at the same time; then the inner phases of an iterated group."""
+    """A phase before its transfers are planned: connections, names of components, and the inner phases of an iterated group."""
 
     connections: list[Connection]
     names: list[str]
@@ -119,7 +133,7 @@ def _connections_of(phase: _PhaseDraft) -> Iterator[Connection]:
 
 
 def _split_into_phases(system: System) -> Iterator[_PhaseDraft]:
-    """Every phase, in order."""
+    """Yield the phases of the system, in order."""
     incoming: dict[str, list[Connection]] = defaultdict(list)
     for connection in system.connections:
         incoming[connection.target.component].append(connection)
@@ -129,15 +143,18 @@ def _split_into_phases(system: System) -> Iterator[_PhaseDraft]:
 def _phases_of_stages(
     stages: Sequence[Stage], parallel: Parallel, inside: frozenset[str], incoming: Mapping[str, Sequence[Connection]]
 ) -> Iterator[_PhaseDraft]:
-    """Phases of stages whose members read from `inside` now; everything else was read before."""
+    """Yield the phases of the stages.
+
+    Connections from components outside `inside` are not read here: an enclosing stage has read them.
+    """
     for stage in stages:
         groups = [member for member in stage if isinstance(member, Group)]
         own_group = {name: frozenset(component_names(group.stages)) for group in groups for name in component_names(group.stages)}
-        readers = [connection for name in component_names([stage]) for connection in incoming.get(name, ())]
+        connections = [connection for name in component_names([stage]) for connection in incoming.get(name, ())]
         yield _PhaseDraft(
             [
                 c
-                for c in readers
+                for c in connections
                 if c.source.component in inside and c.source.component not in own_group.get(c.target.component, ())
             ],
             [member for member in stage if not isinstance(member, Group)],
@@ -152,30 +169,30 @@ def _phases_of_stages(
 
 
 def _input_layout(system: System, connections: Iterable[Connection]) -> Layout:
-    """Inputs in the order in which they are gathered, so that what is gathered together lies together."""
+    """Lay out the inputs in the order of the transfers, so that the targets of a transfer are consecutive."""
     return _layout_of_endpoints(system, (connection.target for connection in connections), "input")
 
 
 def _output_layout(system: System, connections: Iterable[Connection], recorded: Iterable[Endpoint]) -> Layout:
-    """Every output that something reads, in the order in which they are read first."""
+    """Lay out the connected and recorded outputs, in the order in which they are first read."""
     return _layout_of_endpoints(system, (*(connection.source for connection in connections), *recorded), "output")
 
 
 def _layout_of_endpoints(system: System, endpoints: Iterable[Endpoint], causality: Causality) -> Layout:
-    wanted: dict[str, dict[str, Variable]] = {name: {} for name in component_names(system.stages)}
+    used: dict[str, dict[str, Variable]] = {name: {} for name in component_names(system.stages)}
     for endpoint in endpoints:
         variable = system.find_element(endpoint).variable
-        wanted[endpoint.component][variable.name] = variable
-    return build_layout({name: _variables_to_bind(system.components[name], found, causality) for name, found in wanted.items()})
+        used[endpoint.component][variable.name] = variable
+    return build_layout({name: _variables_to_bind(system.components[name], some, causality) for name, some in used.items()})
 
 
-def _variables_to_bind(component: Component, wanted: Mapping[str, Variable], causality: Causality) -> Sequence[Variable]:
+def _variables_to_bind(component: Component, used: Mapping[str, Variable], causality: Causality) -> Sequence[Variable]:
     if not component.binds_everything:
-        return _group_by_type(list(wanted.values()))
-    return [variable for variable in component.variables if variable.causality == causality or variable.name in wanted]
+        return _group_by_type(list(used.values()))
+    return [variable for variable in component.variables if variable.causality == causality or variable.name in used]
 
 
 def _group_by_type(variables: Sequence[Variable]) -> list[Variable]:
-    """Those of one type next to each other, so that one call sets or gets them all; enumerations go with integers."""
+    """Group variables by type, so that one FMI call sets or gets all of a type; enumerations count as integers."""
     types = [f"Int{8 * v.dtype.itemsize}" if v.type == "Enumeration" else v.type for v in variables]
     return [variable for kind in dict.fromkeys(types) for variable, type_ in zip(variables, types, strict=True) if type_ == kind]

@@ -1,4 +1,4 @@
-"""Recording: a row of values at every recorded communication point."""
+"""Recording of outputs: one row of values per recorded communication point."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .layout import ArrayPosition
 from .plan import Plan
 from .transfer_calls import MAX_SINGLE_COPIES
 
-#: puts the present values into a row, given its number
+#: writes the current values into the row with this number
 RowWriter = Callable[[int], object]
 
 
 class RowPart(NamedTuple):
-    """Values of one dtype that go into each row: from these places of the signals, to this position in the row (bytes)."""
+    """Values of one dtype in a row: `source[indices]`, written at byte offset `position`."""
 
     source: np.ndarray
     indices: np.ndarray
@@ -29,110 +29,114 @@ class RowPart(NamedTuple):
 
 
 class Recorder:
-    """Keeps the values of `columns` (recorded name -> output) at every `every`-th communication point.
+    """Stores the values of outputs at every `every`-th communication point.
 
-    A row is the whole block of signals when at least half of it is wanted (one copy of memory), else only what is wanted,
-    packed. With `file` the rows lie in that file; very many lie in a temporary one. Texts are kept apart, in memory.
+    A row is a copy of the whole output buffer if at least half of it is recorded; otherwise it contains only the recorded values.
+    Strings and binaries are stored in memory, apart from the rows.
+
+    Args:
+        plan: the compiled system.
+        columns: recorded name -> output.
+        every: recording interval (macro steps).
+        file: file for the rows; by default they are in memory, or in a temporary file if there are very many.
     """
 
     def __init__(self, plan: Plan, columns: Mapping[str, Endpoint], every: int = 1, file: Path | None = None):
         self._plan, self.every = plan, every
-        #: recorded name -> the variable it belongs to
+        #: recorded name -> its variable
         self.variables = {name: plan.system.find_element(endpoint).variable for name, endpoint in columns.items()}
         self._positions = {name: plan.outputs.positions[endpoint] for name, endpoint in columns.items()}
-        slots = sorted({slot for slot in self._positions.values() if not slot.dtype.hasobject}, key=_alignment_order)
-        #: the whole block of signals is a row
-        self.whole_buffer = 2 * sum(slot.dtype.itemsize for slot in slots) >= plan.outputs.buffer.nbytes > 0
-        #: what a row consists of otherwise
-        self.row_parts: Sequence[RowPart] = () if self.whole_buffer else list(self._pack_row(slots))
-        dtype, expected = self._row_dtype(slots), plan.grid.count // every + 1
-        self.row_store = open_row_store(dtype, expected, file)
-        #: rows recorded so far
+        numeric = sorted({p for p in self._positions.values() if not p.dtype.hasobject}, key=_alignment_order)
+        #: a row is a copy of the whole output buffer
+        self.whole_buffer = 2 * sum(position.dtype.itemsize for position in numeric) >= plan.outputs.buffer.nbytes > 0
+        #: the parts of a row otherwise
+        self.row_parts: Sequence[RowPart] = () if self.whole_buffer else list(self._pack_row(numeric))
+        dtype, expected_rows = self._row_dtype(numeric), plan.grid.count // every + 1
+        self.row_store = open_row_store(dtype, expected_rows, file)
+        #: number of rows recorded so far
         self.row_count = 0
         self._string_columns = {
-            name: _StringColumn(plan.outputs.arrays[slot.dtype], slot.offset) for name, slot in self._string_positions().items()
+            name: _StringColumn(plan.outputs.arrays[position.dtype], position.offset)
+            for name, position in self._positions.items()
+            if position.dtype.hasobject
         }
-        #: what keeps a row's texts, and what keeps a row of the present chunk
-        self._string_writers: list[RowWriter] = [texts.append for texts in self._string_columns.values()]
+        self._string_writers: list[RowWriter] = [column.append for column in self._string_columns.values()]
+        #: functions that write a row of the current chunk
         self.row_writers: Sequence[RowWriter] = ()
-        #: rows that still fit into the present chunk, and the chunk's memory
+        #: number of rows that still fit into the current chunk, and the bytes of the chunk
         self.free_rows, self.chunk = 0, np.zeros(0, np.uint8)
 
-    def _string_positions(self) -> dict[str, ArrayPosition]:
-        return {name: slot for name, slot in self._positions.items() if slot.dtype.hasobject}
+    def _pack_row(self, numeric: Sequence[ArrayPosition]) -> Iterator[RowPart]:
+        row_offset = 0
+        for dtype, positions in groupby(numeric, lambda position: position.dtype):
+            indices = np.array([position.offset for position in positions], np.intp)
+            yield RowPart(self._plan.outputs.arrays[dtype], indices, row_offset)
+            row_offset += len(indices) * dtype.itemsize
 
-    def _pack_row(self, slots: Sequence[ArrayPosition]) -> Iterator[RowPart]:
-        position = 0
-        for dtype, alike in groupby(slots, lambda slot: slot.dtype):
-            offsets = np.array([slot.offset for slot in alike], np.intp)
-            yield RowPart(self._plan.outputs.arrays[dtype], offsets, position)
-            position += len(offsets) * dtype.itemsize
-
-    def _row_dtype(self, slots: Sequence[ArrayPosition]) -> np.dtype[Any]:
-        """The row as a structured dtype with the recorded names as fields; two names of one signal share their memory."""
-        signals = self._plan.outputs
+    def _row_dtype(self, numeric: Sequence[ArrayPosition]) -> np.dtype[Any]:
+        """Return the structured dtype of a row: one field per recorded name; names of the same output share their bytes."""
+        outputs = self._plan.outputs
+        ends = np.cumsum([0, *(position.dtype.itemsize for position in numeric)]).tolist()
         if self.whole_buffer:
-            positions = {slot: signals.byte_offset(slot) for slot in slots}
+            offsets, size = {position: outputs.byte_offset(position) for position in numeric}, outputs.buffer.nbytes
         else:
-            ends = np.cumsum([0, *(slot.dtype.itemsize for slot in slots)]).tolist()
-            positions = dict(zip(slots, ends, strict=False))
-        size = signals.buffer.nbytes if self.whole_buffer else -(-sum(slot.dtype.itemsize for slot in slots) // 8) * 8
-        fields = {name: slot for name, slot in self._positions.items() if not slot.dtype.hasobject}
+            offsets, size = dict(zip(numeric, ends, strict=False)), -(-ends[-1] // 8) * 8
+        fields = {name: position for name, position in self._positions.items() if not position.dtype.hasobject}
         return np.dtype(
             {
                 "names": list(fields),
-                "formats": [slot.dtype for slot in fields.values()],
-                "offsets": [positions[slot] for slot in fields.values()],
+                "formats": [position.dtype for position in fields.values()],
+                "offsets": [offsets[position] for position in fields.values()],
                 "itemsize": size,
             }
         )
 
     def start_chunk(self) -> None:
-        """A new chunk, when the present one is full."""
+        """Add a chunk to the row store; call it when the current chunk is full."""
         chunk = self.row_store.add_chunk()
         self.free_rows, self.chunk = len(chunk), chunk.view(np.uint8) if chunk.dtype.itemsize else np.zeros(0, np.uint8)
         size, first = self.row_store.dtype.itemsize, self.row_count
         if self.whole_buffer:
-            keepers = [_buffer_writer(self.chunk.data, self._plan.outputs.buffer.data, size, first)]
+            writers = [_buffer_writer(self.chunk.data, self._plan.outputs.buffer.data, size, first)]
         else:
-            keepers = [_part_writer(self.chunk, size, piece, first) for piece in self.row_parts]
-        self.row_writers = keepers + self._string_writers
+            writers = [_part_writer(self.chunk, size, part, first) for part in self.row_parts]
+        self.row_writers = writers + self._string_writers
 
     def record(self, n: int) -> None:
-        """Keep the present values as those of communication point n, if it is one to be recorded."""
+        """Record the current values as those of communication point `n`, if `n` is a multiple of the recording interval."""
         if n % self.every:
             return
         if not self.free_rows:
             self.start_chunk()
         row = self.row_count
-        for keep in self.row_writers:
-            keep(row)
+        for write in self.row_writers:
+            write(row)
         self.row_count = row + 1
         self.free_rows -= 1
 
     def last_point_in_chunk(self, n: int) -> int:
-        """The last communication point after n whose row fits into the present chunk; a new chunk, when it is full now."""
+        """Return the last communication point after `n` whose row fits into the current chunk; a full chunk is replaced."""
         if not self.free_rows:
             self.start_chunk()
         return n - n % self.every + (self.free_rows + 1) * self.every - 1
 
     def set_row_count(self, rows: int) -> None:
-        """Rows until this number were put into the chunk by someone else."""
+        """Set the number of recorded rows, after an executor has written rows into the chunk."""
         self.free_rows -= rows - self.row_count
         self.row_count = rows
 
     @property
     def chunk_bytes_used(self) -> int:
-        """Bytes of the present chunk that are in use."""
+        """Number of bytes of the current chunk that are in use."""
         return len(self.chunk) - self.free_rows * self.row_store.dtype.itemsize
 
     @property
     def has_strings(self) -> bool:
-        """Rows are more than copies of memory: there are texts."""
+        """Strings or binaries are recorded, which only Python can store."""
         return bool(self._string_columns)
 
     def recording(self) -> Recording:
-        """Everything recorded so far; columns in the order they were asked for."""
+        """Return everything recorded so far, with the columns in the order of `columns`."""
         rows = self.row_store.read_first(self.row_count)
         columns: dict[str, np.ndarray] = {}
         for name, variable in self.variables.items():
@@ -150,49 +154,49 @@ class Recorder:
 
     @property
     def units(self) -> dict[str, str]:
-        """Unit of each column, "" where it is unknown."""
+        """Unit of each column; "" if it has none."""
         return {name: variable.unit.name if variable.unit else "" for name, variable in self.variables.items()}
 
 
-def _alignment_order(slot: ArrayPosition) -> tuple[int, str, int]:
-    """The widest first, so that every value of a packed row is aligned."""
-    return -slot.dtype.itemsize, slot.dtype.str, slot.offset
+def _alignment_order(position: ArrayPosition) -> tuple[int, str, int]:
+    """Return a sort key: largest item size first, so that every value of a packed row is aligned."""
+    return -position.dtype.itemsize, position.dtype.str, position.offset
 
 
-def _buffer_writer(chunk: memoryview, block: memoryview, size: int, first: int) -> RowWriter:
-    """Puts the whole block into a row of the chunk whose first row is `first`."""
+def _buffer_writer(chunk: memoryview, buffer: memoryview, size: int, first: int) -> RowWriter:
+    """Return a function that copies the whole buffer into a row of the chunk whose first row is `first`."""
 
-    def keep(row: int) -> None:
+    def write(row: int) -> None:
         begin = (row - first) * size
-        chunk[begin : begin + size] = block
+        chunk[begin : begin + size] = buffer
 
-    return keep
+    return write
 
 
-def _part_writer(chunk: np.ndarray, size: int, piece: RowPart, first: int) -> RowWriter:
-    """Puts a piece into a row of the chunk whose first row is `first`."""
-    source, indices, position = piece
+def _part_writer(chunk: np.ndarray, size: int, part: RowPart, first: int) -> RowWriter:
+    """Return a function that writes a part into a row of the chunk whose first row is `first`."""
+    source, indices, position = part
     shape, strides = (len(chunk) // size, len(indices)), (size, source.itemsize)
     cells = np.ndarray(shape, source.dtype, chunk.data, position, strides)
     columns = [
         (column.data, source.data, index) for column, index in zip(cells.T, indices[:MAX_SINGLE_COPIES].tolist(), strict=False)
     ]
 
-    def keep_each(row: int) -> None:
+    def write_each(row: int) -> None:
         for column, values, index in columns:
             column[row - first] = values[index]
 
-    def keep_all(row: int) -> None:
+    def write_all(row: int) -> None:
         source.take(indices, None, cells[row - first], "clip")
 
-    return keep_each if len(columns) == len(indices) else keep_all
+    return write_each if len(columns) == len(indices) else write_all
 
 
 class _StringColumn:
-    """A column of texts or binaries, kept as its changes."""
+    """Column of strings or binaries, stored as its changes."""
 
-    def __init__(self, values: np.ndarray, place: int):
-        self._values, self._index = values, place
+    def __init__(self, values: np.ndarray, index: int):
+        self._values, self._index = values, index
         self._changes: list[tuple[int, Any]] = []
 
     def append(self, row: int) -> None:

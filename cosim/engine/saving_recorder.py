@@ -1,4 +1,4 @@
-"""Texts of rows while a run goes on: numbers lie in a file of rows anyway, texts are written beside it whenever they change."""
+"""A recorder that also writes string signals to disk as they change, so they survive a crash."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ..core.json_values import encode_value
 from ..core.system import Endpoint
 from ..process.run_files.folder import HEADER_FILE, ROWS_FILE, TEXTS_FILE
 from . import Recorder
@@ -16,41 +17,49 @@ from .plan import Plan
 
 
 class SavingRecorder(Recorder):
-    """A recorder whose rows, texts among them, outlive the process in `folder` (see `unfinished`).
+    """Recorder whose rows and strings survive the process in `folder` (see `process.run_files.folder`).
 
-    A line of the file of texts is JSON: the number of a row, and the texts that are others from this row on.
+    Each line of the file of strings is JSON: the number of a row, and the strings that change in this row.
+
+    Args:
+        plan: the compiled system.
+        columns: recorded name -> output.
+        every: recording interval (macro steps).
+        folder: folder of the unfinished run.
     """
 
     def __init__(self, plan: Plan, columns: Mapping[str, Endpoint], every: int, folder: Path):
         super().__init__(plan, columns, every, folder / ROWS_FILE)
-        slots = {name: plan.outputs.positions[endpoint] for name, endpoint in columns.items()}
-        self._text_signals = [(name, plan.outputs.arrays[s.dtype], s.offset) for name, s in slots.items() if s.dtype.hasobject]
-        self._saved_texts: dict[str, Any] = dict.fromkeys((name for name, _, _ in self._text_signals), "")
+        positions = {name: plan.outputs.positions[endpoint] for name, endpoint in columns.items()}
+        self._strings = [(name, plan.outputs.arrays[p.dtype], p.offset) for name, p in positions.items() if p.dtype.hasobject]
+        self._saved_strings: dict[str, Any] = dict.fromkeys((name for name, _, _ in self._strings), "")
         self._file = (folder / TEXTS_FILE).open("wb", buffering=0)
-        if self._text_signals:
-            self._string_writers.append(self._save_changed_texts)
+        if self._strings:
+            self._string_writers.append(self._save_changed_strings)
 
-    def _save_changed_texts(self, row: int) -> None:
-        """In one write without a buffer, which nothing that kills this process can take back."""
-        texts = {name: array[place] for name, array, place in self._text_signals}
-        if changed := {name: text for name, text in texts.items() if text != self._saved_texts[name]}:
-            self._saved_texts |= changed
-            os.write(self._file.fileno(), json.dumps([row, changed], default=_encode_bytes).encode() + b"\n")
-
-
-def _encode_bytes(value: bytes) -> dict[str, str]:
-    return {"bytes": value.hex()}
+    def _save_changed_strings(self, row: int) -> None:
+        """Write a line in one unbuffered call, so that it is complete even if this process is killed."""
+        strings = {name: array[index] for name, array, index in self._strings}
+        if changed := {name: value for name, value in strings.items() if value != self._saved_strings[name]}:
+            self._saved_strings |= changed
+            os.write(self._file.fileno(), json.dumps([row, changed], default=encode_value).encode() + b"\n")
 
 
 def write_header(folder: Path, executor: Executor) -> None:
-    """Describe the run that is about to step."""
+    """Write the header of an unfinished run: time grid, format of a row, and the names of the calls.
+
+    Args:
+        folder: folder of the unfinished run.
+        executor: an initialized executor, before its first step.
+    """
     recorder, grid = executor.recorder, executor.plan.grid
     dtype = recorder.row_store.dtype
+    fields: Mapping[str, Any] = dtype.fields or {}
     columns = [
         {
             "name": name,
             "dtype": dtype[name].str,
-            "offset": dtype.fields[name][1],  # type: ignore[index]
+            "offset": fields[name][1],
             "boolean": recorder.variables[name].type == "Boolean",
             "unit": recorder.units[name],
         }

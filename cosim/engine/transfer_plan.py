@@ -1,4 +1,4 @@
-"""Which values move together, and how: connections become gathers."""
+"""Grouping of connections into transfers, which copy many values at once."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,10 @@ from .layout import ArrayPosition, Dtype, Layout
 
 @dataclass(frozen=True, eq=False)
 class Transfer:
-    """Values of one dtype that move together: target = factor * source + offset, `delay` macro steps late."""
+    """Values of one dtype that are copied together: target = factor * source + offset, `delay` macro steps late.
+
+    Without `factor` and `offset` the values are copied, and converted to the dtype of the target.
+    """
 
     source: np.ndarray
     source_indices: np.ndarray
@@ -29,9 +31,9 @@ class Transfer:
 
 
 def unit_conversion(source: Variable, target: Variable) -> tuple[float, float]:
-    """(factor, offset) from the source's unit to the target's; (1.0, 0.0) where one of them has no unit.
+    """Return (factor, offset) from the source's unit to the target's unit; (1.0, 0.0) if one of them has no unit.
 
-    Differences have no offset (FMI 2.0 section 2.2.3, FMI 3.0 section 2.4.4: relativeQuantity).
+    A relative quantity has no offset (FMI 2.0 section 2.2.3, FMI 3.0 section 2.4.4: relativeQuantity).
     """
     if source.unit is None or target.unit is None:
         return 1.0, 0.0
@@ -40,21 +42,27 @@ def unit_conversion(source: Variable, target: Variable) -> tuple[float, float]:
 
 
 class TransferPlanner:
-    """Makes gathers out of connections, as few and as long as possible."""
+    """Groups connections into as few and as long transfers as possible.
 
-    def __init__(self, system: System, inputs: Layout, signals: Layout):
-        self._system, self._inputs, self._signals = system, inputs, signals
-        #: (dtype of source, place of target) -> offset of source, for all connections that just copy
+    Args:
+        system: its connections and variables.
+        inputs: layout of the inputs.
+        outputs: layout of the outputs.
+    """
+
+    def __init__(self, system: System, inputs: Layout, outputs: Layout):
+        self._system, self._inputs, self._outputs = system, inputs, outputs
+        #: (dtype of source, position of target) -> offset of source, for connections without delay and conversion
         self._copies: dict[tuple[Dtype, ArrayPosition], int] = {}
         for connection in system.connections:
             if not connection.delay and self._unit_conversion(connection) == (1.0, 0.0):
                 source, target = self._positions(connection)
                 self._copies[source.dtype, target] = source.offset
-        #: targets of the phases so far: what they read earlier on purpose is not read again
+        #: targets of the connections of this phase and of earlier ones, which must not be overwritten with newer values
         self._targets_read: set[ArrayPosition] = set()
 
     def _positions(self, connection: Connection) -> tuple[ArrayPosition, ArrayPosition]:
-        return self._signals.positions[connection.source], self._inputs.positions[connection.target]
+        return self._outputs.positions[connection.source], self._inputs.positions[connection.target]
 
     def _unit_conversion(self, connection: Connection) -> tuple[float, float]:
         return unit_conversion(
@@ -62,32 +70,38 @@ class TransferPlanner:
         )
 
     def plan_transfers(self, connections: Iterable[Connection]) -> Iterator[Transfer]:
-        """The gathers of one phase, by dtypes, delay, and with or without conversion. Phases come in order."""
+        """Yield the transfers of one phase, grouped by dtypes, delay and unit conversion.
+
+        Args:
+            connections: those that are read in this phase; call this method in the order of the phases.
+        """
         connections = list(connections)
         self._targets_read |= {self._positions(connection)[1] for connection in connections}
-        kinds: dict[tuple[Any, ...], list[Connection]] = defaultdict(list)
+        groups: dict[tuple[Dtype, Dtype, int, bool], list[Connection]] = defaultdict(list)
         for connection in connections:
             source, target = self._positions(connection)
             converted = self._unit_conversion(connection) != (1.0, 0.0)
-            kinds[source.dtype, target.dtype, connection.delay, converted].append(connection)
-        for (_, _, delay, converted), alike in kinds.items():
+            groups[source.dtype, target.dtype, connection.delay, converted].append(connection)
+        for (_, _, delay, converted), group in groups.items():
             if delay or converted:
-                yield self._delayed_or_converted(alike, delay, converted)
+                yield self._delayed_or_converted(group, delay, converted)
             else:
-                yield from self._contiguous_copies(alike)
+                yield from self._contiguous_copies(group)
 
     def _delayed_or_converted(self, connections: list[Connection], delay: int, converted: bool) -> Transfer:
         sources, targets = zip(*map(self._positions, connections), strict=True)
-        both = np.ascontiguousarray(np.transpose([self._unit_conversion(connection) for connection in connections]))
-        return self._make_transfer(sources, targets, delay, *(both if converted else ()))
+        if not converted:
+            return self._make_transfer(sources, targets, delay)
+        factor, offset = np.ascontiguousarray(np.transpose([self._unit_conversion(connection) for connection in connections]))
+        return self._make_transfer(sources, targets, delay, factor, offset)
 
     def _contiguous_copies(self, connections: list[Connection]) -> Iterator[Transfer]:
-        """Copies, joined to runs of neighbouring targets.
+        """Yield plain copies with consecutive targets.
 
-        A gap is filled with the copies that belong there although they are read again later, in the phase they belong to: one
-        long gather costs less than two short ones.
+        A gap between targets is filled with connections of later phases, which are copied again in their own phase: one long
+        transfer costs less than two short ones.
         """
-        source_dtype, target_dtype = (slot.dtype for slot in self._positions(connections[0]))
+        source_dtype, target_dtype = (position.dtype for position in self._positions(connections[0]))
         offsets = sorted(self._positions(connection)[1].offset for connection in connections)
         runs = [[offsets[0]]]
         for before, after in pairwise(offsets):
@@ -105,11 +119,20 @@ class TransferPlanner:
     def _may_be_read_early(self, source_dtype: Dtype, target: ArrayPosition) -> bool:
         return (source_dtype, target) in self._copies and target not in self._targets_read
 
-    def _make_transfer(self, sources: Sequence[ArrayPosition], targets: Sequence[ArrayPosition], *more: Any) -> Transfer:
+    def _make_transfer(
+        self,
+        sources: Sequence[ArrayPosition],
+        targets: Sequence[ArrayPosition],
+        delay: int = 0,
+        factor: np.ndarray | None = None,
+        offset: np.ndarray | None = None,
+    ) -> Transfer:
         return Transfer(
-            self._signals.arrays[sources[0].dtype],
-            np.array([slot.offset for slot in sources], np.intp),
+            self._outputs.arrays[sources[0].dtype],
+            np.array([position.offset for position in sources], np.intp),
             self._inputs.arrays[targets[0].dtype],
-            np.array([slot.offset for slot in targets], np.intp),
-            *more,
+            np.array([position.offset for position in targets], np.intp),
+            delay,
+            factor,
+            offset,
         )

@@ -1,1 +1,1 @@
-"""From sources to FMUs: Modelica, CasADi equations and Python classes; used by `cosim build` only."""
+"""Export of FMUs from Modelica models, CasADi equations, Python classes and C sources (`cosim build`)."""

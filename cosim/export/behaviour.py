@@ -1,6 +1,6 @@
-"""Whether two FMUs behave alike: the same variables, and the same outputs under random inputs and parameters.
+"""Comparison of two FMUs by behaviour: declared variables, and outputs under random inputs and parameters.
 
-Bytes are no measure: another compiler makes other bytes of the same model.
+The files themselves are not compared: different compilers produce different binaries for the same model.
 """
 
 from __future__ import annotations
@@ -25,65 +25,80 @@ _NUMERIC_TYPES = ("Float64", "Int32", "Boolean", "Enumeration")
 
 @dataclass(frozen=True)
 class Trace:
-    """What an FMU did: its outputs after initialization and each step (rows), and why it stopped early, if it did."""
+    """Recorded outputs of one FMU simulation."""
 
     variables: Sequence[Variable]
+    #: names of the scalar outputs, one for each column of `values`
     outputs: Sequence[str]
+    #: outputs after initialization and after each step, shape (rows, columns)
     values: np.ndarray
+    #: message of the error that ended the simulation, or ""
     failure: str = ""
 
 
 def compare_fmus(first: Sequence[Path], second: Sequence[Path], seed: int = 1) -> dict[Path, str]:
-    """How FMUs of `second` differ from their counterparts in `first`; those that behave alike are left out.
+    """Compare each FMU of `second` with its counterpart in `first`.
 
-    Each side runs in one process of its own, so that an FMU that crashes is named instead of taking this process along.
+    The FMUs of each side run in a separate process, so that a crashing FMU is reported and does not end this process.
+
+    Args:
+        first: The reference FMUs.
+        second: The FMUs to compare, in the same order.
+        seed: Seed of the random inputs and parameters.
+
+    Returns:
+        The first difference of each FMU of `second` that behaves differently. FMUs that behave alike are omitted.
     """
     if not first:
         return {}
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(1, context) as one, ProcessPoolExecutor(1, context) as other:
-        left = [one.submit(record_traces, path, seed) for path in first]
-        right = [other.submit(record_traces, path, seed) for path in second]
-        outcomes = {path: _difference_of_results(a, b) for path, a, b in zip(second, left, right, strict=True)}
-    return {path: difference for path, difference in outcomes.items() if difference}
+    with ProcessPoolExecutor(1, context) as first_pool, ProcessPoolExecutor(1, context) as second_pool:
+        first_traces = [first_pool.submit(record_traces, path, seed) for path in first]
+        second_traces = [second_pool.submit(record_traces, path, seed) for path in second]
+        differences = {path: _difference_of_results(a, b) for path, a, b in zip(second, first_traces, second_traces, strict=True)}
+    return {path: difference for path, difference in differences.items() if difference}
 
 
 def _difference_of_results(first: Future[list[Trace]], second: Future[list[Trace]]) -> str:
     try:
         pairs = zip(first.result(), second.result(), strict=True)
     except BrokenProcessPool:
-        return "the process that ran it, or one before it, died"
+        return "the process that simulates the FMUs crashed in this FMU or in one before it"
     except Exception as error:
-        return f"cannot be run: {error}"
+        return f"cannot be simulated: {error}"
     return next((text for a, b in pairs if (text := first_difference(a, b))), "")
 
 
 def first_difference(first: Trace, second: Trace) -> str:
-    """The first thing in which two traces differ; empty when they agree within the tolerances."""
-    ours, theirs = ({variable.name: variable for variable in trace.variables} for trace in (first, second))
-    for name in sorted(ours.keys() | theirs.keys()):
-        if ours.get(name) != theirs.get(name):
-            return f'variable "{name}" {_declaration_difference(ours.get(name), theirs.get(name))}'
+    """Return a description of the first difference between two traces, or "" if they agree within the tolerances."""
+    first_variables, second_variables = ({variable.name: variable for variable in trace.variables} for trace in (first, second))
+    for name in sorted(first_variables.keys() | second_variables.keys()):
+        a, b = first_variables.get(name), second_variables.get(name)
+        if a != b:
+            return f'variable "{name}" {_declaration_difference(a, b)}'
     if first.failure != second.failure:
         return f'outcome differs: "{first.failure or "no failure"}" and "{second.failure or "no failure"}"'
-    for name, a, b in zip(first.outputs, first.values.T, second.values.T, strict=True):
-        scale = np.nanmax(np.abs([*a, *b, 0.0]))
-        wrong = ~np.isclose(a, b, rtol=0, atol=RELATIVE_TOLERANCE * scale + ABSOLUTE_TOLERANCE, equal_nan=True)
-        if wrong.any():
-            row = int(np.argmax(wrong))
-            return f'output "{name}" differs at t = {row * STEP_SIZE:.12g} s: {a[row]!r} and {b[row]!r}'
+    for name, x, y in zip(first.outputs, first.values.T, second.values.T, strict=True):
+        scale = np.nanmax(np.abs([*x, *y, 0.0]))
+        differing = ~np.isclose(x, y, rtol=0, atol=RELATIVE_TOLERANCE * scale + ABSOLUTE_TOLERANCE, equal_nan=True)
+        if differing.any():
+            row = int(np.argmax(differing))
+            return f'output "{name}" differs at t = {row * STEP_SIZE:.12g} s: {x[row]!r} and {y[row]!r}'
     return ""
 
 
-def _declaration_difference(ours: Variable | None, theirs: Variable | None) -> str:
-    if ours is None or theirs is None:
-        return f"exists only in the {'rebuilt' if ours is None else 'present'} FMU"
-    changed = [key for key in Variable.__slots__ if getattr(ours, key) != getattr(theirs, key)]
-    return "; ".join(f"has {key} {getattr(ours, key)!r} and {getattr(theirs, key)!r}" for key in changed)
+def _declaration_difference(first: Variable | None, second: Variable | None) -> str:
+    if first is None or second is None:
+        return f"exists only in the {'rebuilt' if first is None else 'present'} FMU"
+    changed = [key for key in Variable.__slots__ if getattr(first, key) != getattr(second, key)]
+    return "; ".join(f"has {key} {getattr(first, key)!r} and {getattr(second, key)!r}" for key in changed)
 
 
 def record_traces(path: Path, seed: int) -> list[Trace]:
-    """Two runs of an FMU: with its own parameters, and with random ones. The name of the file goes into the seed."""
+    """Simulate an FMU with its default parameters and with random ones.
+
+    The random numbers depend on `seed` and on the file name.
+    """
     return [_record_trace(path, np.random.default_rng([seed, crc32(path.name.encode())]), vary) for vary in (False, True)]
 
 
@@ -110,12 +125,12 @@ def _record_trace(path: Path, random: np.random.Generator, vary_parameters: bool
         failure = str(error)
     finally:
         component.free()
-    names = [slot for variable in _variables_in_memory_order(outputs) for slot in variable.scalar_names]
+    names = [name for variable in _variables_in_memory_order(outputs) for name in variable.scalar_names]
     return Trace(component.variables, names, np.array(rows).reshape(len(rows), len(names)), failure)
 
 
 def _simulate(component: Component, inputs: Ports, random: np.random.Generator) -> Iterator[None]:
-    """Walk through the life cycle; yields wherever outputs can be read."""
+    """Initialize and step the component; yield whenever its outputs can be read."""
     component.enter_initialization_mode(0.0, STEP_COUNT * STEP_SIZE)
     _set_random_inputs(inputs, random)
     component.set_inputs()
@@ -138,7 +153,7 @@ def _allocate_ports(variables: Sequence[Variable]) -> Ports:
 
 
 def _variables_in_memory_order(ports: Ports) -> list[Variable]:
-    """The variables in the order in which their values lie in the arrays, one array after the other."""
+    """Return the variables in the order of their values in the concatenated arrays."""
     return [variable for dtype in ports.arrays for variable in ports.variables if variable.dtype == dtype]
 
 
@@ -159,7 +174,7 @@ def _set_random_parameters(component: Component, random: np.random.Generator, va
 
 
 def _random_values(variable: Variable, random: np.random.Generator) -> np.ndarray:
-    """Random values: inputs all over their declared limits, else, like parameters, about the start value."""
+    """Return random values: within the declared limits for bounded inputs, else around the start value."""
     size = len(variable.scalar_names)
     start = np.resize(np.array(variable.start if variable.start is not None else 0, float), size)
     low, high = (np.nan if limit is None else limit for limit in (variable.minimum, variable.maximum))
@@ -170,6 +185,6 @@ def _random_values(variable: Variable, random: np.random.Generator) -> np.ndarra
         return (random.integers(int(low), int(high) + 1, size) if bounded else start).astype(variable.dtype)
     if variable.causality == "input" and bounded:
         return random.uniform(low, high, size)
-    least, share = (0.1, 0.2) if variable.causality == "parameter" else (2.0, 2.0)
-    values = start + np.where(start == 0, least, share * np.abs(start)) * random.uniform(-1, 1, size)
+    absolute_range, relative_range = (0.1, 0.2) if variable.causality == "parameter" else (2.0, 2.0)
+    values = start + np.where(start == 0, absolute_range, relative_range * np.abs(start)) * random.uniform(-1, 1, size)
     return np.fmin(np.fmax(values, low), high)

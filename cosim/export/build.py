@@ -1,4 +1,4 @@
-"""From sources to `fmus/`: what `cosim build` does, and the manifest that says what came of what."""
+"""Export of all sources to `fmus/` (`cosim build`) and the manifest of sources, FMUs and tool versions."""
 
 from __future__ import annotations
 
@@ -20,33 +20,42 @@ MANIFEST = Path("fmus/manifest.json")
 
 @dataclass(frozen=True, slots=True)
 class BuildResult:
-    """One source that was exported, and the FMUs that were written (FMI version -> file)."""
+    """An exported source and its FMUs (FMI version -> file)."""
 
     source: Path
     fmus: Mapping[int, Path]
 
 
 def build(
-    sources: Sequence[Path] | None, root: Path, report: Callable[[BuildResult], None] = lambda built: None
+    sources: Sequence[Path] | None, root: Path, report: Callable[[BuildResult], None] = lambda _result: None
 ) -> list[BuildResult]:
-    """Export sources (None: all below `root`) to `fmus/` and `fmus/fmi3/`, and write down in the manifest what came of what.
+    """Export sources to `fmus/` and `fmus/fmi3/` and record them in the manifest.
 
-    Building all also removes FMUs whose source is gone. `report` is called after each source.
+    Args:
+        sources: The files to export. None exports all sources below `root` and removes FMUs whose source no longer exists.
+        root: The project folder.
+        report: Called after each exported source.
+
+    Returns:
+        One result per source, in the order of export.
+
+    Raises:
+        InputError: A file is not a source below `root`, or a source cannot be exported.
     """
     manifest = read_manifest(root)
     selected = _select_sources(sources, root)
     if sources is None:
         _remove_orphans(manifest, selected, root)
-    finished = []
+    results = []
     for source in selected:
         fmus = fmu_files(source, root)
         files = export_source(source, fmus)
         entry = _manifest_entry(source, files, fmus, root)
         manifest = (manifest if sources is None else read_manifest(root)) | {source.manifest_key: entry}
         _write_manifest(manifest, root)
-        finished.append(BuildResult(source.path, fmus))
-        report(finished[-1])
-    return finished
+        results.append(BuildResult(source.path, fmus))
+        report(results[-1])
+    return results
 
 
 def _remove_orphans(manifest: dict[str, Any], sources: Sequence[Source], root: Path) -> None:
@@ -56,27 +65,50 @@ def _remove_orphans(manifest: dict[str, Any], sources: Sequence[Source], root: P
 
 
 def build_to(source: Path, model: str | None, target: Path, fmi_version: int = 2) -> Path:
-    """Export one file anywhere to `target`; `model` names the model when it is not the one named as the Modelica file."""
-    described = classify_source(source, model)
-    if fmi_version not in described.fmi_versions:
-        raise InputError(Problem(f"a {described.kind.name} cannot be exported as FMI {fmi_version}.0", str(source)))
-    export_source(described, {fmi_version: target}, model)
+    """Export one source file to one FMU.
+
+    Args:
+        source: The source file; it may be anywhere.
+        model: Name of the Modelica model. None selects the model with the name of the file.
+        target: The FMU to write.
+        fmi_version: 2 or 3.
+
+    Returns:
+        `target`.
+
+    Raises:
+        InputError: The file cannot be exported, or not for this FMI version.
+    """
+    classified = classify_source(source, model)
+    if fmi_version not in classified.fmi_versions:
+        raise InputError(Problem(f"a {classified.kind.name} cannot be exported as FMI {fmi_version}.0", str(source)))
+    export_source(classified, {fmi_version: target}, model)
     return target
 
 
 def cached_fmu(source: Path, model: str | None) -> Path:
-    """The FMI 2.0 FMU of a Modelica model, built on demand and kept per user until anything it depends on changes."""
-    described = classify_source(source, model)
+    """Return the FMI 2.0 FMU of a Modelica model from the user's cache.
+
+    The FMU is built if the model, the Modelica files beside it, the exporter or the tools have changed since the last build.
+
+    Args:
+        source: The Modelica file.
+        model: Name of the model. None selects the model with the name of the file.
+
+    Raises:
+        InputError: The model cannot be exported.
+    """
+    classified = classify_source(source, model)
     files = sorted(source.resolve().parent.rglob("*.mo"))
     exporter = sorted(path for path in Path(__file__).parent.rglob("*") if path.suffix in (".py", ".c", ".h"))
     contents = [(str(path), file_hash(path)) for path in [*files, *exporter]]
-    key = sha256(json.dumps([str(source.resolve()), model, tool_versions(described), contents]).encode())
-    target = cache_directory() / "fmus" / key.hexdigest()[:24] / f"{described.name}.fmu"
+    key = sha256(json.dumps([str(source.resolve()), model, tool_versions(classified), contents]).encode())
+    target = cache_directory() / "fmus" / key.hexdigest()[:24] / f"{classified.name}.fmu"
     return target if target.is_file() else build_to(source, model, target)
 
 
 def fmu_files(source: Source, root: Path) -> dict[int, Path]:
-    """FMI version -> the FMU of a source below `root`."""
+    """Return the path of a source's FMU below `root` for each FMI version."""
     return {version: root / FMU_FOLDERS[version] / source.kind.folder / f"{source.name}.fmu" for version in source.fmi_versions}
 
 
@@ -84,13 +116,13 @@ def _select_sources(sources: Sequence[Path] | None, root: Path) -> list[Source]:
     known = {source.path.resolve(): source for source in find_sources(root)}
     if sources is None:
         return list(known.values())
-    places = {str(path.relative_to(root.resolve())) for path in known}
+    known_names = {str(path.relative_to(root.resolve())) for path in known}
     problems = []
     files = [resolve_source_path(path) for path in sources]
     for path in files:
         if path.resolve() not in known:
-            where = ", ".join(kind.pattern for kind in SOURCE_KINDS)
-            problems.append(Problem(f"is no source of an FMU ({where}){did_you_mean(str(path), places)}", str(path)))
+            patterns = ", ".join(kind.pattern for kind in SOURCE_KINDS)
+            problems.append(Problem(f"is not a source of an FMU ({patterns}){did_you_mean(str(path), known_names)}", str(path)))
     if problems:
         raise InputError(problems)
     return [known[path.resolve()] for path in files]
@@ -100,12 +132,20 @@ def _select_sources(sources: Sequence[Path] | None, root: Path) -> list[Source]:
 
 
 def read_manifest(root: Path) -> dict[str, Any]:
-    """Names of FMUs -> {"sources": file -> sha256, "fmus": file -> sha256, "tools": name -> version}; {} without a manifest."""
+    """Return the manifest of the built FMUs, or {} if there is none.
+
+    Returns:
+        For each FMU name, the keys "sources" (file -> SHA-256), "fmus" (file -> SHA-256) and "tools" (name -> version).
+
+    Raises:
+        InputError: The file is not valid JSON.
+    """
     path = root / MANIFEST
     try:
-        return json.loads(path.read_text()) if path.is_file() else {}
+        manifest: dict[str, Any] = json.loads(path.read_text()) if path.is_file() else {}
     except json.JSONDecodeError as error:
-        raise InputError(Problem(f"is no JSON: {error}; remove it and run `cosim build`", str(path))) from None
+        raise InputError(Problem(f"is not valid JSON: {error}; remove it and run `cosim build`", str(path))) from None
+    return manifest
 
 
 def _write_manifest(manifest: Mapping[str, Any], root: Path) -> None:
@@ -122,4 +162,5 @@ def _file_hashes(files: Iterable[Path], root: Path) -> dict[str, str]:
 
 
 def file_hash(path: Path) -> str:
+    """Return the SHA-256 digest of a file as hexadecimal text."""
     return sha256(path.read_bytes()).hexdigest()

@@ -1,4 +1,4 @@
-"""Whether `fmus/` is what its sources say: what `cosim build --check` does."""
+"""Check that the FMUs in `fmus/` correspond to their sources (`cosim build --check`)."""
 
 from __future__ import annotations
 
@@ -14,27 +14,36 @@ from .sources import Source, export_source, find_sources
 
 
 def check_fmus(root: Path) -> list[Problem]:
-    """Whether `fmus/` is what its sources say: hashes agree with the manifest, and rebuilt FMUs behave as the present ones."""
+    """Check that the FMUs in `fmus/` correspond to their sources.
+
+    The hashes of all files must agree with the manifest, and rebuilt FMUs must behave like the present ones.
+
+    Args:
+        root: The project folder.
+
+    Returns:
+        All deviations; empty if there are none.
+    """
     manifest, sources = read_manifest(root), find_sources(root)
     problems = _orphans(root, manifest, sources)
-    sound = []
+    unchanged = []
     for source in sources:
-        found = _manifest_mismatches(root, manifest, source)
-        problems += found
-        if not found:
-            sound.append(source)
-    return problems + _changed_behaviour(root, sound)
+        mismatches = _manifest_mismatches(root, manifest, source)
+        problems += mismatches
+        if not mismatches:
+            unchanged.append(source)
+    return problems + _changed_behaviour(root, unchanged)
 
 
 def _orphans(root: Path, manifest: Mapping[str, Any], sources: Sequence[Source]) -> list[Problem]:
     expected = {path for source in sources for path in fmu_files(source, root).values()}
     present = set((root / "fmus").rglob("*.fmu"))
     listed = {root / fmu for entry in manifest.values() for fmu in entry["fmus"]}
-    return [Problem("belongs to no source", path.relative_to(root).as_posix()) for path in sorted((present | listed) - expected)]
+    return [Problem("has no source", path.relative_to(root).as_posix()) for path in sorted((present | listed) - expected)]
 
 
 def _manifest_mismatches(root: Path, manifest: Mapping[str, Any], source: Source) -> list[Problem]:
-    """What the manifest says about a source and is no longer true."""
+    """Return the deviations of a source and its FMUs from their entry in the manifest."""
     entry = manifest.get(source.manifest_key)
     if entry is None:
         return [Problem("has no FMU; run `cosim build`", source.path.relative_to(root).as_posix())]
@@ -57,14 +66,14 @@ def _changed_behaviour(root: Path, sources: Sequence[Source]) -> list[Problem]:
     rebuilt: list[Path] = []
     with TemporaryDirectory(prefix="cosim-check-") as temporary:
         for source in sources:
-            again = fmu_files(source, Path(temporary))
+            targets = fmu_files(source, Path(temporary))
             try:
-                export_source(source, again)
+                export_source(source, targets)
             except CosimError as error:
-                problems.append(Problem(f"cannot be built any more: {error}", source.path.relative_to(root).as_posix()))
+                problems.append(Problem(f"can no longer be built: {error}", source.path.relative_to(root).as_posix()))
                 continue
             present += fmu_files(source, root).values()
-            rebuilt += again.values()
+            rebuilt += targets.values()
         for path, difference in compare_fmus(present, rebuilt).items():
             problems.append(Problem(f"differs from a rebuild: {difference}", path.relative_to(temporary).as_posix()))
     return problems

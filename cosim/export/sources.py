@@ -1,4 +1,4 @@
-"""The sources of FMUs: which kinds there are, where they live, and how each becomes an FMU."""
+"""Kinds of FMU sources, their file patterns and their exporters."""
 
 from __future__ import annotations
 
@@ -21,24 +21,26 @@ from .foreign.relative_imports import with_relative_imports
 
 @dataclass(frozen=True, slots=True)
 class SourceKind:
-    """A kind of source: where its files lie, which package reads it, and how.
-
-    Either `load` reads it as a block, which becomes an FMU of each version, or `write` makes its FMI 2.0 FMU and returns the
-    files that went in. Its FMUs lie in `folder` below `fmus/`.
-    """
+    """A kind of source with its exporter: either `load_block` or `write_fmi2`."""
 
     name: str
+    #: glob pattern of the source files, relative to the project folder
     pattern: str
+    #: distribution package that the exporter needs
     package: str
+    #: read a source file (and the named model in it) as a block, which is exported for FMI 2.0 and 3.0
     load_block: Callable[[Path, str | None], Block] | None
+    #: folder of the FMUs below `fmus/`
     folder: str = ""
+    #: write the FMI 2.0 FMU of a source file and return the files that it was made from
     write_fmi2: Callable[[Path, Path], list[Path]] | None = None
+    #: true if the exporter runs the C compiler
     compiled: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A file that becomes an FMU; `name` is the FMU's file name without ending."""
+    """A source file; `name` is the name of its FMU without the suffix."""
 
     path: Path
     kind: SourceKind
@@ -46,11 +48,12 @@ class Source:
 
     @property
     def manifest_key(self) -> str:
-        """The name with the folder of its kind: what the manifest calls it."""
+        """Key of the FMU in the manifest: its folder and name."""
         return f"{self.kind.folder}/{self.name}".lstrip("/")
 
     @property
     def fmi_versions(self) -> Sequence[int]:
+        """FMI versions that the source can be exported for."""
         return (2, 3) if self.kind.load_block else (2,)
 
 
@@ -60,12 +63,12 @@ def _load_modelica(path: Path, model: str | None) -> Block:
     return load_block(path, model)
 
 
-def _load_equations(path: Path, model: str | None) -> Block:
-    from ..components.python_class import load_object
+def _load_equations(path: Path, _model: str | None) -> Block:
+    from ..components.python_import import load_object
 
-    block = load_object(f"{path.name}:block", path.parent)
+    create_block: Callable[[], Block] = load_object(f"{path.name}:block", path.parent)
     try:
-        return block()
+        return create_block()
     except CosimError:
         raise
     except Exception as error:
@@ -87,19 +90,33 @@ SOURCE_KINDS = (
 
 
 def find_sources(root: Path) -> list[Source]:
-    """All sources below `root` that `cosim build` exports, ordered by the names of their FMUs, which must differ."""
+    """Return all sources below `root`, sorted by the names of their FMUs.
+
+    Files whose names begin with an underscore are ignored.
+
+    Raises:
+        InputError: Two sources have the same FMU name.
+    """
     paths = [path for kind in SOURCE_KINDS for path in root.glob(kind.pattern) if not path.name.startswith("_")]
     sources = sorted(map(classify_source, paths), key=lambda source: source.manifest_key)
     clashes = [(a, b) for a, b in pairwise(sources) if a.manifest_key == b.manifest_key]
     if clashes:
         raise InputError(
-            [Problem(f'becomes "{a.manifest_key}.fmu" as {b.path} does; rename one', str(a.path)) for a, b in clashes]
+            [Problem(f'has the same FMU name "{a.manifest_key}.fmu" as {b.path}; rename one', str(a.path)) for a, b in clashes]
         )
     return sources
 
 
 def classify_source(path: Path, model: str | None = None) -> Source:
-    """What kind of source a file is, and the name of its FMU. Raises InputError for files that cannot be exported."""
+    """Determine the kind of a source file and the name of its FMU.
+
+    Args:
+        path: The source file, or the folder of a C controller.
+        model: Name of the Modelica model. None selects the model with the name of the file.
+
+    Raises:
+        InputError: The file cannot be exported.
+    """
     path = resolve_source_path(path)
     if path.suffix == ".mo":
         return Source(path, SOURCE_KINDS[0], snake_case((model or path.stem).rpartition(".")[2]))
@@ -115,12 +132,13 @@ def classify_source(path: Path, model: str | None = None) -> Source:
 
 
 def resolve_source_path(path: Path) -> Path:
-    """The file that stands for a source: a controller in C may be named by its folder."""
+    """Return the model description if `path` is the folder of a C controller, else `path` itself."""
     return path / DESCRIPTION_FILE if (path / DESCRIPTION_FILE).is_file() else path
 
 
 def snake_case(name: str) -> str:
-    """
+    """Convert a name from CamelCase to snake_case.
+
     >>> snake_case("ArDroneCascaded"), snake_case("PIDController")
     ('ar_drone_cascaded', 'pid_controller')
     """
@@ -128,7 +146,19 @@ def snake_case(name: str) -> str:
 
 
 def export_source(source: Source, targets: Mapping[int, Path], model: str | None = None) -> list[Path]:
-    """Export to one file per FMI version; the result lists all files that went in."""
+    """Export a source to one FMU per FMI version.
+
+    Args:
+        source: The source.
+        targets: The FMU to write for each FMI version.
+        model: Name of the Modelica model. None selects the model with the name of the file.
+
+    Returns:
+        All files that the FMUs were made from.
+
+    Raises:
+        InputError: The source is faulty, or a tool for the export is missing.
+    """
     tool_version(source.kind.package)
     if source.kind.load_block is None:
         assert source.kind.write_fmi2 is not None
@@ -140,7 +170,11 @@ def export_source(source: Source, targets: Mapping[int, Path], model: str | None
 
 
 def tool_version(package: str) -> str:
-    """The version of an installed package that exporting needs; raises InputError when it is missing."""
+    """Return the version of an installed distribution package.
+
+    Raises:
+        InputError: The package is not installed.
+    """
     try:
         return version(package)
     except PackageNotFoundError:
@@ -148,7 +182,7 @@ def tool_version(package: str) -> str:
 
 
 def tool_versions(source: Source) -> dict[str, str]:
-    """Names and versions of everything that turns this source into an FMU."""
+    """Return the names and versions of the tools that export a source."""
     versions = {source.kind.package: tool_version(source.kind.package)}
     if source.kind.compiled:
         versions["compiler"] = compiler_version(tuple(find_compiler()))

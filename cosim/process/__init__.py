@@ -1,1 +1,1 @@
-"""Operating-system processes: supervision, journal, containment of foreign code, sandbox, files of a run."""
+"""Operating-system processes: supervision, journal, restoring of process state, sandbox, files of a run."""

@@ -1,7 +1,7 @@
-"""What this process is doing, in memory that a supervising process can still read after a crash.
+"""Record of the present activity of this process, in memory that a supervising process can read after a crash.
 
-A journal is a small block of memory: the marker of the executor (see `engine.executor`), and beside it the activity that is
-going on outside the stepping loop, with the time it may take. Without a supervisor nothing is noted.
+A journal is a small block of memory. It holds the marker of the executor (see `MARKER_SIZE`) and the present activity outside the
+stepping loop with its deadline. A process without a supervisor has no journal.
 """
 
 from __future__ import annotations
@@ -18,42 +18,53 @@ from typing import Any, NamedTuple
 
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, describe_exception
 
-#: bytes of a journal; its fields: int64 until 64, the time as double, then two texts
+#: size of a journal (bytes)
 JOURNAL_SIZE = 5 * 4096
+#: indices of the int64 fields, which occupy the first 64 bytes
 CALL_NUMBER, STEP_COUNT, ROW_COUNT, PHASE, CHANGE_COUNT, DEADLINE, EXIT_CODE, CSV_UPDATE = range(8)
-_TIME_OFFSET, _COMPONENT_OFFSET, _FUNCTION_OFFSET, _FOLDER_OFFSET, _CSV_PATH_OFFSET, _MAX_TEXT_SIZE = (
-    64,
-    4096,
-    8192,
-    12288,
-    16384,
-    4092,
-)
+#: number of leading fields that form the marker, which the executor updates: present call, finished macro steps, recorded rows
+MARKER_SIZE = 3
+#: offsets of a float64 and of four texts; a text is its length (uint32) followed by UTF-8
+_TIME_OFFSET, _COMPONENT_OFFSET, _FUNCTION_OFFSET, _FOLDER_OFFSET, _CSV_PATH_OFFSET = 64, 4096, 8192, 12288, 16384
+_MAX_TEXT_SIZE = 4092
 
 
 class Phase(IntEnum):
-    """What kind of thing is going on: nothing foreign, a call, the stepping loop, a call with all results written, the end,
-    or that a call or the stepping loop waits for something that is no component."""
+    """Kind of the present activity."""
 
-    IDLE, CALLING, STEPPING, RESULTS_WRITTEN, DONE, WAITING = range(6)
+    #: no foreign code is running
+    IDLE = 0
+    #: a call into a component, outside the stepping loop
+    CALLING = 1
+    #: the stepping loop
+    STEPPING = 2
+    #: a call into a component after all results were written
+    RESULTS_WRITTEN = 3
+    #: the entry function of the process has returned
+    DONE = 4
+    #: a call or the stepping loop waits for something that is not a component
+    WAITING = 5
 
     @property
     def in_loop(self) -> bool:
-        """Rows are being recorded."""
+        """Whether rows are being recorded."""
         return self in (Phase.STEPPING, Phase.WAITING)
 
 
 _PHASES = frozenset(Phase)
-#: no deadline is longer (ms)
+#: longest deadline (ms)
 _MAX_DEADLINE = 10**15
 
 
 @dataclass(frozen=True, slots=True)
 class Deadlines:
-    """How long a call into a component may take, in s of wall time.
+    """Maximum duration of one call into a component, in s of wall time.
 
-    `load`: load and instantiate; `initialization`: until the end of initialization mode; `step`: one call while stepping;
-    `end`: terminate and free.
+    Attributes:
+        load: Loading and instantiating.
+        initialization: Calls until the end of initialization mode.
+        step: Calls in the stepping loop.
+        end: Terminating and freeing.
     """
 
     load: float = 10.0
@@ -63,7 +74,7 @@ class Deadlines:
 
 
 class Activity(NamedTuple):
-    """What the journal says: a call into a component, begun at simulation time `time` (NaN: outside the simulation)."""
+    """Recorded call into a component at simulation time `time` (s; NaN outside the simulation), with its deadline (s)."""
 
     component: str
     function: str
@@ -72,7 +83,7 @@ class Activity(NamedTuple):
 
 
 class Journal:
-    """A journal in `memory`, which may be shared with another process."""
+    """Journal in `memory`, a buffer of `JOURNAL_SIZE` bytes that may be shared with another process."""
 
     def __init__(self, memory: Any):
         self.memory = memory
@@ -88,25 +99,26 @@ class Journal:
 
     @property
     def is_valid(self) -> bool:
-        """Whether this can be what cosim wrote: foreign code in the process can write anywhere."""
+        """Whether the content is plausible; foreign code in the process can overwrite it."""
         deadline, counts = self[DEADLINE], (self[STEP_COUNT], self[ROW_COUNT], self[CHANGE_COUNT])
         return self[PHASE] in _PHASES and self[CSV_UPDATE] in (0, 1) and -1 <= deadline <= _MAX_DEADLINE and min(counts) >= 0
 
     def to_bytes(self) -> bytes:
-        """All that stands here."""
+        """Return a copy of the whole content."""
         return bytes(self.memory[:])
 
     def restore(self, contents: bytes) -> None:
-        """As it was when `contents` were taken."""
+        """Restore a content returned by `to_bytes`."""
         self.memory[:] = contents
 
     @property
     def phase(self) -> Phase:
+        """Present phase."""
         return Phase(self[PHASE])
 
     def enter_phase(self, phase: Phase, deadline: float = math.inf) -> None:
-        """From now on this is going on, for at most `deadline` s at a time."""
-        self[CHANGE_COUNT] += 1  # first: whoever sees the new deadline sees that something has changed
+        """Begin a phase with a maximum duration of each call (s); wait for the end of an update of the result file."""
+        self[CHANGE_COUNT] += 1  # first, so that a reader of the new deadline also reads the new count
         self[DEADLINE] = -1 if math.isinf(deadline) else int(min(deadline * 1000, _MAX_DEADLINE))
         self[PHASE] = phase
         while self[CSV_UPDATE]:
@@ -114,7 +126,7 @@ class Journal:
 
     @contextmanager
     def updating_csv(self) -> Iterator[bool]:
-        """Within this block the supervisor may change the result file, if True comes of it: the run does not touch it yet."""
+        """Yield whether the supervisor may replace the result file; the run does not write it during the block."""
         self[CSV_UPDATE] = 1
         try:
             yield self.phase.in_loop
@@ -122,43 +134,43 @@ class Journal:
             self[CSV_UPDATE] = 0
 
     def record_call(self, component: str, function: str, time: float = math.nan) -> None:
-        """Which call is being made."""
+        """Record the present call and its simulation time (s; NaN outside the simulation)."""
         struct.pack_into("d", self.memory, _TIME_OFFSET, time)
         self._write_text(_COMPONENT_OFFSET, component)
         self._write_text(_FUNCTION_OFFSET, function)
 
     def activity(self) -> Activity:
-        """What was noted last."""
+        """Return the call that was recorded last."""
         (time,) = struct.unpack_from("d", self.memory, _TIME_OFFSET)
         return Activity(self._read_text(_COMPONENT_OFFSET), self._read_text(_FUNCTION_OFFSET), time, self.deadline)
 
     @property
     def deadline(self) -> float:
-        """How long what is going on may take (s)."""
+        """Deadline of the present phase (s)."""
         milliseconds = self[DEADLINE]
         return math.inf if milliseconds < 0 else milliseconds / 1000
 
     def set_run_files(self, folder: Path, csv: Path | None) -> None:
-        """The run's files lie in `folder`; the user waits for its rows in `csv`."""
+        """Record the folder of the files of the run, and the CSV file for its rows (None: no such file)."""
         self._write_text(_FOLDER_OFFSET, str(folder.resolve()))
         self._write_text(_CSV_PATH_OFFSET, str(csv.resolve()) if csv else "")
 
     @property
     def folder(self) -> Path | None:
-        """Where the files of the run lie (see `unfinished`), once that is known."""
+        """Folder of the files of the run (see `process.run_files`); None if not set."""
         return Path(text) if (text := self._read_text(_FOLDER_OFFSET)) else None
 
     @property
     def csv_path(self) -> Path | None:
-        """Where the user wants the rows."""
+        """CSV file for the rows of the run; None if not set."""
         return Path(text) if (text := self._read_text(_CSV_PATH_OFFSET)) else None
 
-    def _write_text(self, place: int, text: str) -> None:
+    def _write_text(self, offset: int, text: str) -> None:
         data = text.encode("utf-8", "replace")[:_MAX_TEXT_SIZE]
-        struct.pack_into(f"I{len(data)}s", self.memory, place, len(data), data)
+        struct.pack_into(f"I{len(data)}s", self.memory, offset, len(data), data)
 
-    def _read_text(self, place: int) -> str:
-        size, data = struct.unpack_from(f"I{_MAX_TEXT_SIZE}s", self.memory, place)
+    def _read_text(self, offset: int) -> str:
+        size, data = struct.unpack_from(f"I{_MAX_TEXT_SIZE}s", self.memory, offset)
         return str(data[:size].decode("utf-8", "replace"))
 
 
@@ -166,21 +178,28 @@ _current: Journal | None = None
 
 
 def set_current_journal(journal: Journal | None) -> None:
-    """This process notes what it does in `journal` from now on."""
+    """Set the journal of this process; None for none."""
     global _current
     _current = journal
 
 
 def current_journal() -> Journal | None:
-    """The journal of this process, if it has a supervisor."""
+    """Return the journal of this process; None without a supervisor."""
     return _current
 
 
 @contextmanager
 def calling_component(component: str, function: str, deadline_name: str, time: float = math.nan) -> Iterator[None]:
-    """Within this block a function of a component is called, outside the stepping loop; `kind` names its deadline.
+    """Record a call into a component, outside the stepping loop, for the duration of the block.
 
-    Raises ComponentError for whatever is raised there.
+    Args:
+        component: Name of the component.
+        function: Name of its function.
+        deadline_name: Attribute of `Deadlines` with the maximum duration.
+        time: Simulation time (s); NaN outside the simulation.
+
+    Raises:
+        ComponentError: The block raised an exception, see `as_component_error`.
     """
     journal = _current
     if journal is None:
@@ -202,7 +221,7 @@ def calling_component(component: str, function: str, deadline_name: str, time: f
 
 @contextmanager
 def as_component_error(component: str, function: str, time: float = math.nan) -> Iterator[None]:
-    """What is raised in this block is a failure of the component: a ComponentError, unless it is an error of cosim already."""
+    """Raise a ComponentError for an exception in the block that is no CosimError and not in `PASS_THROUGH_EXCEPTIONS`."""
     try:
         yield
     except (CosimError, *PASS_THROUGH_EXCEPTIONS):
@@ -213,7 +232,7 @@ def as_component_error(component: str, function: str, time: float = math.nan) ->
 
 @contextmanager
 def suspending_deadline() -> Iterator[None]:
-    """Within this block something is done or waited for that is no component, as long as it takes."""
+    """Suspend the deadline: the time spent in this block is not a component's."""
     journal = _current
     if journal is None:
         yield

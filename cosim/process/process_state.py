@@ -1,123 +1,73 @@
-"""What foreign code may change in the process it is loaded into, and how to change it back."""
+"""Capture and restore the process-wide state that foreign code may change."""
 
 from __future__ import annotations
 
 import ctypes
 import locale
 import os
+import resource
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..core import component_log
-from . import float_mode
+from .float_mode import FloatEnvironment
 from .journal import Phase, current_journal
 
-if sys.platform != "win32":
-    import resource
-
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGSEGV, signal.SIGFPE, signal.SIGABRT, signal.SIGPIPE, signal.SIGCHLD)
+_TIMERS = (signal.ITIMER_REAL, signal.ITIMER_VIRTUAL, signal.ITIMER_PROF)
+_LIMITS = (resource.RLIMIT_AS, resource.RLIMIT_CPU, resource.RLIMIT_DATA, resource.RLIMIT_FSIZE, resource.RLIMIT_NOFILE)
 _SIGACTION_SIZE = 512  # more than any platform's struct sigaction, which begins with the handler
 _POINTER_SIZE = ctypes.sizeof(ctypes.c_void_p)
 
 
-@dataclass(frozen=True)
 class ProcessState:
-    """Working directory, file mode mask, locale of the C library, environment, signals, floating-point mode and limits."""
+    """Values of all attributes in `_ATTRIBUTES` at the time of construction."""
 
-    working_directory: str
-    umask: int
-    locale: bytes
-    environment: dict[bytes, bytes]
-    signal_actions: dict[int, bytes]
-    float_environment: float_mode.FloatEnvironment
-    signal_mask: set[int]
-    timers: dict[int, bool]
-    resource_limits: dict[int, tuple[int, int]]
-
-    @classmethod
-    def capture(cls) -> ProcessState:
-        mask = os.umask(0)
-        os.umask(mask)
-        handlers: dict[int, bytes] = {number: _signal_action(number) for number in _SIGNALS}
-        floats, blocked = float_mode.FloatEnvironment(), _signal_mask()
-        return cls(
-            str(Path.cwd()), mask, _locale(), _c_environment(), handlers, floats, blocked, _running_timers(), _resource_limits()
-        )
+    def __init__(self) -> None:
+        self._values = [attribute.read() for attribute in _ATTRIBUTES]
 
     def restore(self) -> list[str]:
-        """Bring everything back to this state; says what had been changed."""
-        return list(self._restore_each())
-
-    def _restore_each(self) -> Iterator[str]:
-        if self.float_environment.restore():
-            yield "the floating-point mode"
-        if _working_directory() != self.working_directory:
-            os.chdir(self.working_directory)
-            yield "the working directory"
-        if os.umask(self.umask) != self.umask:
-            yield "the file mode mask"
-        if _locale() != self.locale:
-            _c_library().setlocale(locale.LC_ALL, self.locale)
-            yield "the locale"
-        if (now := _c_environment()) != self.environment:
-            for name in {*now, *self.environment}:
-                value = self.environment.get(name)
-                _c_library().unsetenv(name) if value is None else _c_library().setenv(name, value, 1)
-            yield "the environment"
-        changed = [n for n in _SIGNALS if _signal_action(n)[:_POINTER_SIZE] != self.signal_actions[n][:_POINTER_SIZE]]
-        for number in changed:
-            _c_library().sigaction(int(number), self.signal_actions[number], None)
-        if changed:
-            yield f"what is done upon {', '.join(signal.Signals(number).name for number in changed)}"
-        if _signal_mask() != self.signal_mask:
-            signal.pthread_sigmask(signal.SIG_SETMASK, self.signal_mask)
-            yield "which signals are blocked"
-        if running := [timer for timer, runs in _running_timers().items() if runs and not self.timers[timer]]:
-            for timer in running:
-                signal.setitimer(timer, 0)
-            yield "the timers"
-        if (limits := _resource_limits()) != self.resource_limits:
-            for kind, limit in self.resource_limits.items():
-                if limits[kind] != limit:
-                    _restore_limit(kind, limit)
-            yield (
-                "the limits" if _resource_limits() == self.resource_limits else "the limits (what was lowered for good stays so)"
-            )
+        """Restore all attributes; return a description of each one that had changed."""
+        details = ((attribute.name, attribute.restore(value)) for attribute, value in zip(_ATTRIBUTES, self._values, strict=True))
+        return [f"{name}{detail}" for name, detail in details if detail is not None]
 
 
 @contextmanager
 def restoring_process_state(component: str) -> Iterator[None]:
-    """What components change in the process while the block lasts is changed back, and `who` is named.
+    """Restore the process state at the end of the block and warn of each change.
 
-    A supervised process whose own output was closed ends here: only its supervisor can still say by whom, and save the rows.
+    A supervised process whose standard output or standard error was closed ends here: only its supervisor can still report the
+    component and save the rows.
+
+    Args:
+        component: Name of the component or components that may change the state, for messages.
     """
-    state, voices = ProcessState.capture(), _output_files()
+    state, output_files = ProcessState(), _output_files()
     try:
         yield
     finally:
         journal = current_journal()
-        if journal and voices != _output_files():
+        if journal and output_files != _output_files():
             journal.record_call(component, "a call that closed the files of the process")
             journal.enter_phase(Phase.CALLING)
             os._exit(70)
-        for what in state.restore():
-            component_log.log_message(component, component_log.WARNING, f"changed {what} of the process; it was changed back")
+        for change in state.restore():
+            component_log.log_message(component, component_log.WARNING, f"changed {change} of the process; it was changed back")
 
 
 def _output_files() -> list[tuple[int, int]]:
-    """What the streams of Python lead to, if they can be written."""
-    found = []
+    """Return device and inode of the files behind `sys.stdout` and `sys.stderr`, if they have any."""
+    files = []
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError, AttributeError):
-            place = os.fstat(stream.fileno())
-            found.append((place.st_dev, place.st_ino))
-    return found
+            status = os.fstat(stream.fileno())
+            files.append((status.st_dev, status.st_ino))
+    return files
 
 
 @cache
@@ -133,52 +83,129 @@ def _working_directory() -> str:
     return ""
 
 
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
 def _locale() -> bytes:
     return bytes(_c_library().setlocale(locale.LC_ALL, None) or b"C")
 
 
+def _set_locale(name: bytes) -> None:
+    _c_library().setlocale(locale.LC_ALL, name)
+
+
 def _c_environment() -> dict[bytes, bytes]:
-    """The C library's environment; Python's own copy is not changed by foreign code."""
+    """Return the environment of the C library, which foreign code changes without changing `os.environ`."""
     if sys.platform != "linux":
         return {}
     entries = ctypes.POINTER(ctypes.c_char_p).in_dll(_c_library(), "environ")
-    found, i = {}, 0
-    while entries and entries[i] is not None:
-        name, _, value = entries[i].partition(b"=")
-        found[name] = value
+    variables, i = {}, 0
+    while entries and (entry := entries[i]) is not None:
+        name, _, value = entry.partition(b"=")
+        variables[name] = value
         i += 1
-    return found
+    return variables
 
 
-def _signal_action(number: int) -> bytes:
-    if sys.platform == "win32":
-        return b""
-    action = ctypes.create_string_buffer(_SIGACTION_SIZE)
-    _c_library().sigaction(int(number), None, action)
-    return action.raw
+def _set_c_environment(variables: dict[bytes, bytes]) -> None:
+    for name in {*_c_environment(), *variables}:
+        value = variables.get(name)
+        _c_library().unsetenv(name) if value is None else _c_library().setenv(name, value, 1)
 
 
 def _signal_mask() -> set[int]:
-    return set() if sys.platform == "win32" else {*signal.pthread_sigmask(signal.SIG_BLOCK, ())}
+    return {*signal.pthread_sigmask(signal.SIG_BLOCK, ())}
 
 
-def _running_timers() -> dict[int, bool]:
-    """Whether the timers that send signals are running."""
-    if sys.platform == "win32":
-        return {}
-    return {timer: any(signal.getitimer(timer)) for timer in (signal.ITIMER_REAL, signal.ITIMER_VIRTUAL, signal.ITIMER_PROF)}
+def _set_signal_mask(mask: set[int]) -> None:
+    signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+def _restore_float_mode(environment: FloatEnvironment) -> str | None:
+    return "" if environment.restore() else None
+
+
+def _signal_actions() -> dict[int, bytes]:
+    """Return the C `struct sigaction` of each signal in `_SIGNALS`."""
+    actions: dict[int, bytes] = {}
+    for number in _SIGNALS:
+        action = ctypes.create_string_buffer(_SIGACTION_SIZE)
+        _c_library().sigaction(int(number), None, action)
+        actions[number] = action.raw
+    return actions
+
+
+def _restore_signal_actions(saved: dict[int, bytes]) -> str | None:
+    """Restore the actions whose handlers differ; return the names of their signals."""
+    current = _signal_actions()
+    changed = [number for number in saved if current[number][:_POINTER_SIZE] != saved[number][:_POINTER_SIZE]]
+    for number in changed:
+        _c_library().sigaction(int(number), saved[number], None)
+    return f" {', '.join(signal.Signals(number).name for number in changed)}" if changed else None
+
+
+def _running_timers() -> set[int]:
+    return {timer for timer in _TIMERS if any(signal.getitimer(timer))}
+
+
+def _stop_new_timers(saved: set[int]) -> str | None:
+    new = _running_timers() - saved
+    for timer in new:
+        signal.setitimer(timer, 0)
+    return "" if new else None
 
 
 def _resource_limits() -> dict[int, tuple[int, int]]:
-    if sys.platform == "win32":
-        return {}
-    kinds = (resource.RLIMIT_AS, resource.RLIMIT_CPU, resource.RLIMIT_DATA, resource.RLIMIT_FSIZE, resource.RLIMIT_NOFILE)
-    return {kind: resource.getrlimit(kind) for kind in kinds}
+    return {kind: resource.getrlimit(kind) for kind in _LIMITS}
 
 
-def _restore_limit(kind: int, limit: tuple[int, int]) -> None:
-    """As far as that is allowed: what was given away for good stays away."""
-    if sys.platform == "win32":
-        return
-    with suppress(ValueError, OSError):
-        resource.setrlimit(kind, limit)
+def _restore_resource_limits(saved: dict[int, tuple[int, int]]) -> str | None:
+    """Restore limits if permitted; a lowered hard limit cannot be raised again."""
+    current = _resource_limits()
+    if current == saved:
+        return None
+    for kind, limit in saved.items():
+        if current[kind] != limit:
+            with suppress(ValueError, OSError):
+                resource.setrlimit(kind, limit)
+    return "" if _resource_limits() == saved else " (what was lowered for good stays so)"
+
+
+class _Attribute(NamedTuple):
+    """One attribute of the process.
+
+    `restore` takes the value that `read` returned earlier. It returns None if nothing had changed, else details that follow the
+    name in the warning.
+    """
+
+    name: str
+    read: Callable[[], Any]
+    restore: Callable[[Any], str | None]
+
+
+def _compared(name: str, read: Callable[[], Any], write: Callable[[Any], object]) -> _Attribute:
+    """Return an attribute that has changed if its value differs, and is restored by `write`."""
+
+    def restore(value: Any) -> str | None:
+        if read() == value:
+            return None
+        write(value)
+        return ""
+
+    return _Attribute(name, read, restore)
+
+
+_ATTRIBUTES = (
+    _Attribute("the floating-point mode", FloatEnvironment, _restore_float_mode),
+    _compared("the working directory", _working_directory, os.chdir),
+    _compared("the file mode mask", _umask, os.umask),
+    _compared("the locale", _locale, _set_locale),
+    _compared("the environment", _c_environment, _set_c_environment),
+    _Attribute("what is done upon", _signal_actions, _restore_signal_actions),
+    _compared("which signals are blocked", _signal_mask, _set_signal_mask),
+    _Attribute("the timers", _running_timers, _stop_new_timers),
+    _Attribute("the limits", _resource_limits, _restore_resource_limits),
+)

@@ -1,4 +1,4 @@
-"""Standard output and standard error of a command, which works on when nobody reads them any more."""
+"""Standard streams that survive a closed pipe (`cosim run ... | head`)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, TextIO
 
 
 class _BrokenPipeIgnoringFile(io.FileIO):
-    """A file whose reader may go away, as `head` does: what is written from then on is dropped."""
+    """File that drops output after the reader closed the pipe."""
 
     def write(self, data: Any) -> int:
         try:
@@ -18,9 +18,15 @@ class _BrokenPipeIgnoringFile(io.FileIO):
 
 
 def ignoring_broken_pipe(stream: TextIO, duplicate: bool = False) -> TextIO:
-    """The stream, working on without a reader; `apart`: on a file descriptor of its own, which foreign code does not know.
+    """Return a text stream to the same file that ignores a closed pipe.
 
-    A stream that is no file, such as that of a notebook, stays as it is.
+    Args:
+        stream: The stream to replace.
+        duplicate: Write through a duplicated descriptor, so that foreign code that closes or redirects the original one does
+            not affect the stream.
+
+    Returns:
+        The stream itself if it has no file descriptor, as in a notebook.
     """
     try:
         descriptor = stream.fileno()

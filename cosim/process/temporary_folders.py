@@ -1,4 +1,4 @@
-"""Folders for temporary files that go with their process: at its end, or, when it was killed, at the start of the next one."""
+"""Temporary folders that are removed with their process, or by a later process if theirs was killed."""
 
 from __future__ import annotations
 
@@ -12,15 +12,19 @@ from pathlib import Path
 from shutil import rmtree
 from weakref import finalize
 
-#: what a folder is for: a run, an extracted FMU, what an FMU in a process of its own writes
+#: prefixes of folders for a run, an extracted FMU, and the files that an isolated FMU writes
 RUN_PREFIX, FMU_PREFIX, WORKER_PREFIX = "cosim-run-", "cosim-fmu-", "cosim-worker-"
 
 
 class LockedFolder:
-    """A new temporary folder until `cleanup`; folders of processes that were killed before they could end are removed first.
+    """New temporary folder, removed by `cleanup` or at the end of the process.
 
-    The process holds a lock on its folder, which the operating system takes back however the process ends. The lock is what
-    makes a folder taken: process ids may be reused, or belong to another container with the same /tmp.
+    The process holds a lock on the folder, which the operating system releases even if the process is killed. An unlocked folder
+    is therefore abandoned. Process ids would not do: they are reused, and another container may share /tmp. Abandoned folders are
+    removed before the new one is created.
+
+    Attributes:
+        name: Path of the folder.
     """
 
     def __init__(self, prefix: str):
@@ -29,13 +33,13 @@ class LockedFolder:
         self._finalizer = finalize(self, _remove_folder, self.name, lock, os.getpid())
 
     def cleanup(self) -> None:
-        """Remove the folder; done at the end of the process at the latest."""
+        """Remove the folder."""
         self._finalizer()
 
 
 @contextmanager
 def temporary_run_folder() -> Iterator[str]:
-    """A locked folder until the block ends."""
+    """Yield the path of a new folder, which is removed at the end of the block."""
     folder = LockedFolder(RUN_PREFIX)
     try:
         yield folder.name
@@ -44,29 +48,29 @@ def temporary_run_folder() -> Iterator[str]:
 
 
 def _remove_folder(folder: str, lock: int, owner: int) -> None:
-    """What cannot be removed stays, and the next process finds it. A child that was forked owns nothing."""
+    """Remove the folder, except in a forked child; a later process removes what remains."""
     if os.getpid() != owner:
         return
     rmtree(folder, ignore_errors=True)
-    with suppress(OSError):  # foreign code has closed all descriptors
+    with suppress(OSError):  # foreign code may have closed all descriptors
         os.close(lock)
 
 
 def _create_locked_folder(prefix: str) -> tuple[str, int]:
-    """A new folder and the descriptor that holds its lock; another process may have removed it before it was locked."""
+    """Return a new folder and the descriptor of its lock, -1 if the system has no locks."""
     while True:
         folder = tempfile.mkdtemp(prefix=prefix)
         lock = _lock_folder(folder, wait=True)
         if lock is None:
-            return folder, -1  # no locks here: such folders are never taken for abandoned ones
-        if Path(folder).is_dir():
+            return folder, -1
+        if Path(folder).is_dir():  # else another process removed it before it was locked
             return folder, lock
         os.close(lock)
 
 
 @cache
 def _remove_abandoned_folders(directory: str) -> None:
-    """Once in a process: 1000 runs need not look 1000 times."""
+    """Remove abandoned folders; cached, so that it happens once per process."""
     for prefix in (RUN_PREFIX, FMU_PREFIX, WORKER_PREFIX):
         for folder in Path(directory).glob(f"{prefix}*"):
             lock = _lock_folder(folder, wait=False)
@@ -76,7 +80,7 @@ def _remove_abandoned_folders(directory: str) -> None:
 
 
 def _lock_folder(folder: str | Path, wait: bool) -> int | None:
-    """A descriptor that holds the lock of a folder of this user; None when it cannot be had."""
+    """Lock a folder of this user and return the descriptor that holds the lock; None if that is impossible."""
     if sys.platform == "win32":
         return None
     import fcntl

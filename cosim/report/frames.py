@@ -16,7 +16,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from ..components.python_class import load_object
+from ..components.python_import import load_object
 from ..core.errors import CosimError
 from ..core.resources import root
 from ..results import Result

@@ -23,7 +23,7 @@ from inspect import getattr_static
 from pathlib import Path
 from typing import Any
 
-from ..components.python_class import load_object
+from ..components.python_import import load_object
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, did_you_mean
 from ..results.files import to_json_types
 from ..scenario.json_document import read_document

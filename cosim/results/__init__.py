@@ -1,4 +1,4 @@
-"""The product of a run: its signals and figures of merit, and the files they are kept in."""
+"""Results of a run: signals, KPIs, checks, their files, and comparison with a reference."""
 
 from .result import KpiError, Kpis, Result, SignalError, write_run
 

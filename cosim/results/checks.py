@@ -1,4 +1,4 @@
-"""Checks of KPIs against the limits that a scenario states."""
+"""Checks of KPIs against the limits of a scenario."""
 
 from __future__ import annotations
 
@@ -15,7 +15,13 @@ LIMIT_OPERATORS: Mapping[str, Callable[[Any, Any], bool]] = {"min": operator.ge,
 
 
 class CheckOutcome(NamedTuple):
-    """A check as the scenario states it, the value that was found, and whether it is within the limits."""
+    """Outcome of a check.
+
+    Attributes:
+        check: The check as in the scenario, such as {"kpi": "landing.lateral_error", "max": 0.1}.
+        value: Value of the KPI; NaN if it was not evaluated.
+        passed: The value is within all limits.
+    """
 
     check: Mapping[str, Any]
     value: Number
@@ -23,7 +29,7 @@ class CheckOutcome(NamedTuple):
 
     @property
     def limits(self) -> str:
-        """The limits in words: "max 0.1"."""
+        """The limits in words, such as "max 0.1"."""
         return ", ".join(f"{key} {str(limit).lower()}" for key, limit in self.check.items() if key != "kpi")
 
     def __str__(self) -> str:
@@ -32,9 +38,17 @@ class CheckOutcome(NamedTuple):
 
 
 def evaluate_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, Any]]) -> list[CheckOutcome]:
-    """Hold `kpis` against checks such as {"kpi": "landing.lateral_error", "max": 0.1}; limits: "min", "max", "equals".
+    """Evaluate checks; NaN violates every limit.
 
-    NaN keeps no limit. Raises InputError for KPIs that were not evaluated and limits that do not exist.
+    Args:
+        kpis: Values of KPIs by name.
+        checks: Checks such as {"kpi": "landing.lateral_error", "max": 0.1}, with the limits "min", "max" and "equals".
+
+    Returns:
+        The outcomes, in the order of the checks.
+
+    Raises:
+        InputError: A KPI was not evaluated, or a limit does not exist; `problems` lists all such checks.
     """
     checks = list(checks)
     if problems := [problem for check in checks for problem in _find_check_problems(kpis, check)]:
@@ -43,7 +57,7 @@ def evaluate_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, An
 
 
 def evaluate_all_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, Any]]) -> list[CheckOutcome]:
-    """As `evaluate_checks`, but a check of a KPI that was not evaluated is one that is not met: its value is NaN."""
+    """Evaluate checks like `evaluate_checks`, but a missing KPI fails its check with the value NaN."""
     checks = list(checks)
     return evaluate_checks({**{check["kpi"]: math.nan for check in checks}, **kpis}, checks)
 

@@ -1,4 +1,4 @@
-"""Recordings as CSV: first column `time`, quoted names, no row of units, booleans 0 and 1, numbers that round-trip."""
+"""CSV files of recordings: first column `time`, quoted names, no row of units, Booleans as 0 and 1, exact numbers."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pydantic_core
 
+from ..core.csv_text import format_header, quote_cell
 from ..core.errors import InputError, Problem
 from ..core.paths import open_text
 from ..core.recording import Recording
@@ -20,32 +21,44 @@ ROWS_PER_CHUNK = 2000
 
 
 def write_csv(recording: Recording, path: str | Path) -> None:
-    """Write `recording` to `path`, which is replaced only when the file is complete."""
+    """Write a recording; an existing file is replaced only when the new one is complete.
+
+    Args:
+        recording: The recording.
+        path: The CSV file; missing folders are created.
+
+    Raises:
+        InputError: The path cannot be written.
+        OutputError: The disk is full or defective.
+    """
     columns = [recording.time, *recording.columns.values()]
     with writing_atomically(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(",".join(map(_quote_csv, ("time", *recording.columns))) + "\n")
+        file.write(format_header(recording.columns))
         for piece in iterate_chunks(columns, ROWS_PER_CHUNK):
             cells = [_format_column(column[piece]) for column in columns]
             file.writelines(",".join(row) + "\n" for row in zip(*cells, strict=True))
 
 
-def _quote_csv(text: str) -> str:
-    return '"' + str(text).replace('"', '""') + '"'
-
-
 def _format_column(column: np.ndarray) -> list[str]:
-    """The texts of one column. pydantic's writer finds the shortest digits that round-trip three times faster than `repr`."""
+    """Return the cells of one column; `pydantic_core` finds the shortest exact digits three times faster than `repr`."""
     if column.dtype == object:
-        return list(map(_quote_csv, column))
+        return list(map(quote_cell, column))
     numbers = column.astype(np.uint8) if column.dtype == bool else column
     return pydantic_core.to_json(numbers.tolist(), inf_nan_mode="constants")[1:-1].decode().split(",")
 
 
 def read_csv(path: str | Path) -> Recording:
-    """Read a recording; other programs' files are welcome if their first column is named `time`.
+    """Read a recording, also of another program, if the first column is named `time`.
 
-    CSV knows no types: a column is int64 (or uint64) where all its texts are integers, else float64, else text. So booleans
-    return as 0 and 1. Units are unknown. Raises InputError with the line of whatever cannot be read.
+    Args:
+        path: The CSV file.
+
+    Returns:
+        A recording without units. A column of integers has the type int64 or uint64, another column of numbers float64, any other
+        column object (strings). Booleans are returned as 0 and 1.
+
+    Raises:
+        InputError: The file cannot be read, with the line of each problem.
     """
     path = Path(path)
     try:

@@ -1,4 +1,4 @@
-"""Files that are either whole or not there: each is written under a temporary name and then renamed."""
+"""Atomic writing of files: each is written under a temporary name and then renamed."""
 
 from __future__ import annotations
 
@@ -18,17 +18,21 @@ import numpy as np
 
 from ..core.errors import CosimError, InputError, OutputError
 
-#: what the disk is to blame for, and not the path
+#: errors of the disk, not of the path
 _DISK_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 
-#: end of the names of files that are being written
+#: suffix of files that are being written
 _PART_SUFFIX = ".part"
 
 
 def iterate_chunks(arrays: Sequence[np.ndarray], size: int) -> Iterator[slice]:
-    """Slices of at most `size` rows that cover arrays of equal length, to read them in bounded memory.
+    """Yield slices that cover arrays of equal length, to read them in bounded memory.
 
-    What was read of arrays that lie in files is let go of after each piece.
+    Memory of arrays that are mapped to files is released after each slice.
+
+    Args:
+        arrays: Arrays of shape (rows,).
+        size: Maximum number of rows of a slice.
     """
     files = {id(file): file for array in arrays if (file := _memory_map(array))}
     for first in range(0, len(arrays[0]), size):
@@ -38,6 +42,7 @@ def iterate_chunks(arrays: Sequence[np.ndarray], size: int) -> Iterator[slice]:
 
 
 def _memory_map(array: Any) -> mmap.mmap | None:
+    """Return the file mapping behind an array; None if it is not mapped to a file."""
     while array is not None and not isinstance(array, mmap.mmap):
         array = getattr(array, "base", None)
     return array if hasattr(mmap, "MADV_DONTNEED") else None
@@ -45,9 +50,17 @@ def _memory_map(array: Any) -> mmap.mmap | None:
 
 @contextmanager
 def writing_atomically(path: str | Path) -> Iterator[Path]:
-    """A temporary path beside `path`; what is written there becomes `path` when the block ends well, else it disappears.
+    """Rename a temporary file to `path` at the end of the block, or remove it if the block raises.
 
-    Missing folders are made. Raises InputError when nothing can be written there, OutputError when the disk is full or failed.
+    Args:
+        path: The file to write; missing folders are created.
+
+    Yields:
+        Path of the temporary file, in the same folder.
+
+    Raises:
+        InputError: The path cannot be written.
+        OutputError: The disk is full or defective.
     """
     path = Path(path)
     temporary = path.with_name(f".{path.name}.{os.getpid()}{_PART_SUFFIX}")
@@ -67,7 +80,7 @@ def _write_error(text: str, error: OSError) -> CosimError:
 
 
 def check_writable(directory: Path) -> None:
-    """Make sure that files can be written to `directory` before the work begins; raises as `replacing`."""
+    """Create a folder if necessary and raise the errors of `writing_atomically` if no file can be written there."""
     try:
         directory.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=directory):
@@ -77,7 +90,12 @@ def check_writable(directory: Path) -> None:
 
 
 def remove_files(directory: Path, *names: str) -> None:
-    """Remove the files `names` of earlier work, and what a killed process has left of writing them; raises as `replacing`."""
+    """Remove files of earlier runs and their temporary files; raise the errors of `writing_atomically`.
+
+    Args:
+        directory: Folder of the files.
+        *names: Names of the files.
+    """
     try:
         for name in names:
             for path in (directory / name, *directory.glob(f".{glob.escape(name)}.*{_PART_SUFFIX}")):
@@ -87,14 +105,14 @@ def remove_files(directory: Path, *names: str) -> None:
 
 
 def write_json(data: Mapping[str, Any], path: str | Path) -> None:
-    """Write `data` as JSON in its own order, two spaces deep; see `plain` for what becomes of its values."""
+    """Write `data` as JSON with an indent of two spaces; see `to_json_types` for the values."""
     text = json.dumps(to_json_types(data), indent=2, ensure_ascii=False, allow_nan=False)
     with writing_atomically(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8", newline="\n")
 
 
 def to_json_types(value: Any) -> Any:
-    """`value` in JSON's own types: NumPy numbers and arrays and paths converted, NaN and infinities (unknown to JSON) null."""
+    """Convert a value to types that JSON supports: NumPy values and paths are converted, NaN and infinities become None."""
     match value:
         case Mapping():
             return {str(key): to_json_types(item) for key, item in value.items()}

@@ -1,11 +1,12 @@
-"""Key performance indicators: numbers computed from a result.
+"""Key performance indicators (KPIs): numbers computed from a result.
 
-A KPI is a plain function `function(result, **arguments)` that returns its numbers by name:
+A KPI is a function `function(result, **arguments)` that returns one or more values by name:
 
     @units(lateral_error="m")
+    @better(lateral_error="lower")
     def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, float]: ...
 
-Arguments that are annotated as `Signal` or `Prefix` are held against the recorded signals before a scenario runs.
+Arguments annotated as `Signal` or `Prefix` are compared with the recorded signals before a scenario runs.
 """
 
 from __future__ import annotations
@@ -25,26 +26,29 @@ from ..core.units import multiply_units
 from .checks import Number
 from .result import Result
 
-#: the name of a recorded signal: "plant.uav.position.z"
+#: name of a recorded signal, such as "plant.uav.position.z"
 Signal = str
-#: what names of recorded signals begin with, up to a dot or bracket: "plant.uav"
+#: prefix of names of recorded signals, up to a dot or bracket, such as "plant.uav"
 Prefix = str
 KpiFunction = TypeVar("KpiFunction", bound=Callable[..., Any])
 
-
-#: a factor of a declared unit: a unit, or the argument whose signal has it, and a power
+#: factor of a declared unit: a unit, or the name of an argument in braces, and a power
 _UNIT_FACTOR = re.compile(r"(\{(\w+)\}|[A-Za-z%]+)(-?\d*)")
 
 
 class ResultFunction(NamedTuple):
-    """A function of a result under the name that a scenario gives it, with its keyword arguments: a KPI or a figure."""
+    """KPI or figure of a scenario: its name, function and keyword arguments."""
 
     name: str
     function: Callable[..., Any]
     arguments: Mapping[str, Any]
 
     def problems(self, kind: str) -> list[Problem]:
-        """What is wrong with the arguments; `kind` ("KPI", "figure") says in the messages what this is."""
+        """Return the errors of the arguments.
+
+        Args:
+            kind: "KPI" or "figure", for the messages.
+        """
         signature = inspect.signature(self.function)
         try:
             signature.bind(None, **self.arguments)
@@ -55,7 +59,19 @@ class ResultFunction(NamedTuple):
         return []
 
     def evaluate(self, kind: str, result: Result) -> Any:
-        """The function's value. Raises InputError for wrong arguments or signals, ComponentError when the function fails."""
+        """Call the function.
+
+        Args:
+            kind: "KPI" or "figure", for the messages.
+            result: First argument of the function.
+
+        Returns:
+            The value of the function.
+
+        Raises:
+            InputError: The arguments do not match the function, or a signal was not recorded.
+            ComponentError: The function raised any other exception.
+        """
         if problems := self.problems(kind):
             raise InputError(problems)
         try:
@@ -68,37 +84,70 @@ class ResultFunction(NamedTuple):
             raise self.failure(kind, describe_exception(error)) from error
 
     def failure(self, kind: str, reason: str) -> ComponentError:
-        """The error that says this function is at fault."""
+        """Return a ComponentError that names this function."""
         return ComponentError(f'{kind} "{self.name}"', self.function.__name__, reason)
 
 
 def units(**unit_of: str) -> Callable[[KpiFunction], KpiFunction]:
-    """Decorator: the units of a KPI's numbers in Modelica syntax; what is not named is a count or a Boolean.
+    """Declare the units of a KPI's values.
 
-    "{signal}" stands for the unit of the signal that the argument `signal` names: an integral of its square has "{signal}2.s".
+        @units(max_speed="m/s", distance="{speed}.s")
+        def motion(result: Result, speed: Signal) -> dict[str, float]: ...
+
+    Args:
+        **unit_of: Unit of each value, in Modelica syntax. "{speed}" is the unit of the signal that the argument `speed` names;
+            "{speed}2.s" is the unit of the integral of its square. Values without a unit are counts, ratios or Booleans.
+
+    Returns:
+        A decorator that returns the function itself.
     """
 
     def declare(function: KpiFunction) -> KpiFunction:
-        function.units = unit_of  # type: ignore[attr-defined]
+        vars(function)["units"] = unit_of
         return function
 
     return declare
 
 
 def better(**sense: Literal["lower", "higher"]) -> Callable[[KpiFunction], KpiFunction]:
-    """Decorator: which of a KPI's numbers are better the lower or the higher they are; what is not named is neither."""
+    """Declare which of a KPI's values should be minimized ("lower") or maximized ("higher").
+
+        @better(overshoot="lower", share_on_course="higher")
+        def course(result: Result, signal: Signal) -> dict[str, float]: ...
+
+    Args:
+        **sense: "lower" or "higher" for each value; the others are only informative.
+
+    Returns:
+        A decorator that returns the function itself.
+    """
 
     def declare(function: KpiFunction) -> KpiFunction:
-        function.better = sense  # type: ignore[attr-defined]
+        vars(function)["better"] = sense
         return function
 
     return declare
 
 
-def evaluate_kpis(result: Result, kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]]) -> dict[str, Number]:
-    """The numbers of all KPIs, given as (name, function, arguments), as "name.key" in the order given.
+def declared_units(function: Callable[..., Any]) -> Mapping[str, str]:
+    """Return the units that `units` declared, by name of the value."""
+    unit_of: Mapping[str, str] = getattr(function, "units", {})
+    return unit_of
 
-    Values may be NaN (not applicable to this run). Raises InputError or ComponentError that name the KPI.
+
+def evaluate_kpis(result: Result, kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]]) -> dict[str, Number]:
+    """Evaluate KPIs.
+
+    Args:
+        result: The run.
+        kpis: Name, function and arguments of each KPI.
+
+    Returns:
+        All values by "name.key", in the order of the KPIs. NaN: not applicable to this run.
+
+    Raises:
+        InputError: Arguments of a KPI do not match its function, or a signal was not recorded.
+        ComponentError: The function of a KPI failed or returned something other than numbers.
     """
     values: dict[str, Number] = {}
     for evaluation in map(ResultFunction._make, kpis):
@@ -110,6 +159,7 @@ def evaluate_kpis(result: Result, kpis: Iterable[tuple[str, Callable[..., Any], 
 
 
 def _checked_number(evaluation: ResultFunction, key: str, value: Any) -> Number:
+    """Return a value as Python number or Boolean; raise ComponentError for anything else."""
     number = value.item() if isinstance(value, np.generic) else value
     if isinstance(number, int) and abs(number) > sys.float_info.max:
         raise evaluation.failure("KPI", f'"{key}" is larger than any double')
@@ -119,15 +169,24 @@ def _checked_number(evaluation: ResultFunction, key: str, value: Any) -> Number:
 
 
 def first_crossing_time(time: np.ndarray, values: np.ndarray, level: float) -> float:
-    """When a line through the rows (`time`, `values`), shape (rows,), first is at `level` or above; NaN when it never is."""
+    """Return the first time at which the polyline through the rows reaches a level.
+
+    Args:
+        time: Times (s), shape (rows,).
+        values: Values, shape (rows,).
+        level: The level, reached from below.
+
+    Returns:
+        Time (s), interpolated linearly; NaN if the level is never reached.
+    """
     above = np.flatnonzero(values >= level)
     if not above.size:
         return math.nan
     row = above[0]
     if row == 0:
         return float(time[0])
-    share = (level - values[row - 1]) / (values[row] - values[row - 1])
-    return float(time[row - 1] + share * (time[row] - time[row - 1]))
+    fraction = (level - values[row - 1]) / (values[row] - values[row - 1])
+    return float(time[row - 1] + fraction * (time[row] - time[row - 1]))
 
 
 def kpi_units(
@@ -135,20 +194,26 @@ def kpi_units(
     names: Iterable[str],
     signal_units: Mapping[str, str] = MappingProxyType({}),
 ) -> dict[str, str]:
-    """The unit that a KPI's function declares (see `units`) for each of `names`, "" for none; "time[3]" is declared as "time".
+    """Return the units of KPI values (see `units`).
 
-    `signal_units` are those of the result; a unit that depends on a signal's is "" where that is unknown.
+    Args:
+        kpis: Name, function and arguments of each KPI.
+        names: Names of values, such as "landing.time"; the unit of "waypoints.time[3]" is that of "waypoints.time".
+        signal_units: Units of the signals of the result.
+
+    Returns:
+        The unit of each name; "" if none is declared, or if it depends on the unknown unit of a signal.
     """
     declared = {
         f"{name}.{key}": _resolve_unit(unit, arguments, signal_units)
         for name, function, arguments in kpis
-        for key, unit in getattr(function, "units", {}).items()
+        for key, unit in declared_units(function).items()
     }
     return {name: declared.get(name.partition("[")[0], "") for name in names}
 
 
 def _resolve_unit(declared: str, arguments: Mapping[str, Any], signal_units: Mapping[str, str]) -> str:
-    """A declared unit with the units of signals in their places."""
+    """Replace the names of arguments in a declared unit by the units of their signals."""
     if "{" not in declared:
         return declared
     factors = [(part, signal, int(power or 1)) for part, signal, power in _UNIT_FACTOR.findall(declared)]
@@ -157,7 +222,12 @@ def _resolve_unit(declared: str, arguments: Mapping[str, Any], signal_units: Map
 
 
 def kpi_senses(kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]], names: Iterable[str]) -> dict[str, str]:
-    """ "lower" or "higher" for each of `names` whose KPI's function says what is better (see `better`)."""
+    """Return "lower" or "higher" for those KPI values that declare it (see `better`).
+
+    Args:
+        kpis: Name, function and arguments of each KPI.
+        names: Names of values, such as "landing.time".
+    """
     declared = {f"{name}.{key}": sense for name, function, _ in kpis for key, sense in getattr(function, "better", {}).items()}
-    found = {name: declared.get(name.partition("[")[0]) for name in names}
-    return {name: sense for name, sense in found.items() if sense}
+    senses = {name: declared.get(name.partition("[")[0]) for name in names}
+    return {name: sense for name, sense in senses.items() if sense}

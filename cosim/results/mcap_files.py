@@ -1,12 +1,14 @@
-"""Recordings as MCAP, which Foxglove, PlotJuggler and the tools of ROS 2 open (extra `mcap`).
+"""MCAP files of recordings for Foxglove, PlotJuggler and the tools of ROS 2 (extra `mcap`).
 
-- /tf (foxglove.FrameTransforms): everything that was recorded with `position.x|y|z` and `orientation.w|x|y|z`, in the frame
-  "world" (z up, m), each under its own name ("plant.uav")
-- /scene (foxglove.SceneUpdate): what it looks like, once, see `scene` of `write_mcap`
-- /signals/NAME (JSON): all signals of a component, nested by the dots of their names, arrays as arrays; NaN and infinities are
-  null, units stand in the schema
+Topics:
 
-The file's clock begins with the run's: 1 s is 1 s after 1970-01-01, and a run that starts before 0 s is shifted to 0 s.
+- /tf (foxglove.FrameTransforms): pose of everything that was recorded with `position.x|y|z` and `orientation.w|x|y|z`, in the
+  frame "world" (z up, m); the frame of a body has its name ("plant.uav")
+- /scene (foxglove.SceneUpdate): shapes of the bodies, logged once, see `write_mcap`
+- /signals/NAME (JSON): all signals of a component, nested by the dots of their names; NaN and infinities are null, units are in
+  the schema
+
+Simulation time 0 s is 1970-01-01 00:00 in the file. A run that starts before 0 s is shifted to start there.
 """
 
 from __future__ import annotations
@@ -27,12 +29,12 @@ from .files import iterate_chunks, to_json_types, writing_atomically
 ROWS_PER_CHUNK = 2000
 _POSE_SIGNALS = [*(f"position.{axis}" for axis in "xyz"), *(f"orientation.{axis}" for axis in "wxyz")]
 _ELEMENT_PATTERN = re.compile(r"(.*)\[[\d,]+\]")
-#: names -> column, columns of an array, or names further down
+#: maps each part of a name to an index of a column, indices of the elements of an array, or a subtree
 SignalTree = dict[str, "int | list[int] | SignalTree"]
 
 
 def require_mcap() -> None:
-    """Raises InputError when the package that writes MCAP is not installed."""
+    """Raise InputError if the package foxglove-sdk is not installed."""
     try:
         import foxglove  # noqa: F401
     except ImportError:
@@ -42,10 +44,17 @@ def require_mcap() -> None:
 def write_mcap(
     recording: Recording, path: str | Path, scene: Mapping[str, Any] | None = None, metadata: Mapping[str, Any] | None = None
 ) -> None:
-    """Write `recording` to `path`, which is replaced only when the file is complete.
+    """Write an MCAP file; an existing file is replaced only when the new one is complete.
 
-    `scene` holds "bodies", "fixed" and "markers" as `cosim.report.scene` has them, `about` whatever describes the run (metadata).
-    Raises InputError when the file cannot be written or the package foxglove-sdk is not installed.
+    Args:
+        recording: The recording.
+        path: The MCAP file.
+        scene: "bodies", "fixed" and "markers" of the scene, in the format of `cosim.report.scene`; None for no scene.
+        metadata: Description of the run, written as metadata record "run".
+
+    Raises:
+        InputError: The file cannot be written, or the package foxglove-sdk is not installed.
+        OutputError: The disk is full or defective.
     """
     require_mcap()
     import foxglove
@@ -81,7 +90,7 @@ def _log_poses(recording: Recording, times: list[int], context: Any) -> None:
     if not names:
         return
     channel = FrameTransformsChannel("/tf", context=context)
-    columns = [recording.columns[f"{name}.{rest}"] for name in names for rest in _POSE_SIGNALS]
+    columns = [recording.columns[f"{name}.{signal}"] for name in names for signal in _POSE_SIGNALS]
     for now, row in zip(times, _iterate_rows(columns), strict=True):
         stamp = Timestamp(*divmod(now, 10**9))
         numbers = (row[first : first + len(_POSE_SIGNALS)] for first in range(0, len(row), len(_POSE_SIGNALS)))
@@ -99,9 +108,9 @@ def _log_poses(recording: Recording, times: list[int], context: Any) -> None:
 
 
 def find_poses(recording: Recording) -> list[str]:
-    """Names of everything that was recorded with position and orientation."""
-    heads = (name.removesuffix(".position.x") for name in recording.columns if name.endswith(".position.x"))
-    return [head for head in heads if all(f"{head}.{rest}" in recording.columns for rest in _POSE_SIGNALS)]
+    """Return the prefixes of everything that was recorded with position and orientation."""
+    prefixes = (name.removesuffix(".position.x") for name in recording.columns if name.endswith(".position.x"))
+    return [prefix for prefix in prefixes if all(f"{prefix}.{signal}" in recording.columns for signal in _POSE_SIGNALS)]
 
 
 def _log_signals(recording: Recording, times: list[int], context: Any) -> None:
@@ -124,8 +133,8 @@ def _iterate_rows(columns: list[np.ndarray]) -> Iterator[tuple[Any, ...]]:
 
 
 def _build_tree(names: list[str]) -> SignalTree:
-    """Columns by component and the parts of their names. A name with others below it becomes their neighbour `value`."""
-    inner = {name[:place] for name in names for place, letter in enumerate(name) if letter == "."}
+    """Group columns by the parts of their names; a name that is also the prefix of others gets the part `value` appended."""
+    inner = {name[:i] for name in names for i, letter in enumerate(name) if letter == "."}
     tree: SignalTree = {}
     for column, name in enumerate(names):
         *path, leaf = [*name.split("."), *(["value"] if name in inner or "." not in name else [])]
@@ -140,13 +149,14 @@ def _build_tree(names: list[str]) -> SignalTree:
 
 
 def _nest_values(node: Any, row: tuple[Any, ...]) -> Any:
+    """Return the values of a row in the structure of a node of the tree."""
     if isinstance(node, dict):
         return {name: _nest_values(child, row) for name, child in node.items()}
     return [row[column] for column in node] if isinstance(node, list) else row[node]
 
 
 def _json_schema(node: Any, columns: list[np.ndarray], units: list[str]) -> dict[str, Any]:
-    """JSON Schema of what `_values` gives."""
+    """Return the JSON Schema of the messages that `_nest_values` returns for a node of the tree."""
     if isinstance(node, dict):
         return {"type": "object", "properties": {name: _json_schema(child, columns, units) for name, child in node.items()}}
     if isinstance(node, list):

@@ -1,4 +1,4 @@
-"""The scene of a run as a message of Foxglove: boxes, spheres and cylinders that move with their bodies."""
+"""Conversion of a scene to Foxglove messages."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-#: corners of a ring
+#: number of corners of a polygon that approximates a ring
 _RING_CORNERS = 32
 
 
 def log_scene(scene: Mapping[str, Any], now: int, context: Any) -> None:
-    """Log `scene` (see `cosim.report.scene`) once, at `now` (ns), on the topic /scene."""
+    """Log a scene (see `cosim.report.scene`) once, at the time `now` (ns), on the topic /scene."""
     from foxglove.channels import SceneUpdateChannel
     from foxglove.messages import SceneUpdate
 
@@ -20,7 +20,7 @@ def log_scene(scene: Mapping[str, Any], now: int, context: Any) -> None:
         for marker in scene.get("markers", ())
     ]
     parts = {body["name"]: body["parts"] for body in scene.get("bodies", ())}
-    entities = [_scene_entity(name, name, own, now) for name, own in parts.items()]
+    entities = [_scene_entity(name, name, shapes, now) for name, shapes in parts.items()]
     entities.append(_scene_entity("fixed", "world", [*scene.get("fixed", ()), *markers], now))
     SceneUpdateChannel("/scene", context=context).log(SceneUpdate(entities=entities), log_time=now)
 
@@ -57,7 +57,7 @@ def _sphere_primitive(part: Mapping[str, Any]) -> Any:
 
 
 def _cylinder_primitive(part: Mapping[str, Any]) -> Any:
-    """A cylinder (radius, length) or a cone (lower and upper radius, length)."""
+    """Convert a cylinder (radius, length) or a cone (lower and upper radius, length)."""
     from foxglove.messages import CylinderPrimitive
 
     lower, upper, length = part["size"] if part["shape"] == "cone" else (part["size"][0], *part["size"])

@@ -1,4 +1,4 @@
-"""Recordings as Parquet, column by column in the signals' own types: about a fifth of a CSV file's size (extra `parquet`)."""
+"""Parquet files of recordings, with the types of the signals and about a fifth of the size of CSV (extra `parquet`)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ROWS_PER_GROUP = 1 << 17
 
 
 def require_parquet() -> None:
-    """Raises InputError when the package that writes Parquet is not installed."""
+    """Raise InputError if the package pyarrow is not installed."""
     try:
         import pyarrow.parquet  # noqa: F401
     except ImportError:
@@ -23,10 +23,17 @@ def require_parquet() -> None:
 
 
 def write_parquet(recording: Recording, path: str | Path) -> None:
-    """Write `recording` to `path`, which is replaced only when the file is complete; rows go to disk group by group.
+    """Write a Parquet file in bounded memory; an existing file is replaced only when the new one is complete.
 
-    The first column is `time` (s); the unit of a column stands in the metadata of its field. Raises InputError when the file
-    cannot be written or the package pyarrow is not installed.
+    The first column is `time` (s). The metadata of each field contains its unit.
+
+    Args:
+        recording: The recording.
+        path: The Parquet file.
+
+    Raises:
+        InputError: The file cannot be written, or the package pyarrow is not installed.
+        OutputError: The disk is full or defective.
     """
     require_parquet()
     import pyarrow as pa

@@ -1,4 +1,4 @@
-"""`Result`: everything that is known about one finished run."""
+"""Result of one finished run."""
 
 from __future__ import annotations
 
@@ -22,19 +22,22 @@ if TYPE_CHECKING:
 
 
 class SignalError(InputError, KeyError):
-    """A signal was asked for that was not recorded."""
+    """Access to a signal that was not recorded; also a KeyError."""
 
-    __str__ = Exception.__str__  # KeyError would print the repr
+    __str__ = Exception.__str__  # KeyError.__str__ would return the repr
 
 
 class KpiError(InputError, KeyError):
-    """A KPI was asked for that was not computed."""
+    """Access to a KPI that was not computed; also a KeyError."""
 
     __str__ = Exception.__str__
 
 
 class Kpis(dict[str, float | int | bool]):
-    """KPIs by their names; asking for another one raises KpiError (an InputError and a KeyError) with the nearest name."""
+    """Values of KPIs by name, such as `result.kpis["landing.lateral_error"]`.
+
+    An unknown name raises KpiError (an InputError and a KeyError), whose message contains the most similar name.
+    """
 
     def __missing__(self, name: str) -> float | int | bool:
         raise KpiError(f'no KPI "{name}" was computed{did_you_mean(name, self)}')
@@ -42,12 +45,17 @@ class Kpis(dict[str, float | int | bool]):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
-    """A recorded run; `result["plant.uav.position.z"]` are the values of one signal, shape (rows,).
+    """Recorded run: a read-only mapping from names of signals to their values.
 
-    `kpis` maps "landing.lateral_error" to a number or Boolean, `timing` names of durations to wall time in s
-    ("loop_seconds": the stepping loop alone), `metadata` whatever describes the run: versions, hashes, seeds. `checks` are the
-    scenario's checks held against the KPIs, each with its `check`, `value` and `passed`: one that is not met raises nothing. A
-    result that was read from files has none.
+        result["plant.uav.position.z"]  # shape (rows,)
+
+    Attributes:
+        recording: The recorded signals.
+        kpis: KPIs by name, such as "landing.lateral_error".
+        timing: Wall time by name (s), such as "loop_seconds" for the stepping loop alone.
+        metadata: Description of the run: scenario, versions, hashes, failure.
+        checks: Outcomes of the scenario's checks, each with `check`, `value` and `passed`; empty if the result was read from a
+            file.
     """
 
     recording: Recording
@@ -58,16 +66,23 @@ class Result:
 
     @property
     def time(self) -> np.ndarray:
-        """Time of each row in s, shape (rows,)."""
+        """Time of each row (s), shape (rows,)."""
         return self.recording.time
 
     @property
     def units(self) -> Mapping[str, str]:
-        """Unit of each signal in Modelica syntax, "" where it is unknown."""
+        """Unit of each signal in Modelica syntax; "" if unknown."""
         return self.recording.units
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """Values of one signal; raises SignalError (an InputError and a KeyError) for a name that was not recorded."""
+        """Return the values of one signal, shape (rows,).
+
+        Args:
+            name: Name of the signal.
+
+        Raises:
+            SignalError: The signal was not recorded; also an InputError and a KeyError.
+        """
         try:
             return self.recording.columns[name]
         except KeyError:
@@ -81,11 +96,11 @@ class Result:
         return iter(self.recording.columns)
 
     def __len__(self) -> int:
-        """Number of signals."""
+        """Return the number of signals."""
         return len(self.recording.columns)
 
     def __repr__(self) -> str:
-        """What ran, how far, which checks it did not meet, and the KPIs."""
+        """Return name, size, failure, failed checks and KPIs, in several lines."""
         rows = f"{len(self.time)} rows of {len(self)} signals"
         span = f", {self.time[0]:g} s to {self.time[-1]:g} s" if len(self.time) else ""
         failure, units = self.metadata.get("failure"), self.metadata.get("kpi_units", {})
@@ -104,31 +119,76 @@ class Result:
         return [f"{len(self.checks) - len(failed)} of {len(self.checks)} checks passed{':' * bool(failed)}", *failed]
 
     def signals(self, pattern: str = "*") -> list[str]:
-        """Names that match `pattern`, in recorded order; `*` stands for any text, dots and brackets included."""
+        """Return the names of signals that match a pattern, in recorded order.
+
+        Args:
+            pattern: `*` matches any text, also dots and brackets.
+        """
         matches = re.compile(".*".join(map(re.escape, pattern.split("*")))).fullmatch
         return [name for name in self if matches(name)]
 
     def to_csv(self, path: str | Path) -> None:
-        """Write all signals to a CSV file (see `cosim.results.csv_files`)."""
+        """Write all signals to a CSV file.
+
+        Args:
+            path: The file; missing folders are created, an existing file is replaced.
+
+        Raises:
+            InputError: The path cannot be written.
+            OutputError: The disk is full or defective.
+        """
         write_csv(self.recording, path)
 
     def to_parquet(self, path: str | Path) -> None:
-        """Write all signals to a Parquet file (see `cosim.results.parquet_files`)."""
+        """Write all signals to a Parquet file.
+
+        Args:
+            path: The file; missing folders are created, an existing file is replaced.
+
+        Raises:
+            InputError: The path cannot be written, or the package pyarrow is not installed.
+            OutputError: The disk is full or defective.
+        """
         write_parquet(self.recording, path)
 
     def to_mcap(self, path: str | Path, scene: Mapping[str, Any] | None = None) -> None:
-        """Write poses, signals and the scene, when it is given, to an MCAP file (see `cosim.results.mcap_files`)."""
+        """Write poses, signals and scene to an MCAP file (topics: see `cosim.results.mcap_files`).
+
+        Args:
+            path: The file; missing folders are created, an existing file is replaced.
+            scene: Scene in the format of `cosim.report.scene`; None for no scene.
+
+        Raises:
+            InputError: The path cannot be written, or the package foxglove-sdk is not installed.
+            OutputError: The disk is full or defective.
+        """
         about = {key: value for key, value in self.metadata.items() if key in ("name", "versions", "sha256")}
         write_mcap(self.recording, path, scene, about)
 
     @classmethod
     def from_csv(cls, path: str | Path) -> Result:
-        """A result with the signals of a CSV file and nothing else; raises InputError when it cannot be read."""
+        """Read a result from a CSV file, which contains only signals.
+
+        Args:
+            path: The file.
+
+        Raises:
+            InputError: The file cannot be read.
+        """
         return cls(read_csv(path))
 
 
 def write_run(result: Result, directory: str | Path) -> None:
-    """Write `result.csv`, `kpis.json` and `run.json` (metadata, timing, units) to `directory`, each of them atomically."""
+    """Write `result.csv`, `kpis.json` and `run.json` (metadata, timing, units), each atomically.
+
+    Args:
+        result: The result.
+        directory: Folder of the files; created if missing.
+
+    Raises:
+        InputError: The folder cannot be written.
+        OutputError: The disk is full or defective.
+    """
     directory = Path(directory)
     result.to_csv(directory / "result.csv")
     write_json(result.kpis, directory / "kpis.json")

@@ -4,4 +4,4 @@ from .nested_systems import find_scenario, load_scenario
 from .prepared_run import PreparedRun, prepare
 from .schema import json_schema
 
-__all__ = ["PreparedRun", "prepare", "find_scenario", "json_schema", "load_scenario"]
+__all__ = ["PreparedRun", "find_scenario", "json_schema", "load_scenario", "prepare"]

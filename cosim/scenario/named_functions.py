@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ..components.python_class import load_object
+from ..components.python_import import load_object
 from ..core.errors import Problem, did_you_mean
 from ..core.paths import is_file
 from .nested_systems import Node

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..components.python_class import package_files
+from ..components.python_import import package_files
 from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean
 from .json_document import Document, read_document

@@ -11,12 +11,12 @@ from types import MappingProxyType
 from typing import Any
 
 from ..components.fmi import FmuFile
-from ..components.python_class import package_files
+from ..components.python_import import package_files
 from ..core.component import Component
 from ..core.errors import InputError, Problem
 from ..core.stopwatch import Stopwatch
 from ..core.system import System
-from ..engine.run_loop import Settings
+from ..engine.settings import Settings
 from ..process.float_mode import default_float_mode
 from ..process.journal import as_component_error
 from .component_factory import ComponentFactory

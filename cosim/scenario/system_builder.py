@@ -14,7 +14,8 @@ from ..components.input_table import read_input_table
 from ..core.component import Component, Variable
 from ..core.errors import InputError, Problem
 from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System
-from ..engine.run_loop import Event, Settings, find_problems
+from ..engine.run_checks import find_problems
+from ..engine.settings import Event, Settings
 from ..process.journal import Deadlines
 from .component_factory import ComponentFactory
 from .name_resolution import SlotIndex, Target, UnknownName, check_assignment, resolve_name
@@ -245,8 +246,8 @@ class SystemBuilder:
     def _is_consequence(self, problem: Problem) -> bool:
         """Whether a problem only follows from a time or a component list that was refused."""
         times = {"stop_time", "step_size", "start_time"} & self.root.invalid_keys
-        timing = problem.subject[:1] in (("stop_time",), ("record",)) or problem.subject[-1:] == ("period",)
-        return bool(times and (timing or problem.message.startswith("event time")))
+        about_times = problem.subject[:1] in (("stop_time",), ("record",)) or problem.subject[-1:] in (("period",), ("time",))
+        return bool(times and about_times)
 
     def _with_location(self, problem: Problem) -> Problem:
         """A problem of the system, with the place in the file of the setting it is about."""

@@ -1,4 +1,4 @@
-"""What surrounds the vehicles: waves, wind, current, and what lies below a multirotor."""
+"""Environment of the vehicles: waves, wind, current, and the surface below a multirotor."""
 
 from __future__ import annotations
 
@@ -8,17 +8,24 @@ from cosim.core.errors import InputError
 
 from ..json_reader import JsonReader
 from . import settings
-from .sea import CALM, Sea, realise_sea
+from .sea import Sea
 
 
 def sea(environment: Any) -> Sea:
-    """The components of the sea that the section "environment" of a world's arguments describes, as the world makes them.
+    """Return the wave components of a world, for example for plotting.
 
-    Their time counts from the start of the run, and the world's input `environment.wave_gain` multiplies all amplitudes.
-    No waves: arrays of length 0. Raises InputError with all problems.
+    Args:
+        environment: Argument "environment" of the world, a JSON object.
+
+    Returns:
+        Components whose time (s) counts from the start of the run; arrays of length 0 without waves. The world's input
+        `environment.wave_gain` multiplies all amplitudes.
+
+    Raises:
+        InputError: With all problems.
     """
     reader = JsonReader()
-    read = settings.read_environment(reader, environment)
+    environment_settings = settings.read_environment(reader, environment)
     if reader.problems:
         raise InputError(reader.problems)
-    return realise_sea(read.waves, read.seed) if read.waves else CALM
+    return environment_settings.sea()

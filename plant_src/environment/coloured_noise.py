@@ -1,11 +1,11 @@
-"""Coloured noise on a fixed grid of time, as a pure function of seed, name and place on the grid.
+"""Coloured noise on a fixed time grid, as a pure function of seed, name and grid index.
 
-A channel is white noise through (1 + b T s) / (1 + T s)^2, or through 1 / (1 + T s), discretised exactly: sampled at the grid it
-has the variance, the autocorrelation and the joint distribution of the continuous process, for any T. With
+A channel is white noise filtered by (1 + b T s) / (1 + T s)^2, or 1 / (1 + T s), discretised exactly: on the grid it has the
+variance, autocorrelation and joint distribution of the continuous process, for any T. With
 
     T x1' = -x1 + white,  T x2' = -x2 + x1,  y = b x1 + (1 - b) x2      (b = 1: first order)
 
-the variances are P11 = p, P12 = P22 = p / 2, and y has b^2 p + (1 - b)^2 p / 2 + b (1 - b) p.
+the covariances are P11 = p, P12 = P22 = p / 2, and the variance of y is b^2 p + (1 - b)^2 p / 2 + b (1 - b) p.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ import numpy as np
 
 from .random_generator import generator
 
-#: a value holds so long (s)
+#: time step of the grid, over which a value is constant (s)
 GRID_STEP = 0.01
 
-#: values that are computed together
+#: number of grid points that are computed together
 BLOCK_LENGTH = 256
 
 
 @dataclass(frozen=True)
 class Channel:
-    """Noise of a standard deviation, a time constant T (s) and a lead b; b = 1 is first order."""
+    """Noise with a standard deviation, a time constant T (s) and a lead b; b = 1 gives a first-order filter."""
 
     deviation: float
     time_constant: float
@@ -34,9 +34,14 @@ class Channel:
 
 
 class ColouredNoise:
-    """Channels of noise: `noise[k]` are their values from k GRID to (k + 1) GRID.
+    """Several channels of noise; `noise[k]` holds their values from k GRID_STEP to (k + 1) GRID_STEP.
 
-    In steps of the grid: x1 <- a x1 + n1, x2 <- a (x2 + g x1) + n2, with correlated noises n1 and n2.
+    A step of the grid is x1 <- a x1 + n1, x2 <- a (x2 + g x1) + n2, with correlated white noises n1 and n2.
+
+    Args:
+        seed: Seed of all random numbers of the world.
+        name: Name of this noise; other names give independent noise.
+        channels: Filters.
     """
 
     def __init__(self, seed: int, name: str, channels: Sequence[Channel]):
@@ -46,19 +51,19 @@ class ColouredNoise:
         self._g = g = GRID_STEP / time_constant
         self._a = a = np.exp(-g)
         self._lead = lead
-        kept = a**2 * np.array([p, p * (g + 1 / 2), p * (g**2 + g + 1 / 2)])  # of P11, P12 and P22 after a step
-        self._noise_root = _covariance_root(*(np.array([p, p / 2, p / 2]) - kept))
+        propagated = a**2 * np.array([p, p * (g + 1 / 2), p * (g**2 + g + 1 / 2)])  # P11, P12, P22 after a step without noise
+        self._noise_root = _covariance_root(*(np.array([p, p / 2, p / 2]) - propagated))
         white = generator(seed, name).standard_normal((2, len(channels), 1))
-        #: x1 and x2 at the start of each block, as far as this was computed
+        #: x1 and x2 at the start of each block computed so far
         self._block_start_states = [_correlated(_covariance_root(p, p / 2, p / 2), white)]
         self._block_number, self._values = -1, [()]
 
     def __getitem__(self, index: int) -> tuple[float, ...]:
-        number, place = divmod(index, BLOCK_LENGTH)
-        return self.values_in_block(number)[place]
+        number, row = divmod(index, BLOCK_LENGTH)
+        return self.values_in_block(number)[row]
 
     def values_in_block(self, number: int) -> Sequence[tuple[float, ...]]:
-        """The values from the place `number` times BLOCK on, BLOCK of them."""
+        """Return the values of all channels at the grid indices from `number` BLOCK_LENGTH on, a tuple for each index."""
         if number != self._block_number:
             for missing in range(len(self._block_start_states) - 1, number):
                 self._compute(missing)
@@ -66,6 +71,7 @@ class ColouredNoise:
         return self._values
 
     def _compute(self, number: int) -> None:
+        """Compute one block, whose start states must be known."""
         white = generator(self._seed, self._name, str(number)).standard_normal((2, len(self._a), BLOCK_LENGTH))
         n1, n2 = _correlated(self._noise_root, white)
         start1, start2 = self._block_start_states[number]
@@ -77,25 +83,25 @@ class ColouredNoise:
         self._block_number, self._values = number, list(zip(*self._map_channels(values).tolist(), strict=True))
 
     def _map_channels(self, values: np.ndarray) -> np.ndarray:
-        """What is given of the values of all channels, a row each."""
+        """Hook for subclasses: map channel values, shape (channels, BLOCK_LENGTH), to the published values."""
         return values
 
 
 def _covariance_root(c11: np.ndarray, c12: np.ndarray, c22: np.ndarray) -> tuple[np.ndarray, ...]:
-    """r11, r21, r22 of the lower triangular square root of a covariance (2, 2), for each channel."""
+    """Return the elements r11, r21, r22 of the Cholesky factor of a covariance matrix (2, 2), for each channel."""
     r11 = np.sqrt(c11)
     r21 = np.divide(c12, r11, out=np.zeros_like(r11), where=r11 > 0)
     return r11, r21, np.sqrt(np.maximum(c22 - r21**2, 0))
 
 
 def _correlated(root: Sequence[np.ndarray], white: np.ndarray) -> np.ndarray:
-    """Two noises (2, channels, n) of that covariance from two white ones."""
+    """Return two noises with the covariance of `root` from two white noises, shape (2, channels, n)."""
     r11, r21, r22 = root
     return np.array([r11 * white[0], r21 * white[0] + r22 * white[1]])
 
 
 def _first_order_recursion(a: np.ndarray, start: np.ndarray, forcing: np.ndarray) -> np.ndarray:
-    """x[k + 1] = a x[k] + forcing[k] from x[0] = start along the last axis, by doubling: log2(n) additions of arrays."""
+    """Return x[k + 1] = a x[k] + forcing[k] with x[0] = start along the last axis, by log2(n) array operations."""
     x, reach, power = np.concatenate([start, forcing], axis=1), 1, a
     while reach < x.shape[1]:
         x[:, reach:] += power * x[:, :-reach]

@@ -1,4 +1,4 @@
-"""The environment at work: before each step it writes into every vehicle's surroundings what air and water do to it there."""
+"""Environment model: computes wind, current, waves and ground distance and writes the environment inputs of all vehicles."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from cosim.core.component import Variable
 
-from ..physics.body import FloatingBody
+from ..physics.vessel_bodies import FloatingBody
 from ..vehicles.common.interface import CURRENT_INPUTS, WAVE_GAIN_INPUT, WIND_INPUTS, scalar_variable
 from .coloured_noise import BLOCK_LENGTH, GRID_STEP
 from .current import Current
@@ -24,21 +24,36 @@ if TYPE_CHECKING:
     from ..physics.body import ContactBody
     from ..placement import Platform, VehiclePlacement
 
-_GRID_TOLERANCE = 1e-6  # of the grid of noise: times are not exact multiples of it
+_GRID_TOLERANCE = 1e-6  # in grid steps of the noise; times are not exact multiples of the grid step
 _DOUBLE_SIZE = struct.calcsize("d")
 _pack_vector, _unpack_vector = struct.Struct("3d").pack_into, struct.Struct("3d").unpack_from
 _pack_pair, _unpack_pair = struct.Struct("2d").pack_into, struct.Struct("2d").unpack_from
 _unpack_pose = struct.Struct("7d").unpack_from
 
-UpdateFunction = Callable[[float], None]  # of the time since the start (s)
+#: function of the time since the start (s)
+UpdateFunction = Callable[[float], None]
 
 
 class EnvironmentModel:
-    """Air, water and what is below, for the vehicles of one world.
+    """Environment of the vehicles of one world.
 
-    `inputs` are the mean wind, the mean current and the factor on the waves, as far as the environment has them, `outputs` what
-    vehicles publish about them. Both lie in `block`, which is all that changes: the rest is a function of time and seed.
-    `update` is to be called before each step of the vehicles and `publish` after the last one, with the time since the start.
+    Call `update` before each step of the vehicles, and `publish` after the last one.
+
+    Args:
+        environment: Waves, wind and current.
+        sea: Realisation of the waves.
+        vehicles: All vehicles.
+        platforms: All platforms.
+        bodies: Contact body of each vehicle.
+
+    Attributes:
+        values: Inputs and outputs, which are the whole state: everything else is a function of time and seed.
+        inputs: View of `values`: mean wind (m/s), mean current (m/s) and wave gain (1), as far as the environment has them.
+        outputs: View of `values`: wind (m/s) and wave elevation (m) at the vehicles.
+        input_variables: Variables of `inputs`.
+        output_variables: Variables of `outputs`.
+        update_functions: Functions that write the environment inputs, empty without wind, waves, current and ground effect.
+        vessels_without_wave_motion: Names of planar vessels in waves.
     """
 
     def __init__(
@@ -50,7 +65,7 @@ class EnvironmentModel:
         bodies: Sequence[ContactBody],
     ):
         self._wind_vehicles = _bodies_with_input(bodies, "wind.x") if environment.wind else []
-        self._wave_vessels = [shadow for shadow in bodies if isinstance(shadow, FloatingBody)] if environment.waves else []
+        self._wave_vessels = [body for body in bodies if isinstance(body, FloatingBody)] if environment.waves else []
         self.input_variables, self.output_variables = (
             _input_variables(environment),
             _output_variables(self._wind_vehicles, self._wave_vessels),
@@ -58,64 +73,63 @@ class EnvironmentModel:
         self.values = np.zeros(len(self.input_variables) + len(self.output_variables))
         self.inputs, self.outputs = np.split(self.values, [len(self.input_variables)])
         self.inputs[:] = [variable.start for variable in self.input_variables]
-        #: vessels that the waves pass by
         self.vessels_without_wave_motion = [
-            s.name for s in bodies if environment.waves and s.model.is_vessel and s not in self._wave_vessels
+            body.name for body in bodies if environment.waves and body.model.is_vessel and body not in self._wave_vessels
         ]
         self._wave_gain: Any = self._input_view("wave_gain") if environment.waves else np.ones(1).data
         self.update_functions = list(self._create_updates(environment, bodies))
-        if lifted := _multirotors_in_ground_effect(vehicles, bodies):
-            vessels = [shadow for shadow in bodies if shadow.model.is_vessel]
+        if affected := _multirotors_in_ground_effect(vehicles, bodies):
+            vessels = [body for body in bodies if body.model.is_vessel]
             self.update_functions.append(
-                _GroundDistanceUpdate(lifted, GroundDistance(vessels, platforms, sea), self._wave_gain).update
+                _GroundDistanceUpdate(affected, GroundDistance(vessels, platforms, sea), self._wave_gain).update
             )
         first = 3 * len(self._wind_vehicles)
         self._elevations = [
-            (shadow.elevation_function(len(sea.phase), sea.component_table()), first + k)
-            for k, shadow in enumerate(self._wave_vessels)
+            (body.elevation_function(len(sea.phase), sea.component_table()), first + k)
+            for k, body in enumerate(self._wave_vessels)
         ]
         self._published: Any = self.outputs.data
 
     def _input_view(self, name: str) -> Any:
-        """The inputs from one of them on."""
+        """Return a memoryview of the inputs from the named one on."""
         names = [variable.name for variable in self.input_variables]
         return self.inputs[names.index(f"environment.{name}") :].data
 
-    def _create_updates(self, environment: EnvironmentSettings, shadows: Sequence[ContactBody]) -> Iterator[UpdateFunction]:
+    def _create_updates(self, environment: EnvironmentSettings, bodies: Sequence[ContactBody]) -> Iterator[UpdateFunction]:
         seed, wind, current = environment.seed, environment.wind, environment.current
         if wind:
             yield _WindUpdate(wind, seed, self._input_view("wind.x"), self._wind_vehicles, self.outputs.data).update
         if current:
-            yield _CurrentUpdate(current, seed, self._input_view("current.x"), _bodies_with_input(shadows, "current.x")).update
+            yield _CurrentUpdate(current, seed, self._input_view("current.x"), _bodies_with_input(bodies, "current.x")).update
         if self._wave_vessels:
-            gains = [_input_data(shadow, "wave_gain") for shadow in self._wave_vessels]
-            yield lambda time: _set_all(gains, self._wave_gain[0])
+            gains = [_input_data(body, "wave_gain") for body in self._wave_vessels]
+            yield lambda _time: _set_all(gains, self._wave_gain[0])
 
     def update(self, time: float) -> None:
-        """Write the surroundings of all vehicles."""
+        """Write the environment inputs of all vehicles for a time since the start (s)."""
         for update in self.update_functions:
             update(time)
 
     def publish(self, time: float) -> None:
-        """Write the outputs that follow from where the vehicles are now."""
-        for elevation, place in self._elevations:
-            self._published[place] = self._wave_gain[0] * elevation(time)
+        """Write the wave elevations at the vessels for a time since the start (s)."""
+        for elevation, index in self._elevations:
+            self._published[index] = self._wave_gain[0] * elevation(time)
 
 
-def _bodies_with_input(shadows: Sequence[ContactBody], name: str) -> list[ContactBody]:
-    """Those that have something in their surroundings."""
-    return [shadow for shadow in shadows if any(variable.name == name for variable in shadow.model.environment_inputs)]
+def _bodies_with_input(bodies: Sequence[ContactBody], name: str) -> list[ContactBody]:
+    """Return the vehicles that have an environment input."""
+    return [body for body in bodies if any(variable.name == name for variable in body.model.environment_inputs)]
 
 
-def _input_data(shadow: ContactBody, name: str) -> Any:
-    """The surroundings of a vehicle from a number on, as memoryview: numpy takes longer for so few numbers."""
-    names = [variable.name for variable in shadow.model.environment_inputs]
-    return shadow.environment_inputs[names.index(name) :].data
+def _input_data(body: ContactBody, name: str) -> Any:
+    """Return a memoryview of a vehicle's environment inputs from the named one on; it is faster than NumPy for few numbers."""
+    names = [variable.name for variable in body.model.environment_inputs]
+    return body.environment_inputs[names.index(name) :].data
 
 
-def _set_all(slots: Sequence[Any], value: float) -> None:
-    for slot in slots:
-        slot[0] = value
+def _set_all(inputs: Sequence[Any], value: float) -> None:
+    for first in inputs:
+        first[0] = value
 
 
 def _input_variables(environment: EnvironmentSettings) -> list[Variable]:
@@ -129,58 +143,64 @@ def _input_variables(environment: EnvironmentSettings) -> list[Variable]:
     return [replace(variable, name=f"environment.{variable.name}", start=start) for variable, start in pairs]
 
 
-def _output_variables(blown: Sequence[ContactBody], waved: Sequence[ContactBody]) -> list[Variable]:
+def _output_variables(wind_vehicles: Sequence[ContactBody], wave_vessels: Sequence[ContactBody]) -> list[Variable]:
     elevation = scalar_variable(
-        "wave.elevation", "m", "height of the water at the centre of mass above the still water", "output"
+        "wave.elevation", "m", "elevation of the water at the centre of mass above the still water", "output"
     )
-    winds = [replace(v, name=f"{shadow.name}.{v.name}", causality="output", start=None) for shadow in blown for v in WIND_INPUTS]
-    return [*winds, *(replace(elevation, name=f"{shadow.name}.{elevation.name}", start=None) for shadow in waved)]
+    winds = [
+        replace(wind, name=f"{body.name}.{wind.name}", causality="output", start=None)
+        for body in wind_vehicles
+        for wind in WIND_INPUTS
+    ]
+    return [*winds, *(replace(elevation, name=f"{body.name}.{elevation.name}", start=None) for body in wave_vessels)]
 
 
 class _WindUpdate:
-    """Wind on vehicles: the mean one at their height and gusts, published as well."""
+    """Update of the wind at all vehicles: mean wind at their height and gusts; it is also published."""
 
     def __init__(self, wind: Wind, seed: int, mean: Any, vehicles: Sequence[ContactBody], published: Any):
         self._profile, self._mean, self._published = wind.profile, mean, published
         turbulence = wind.turbulence
-        self._gusts = [DrydenGusts(wind, turbulence, seed, shadow.name) for shadow in vehicles] if turbulence else []
+        self._gusts = [DrydenGusts(wind, turbulence, seed, body.name) for body in vehicles] if turbulence else []
         self._vehicles = [
-            (_input_data(shadow, "wind.x"), 3 * _DOUBLE_SIZE * k, shadow.outputs[2:].data) for k, shadow in enumerate(vehicles)
+            (_input_data(body, "wind.x"), 3 * _DOUBLE_SIZE * k, body.outputs[2:].data) for k, body in enumerate(vehicles)
         ]
-        #: the gusts of all vehicles in the present block of noise
+        #: gusts of all vehicles in the current block of noise
         self._block_number = -1
         self._gust_block: Sequence[Sequence[tuple[float, ...]]] = [[(0.0, 0.0, 0.0)] * len(vehicles)] * BLOCK_LENGTH
 
     def update(self, time: float) -> None:
+        """Write the wind at a time (s)."""
         mean_x, mean_y, mean_z = _unpack_vector(self._mean)
-        number, place = divmod(int(time / GRID_STEP + _GRID_TOLERANCE), BLOCK_LENGTH)
+        number, row = divmod(int(time / GRID_STEP + _GRID_TOLERANCE), BLOCK_LENGTH)
         if number != self._block_number and self._gusts:
             self._block_number, self._gust_block = (
                 number,
                 list(zip(*(gusts.values_in_block(number) for gusts in self._gusts), strict=True)),
             )
         profile, published = self._profile, self._published
-        for (slot, offset, height), (gust_x, gust_y, gust_z) in zip(self._vehicles, self._gust_block[place], strict=True):
-            share = profile(height[0]) if profile else 1.0
-            x, y, z = share * mean_x + gust_x, share * mean_y + gust_y, share * mean_z + gust_z
-            _pack_vector(slot, 0, x, y, z)
+        for (wind, offset, height), (gust_x, gust_y, gust_z) in zip(self._vehicles, self._gust_block[row], strict=True):
+            fraction = profile(height[0]) if profile else 1.0
+            x, y, z = fraction * mean_x + gust_x, fraction * mean_y + gust_y, fraction * mean_z + gust_z
+            _pack_vector(wind, 0, x, y, z)
             _pack_vector(published, offset, x, y, z)
 
 
 class _CurrentUpdate:
-    """One current for all vessels."""
+    """Update of the current, which is the same for all vessels."""
 
     def __init__(self, current: Current, seed: int, mean: Any, vessels: Sequence[ContactBody]):
         self._mean, self._ramp = mean, current.ramp
         self._noise = current.variation.create_noise(seed) if current.variation else None
-        self._slots = [_input_data(shadow, "current.x") for shadow in vessels]
+        self._current_inputs = [_input_data(body, "current.x") for body in vessels]
 
     def update(self, time: float) -> None:
+        """Write the current at a time (s)."""
         x, y = _unpack_pair(self._mean)
-        for more_x, more_y in self._velocity_changes(time):
-            x, y = x + more_x, y + more_y
-        for slot in self._slots:
-            _pack_pair(slot, 0, x, y)
+        for change_x, change_y in self._velocity_changes(time):
+            x, y = x + change_x, y + change_y
+        for current in self._current_inputs:
+            _pack_pair(current, 0, x, y)
 
     def _velocity_changes(self, time: float) -> list[Sequence[float]]:
         changes: list[Sequence[float]] = []
@@ -191,34 +211,35 @@ class _CurrentUpdate:
         return changes
 
 
-def _multirotors_in_ground_effect(spawns: Sequence[VehiclePlacement], shadows: Sequence[ContactBody]) -> list[ContactBody]:
-    """Multirotors whose ground effect is on."""
+def _multirotors_in_ground_effect(vehicles: Sequence[VehiclePlacement], bodies: Sequence[ContactBody]) -> list[ContactBody]:
+    """Return the multirotors with the ground effect switched on."""
     return [
-        shadow
-        for spawn, shadow in zip(spawns, shadows, strict=True)
-        if shadow in _bodies_with_input(shadows, "ground_distance") and spawn.parameter("ground_effect")
+        body
+        for vehicle, body in zip(vehicles, bodies, strict=True)
+        if body in _bodies_with_input(bodies, "ground_distance") and vehicle.parameter("ground_effect")
     ]
 
 
 class _GroundDistanceUpdate:
-    """How high multirotors are above what is below them."""
+    """Update of the height of multirotors above the surface below them."""
 
-    def __init__(self, multirotors: Sequence[ContactBody], below: GroundDistance, wave_gain: Any):
-        self._ground_distance, self._gain = below, wave_gain
+    def __init__(self, multirotors: Sequence[ContactBody], ground_distance: GroundDistance, wave_gain: Any):
+        self._ground_distance, self._gain = ground_distance, wave_gain
         self._vehicles = [
-            (_input_data(shadow, "ground_distance"), shadow.outputs.data, shadow.model.rotor_centre or (0.0, 0.0, 0.0))
-            for shadow in multirotors
+            (_input_data(body, "ground_distance"), body.outputs.data, body.model.rotor_centre or (0.0, 0.0, 0.0))
+            for body in multirotors
         ]
 
     def update(self, time: float) -> None:
-        for slot, outputs, centre in self._vehicles:
+        """Write the ground distances at a time (s)."""
+        for distance, outputs, centre in self._vehicles:
             x, y, z, *q = _unpack_pose(outputs)
             dx, dy, dz = _rotate(q, centre)
-            slot[0] = self._ground_distance.distance(x + dx, y + dy, z + dz, time, self._gain[0])
+            distance[0] = self._ground_distance.distance(x + dx, y + dy, z + dz, time, self._gain[0])
 
 
 def _rotate(q: Sequence[float], vector: Sequence[float]) -> tuple[float, float, float]:
-    """A body vector in the world frame, by the unit quaternion (w, x, y, z)."""
+    """Rotate a body vector into the world frame by a unit quaternion (w, x, y, z)."""
     w, qx, qy, qz = q
     x, y, z = vector
     tx, ty, tz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)

@@ -1,4 +1,4 @@
-"""What lies straight below a multirotor: decks, platforms and the water."""
+"""Distance from a multirotor to the surface vertically below it: deck, platform or water."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from ..physics.body import ContactBody
     from ..placement import Platform
 
-#: so high above the still water (m) waves make no difference to a rotor any more
+#: height above the still water (m) from which waves are ignored, because they do not affect a rotor
 MAX_WAVE_EFFECT_HEIGHT = 5.0
 
 
 class DeckSurface:
-    """The top of a vessel's highest box, of which the published `deck.position` is the centre."""
+    """The landing deck of a vessel: the top of its highest box, centred at the output `deck.position`."""
 
     def __init__(self, vessel: ContactBody):
         half_x, half_y, _ = max(vessel.model.body.boxes, key=lambda box: box.position[2] + box.half_extents[2]).half_extents
@@ -27,7 +27,7 @@ class DeckSurface:
         self._centre, self._orientation = slots.index("deck.position.x"), slots.index("orientation.w")
 
     def height(self, x: float, y: float) -> float | None:
-        """Height of the deck (m, world frame) at a place that it is below or above."""
+        """Return the height of the deck (m, world frame) at (x, y), or None beside the deck."""
         c, q, outputs = self._centre, self._orientation, self._outputs
         dx, dy = x - outputs[c], y - outputs[c + 1]
         if abs(dx) > self._bounding_radius or abs(dy) > self._bounding_radius:
@@ -44,7 +44,7 @@ class DeckSurface:
 
 
 class GroundDistance:
-    """Distances from the rotor planes of multirotors to the next surface straight below."""
+    """Distances from points to the highest surface vertically below them."""
 
     def __init__(self, vessels: Sequence[ContactBody], platforms: Sequence[Platform], sea: Sea):
         self._decks = [DeckSurface(vessel) for vessel in vessels]
@@ -52,15 +52,23 @@ class GroundDistance:
         self._elevation = sea.elevation_function() if len(sea.amplitude) else None
 
     def distance(self, x: float, y: float, z: float, time: float, wave_gain: float) -> float:
-        """From a point in the world (m); zero below the water."""
+        """Return the distance (m) below a point, 0 under water.
+
+        Args:
+            x: East position (m, world frame).
+            y: North position (m, world frame).
+            z: Height (m, world frame).
+            time: Time of the waves (s).
+            wave_gain: Factor on all amplitudes (1).
+        """
         solid = self._solid_height(x, y, z)
-        if solid > -math.inf:  # it keeps the water away
+        if solid > -math.inf:  # decks and platforms hide the water
             return z - solid
         surface = wave_gain * self._elevation(x, y, time) if z < MAX_WAVE_EFFECT_HEIGHT and self._elevation else 0.0
         return max(z - surface, 0.0)
 
     def _solid_height(self, x: float, y: float, z: float) -> float:
-        """Height (m) of the highest deck or platform at a place that is not above z."""
+        """Return the height (m) of the highest deck or platform at (x, y) that is not above z, or -inf."""
         highest = -math.inf
         for deck in self._decks:
             height = deck.height(x, y)

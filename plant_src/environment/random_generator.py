@@ -1,4 +1,4 @@
-"""Random numbers that depend on nothing but a seed and a name."""
+"""Random number generators that depend only on a seed and names."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import numpy as np
 
 
 def generator(seed: int, *names: str) -> np.random.Generator:
-    """A generator of its own for everything that is random: other names and other seeds give unrelated numbers.
+    """Return the random number generator of `seed` and `names`.
 
-    PCG64 and the way it is seeded are fixed, so equal arguments give equal numbers on every machine.
+    Other seeds and names give statistically independent numbers. PCG64 and its seeding are fixed, so equal arguments give equal
+    numbers on all machines.
     """
     key = int.from_bytes("/".join(names).encode(), "big")
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, key])))

@@ -1,12 +1,13 @@
-"""One realisation of an irregular sea: long-crested components in deep water, w^2 = g k.
+"""Realisation of an irregular sea by long-crested components in deep water, w^2 = g k.
 
     elevation(x, y, t) = sum a cos(k (x cos d + y sin d) - w t + phase)
 
-The spectrum between LOWEST and HIGHEST times the peak frequency (99.5 % of the energy of a Pierson-Moskowitz sea) is cut into
-bins of equal energy. Every bin gives one component of the same amplitude, sum a^2 / 2 = m0 of this part, at a frequency drawn
-from its bin with the density of the spectrum: so the frequencies have no common divisor, and the sea does not repeat itself.
-Directions are drawn likewise from bins of equal energy of the spreading function D(d) ~ cos^n(d - mean), |d - mean| < pi/2
-(DNV-RP-C205, 3.5.8), in random order; without spreading all are the mean one.
+The spectrum between MIN_FREQUENCY_RATIO and MAX_FREQUENCY_RATIO times the peak frequency (99.5 % of the energy of a
+Pierson-Moskowitz sea) is divided into bins of equal energy. Each bin gives one component. All components have the same amplitude
+with sum a^2 / 2 = m0 of this part. The frequency is drawn from the bin with the density of the spectrum, so the frequencies have
+no common divisor and the sea does not repeat itself. Directions are drawn in the same way from bins of equal energy of the
+spreading function D(d) ~ cos^n(d - mean), |d - mean| < pi/2 (DNV-RP-C205, 3.5.8), and assigned in random order. Without
+spreading all components have the mean direction.
 """
 
 from __future__ import annotations
@@ -22,20 +23,25 @@ import numpy as np
 from .random_generator import generator
 from .spectrum import GRAVITY, SPECTRA
 
-#: the part of a spectrum that becomes waves, in peak frequencies
+#: range of frequencies of the components over the peak frequency
 MIN_FREQUENCY_RATIO, MAX_FREQUENCY_RATIO = 0.5, 4.0
 
-#: a vessel's equations have room for so many
+#: upper limit of the number of components, given by the equations of the vessels
 MAX_COMPONENTS = 64
 
 _pack_vector = struct.Struct("3d").pack_into
-_FREQUENCY_COUNT, _DIRECTION_COUNT = 20_001, 2_001  # places at which the energy below is tabulated
+_FREQUENCY_COUNT, _DIRECTION_COUNT = 20_001, 2_001  # grid points of the tabulated energy
 
 
 class Sea(NamedTuple):
-    """Components: amplitude (m), frequency (rad/s), wave number (rad/m), direction (rad), phase (rad), each of shape (n,).
+    """Wave components, arrays of shape (n,).
 
-    A direction is that towards which the wave runs, counter-clockwise from x.
+    Attributes:
+        amplitude: Amplitudes (m).
+        frequency: Angular frequencies (rad/s).
+        wave_number: Wave numbers (rad/m).
+        direction: Directions of propagation, counter-clockwise from x (rad).
+        phase: Phases at the origin (rad).
     """
 
     amplitude: np.ndarray
@@ -45,33 +51,43 @@ class Sea(NamedTuple):
     phase: np.ndarray
 
     def elevation(self, x: float, y: float, time: float) -> float:
-        """Height of the water (m) at a place in the world (m) and a time (s)."""
+        """Return the elevation of the water (m) at a position in the world frame (m) and a time (s)."""
         return self.elevation_function()(x, y, time)
 
     def component_table(self) -> np.ndarray:
-        """Amplitude, wave number along x and y, frequency and phase of the components, a row each, with zeros for the rest."""
+        """Return amplitude, wave number along x and y, frequency and phase, shape (5, MAX_COMPONENTS), padded with zeros."""
         east, north = self.wave_number * np.cos(self.direction), self.wave_number * np.sin(self.direction)
         rows = np.zeros((5, MAX_COMPONENTS))
         rows[:, : len(self.phase)] = self.amplitude, east, north, self.frequency, self.phase
         return rows
 
     def elevation_function(self) -> Callable[[float, float, float], float]:
-        """`elevation` for frequent use: with memory of its own it takes half the time."""
+        """Return a function equal to `elevation` that reuses its arrays and thus takes half the time."""
         east, north = self.wave_number * np.cos(self.direction), self.wave_number * np.sin(self.direction)
         rates = np.array([east, north, -self.frequency, self.phase])
-        place, angles = np.array([0.0, 0.0, 0.0, 1.0]), np.empty(len(self.phase))
-        where = place.data
+        arguments, angles = np.array([0.0, 0.0, 0.0, 1.0]), np.empty(len(self.phase))
+        arguments_data = arguments.data
 
         def elevation(x: float, y: float, time: float) -> float:
-            _pack_vector(where, 0, x, y, time)
-            return float(self.amplitude.dot(np.cos(place.dot(rates, angles), angles)))
+            _pack_vector(arguments_data, 0, x, y, time)
+            return float(self.amplitude.dot(np.cos(arguments.dot(rates, angles), angles)))
 
         return elevation
 
 
 @dataclass(frozen=True)
 class Waves:
-    """What a sea is made from: lengths in m, times in s, angles in rad; `spreading` is the power n, None: long crests."""
+    """Parameters of a sea.
+
+    Attributes:
+        spectrum: Name of the spectrum (`spectrum.SPECTRA`).
+        significant_height: Hs (m).
+        peak_period: Tp (s).
+        gamma: Peak enhancement factor.
+        direction: Mean direction of propagation, counter-clockwise from x (rad).
+        spreading: Exponent n of the spreading function, or None for long-crested waves.
+        components: Number of components.
+    """
 
     spectrum: str
     significant_height: float
@@ -82,11 +98,12 @@ class Waves:
     components: int
 
 
+#: sea without waves
 CALM = Sea(*(np.zeros(0) for _ in Sea._fields))
 
 
 def realise_sea(waves: Waves, seed: int) -> Sea:
-    """The sea of this seed: equal arguments give equal numbers."""
+    """Return the realisation of a sea for a seed; equal arguments give equal numbers."""
     if waves.significant_height == 0:
         return CALM
     random, count = generator(seed, "waves"), waves.components
@@ -106,7 +123,7 @@ def realise_sea(waves: Waves, seed: int) -> Sea:
 def _stratified_samples(
     grid: np.ndarray, density: np.ndarray, random: np.random.Generator, count: int
 ) -> tuple[np.ndarray, float]:
-    """One place from each of `count` bins of equal area under a density, in order; and the whole area."""
-    below = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(grid))])
-    shares = (np.arange(count) + random.uniform(size=count)) / count
-    return np.interp(shares * below[-1], below, grid), float(below[-1])
+    """Return one sample from each of `count` bins with equal area under a density, in ascending order, and the total area."""
+    cumulative = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(grid))])
+    quantiles = (np.arange(count) + random.uniform(size=count)) / count
+    return np.interp(quantiles * cumulative[-1], cumulative, grid), float(cumulative[-1])

@@ -1,4 +1,6 @@
-"""Reading the section "environment" of a scenario's world: JSON -> what air and water do.
+"""Reader of a world's argument "environment".
+
+The argument is a JSON object such as
 
     {"seed": 7, "sea_state": 3,
      "waves": {"spectrum": "jonswap", "significant_height": 0.05, "peak_period": 2.0, "gamma": 3.3, "direction": 0.5,
@@ -8,7 +10,7 @@
      "current": {"speed": 0.2, "direction": 0.0, "ramp": {"change": [0.1, 0], "start": 10, "duration": 20},
                  "variation": {"standard_deviation": 0.05, "time_constant": 60}}}
 
-Everything can be left out; what each key means and what stands for it if it is missing is said in plant_src/README.md.
+Every key is optional; plant_src/README.md lists meanings, units and defaults.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from typing import Any
 
 from ..json_reader import JsonPath, JsonReader, Numbers
 from .current import Current, Ramp, Variation
-from .sea import MAX_COMPONENTS, Waves
+from .sea import CALM, MAX_COMPONENTS, Sea, Waves, realise_sea
 from .spectrum import GAMMA, MAX_GAMMA, MIN_GAMMA, SIGNIFICANT_HEIGHTS, SPECTRA, fully_developed_period
 from .wind import (
     MAX_HEIGHT,
@@ -33,13 +35,13 @@ from .wind import (
     turbulence_intensities,
 )
 
-#: height (m) at which the wind is measured for turbulence, 20 ft
+#: default height of the turbulence model: 20 ft (m)
 TURBULENCE_HEIGHT = 6.096
 
-#: height (m) at which the mean wind is meant where it grows with height
+#: default height at which a wind profile equals the mean wind (m)
 REFERENCE_HEIGHT = 10.0
 
-#: greater powers of the spreading function are long crests; greater heights (m) are no seas
+#: upper limits of the spreading exponent (1) and of the significant wave height (m)
 MAX_SPREADING, MAX_SIGNIFICANT_HEIGHT = 1000.0, 30.0
 
 _WAVE_KEYS = ("spectrum", "significant_height", "peak_period", "gamma", "direction", "spreading", "components")
@@ -47,16 +49,20 @@ _WAVE_KEYS = ("spectrum", "significant_height", "peak_period", "gamma", "directi
 
 @dataclass(frozen=True)
 class EnvironmentSettings:
-    """What surrounds the vehicles; None: there is none of it, and its variables do not exist."""
+    """Waves, wind and current of a world; the world has no variables of those that are None."""
 
     seed: int = 0
     waves: Waves | None = None
     wind: Wind | None = None
     current: Current | None = None
 
+    def sea(self) -> Sea:
+        """Return the realisation of the waves."""
+        return realise_sea(self.waves, self.seed) if self.waves else CALM
+
 
 def read_environment(reader: JsonReader, spec: Any) -> EnvironmentSettings:
-    """Read the section; problems are left with the reader."""
+    """Read the argument "environment" of a world; problems are added to `reader`."""
     root = ("environment",)
     spec = reader.read_object(spec, root, (), ("seed", "sea_state", "waves", "wind", "current"))
     return EnvironmentSettings(
@@ -71,15 +77,15 @@ def _read_waves(reader: JsonReader, spec: Mapping[str, Any], root: JsonPath) -> 
     path = (*root, "waves")
     height = _read_significant_height(reader, spec, root)
     waves = reader.read_object(spec.get("waves", {}), path, (), _WAVE_KEYS)
-    usual = fully_developed_period(height) if height else 1.0
+    default_period = fully_developed_period(height) if height else 1.0
     spectrum = reader.choice(waves.get("spectrum", "pierson_moskowitz"), (*path, "spectrum"), tuple(SPECTRA))
     if "gamma" in waves and spectrum != "jonswap":
-        reader.add_problem((*path, "gamma"), f'found a peak enhancement, which a "{spectrum}" spectrum does not have')
+        reader.add_problem((*path, "gamma"), f'a "{spectrum}" spectrum has no peak enhancement, expected "spectrum": "jonswap"')
     spreading = waves.get("spreading")
     return Waves(
         spectrum,
         height,
-        reader.positive(waves.get("peak_period", usual), (*path, "peak_period")),
+        reader.positive(waves.get("peak_period", default_period), (*path, "peak_period")),
         reader.number(waves.get("gamma", GAMMA), (*path, "gamma"), MIN_GAMMA, MAX_GAMMA),
         reader.number(waves.get("direction", 0.0), (*path, "direction")),
         None if spreading is None else reader.number(spreading, (*path, "spreading"), 0.0, MAX_SPREADING),
@@ -88,34 +94,34 @@ def _read_waves(reader: JsonReader, spec: Mapping[str, Any], root: JsonPath) -> 
 
 
 def _read_significant_height(reader: JsonReader, spec: Mapping[str, Any], root: JsonPath) -> float:
-    """Hs in m, from the sea state or the waves, whichever is given."""
+    """Return the significant wave height Hs (m) from "sea_state" or "waves"."""
     path, waves = (*root, "waves", "significant_height"), spec.get("waves", {})
     if not isinstance(waves, Mapping):
         return 0.0
     if "sea_state" not in spec:
         if "significant_height" not in waves:
-            reader.add_problem(path[:-1], '"significant_height" is missing; or say "sea_state" beside "waves"')
+            reader.add_problem(path[:-1], '"significant_height" is missing; alternatively set "sea_state" beside "waves"')
         return reader.number(waves.get("significant_height", 0.0), path, 0.0, MAX_SIGNIFICANT_HEIGHT)
     if "significant_height" in waves:
-        reader.add_problem(path, 'found beside "sea_state", which says it already; expected one of them')
+        reader.add_problem(path, 'found beside "sea_state", expected only one of them')
     state = reader.integer(spec["sea_state"], (*root, "sea_state"), 0, len(SIGNIFICANT_HEIGHTS) - 1)
     return SIGNIFICANT_HEIGHTS[state]
 
 
 def _read_velocity(reader: JsonReader, spec: Any, path: JsonPath, axes: str) -> Numbers:
-    """A vector "velocity", or "speed" and "direction" (rad, towards which, counter-clockwise from x)."""
+    """Read "velocity" (m/s), or "speed" (m/s) and "direction" of the flow (rad, counter-clockwise from x)."""
     if not isinstance(spec, Mapping):
         return (0.0,) * len(axes)
     if "velocity" in spec:
         for key in {"speed", "direction"} & set(spec):
-            reader.add_problem((*path, key), 'found beside "velocity", which says it already; expected one of them')
+            reader.add_problem((*path, key), 'found beside "velocity", expected only one of them')
         return reader.vector(spec["velocity"], (*path, "velocity"), axes)
     if "speed" not in spec:
-        reader.add_problem(path, '"speed" is missing; or say "velocity"')
+        reader.add_problem(path, '"speed" is missing; alternatively set "velocity"')
     speed = reader.number(spec.get("speed", 0.0), (*path, "speed"), 0.0)
     direction = reader.number(spec.get("direction", 0.0), (*path, "direction"))
-    level = (speed * math.cos(direction), speed * math.sin(direction), 0.0)
-    return level[: len(axes)]
+    velocity = (speed * math.cos(direction), speed * math.sin(direction), 0.0)
+    return velocity[: len(axes)]
 
 
 def _read_wind(reader: JsonReader, spec: Any, path: JsonPath) -> Wind:
@@ -133,16 +139,16 @@ def _read_turbulence(reader: JsonReader, spec: Any, path: JsonPath, speed: float
     spec = reader.read_object(spec, path, (), ("speed_20ft", "intensity", "height", "airspeed"))
     height = reader.number(spec.get("height", TURBULENCE_HEIGHT), (*path, "height"), MIN_HEIGHT, MAX_HEIGHT)
     if "airspeed" not in spec and speed == 0:
-        reader.add_problem(path, '"airspeed" is missing: without a mean wind nothing says how fast the gusts pass')
+        reader.add_problem(path, '"airspeed" is missing; it is required without a mean wind')
     airspeed = reader.positive(spec.get("airspeed", speed or 1.0), (*path, "airspeed"))
     if "intensity" not in spec:
         speed_20ft = reader.number(spec.get("speed_20ft", speed), (*path, "speed_20ft"), 0.0)
         return Turbulence(turbulence_intensities(speed_20ft, height), height, airspeed)
     if "speed_20ft" in spec:
-        reader.add_problem((*path, "speed_20ft"), 'found beside "intensity", which says it already; expected one of them')
+        reader.add_problem((*path, "speed_20ft"), 'found beside "intensity", expected only one of them')
     u, v, w = reader.vector(spec["intensity"], (*path, "intensity"), "uvw")
     if min(u, v, w) < 0:
-        reader.add_problem((*path, "intensity"), f"found {[u, v, w]}, expected standard deviations of at least 0")
+        reader.add_problem((*path, "intensity"), f"found {[u, v, w]}, expected standard deviations of at least 0 m/s")
     return Turbulence((u, v, w), height, airspeed)
 
 

@@ -1,1 +1,1 @@
-"""The Bullet side of the world: bodies, contacts, clearance."""
+"""Contact between vehicles by Bullet: bodies, contact outputs, clearance."""

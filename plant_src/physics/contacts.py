@@ -1,4 +1,4 @@
-"""What a vehicle publishes about its contacts."""
+"""Contact outputs of the vehicles: normal force and flags."""
 
 from __future__ import annotations
 
@@ -11,65 +11,87 @@ import numpy as np
 from .body import ContactBody
 from .client import pybullet
 
-_BODY_A, _BODY_B, _NORMAL_FORCE = 1, 2, 9  # fields of Bullet's contact points
+_BODY_A, _BODY_B, _DISTANCE, _NORMAL_FORCE = 1, 2, 8, 9  # indices in Bullet's contact points
 
 
-class _ContactTargets(NamedTuple):
-    """What contact between two bodies changes: forces in the outputs, and flags."""
+def overlap_depths(client: int) -> dict[tuple[int, int], float]:
+    """Return the depth (m) of the deepest contact point of each pair of Bullet bodies in their present poses."""
+    pybullet.performCollisionDetection(client)
+    depths: dict[tuple[int, int], float] = {}
+    for point in pybullet.getContactPoints(physicsClientId=client):
+        pair = point[_BODY_A], point[_BODY_B]
+        depths[pair] = max(depths.get(pair, 0.0), -point[_DISTANCE])
+    return depths
+
+
+class _ContactOutputs(NamedTuple):
+    """Outputs that contact between two bodies changes: indices of forces and of flags."""
 
     forces: Sequence[int]
     flags: Sequence[int]
 
 
 class Contacts:
-    """Sums of normal forces, mean over a step of the component, and who touches a vessel.
+    """Contact outputs: normal force (N), mean over the component's step, and flags.
 
-    `outputs` are those of all vehicles, the force of each comes last; `flags` has a row (touching, vessel) for each vehicle.
+    Args:
+        client: Number of the Bullet client.
+        bodies: All vehicles.
+        outputs: Real outputs of all vehicles in order; the last one of each vehicle is the contact force.
+        flags: Contact with anything, contact with a vessel; shape (vehicles, 2).
+
+    Attributes:
+        has_contacts: Whether the outputs may contain contacts that `clear` would remove.
     """
 
-    def __init__(self, client: int, shadows: Sequence[ContactBody], outputs: np.ndarray, flags: np.ndarray):
+    def __init__(self, client: int, bodies: Sequence[ContactBody], outputs: np.ndarray, flags: np.ndarray):
         self._client = client
-        #: whether anything is published that `clear` would change
         self.has_contacts = False
-        # memoryviews: setting an element of a numpy array takes twice as long
+        # memoryviews: setting an element takes half as long as with NumPy
         self._outputs: Any = outputs.data
         self._flags: Any = flags.reshape(-1).data
         self._no_flags, self._touching = np.zeros(flags.size, flags.dtype).data, flags[:, 0].data
-        self._force_ends = list(accumulate(len(shadow.outputs) for shadow in shadows))
-        self._vehicle_indices = {shadow.body_id: k for k, shadow in enumerate(shadows)}
-        self._vessels = {shadow.body_id for shadow in shadows if shadow.model.is_vessel}
-        self._targets: dict[tuple[int, int], _ContactTargets] = {}
+        self._force_ends = list(accumulate(len(body.outputs) for body in bodies))
+        self._vehicle_indices = {body.body_id: k for k, body in enumerate(bodies)}
+        self._vessels = {body.body_id for body in bodies if body.model.is_vessel}
+        self._contact_outputs: dict[tuple[int, int], _ContactOutputs] = {}
 
     def clear(self) -> None:
-        """No contact."""
+        """Set all contact forces to 0 and all flags to false."""
         self.has_contacts = False
         self._flags[:] = self._no_flags
         for end in self._force_ends:
             self._outputs[end - 1] = 0.0
 
     def add(self, step_fraction: float) -> int:
-        """Add the contacts of the last step of Bullet, which is this share of the component's step.
+        """Add the contacts of Bullet's last step to the outputs.
 
-        Returns how many vehicles have had some since `clear`.
+        Args:
+            step_fraction: Duration of Bullet's step over that of the component's step.
+
+        Returns:
+            Number of vehicles with contact since the last `clear`.
         """
         self.has_contacts = True
         forces: dict[tuple[int, int], float] = {}
         for point in pybullet.getContactPoints(physicsClientId=self._client):
-            bodies = point[_BODY_A], point[_BODY_B]
-            forces[bodies] = forces.get(bodies, 0.0) + point[_NORMAL_FORCE]
-        for bodies, force in forces.items():
+            pair = point[_BODY_A], point[_BODY_B]
+            forces[pair] = forces.get(pair, 0.0) + point[_NORMAL_FORCE]
+        for pair, force in forces.items():
             if force:
-                pair = self._targets.get(bodies) or self._find_targets(bodies)
-                for place in pair.forces:
-                    self._outputs[place] += force * step_fraction
-                for place in pair.flags:
-                    self._flags[place] = True
+                changed = self._contact_outputs.get(pair) or self._find_outputs(pair)
+                for index in changed.forces:
+                    self._outputs[index] += force * step_fraction
+                for index in changed.flags:
+                    self._flags[index] = True
         return sum(self._touching)
 
-    def _find_targets(self, bodies: tuple[int, int]) -> _ContactTargets:
-        numbers = [self._vehicle_indices[body] for body in bodies if body in self._vehicle_indices]  # platforms publish nothing
+    def _find_outputs(self, pair: tuple[int, int]) -> _ContactOutputs:
+        vehicles = [self._vehicle_indices[body] for body in pair if body in self._vehicle_indices]  # platforms have no outputs
         on_vessels = [
-            self._vehicle_indices[a] for a, b in (bodies, bodies[::-1]) if a in self._vehicle_indices and b in self._vessels
+            self._vehicle_indices[a] for a, b in (pair, pair[::-1]) if a in self._vehicle_indices and b in self._vessels
         ]
-        flags = [2 * number for number in numbers] + [2 * number + 1 for number in on_vessels]
-        return self._targets.setdefault(bodies, _ContactTargets([self._force_ends[number] - 1 for number in numbers], flags))
+        flags = [2 * vehicle for vehicle in vehicles] + [2 * vehicle + 1 for vehicle in on_vessels]
+        return self._contact_outputs.setdefault(
+            pair, _ContactOutputs([self._force_ends[vehicle] - 1 for vehicle in vehicles], flags)
+        )

@@ -1,4 +1,4 @@
-"""The vehicles of a world: one step of all of them together."""
+"""Fleet: all vehicles of a world, advanced together by one step."""
 
 from __future__ import annotations
 
@@ -11,24 +11,32 @@ from typing import Any
 import numpy as np
 
 from ..placement import Platform, VehiclePlacement
-from ..vehicles.common.alarms import INVALID_STATE
-from .body import ContactBody, InvalidStateError, PlanarBody, body_class
+from ..vehicles.common.step_status import INVALID_STATE
+from .body import ContactBody, InvalidStateError
 from .clearance import BoundingBox, Clearance
 from .client import pybullet
 from .contacts import Contacts
 from .vehicle_arrays import VehicleArrays
+from .vessel_bodies import PlanarBody, body_class
 
-#: so often a step of Bullet is made again at most
+#: limit of the repetitions of a Bullet step that keep planar vessels at their height
 MAX_REPEATS = 10
 
 _unpack_vector = struct.Struct("3d").unpack_from
-_ANGULAR_OFFSET = struct.calcsize("3d")  # where the angular part of a motion begins
+_ANGULAR_OFFSET = struct.calcsize("3d")  # of the angular velocity in a twist, in bytes
 _pack_twist = struct.Struct("6d").pack_into
 
 
 @dataclass(frozen=True)
 class FleetState:
-    """The state of a fleet: Bullet's, which Bullet keeps under a number, and ours."""
+    """Saved state of a fleet.
+
+    Attributes:
+        bullet: Number of the state that Bullet holds.
+        memory: Copy of the arrays of all vehicles.
+        flags: Copy of the contact flags.
+        is_near: For each vehicle whether Bullet steps its body.
+    """
 
     bullet: int
     memory: np.ndarray
@@ -37,10 +45,21 @@ class FleetState:
 
 
 class Fleet:
-    """Vehicles that move by their own equations, and meet each other and the platforms in Bullet.
+    """Vehicles that move by their own equations, and contact between them and the platforms by Bullet.
 
-    `step` holds the length of a step (s); `flags` has a row (touching, vessel) for each vehicle. `inputs` and `outputs` are
-    the real variables of all vehicles, in order.
+    Args:
+        client: Number of the Bullet client.
+        vehicles: Vehicles to create.
+        platforms: Platforms, which exist in Bullet already.
+        step_size: Duration of a step (s), shape (1,); the owner may change it between steps.
+        flags: Contact with anything, contact with a vessel; shape (vehicles, 2).
+
+    Attributes:
+        bodies: Contact body of each vehicle.
+        inputs: Real inputs of all vehicles in order.
+        outputs: Real outputs of all vehicles in order.
+        contacts: Contact outputs.
+        clearance: Detection of near vehicles.
     """
 
     def __init__(
@@ -48,42 +67,50 @@ class Fleet:
         client: int,
         vehicles: Sequence[VehiclePlacement],
         platforms: Sequence[Platform],
-        step: np.ndarray,
+        step_size: np.ndarray,
         flags: np.ndarray,
     ):
         self._client, self._flags = client, flags
-        self._memory = memory = VehicleArrays([body_class(spawn.model).array_sizes(spawn.model) for spawn in vehicles])
+        self._memory = memory = VehicleArrays([body_class(vehicle.model).array_sizes(vehicle.model) for vehicle in vehicles])
         self.bodies: list[ContactBody] = [
-            body_class(spawn.model)(client, spawn, pieces | {"step": step})
-            for spawn, pieces in zip(vehicles, memory.of_vehicle, strict=True)
+            body_class(vehicle.model)(client, vehicle, arrays | {"step_size": step_size})
+            for vehicle, arrays in zip(vehicles, memory.of_vehicle, strict=True)
         ]
         self.inputs, self.outputs = memory.of_all_vehicles["inputs"], memory.of_all_vehicles["outputs"]
         self.contacts = Contacts(client, self.bodies, self.outputs, flags)
-        movable = [shadow.bounding_box(spawn.body) for shadow, spawn in zip(self.bodies, vehicles, strict=True)]
+        movable = [body.bounding_box(vehicle.body) for body, vehicle in zip(self.bodies, vehicles, strict=True)]
         fixed = [_platform_bounding_box(platform) for platform in platforms]
-        self.clearance = Clearance(movable, fixed, *(memory.of_all_vehicles[name] for name in ("path", "anchor", "leash")))
-        self._predict, self._correct = [shadow.predict for shadow in self.bodies], [shadow.correct for shadow in self.bodies]
-        # memoryviews: numpy takes longer for so few numbers
-        self._alarms: Any = memory.of_all_vehicles["alarm"].data
-        self._impulses: Any = memory.of_all_vehicles["impulse"].data
-        #: whether a vehicle may have left what it was near
+        shared = (memory.of_all_vehicles[name] for name in ("endpoints", "reference_position", "safe_distance"))
+        self.clearance = Clearance(movable, fixed, *shared)
+        self._predict, self._correct = [body.predict for body in self.bodies], [body.correct for body in self.bodies]
+        # memoryviews: access to a few numbers is faster than with NumPy
+        self._step_status: Any = memory.of_all_vehicles["step_status"].data
+        self._impulse_magnitudes: Any = memory.of_all_vehicles["impulse_magnitude"].data
+        #: whether a vehicle without contact may have moved away from what it was near
         self._near_vehicles_outdated = True
         self._warm_up_inertia()
         self._set_active_bodies([True] * len(self.bodies))
 
     def _warm_up_inertia(self) -> None:
-        """A step in which nothing can meet: with the next one Bullet uses the inertia that it was given."""
-        for engaged in (False, True):
-            for shadow in self.bodies:
-                shadow.set_active(engaged)
-            if not engaged:
+        """Make one Bullet step without contact, because Bullet applies a changed inertia only from the next step on."""
+        for active in (False, True):
+            for body in self.bodies:
+                body.set_active(active)
+            if not active:
                 pybullet.stepSimulation(self._client)
 
     def advance(self, step_fraction: float) -> None:
-        """One step, which is this share of the component's. Raises UnsoundError; if before the step, nothing has moved."""
+        """Advance all vehicles by one step.
+
+        Args:
+            step_fraction: Duration of the step over that of the component's step.
+
+        Raises:
+            InvalidStateError: If an input or a state is not finite or too large. If `predict` finds it, nothing has moved.
+        """
         for predict in self._predict:
             predict()
-        if self._near_vehicles_outdated or any(self._alarms):
+        if self._near_vehicles_outdated or any(self._step_status):
             self._update_near_vehicles()
         if self._active_bodies:
             self._solve_contacts()
@@ -93,37 +120,38 @@ class Fleet:
             self._publish_contacts(step_fraction)
 
     def _update_near_vehicles(self) -> None:
-        """Let Bullet take part for those that are near something."""
-        if INVALID_STATE in self._alarms:
-            raise InvalidStateError(self.bodies[self._alarms.tolist().index(INVALID_STATE)].describe_invalid_state())
+        """Activate the bodies of the vehicles that are near something, and deactivate the others."""
+        if INVALID_STATE in self._step_status:
+            raise InvalidStateError(self.bodies[self._step_status.tolist().index(INVALID_STATE)].describe_invalid_state())
         self._near_vehicles_outdated = False
-        if not any(self._alarms) and self.clearance.is_valid():
+        if not any(self._step_status) and self.clearance.is_valid():
             return
         near = self.clearance.find_near_vehicles()
         if near != self._is_near:
-            for shadow, is_near, was_near in zip(self.bodies, near, self._is_near, strict=True):
+            for body, is_near, was_near in zip(self.bodies, near, self._is_near, strict=True):
                 if is_near != was_near:
-                    shadow.set_active(is_near)
+                    body.set_active(is_near)
             self._set_active_bodies(near)
 
     def _set_active_bodies(self, near: Sequence[bool]) -> None:
-        """Make steps of Bullet ready, in which these vehicles take part."""
+        """Prepare Bullet steps with these bodies."""
         self._is_near = near
-        self._active_bodies = engaged = [shadow for shadow, is_near in zip(self.bodies, near, strict=True) if is_near]
-        self._velocity_commands = [(shadow.body_id, shadow.twist, shadow.torque) for shadow in engaged]
-        self._velocity_results = [(shadow.body_id, shadow.bullet_twist) for shadow in engaged]
-        self._active_planar_bodies = [shadow for shadow in engaged if isinstance(shadow, PlanarBody)]
+        self._active_bodies = active = [body for body, is_near in zip(self.bodies, near, strict=True) if is_near]
+        self._velocity_commands = [(body.body_id, body.commanded_twist, body.compensating_torque) for body in active]
+        self._velocity_results = [(body.body_id, body.bullet_twist) for body in active]
+        self._active_planar_bodies = [body for body in active if isinstance(body, PlanarBody)]
 
     def _solve_contacts(self) -> None:
-        """One step of Bullet."""
+        """Make one Bullet step, and repeat it until planar vessels keep their height."""
         for vessel in self._active_planar_bodies:
             vessel.reset_height()
         self._step_bullet()
         for repeats in range(MAX_REPEATS):
-            if all([vessel.height_converged(repeats) for vessel in self._active_planar_bodies]):
+            converged = [vessel.height_converged(repeats) for vessel in self._active_planar_bodies]
+            if all(converged):
                 return
-            for shadow in self._active_bodies:
-                shadow.reset_pose()
+            for body in self._active_bodies:
+                body.reset_pose()
             self._step_bullet()
 
     def _step_bullet(self) -> None:
@@ -133,25 +161,26 @@ class Fleet:
             if torque is not None:
                 pybullet.applyExternalTorque(body, -1, _unpack_vector(torque), pybullet.WORLD_FRAME, client)
         pybullet.stepSimulation(client)
-        for body, motion in self._velocity_results:
+        for body, twist in self._velocity_results:
             linear, angular = pybullet.getBaseVelocity(body, client)
-            _pack_twist(motion, 0, *linear, *angular)
+            _pack_twist(twist, 0, *linear, *angular)
 
-    def _publish_contacts(self, share: float) -> None:
+    def _publish_contacts(self, step_fraction: float) -> None:
         touching = 0
-        if total := sum(self._impulses):
+        if total := sum(self._impulse_magnitudes):
             if math.isnan(total):
-                culprit = next(shadow for shadow, value in zip(self.bodies, self._impulses, strict=True) if math.isnan(value))
-                raise InvalidStateError(f"{culprit.name}: the contact forces are not finite")
-            touching = self.contacts.add(share)
+                magnitudes = zip(self.bodies, self._impulse_magnitudes, strict=True)
+                invalid = next(body for body, magnitude in magnitudes if math.isnan(magnitude))
+                raise InvalidStateError(f"{invalid.name}: the contact forces are not finite")
+            touching = self.contacts.add(step_fraction)
         self._near_vehicles_outdated = touching < len(self._active_bodies)
 
-    # -- state ---------------------------------------------------------------------------------------------------------
-
     def get_state(self) -> FleetState:
+        """Return a copy of the state, which also takes memory in Bullet until `free_state`."""
         return FleetState(pybullet.saveState(self._client), self._memory.buffer.copy(), self._flags.copy(), self._is_near)
 
     def set_state(self, state: FleetState) -> None:
+        """Restore a state."""
         pybullet.restoreState(state.bullet, physicsClientId=self._client)
         self._memory.buffer[:], self._flags[:] = state.memory, state.flags
         self._set_active_bodies(state.is_near)
@@ -160,6 +189,7 @@ class Fleet:
         self.contacts.has_contacts = bool(state.flags.any())
 
     def free_state(self, state: FleetState) -> None:
+        """Release the memory of a state in Bullet."""
         pybullet.removeState(state.bullet, physicsClientId=self._client)
 
 

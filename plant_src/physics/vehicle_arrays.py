@@ -1,4 +1,4 @@
-"""The numbers of all vehicles of a world, in one block: to copy it is to save their state."""
+"""Arrays of all vehicles of a world in one buffer, so that one copy saves their state."""
 
 from __future__ import annotations
 
@@ -11,10 +11,15 @@ _Key = TypeVar("_Key", bound=Hashable)
 
 
 class VehicleArrays:
-    """Named pieces; in each the numbers of the first vehicle come first, then those of the second, and so on.
+    """Named arrays of all vehicles; those with the same name lie side by side, in the order of the vehicles.
 
-    `sizes` has for each vehicle how many numbers it needs in which pieces. `whole` maps the name of a piece to the numbers of
-    all vehicles, `parts` has the same for each vehicle alone. All of them are views of `block`.
+    Args:
+        sizes: For each vehicle its arrays, as name to size.
+
+    Attributes:
+        buffer: All numbers; the other arrays are views of it.
+        of_all_vehicles: For each name the numbers of all vehicles.
+        of_vehicle: For each vehicle its arrays by name.
     """
 
     def __init__(self, sizes: Sequence[Mapping[str, int]]):
@@ -22,13 +27,13 @@ class VehicleArrays:
         totals = {name: sum(size.get(name, 0) for size in sizes) for name in names}
         self.buffer = np.zeros(sum(totals.values()))
         self.of_all_vehicles = _split(self.buffer, totals)
-        shares = {
+        views = {
             name: _split(self.of_all_vehicles[name], {k: size.get(name, 0) for k, size in enumerate(sizes)}) for name in names
         }
-        self.of_vehicle = [{name: shares[name][k] for name in size} for k, size in enumerate(sizes)]
+        self.of_vehicle = [{name: views[name][k] for name in size} for k, size in enumerate(sizes)]
 
 
 def _split(array: np.ndarray, sizes: Mapping[_Key, int]) -> dict[_Key, np.ndarray]:
-    """Consecutive parts of an array."""
+    """Return consecutive views of an array."""
     ends = np.cumsum(list(sizes.values())).tolist()
     return {key: array[end - size : end] for (key, size), end in zip(sizes.items(), ends, strict=True)}

@@ -1,1 +1,1 @@
-"""The vehicles, one folder each, and what they have in common."""
+"""Vehicle models, one package each, and the packages that they share."""

@@ -1,4 +1,4 @@
-"""Description of a kind of vehicle: variables, states and body."""
+"""Vehicle model: variables, states and rigid body."""
 
 from __future__ import annotations
 
@@ -15,16 +15,25 @@ from .common.shapes import Body, Box, Vector
 from .multirotor.airframe import Airframe
 from .multirotor.interface import INERTIA_INDICES
 
+#: function from the rotation matrix (3, 3) principal axes to body frame to the collision shape in principal axes
 Boxes = Callable[[np.ndarray], tuple[Box, ...]]
 
 
 @dataclass(frozen=True)
 class Model:
-    """A kind of vehicle: its plant FMU, its variables and states in the order of its equations, and its body in Bullet.
+    """A vehicle model.
 
-    `interface` has the variables of the FMU; in a world the environment sets those inputs that are surroundings. `motion`
-    tells models of the same `vehicle` apart; `constants` is how many numbers the equations make of the parameters, once
-    (None: they use the parameters themselves).
+    Attributes:
+        name: Name of the model and of its plant FMU.
+        interface: Variables of the FMU, in the order of the equations.
+        states: Names of the states, in the order of the equations.
+        body: Rigid body in Bullet for the start values of the parameters.
+        is_vessel: Whether the vehicle floats and has a landing deck.
+        vehicle: Name of the vehicle in scenarios if it differs from `name`.
+        motion: "planar" or "6dof"; distinguishes models of the same vehicle.
+        constant_count: Number of constants that the equations derive from the parameters, or None if they use the parameters.
+        airframe: Data of a multirotor, whose mass and inertia are parameters.
+        boxes: Collision shape of a multirotor.
     """
 
     name: str
@@ -35,17 +44,20 @@ class Model:
     vehicle: str = ""
     motion: str = "6dof"
     constant_count: int | None = None
-    #: of a multirotor, which may have another mass and inertia, and its shapes for a rotation to the body frame
     airframe: Airframe | None = None
     boxes: Boxes | None = None
 
     @property
     def rotor_centre(self) -> Vector | None:
-        """Centre of the rotors in the body frame (m), of a multirotor."""
+        """Mean position of the rotors of a multirotor (m, body frame)."""
         return self.airframe.rotor_centre if self.airframe else None
 
     def body_with(self, parameters: Mapping[str, float]) -> Body:
-        """The body in Bullet of a vehicle with these parameters. Raises InputError when there is no such body."""
+        """Return the rigid body of a vehicle with these parameters.
+
+        Raises:
+            InputError: If mass and inertia are physically impossible; a problem's subject begins with "mass" or "inertia".
+        """
         if self.airframe is None or self.boxes is None:
             return self.body
         inertia = np.zeros((3, 3))
@@ -55,22 +67,22 @@ class Model:
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
-        """What a vehicle of this model has in a world."""
+        """Variables of a vehicle in a world: all but the environment inputs."""
         return tuple(variable for variable in self.interface if variable.name not in ENVIRONMENT_INPUTS)
 
     @cached_property
     def environment_inputs(self) -> tuple[Variable, ...]:
-        """What the environment does to it: the last inputs of the equations."""
+        """Inputs that the environment writes: the last inputs of the equations."""
         return tuple(variable for variable in self.interface if variable.name in ENVIRONMENT_INPUTS)
 
     def real_variables(self, causality: Causality) -> list[Variable]:
-        """The real variables of a causality, in order."""
+        """Return the real variables of a causality, in order."""
         return [variable for variable in self.variables if variable.causality == causality and variable.type == "Float64"]
 
     def slots(self, causality: Causality) -> list[str]:
-        """Names of the real scalars of a causality, in order."""
+        """Return the names of the real scalars of a causality, in order."""
         return [slot for variable in self.real_variables(causality) for slot in variable.scalar_names]
 
     def start_values(self, causality: Causality) -> list[float]:
-        """Start values of the real scalars of a causality, in order."""
-        return np.concatenate([np.zeros(0), *(np.ravel(variable.start) for variable in self.real_variables(causality))]).tolist()
+        """Return the start values of the real scalars of a causality, in order."""
+        return [float(start) for variable in self.real_variables(causality) for start in np.ravel(variable.start)]

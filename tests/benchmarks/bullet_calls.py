@@ -1,4 +1,4 @@
-"""The bare PyBullet calls of a mission: recorded while it is flown, replayed without plant, controllers and importer."""
+"""The PyBullet calls of a mission: recorded during a run, replayed without plant, controllers and importer."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from plant_src.physics.client import pybullet
 
 
 class BulletCall(NamedTuple):
+    """One call of PyBullet and its result."""
+
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
     options: dict[str, Any]
@@ -23,7 +25,7 @@ class BulletCall(NamedTuple):
 
 @dataclass(frozen=True)
 class BulletCalls:
-    """All calls of a mission, `first` to `last` of them in the stepping loop, which has so many macro steps."""
+    """All calls of a mission; calls `first` to `last` belong to the stepping loop, which has `steps` macro steps."""
 
     calls: Sequence[BulletCall]
     first: int
@@ -31,12 +33,12 @@ class BulletCalls:
     steps: int
 
     def replay(self) -> float:
-        """CPU microseconds per macro step of the loop's calls; their results have to be the same, up to the last contact."""
+        """Repeat all calls, check that the results are equal, and return the CPU time (us) of the loop per macro step."""
         begin, loop, end = self.calls[: self.first], self.calls[self.first : self.last], self.calls[self.last :]
         _execute(begin)
-        began = process_time()
+        start = process_time()
         results = _execute(loop)
-        seconds = process_time() - began
+        seconds = process_time() - start
         _execute(end)
         assert results == [call.result for call in loop]
         return seconds / self.steps * 1e6
@@ -47,14 +49,14 @@ def _execute(calls: Sequence[BulletCall]) -> list[Any]:
 
 
 def record_calls(load: Callable[[], Any]) -> BulletCalls:
-    """Fly the scenario that `load` assembles and keep its calls of PyBullet."""
+    """Run the scenario that `load` prepares, and return its calls of PyBullet."""
     calls: list[BulletCall] = []
     marks: list[int] = []
     with pytest.MonkeyPatch.context() as patch:
         for name, function in getmembers(pybullet, isbuiltin):
             patch.setattr(pybullet, name, _recording_wrapper(function, calls))
-        assembly = load()
-        run = simulate(assembly.system, assembly.settings, [lambda *_: marks.append(len(calls))])
+        prepared = load()
+        run = simulate(prepared.system, prepared.settings, [lambda *_: marks.append(len(calls))])
     if run.failure:
         raise run.failure
     return BulletCalls(calls, marks[0], marks[-1], run.macro_steps)

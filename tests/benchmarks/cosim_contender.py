@@ -1,4 +1,4 @@
-"""cosim itself as a contender: a ring of FMUs, or one FMU alone, through the public layer."""
+"""cosim as a contender: a ring of FMUs or one FMU, simulated by `simulate`."""
 
 from __future__ import annotations
 
@@ -11,33 +11,34 @@ from cost_measurement import Stopwatch
 from cosim.components.fmi import FmuFile, create_component
 from cosim.core.system import Connection, Endpoint, System
 from cosim.engine import ExecutorKind, native_available
-from cosim.engine.run_loop import Settings, simulate
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Settings
 
 STEP = Fraction(1, 100)
 
 
 def ring_system(fmu: Path, size: int) -> System:
-    """`size` instances, the outputs of each feed the inputs of the next, side by side in one stage (Jacobi)."""
+    """Return a ring of `size` instances in one stage (Jacobi): the outputs of each feed the inputs of the next."""
     file = FmuFile(fmu)
     names = [f"s{i}" for i in range(size)]
     inputs = [variable.name for variable in file.description.variables if variable.causality == "input"]
     pairs = zip(names, [*names[1:], *names[:1]], strict=True)
-    wires = [Connection(Endpoint(a, f"y{name[1:]}"), Endpoint(b, name)) for a, b in pairs for name in inputs]
-    return System({name: create_component(file, name) for name in names}, wires, (tuple(names),))
+    connections = [Connection(Endpoint(a, f"y{name[1:]}"), Endpoint(b, name)) for a, b in pairs for name in inputs]
+    return System({name: create_component(file, name) for name in names}, connections, (tuple(names),))
 
 
 def single_fmu_system(fmu: Path) -> System:
-    """One instance, its inputs unconnected."""
+    """Return a system of one instance with unconnected inputs."""
     return System({"s0": create_component(FmuFile(fmu), "s0")}, (), (("s0",),))
 
 
 def cpu_per_step(system: System, steps: int, recorded: Sequence[str], executor: ExecutorKind) -> float:
-    """CPU microseconds per macro step."""
+    """Return the CPU time (us) per macro step."""
     return measure_run(system, steps, recorded, executor).cpu
 
 
 def measure_run(system: System, steps: int, recorded: Sequence[str], executor: ExecutorKind) -> Stopwatch:
-    """One simulation. A ring of lags has to stay at 1 exactly."""
+    """Simulate once and return the times; a ring of lags must stay at 1 exactly."""
     columns = {name: Endpoint(*name.split(".")) for name in recorded}
     watch = Stopwatch()
     run = simulate(system, Settings(Fraction(0), steps * STEP, STEP, columns, executor=executor), [watch])
@@ -48,7 +49,7 @@ def measure_run(system: System, steps: int, recorded: Sequence[str], executor: E
 
 
 def executors() -> list[ExecutorKind]:
-    """The executors of this installation, the fastest first."""
+    """Return the executors of this installation, the fastest first."""
     return ["native", "python"] if native_available() else ["python"]
 
 

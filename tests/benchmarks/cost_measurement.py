@@ -1,4 +1,4 @@
-"""Costs of contenders, measured in turns so that whatever else the machine does meets all of them alike."""
+"""Costs of contenders, measured alternately, so that other load of the machine affects all of them equally."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from time import perf_counter, process_time
 
 ROUNDS = 5
 
-#: one measurement: CPU time, if nothing else is said in microseconds per macro step
+#: returns one measurement; CPU time per macro step (us) unless stated otherwise
 Cost = Callable[[], float]
 
 
@@ -24,35 +24,35 @@ class MedianCost:
 
 
 def measure_rounds(contenders: Mapping[str, Cost], rounds: int = ROUNDS) -> list[MedianCost]:
-    """Measure all contenders once in every round; the first is what the others are compared with."""
+    """Measure all contenders once in every round; ratios refer to the first contender."""
     costs = [{name: cost() for name, cost in contenders.items()} for _ in range(rounds)]
     first = next(iter(contenders))
     return [
-        MedianCost(name, median(found[name] for found in costs), median(found[name] / found[first] for found in costs))
+        MedianCost(name, median(row[name] for row in costs), median(row[name] / row[first] for row in costs))
         for name in contenders
     ]
 
 
 def print_heading(title: str, unit: str = "CPU us per step") -> None:
-    print(f"\n{title}: median of {ROUNDS} rounds in turns, load average {os.getloadavg()[0]:.2f}")
-    print(f"  {'workload':24}{'who':28}{unit:>16}{'ratio':>9}")
+    print(f"\n{title}: median of {ROUNDS} alternating rounds, load average {os.getloadavg()[0]:.2f}")
+    print(f"  {'workload':24}{'contender':28}{unit:>16}{'ratio':>9}")
 
 
 def print_rows(workload: str, rows: list[MedianCost]) -> dict[str, float]:
-    """Print the rows of a workload; returns the ratios."""
+    """Print the rows of a workload and return the ratios."""
     for row in rows:
         print(f"  {workload:24}{row.name:28}{row.cost:16.4g}{row.ratio:9.3g}", flush=True)
     return {row.name: row.ratio for row in rows}
 
 
 class Stopwatch:
-    """An observer of a run: CPU time (all threads together) and wall time of its stepping loop, in microseconds per step."""
+    """Observer of a run that measures CPU time (of all threads) and wall time of the stepping loop (us per step)."""
 
     def __init__(self) -> None:
-        self._marks: list[tuple[int, float, float]] = []
+        self._samples: list[tuple[int, float, float]] = []
 
-    def __call__(self, finished: int, count: int) -> None:
-        self._marks.append((finished, process_time(), perf_counter()))
+    def __call__(self, finished: int, _count: int) -> None:
+        self._samples.append((finished, process_time(), perf_counter()))
 
     @property
     def cpu(self) -> float:
@@ -63,5 +63,5 @@ class Stopwatch:
         return self._per_step(2)
 
     def _per_step(self, clock: int) -> float:
-        first, last = self._marks[0], self._marks[-1]
+        first, last = self._samples[0], self._samples[-1]
         return (last[clock] - first[clock]) / (last[0] - first[0]) * 1e6

@@ -1,8 +1,9 @@
-"""The FMUs of the benchmarks: near-empty lags (programs/lag.h), alike for every importer and for the C limit."""
+"""The FMUs of the benchmarks: near-empty first-order lags (programs/lag.h), the same for every importer and the C limit."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 from xml.etree import ElementTree
 
 from cosim.export.fmu.archive import content_token, write_archive
@@ -14,7 +15,10 @@ PROGRAMS = Path(__file__).parent / "programs"
 
 
 def lag_fmu(folder: Path, fmi_version: int = 2, width: int = 1) -> Path:
-    """Build the FMU of `width` lags side by side: inputs u1, u2, ..., outputs y1, y2, ...; raises InputError without compiler."""
+    """Build an FMU of `width` independent lags with inputs u1, u2, ... and outputs y1, y2, ...
+
+    Raises InputError if there is no C compiler.
+    """
     identifier = f"Lag{width}"
     source = f"lag{fmi_version}.c"
     sources = fmi_headers(fmi_version) | {name: (PROGRAMS / name).read_bytes() for name in (source, "lag.h")}
@@ -28,13 +32,13 @@ def lag_fmu(folder: Path, fmi_version: int = 2, width: int = 1) -> Path:
     return write_archive(files, folder / f"{identifier}_fmi{fmi_version}.fmu")
 
 
-def _variable(name: str, causality: str) -> BlockVariable:
-    return BlockVariable(name, name, "Float64", causality, "continuous", 0.0)  # type: ignore[arg-type]
+def _variable(name: str, causality: Literal["input", "output"]) -> BlockVariable:
+    return BlockVariable(name, name, "Float64", causality, "continuous", 0.0)
 
 
 def _without_dependencies(description: bytes) -> bytes:
-    """The description with the statement that no output depends on anything at once, which some importers insist on."""
-    root = ElementTree.fromstring(description)  # noqa: S314 - written by ourselves
+    """Declare that no output has direct feedthrough; some importers require this declaration."""
+    root = ElementTree.fromstring(description)  # noqa: S314 - written by lag_fmu
     for unknown in (*root.iter("Unknown"), *root.iter("Output"), *root.iter("InitialUnknown")):
         unknown.set("dependencies", "")
     return to_bytes(root)

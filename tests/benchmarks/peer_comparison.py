@@ -1,10 +1,10 @@
-"""cosim, its peers and the C limit: one ring of near-empty FMUs, measured in turns, one table.
+"""Comparison of cosim, its peers and the C limit: one ring of near-empty FMUs, measured alternately, in one table.
 
     python tests/benchmarks/peer_comparison.py FOLDER [--sizes 2 8 32 128] [--rounds 5] [--only NAME ...] [--document FILE]
 
-Makes a virtual environment for each peer below FOLDER (once; takes pip, a compiler and a minute or two). A peer that
-cannot be installed or does not run is left out, with the reason. `--document` writes the table between the marks of
-that file (docs/performance.md).
+Creates a virtual environment for each peer below FOLDER; this happens once and needs pip, a C compiler and a minute or two. A
+peer that cannot be installed or fails is omitted, with the reason. `--document` replaces the table between the marks of that
+file (docs/performance.md).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ LIMIT = "C limit"
 
 @dataclass(frozen=True)
 class Peer:
-    """A driver in peers/ and what it needs. It makes so many steps that steps times instances are `budget`, but `fewest`."""
+    """A driver in peers/ and its requirements; it makes `budget` / instances steps, but at least `fewest`."""
 
     driver: str
     requirements: Sequence[str]
@@ -68,18 +68,19 @@ PEERS: Mapping[str, Peer] = {
 
 @dataclass(frozen=True)
 class Cost:
-    """Of one measurement, in microseconds per step, and where the ring ended; nan where there is none."""
+    """CPU and wall time (us) per step and the last value of the ring; NaN without a measurement."""
 
     cpu: float = nan
     wall: float = nan
     last: float = nan
 
 
-Contender = Callable[[int], Cost]  # from the size of the ring
+#: measures a ring of the given size
+Contender = Callable[[int], Cost]
 
 
 def run_c_limit(limit: CLimit, ring: bool = True) -> Contender:
-    """Stepped by the program of the C limit; without `ring` the FMU is the whole ring."""
+    """Return a contender that steps with the program of the C limit; without `ring` the FMU contains the whole ring."""
 
     def run(size: int) -> Cost:
         cpu, last = limit.run(size if ring else 1, max(500, 1_000_000 // size), ring=ring)
@@ -89,7 +90,7 @@ def run_c_limit(limit: CLimit, ring: bool = True) -> Contender:
 
 
 def run_driver(python: Path, peer: Peer, fmu: Path, *more: str) -> Contender:
-    """Stepped by a driver, which answers in JSON."""
+    """Return a contender that steps with a driver, whose output is JSON."""
 
     def run(size: int) -> Cost:
         return Cost(**json.loads(driver_output(python, peer, fmu, size, peer.steps(size), *more)))
@@ -98,7 +99,7 @@ def run_driver(python: Path, peer: Peer, fmu: Path, *more: str) -> Contender:
 
 
 def run_packed(python: Path, peer: Peer, fmu: Path, folder: Path) -> Contender:
-    """A driver packs the ring into an FMU, once for each size."""
+    """Return a contender that steps an FMU into which a driver packs the ring, once per size."""
 
     @cache
     def container(size: int) -> Contender:
@@ -110,7 +111,7 @@ def run_packed(python: Path, peer: Peer, fmu: Path, folder: Path) -> Contender:
 
 
 def driver_output(python: Path, peer: Peer, *arguments: object) -> str:
-    """The last line that a driver writes. Raises SubprocessError when it fails or does not end."""
+    """Return the last line of a driver's output. Raises SubprocessError if it fails or exceeds the time limit."""
     command = [python, DRIVERS / peer.driver, *arguments]
     done = subprocess.run([*map(str, command)], capture_output=True, text=True, timeout=TIME_LIMIT, check=True)
     return last_line(done.stdout)
@@ -121,7 +122,7 @@ def last_line(text: str) -> str:
 
 
 class Comparison:
-    """Who takes part, in which versions, and who does not and why."""
+    """The contenders with their versions, and the absent peers with the reasons."""
 
     def __init__(self, folder: Path, environments: Path, names: Collection[str]):
         self._folder, self._fmu = folder, lag_fmu(folder)
@@ -141,7 +142,7 @@ class Comparison:
         try:
             python = environment(folder, peer.requirements)
         except subprocess.CalledProcessError as error:
-            self.absent[name] = f"cannot be installed: {reason(error)}"
+            self.absent[name] = f"cannot be installed: {failure_reason(error)}"
             return
         self.versions[name] = versions(python, peer.requirements)
         if peer.driver.startswith("pack_"):
@@ -150,7 +151,7 @@ class Comparison:
             self._contenders[name] = run_driver(python, peer, self._fmu)
 
     def measure(self, size: int, rounds: int) -> dict[str, Cost]:
-        """Medians of a ring; who fails once is not asked again."""
+        """Return the median costs for one size; a contender that fails is not measured again."""
         found: dict[str, list[Cost]] = {name: [] for name in self._contenders}
         for _ in range(rounds):
             for name, costs in found.items():
@@ -163,7 +164,7 @@ class Comparison:
         try:
             return self._contenders[name](size)
         except subprocess.SubprocessError as error:
-            self.absent[f"{name}, ring {size}"] = reason(error)
+            self.absent[f"{name}, ring {size}"] = failure_reason(error)
             return Cost()
 
 
@@ -171,21 +172,21 @@ def median_cost(costs: Sequence[Cost]) -> Cost:
     return Cost(*(median(getattr(cost, field) for cost in costs) for field in ("cpu", "wall", "last")))
 
 
-def reason(error: subprocess.SubprocessError) -> str:
+def failure_reason(error: subprocess.SubprocessError) -> str:
     if isinstance(error, subprocess.CalledProcessError):
         return last_line(error.stderr) or f"exit code {error.returncode}"
-    return f"no end after {TIME_LIMIT:g} s"
+    return f"time limit of {TIME_LIMIT:g} s exceeded"
 
 
 def table(medians: Mapping[int, Mapping[str, Cost]], versions: Mapping[str, str]) -> list[str]:
-    """Markdown lines, one for each contender: CPU microseconds per step and, in brackets, times the limit."""
-    lines = ["| who | " + " | ".join(f"ring {size}" for size in medians) + " | y after the run |"]
+    """Return the lines of a Markdown table: CPU time (us) per step and, in brackets, the ratio to the C limit."""
+    lines = ["| contender | " + " | ".join(f"ring {size}" for size in medians) + " | y after the run |"]
     lines.append("|---" * (len(medians) + 2) + "|")
     smallest = medians[min(medians)]
     for name, cost in smallest.items():
-        who = f"{name} ({versions[name]})" if name in versions else name
+        label = f"{name} ({versions[name]})" if name in versions else name
         cells = [_cell(costs[name], costs[LIMIT]) for costs in medians.values()]
-        lines.append(f"| {who} | {' | '.join(cells)} | {'-' if isnan(cost.last) else f'{cost.last:.6g}'} |")
+        lines.append(f"| {label} | {' | '.join(cells)} | {'-' if isnan(cost.last) else f'{cost.last:.6g}'} |")
     return lines
 
 
@@ -201,19 +202,19 @@ def _number(value: float) -> str:
 
 
 def report(comparison: Comparison, sizes: Sequence[int], rounds: int) -> str:
-    """The table with its circumstances."""
+    """Return the table with a description of machine and load."""
     load = os.getloadavg()[0]
     lines = table({size: comparison.measure(size, rounds) for size in sizes}, comparison.versions)
-    lines += ["", f"CPU microseconds per macro step (times the limit); median of {rounds} rounds in turns."]
+    lines += ["", f"CPU microseconds per macro step (times the limit); median of {rounds} alternating rounds."]
     machine = f"CPython {platform.python_version()} on {os.cpu_count()} processors"
-    lines += [f"{machine}; load average {load:.2f} at the start, {os.getloadavg()[0]:.2f} in the end."]
+    lines += [f"{machine}; load average {load:.2f} at the start, {os.getloadavg()[0]:.2f} at the end."]
     if comparison.absent:
-        lines += ["", *(f"* Not measured: {who}: {why}." for who, why in comparison.absent.items())]
+        lines += ["", *(f"* Not measured: {name}: {why}." for name, why in comparison.absent.items())]
     return "\n".join(lines)
 
 
 def write_into(document: Path, text: str, mark: str = "peers") -> None:
-    """Replace what stands between `<!-- MARK -->` and `<!-- /MARK -->`."""
+    """Replace the text between `<!-- MARK -->` and `<!-- /MARK -->`."""
     old = document.read_text()
     new, count = re.subn(rf"(<!-- {mark} -->\n).*?(<!-- /{mark} -->)", lambda m: f"{m[1]}{text}\n{m[2]}", old, flags=re.DOTALL)
     if not count:

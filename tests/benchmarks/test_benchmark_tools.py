@@ -1,4 +1,4 @@
-"""What the benchmarks measure with is right: these tests run with all others."""
+"""Tests of the benchmark tools; they run with all other tests."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ def test_the_lag_is_a_valid_fmu(version, width, tmp_path):
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_importer_and_limit_step_the_same_ring(version, tmp_path):
-    """Both measurements contain a check that all values stay at 1 exactly."""
+def test_importer_and_c_limit_step_the_same_ring(version, tmp_path):
+    """Both measurements check that all values stay at 1 exactly."""
     fmu = lag_fmu(tmp_path, version, width=3)
     assert CLimit(fmu, tmp_path)(4, 100, width=3, recorded=12) > 0
     for executor in executors():
         assert cpu_per_step(ring_system(fmu, 4), 100, [f"s{i}.y{j}" for i in range(4) for j in (1, 2, 3)], executor) > 0
 
 
-def test_the_replayed_calls_of_a_mission_are_the_mission():
-    """The replay contains a check that Bullet answers every call as it did in flight."""
+def test_recorded_bullet_calls_can_be_replayed():
+    """The replay checks that every call returns the same result."""
     calls = record_calls(lambda: cosim.load("demo1_box", stop_time=2.0))
     assert calls.steps == 200
     assert {call.function.__name__ for call in calls.calls[calls.first : calls.last]} >= {"stepSimulation", "resetBaseVelocity"}
@@ -46,8 +46,9 @@ def test_without_peers_cosim_is_compared_with_the_limit(tmp_path):
     command = [sys.executable, PEERS, tmp_path / "cache", "--sizes", "2", "--rounds", "1", "--only"]
     done = subprocess.run([*map(str, command)], capture_output=True, text=True, check=True)
     lines = done.stdout.splitlines()
-    assert lines[0] == "| who | ring 2 | y after the run |"
-    assert "(1x)" in lines[2] and "cosim" in lines[3]
+    assert lines[0] == "| contender | ring 2 | y after the run |"
+    assert "(1x)" in lines[2]
+    assert "cosim" in lines[3]
 
 
 def test_a_table_replaces_the_one_between_the_marks(tmp_path):

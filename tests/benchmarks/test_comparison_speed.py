@@ -1,4 +1,4 @@
-"""How long the comparison of a result with its reference takes.
+"""Duration of the comparison of a result with its reference.
 
 Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_comparison_speed.py
 """
@@ -32,7 +32,7 @@ def test_comparison(signals, rows):
         "within the tolerance in value": waves(signals, rows, noise=0.009),
         "within the tolerance in time": waves(signals, rows, delay=0.05),
     }.items():
-        began = process_time()
+        start = process_time()
         comparison = compare(result, reference, {"*": tolerance})
-        print(f"  {signals} signals of {rows} rows, {name}: {process_time() - began:.3f} s of CPU")
+        print(f"  {signals} signals of {rows} rows, {name}: {process_time() - start:.3f} s of CPU")
         assert comparison.passed, str(comparison)

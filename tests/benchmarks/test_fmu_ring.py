@@ -1,4 +1,4 @@
-"""N near-empty FMUs in a ring, Jacobi: 3 N FMI calls per macro step, so what is measured is the importer.
+"""Ring of N near-empty FMUs, Jacobi: 3 N FMI calls per macro step, whose cost is mostly the importer's.
 
 Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_fmu_ring.py
 """
@@ -12,9 +12,9 @@ from cost_measurement import measure_rounds, print_heading, print_rows
 from lag_fmus import lag_fmu
 
 SIZES = (2, 8, 32, 128, 1024)
-#: steps times FMUs
+#: macro steps times number of FMUs, per measurement
 BUDGETS = {"native": 4_000_000, "python": 100_000}
-#: generous: times the C limit
+#: largest allowed ratio to the C limit (generous)
 LARGEST_RATIO = {"C limit": 2, "cosim, native": 20, "cosim, python": 2000}
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]
 

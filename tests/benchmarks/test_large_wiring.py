@@ -1,4 +1,4 @@
-"""A scenario of 1000 FMUs and 10 000 connections, from its JSON to the first step.
+"""Start of a scenario with 1000 FMUs and 10 000 connections: from JSON to the first step.
 
 Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_large_wiring.py
 """
@@ -17,13 +17,13 @@ import cosim
 
 FMUS, CONNECTIONS = 1000, 10_000
 PARTS = ("parse_seconds", "instantiate_seconds", "wiring_seconds", "initialize_seconds", "loop_seconds")
-#: s, asked for: parsing, extraction and instantiation are reported beside it
+#: required limit (s) for wiring; parsing, extraction and instantiation are only reported
 LONGEST_WIRING = 5.0
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]
 
 
-def ring(fmu: Path, size: int, stages: list[list[str]], wires: int) -> dict[str, Any]:
-    """A scenario: each of `size` instances feeds `wires` inputs of the next, every connection written out."""
+def ring(fmu: Path, size: int, stages: list[list[str]], width: int) -> dict[str, Any]:
+    """Return a scenario in which each of `size` instances feeds `width` inputs of the next one by single connections."""
     names = [f"s{i}" for i in range(size)]
     return {
         "name": "large",
@@ -33,7 +33,7 @@ def ring(fmu: Path, size: int, stages: list[list[str]], wires: int) -> dict[str,
         "connections": [
             {"from": f"{a}.y{k}", "to": f"{b}.u{k}"}
             for a, b in zip(names, [*names[1:], *names[:1]], strict=True)
-            for k in range(1, wires + 1)
+            for k in range(1, width + 1)
         ],
         "algorithm": {"stages": stages or [names]},
     }
@@ -42,10 +42,10 @@ def ring(fmu: Path, size: int, stages: list[list[str]], wires: int) -> dict[str,
 @pytest.mark.parametrize("size", [FMUS, 10], ids=["1000 FMUs", "10 wide FMUs"])
 @pytest.mark.parametrize("order", ["one stage", "a stage each"])
 def test_wiring(size, order, tmp_path):
-    wires = CONNECTIONS // size
+    width = CONNECTIONS // size
     stages = [[f"s{i}"] for i in range(size)] if order == "a stage each" else []
     scenario = tmp_path / "large.json"
-    scenario.write_text(json.dumps(ring(lag_fmu(tmp_path, width=wires), size, stages, wires), indent=1))
+    scenario.write_text(json.dumps(ring(lag_fmu(tmp_path, width=width), size, stages, width), indent=1))
     timing = cosim.run(scenario).timing
     print(f"\n{size} FMUs, {CONNECTIONS} connections, {order}, load average {os.getloadavg()[0]:.2f}")
     for part in PARTS:

@@ -1,4 +1,4 @@
-"""Ten million rows from one FMU to CSV and Parquet files, and the memory that takes.
+"""Ten million rows of one FMU to CSV and Parquet files: duration and memory.
 
 Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_many_rows.py
 """
@@ -12,7 +12,7 @@ import pytest
 from lag_fmus import lag_fmu
 
 ROWS = 10_000_000
-#: asked for (MB)
+#: required limit of memory (MB)
 LARGEST_PEAK = 300
 PROGRAM = """
 import resource, sys, time
@@ -21,7 +21,8 @@ from pathlib import Path
 from cosim.components.fmi import FmuFile, create_component
 from cosim.results.csv_files import write_csv
 from cosim.results.parquet_files import write_parquet
-from cosim.engine.run_loop import Settings, simulate
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Settings
 from cosim.core.system import Endpoint, System
 steps, step = int(sys.argv[2]) - 1, Fraction(1, 100)
 outputs = {f"a.y{k}": Endpoint("a", f"y{k}") for k in range(1, int(sys.argv[3]) + 1)}
@@ -29,9 +30,9 @@ system = System({"a": create_component(FmuFile(Path(sys.argv[1])), "a")}, (), ((
 run = simulate(system, Settings(Fraction(0), steps * step, step, outputs))
 print(run.loop_seconds)
 for name, write in (("csv", write_csv), ("parquet", write_parquet)):
-    began = time.perf_counter()
+    start = time.perf_counter()
     write(run.recording, f"result.{name}")
-    print(time.perf_counter() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+    print(time.perf_counter() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 """
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]
 

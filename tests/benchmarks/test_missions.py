@@ -1,4 +1,4 @@
-"""Flights: Demo 1 against the bare PyBullet calls of the same mission, flight on FMUs alone, several pairs of vehicles.
+"""Missions: Demo 1 compared with its PyBullet calls, a flight of FMUs only, several pairs of vehicles.
 
 Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_missions.py
 """
@@ -22,45 +22,45 @@ from cosim.engine import ExecutorKind
 from cosim.engine.run_loop import simulate
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
-#: generous: times PyBullet's own calls
+#: largest allowed ratio to the PyBullet calls (generous)
 LARGEST_RATIO = 6
-#: between pairs of vehicles (m); far enough for no contact
+#: distance between pairs of vehicles (m), large enough to exclude contact
 DISTANCE = 100.0
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]
 
 
-def flown(scenario: str | Path, executor: ExecutorKind, **changes: Any) -> float:
-    """CPU microseconds per macro step of the stepping loop of one flight."""
-    assembly = cosim.load(scenario)
+def step_cost(scenario: str | Path, executor: ExecutorKind, **changes: Any) -> float:
+    """Return the CPU time (us) per macro step of the stepping loop of one run."""
+    prepared = cosim.load(scenario)
     watch = Stopwatch()
-    run = simulate(assembly.system, replace(assembly.settings, executor=executor, **changes), [watch])
+    run = simulate(prepared.system, replace(prepared.settings, executor=executor, **changes), [watch])
     if run.failure:
         raise run.failure
     return watch.cpu
 
 
-def flights(scenario: str | Path) -> dict[str, Callable[[], float]]:
-    """The contenders of a mission: every executor, and the first of them without recording."""
-    contenders = {executor_label(executor): lambda e=executor: flown(scenario, e) for executor in executors()}
-    return contenders | {"cosim, nothing recorded": lambda: flown(scenario, executors()[0], columns={})}
+def contenders_of(scenario: str | Path) -> dict[str, Callable[[], float]]:
+    """Return the contenders of a mission: every executor, and the first one without recording."""
+    contenders = {executor_label(executor): lambda e=executor: step_cost(scenario, e) for executor in executors()}
+    return contenders | {"cosim, nothing recorded": lambda: step_cost(scenario, executors()[0], columns={})}
 
 
-def test_demo1_against_the_bare_calls_of_pybullet(monkeypatch):
-    """The floor is Bullet taking part in every step; the second row holds the calls that are still made."""
-    made = record_calls(lambda: cosim.load("demo1_box"))
-    (clearance,) = (module for name, module in sys.modules.items() if name.endswith(".plant_src.clearance"))
+def test_demo1_compared_with_its_pybullet_calls(monkeypatch):
+    """The reference steps Bullet in every step; the second row contains only the calls that the plant makes."""
+    actual = record_calls(lambda: cosim.load("demo1_box"))
+    (clearance,) = (module for name, module in sys.modules.items() if name.endswith("plant_src.physics.clearance"))
     monkeypatch.setattr(clearance, "NEAR_DISTANCE", 1e9)
-    everywhere = record_calls(lambda: cosim.load("demo1_box"))
+    in_every_step = record_calls(lambda: cosim.load("demo1_box"))
     monkeypatch.undo()
     print_heading("demo1_box, 40 s")
-    floors = {"PyBullet in every step": everywhere.replay, "PyBullet's calls made": made.replay}
-    ratios = print_rows("demo1_box", measure_rounds({**floors, **flights("demo1_box")}))
+    references = {"PyBullet in every step": in_every_step.replay, "actual PyBullet calls": actual.replay}
+    ratios = print_rows("demo1_box", measure_rounds({**references, **contenders_of("demo1_box")}))
     assert max(ratios.values()) < LARGEST_RATIO
 
 
 def test_free_flight():
-    print_heading("free_flight, 40 s on FMUs alone")
-    ratios = print_rows("free_flight", measure_rounds(flights("free_flight")))
+    print_heading("free_flight, 40 s, FMUs only")
+    ratios = print_rows("free_flight", measure_rounds(contenders_of("free_flight")))
     assert ratios["cosim, nothing recorded"] < 2
 
 
@@ -70,13 +70,13 @@ def test_pairs_of_vehicles(tmp_path):
         scenario = tmp_path / f"pairs{pairs}.json"
         scenario.write_text(json.dumps(with_pairs(pairs)))
         calls = record_calls(lambda scenario=scenario: cosim.load(scenario))
-        contenders = {"PyBullet's calls alone": calls.replay}
-        contenders |= {executor_label(executor): lambda s=scenario, e=executor: flown(s, e) for executor in executors()}
+        contenders = {"PyBullet calls only": calls.replay}
+        contenders |= {executor_label(executor): lambda s=scenario, e=executor: step_cost(s, e) for executor in executors()}
         assert max(print_rows(f"pairs: {pairs}", measure_rounds(contenders)).values()) < LARGEST_RATIO
 
 
 def with_pairs(count: int) -> dict[str, Any]:
-    """Demo 1 with `count` pairs side by side, each on its own box."""
+    """Return Demo 1 with `count` pairs of vehicles, each with its own box."""
     text = (SCENARIOS / "demo1_box.json").read_text()
     demo = json.loads(text.replace('"../', f'"{SCENARIOS.parent}/').replace('"systems/', f'"{SCENARIOS}/systems/'))
     plant, uav, usv = (demo["components"][name] for name in ("plant", "uav", "usv"))

@@ -1,4 +1,4 @@
-"""One FMU alone for 100 000 steps, and FMUs with a thousand inputs and outputs.
+"""One FMU for 100 000 steps, and FMUs with a thousand inputs and outputs.
 
 Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_one_fmu.py
 """
@@ -13,7 +13,7 @@ from lag_fmus import lag_fmu
 
 STEPS = 100_000
 WIDTH = 1000
-#: generous: times the C limit
+#: largest allowed ratio to the C limit (generous)
 LARGEST_RATIO = 500
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]
 

@@ -1,4 +1,4 @@
-"""Two FMUs in one stage, 1 ms per step each: one after the other, and at the same time.
+"""Two FMUs in one stage with steps of 1 ms: sequential and on threads.
 
 Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_parallel_stages.py
 """
@@ -14,14 +14,16 @@ from slow_fmus import slow_fmu
 
 from cosim.components.fmi import FmuFile, create_component
 from cosim.core.system import Parallel, System
-from cosim.engine.run_loop import Settings, simulate
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Settings
 
-LONG, STEPS = 1e-3, 200
+#: duration of a step (s), number of steps
+STEP_DURATION, STEPS = 1e-3, 200
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]
 
 
-def wall(fmus, parallel: Parallel, executor) -> float:
-    """Wall microseconds per macro step."""
+def wall_time(fmus, parallel: Parallel, executor) -> float:
+    """Return the wall time (us) per macro step."""
     components = {f"c{i}": create_component(FmuFile(fmu), f"c{i}") for i, fmu in enumerate(fmus)}
     built = System(components, (), (tuple(components),), parallel=parallel)
     run = simulate(built, Settings(Fraction(0), Fraction(STEPS, 100), Fraction(1, 100), executor=executor))
@@ -31,12 +33,12 @@ def wall(fmus, parallel: Parallel, executor) -> float:
 
 @pytest.mark.parametrize("wait", [False, True], ids=["busy", "waiting"])
 def test_two_long_fmus(wait, tmp_path):
-    fmus = [slow_fmu(tmp_path, name, LONG, wait) for name in ("a", "b")]
+    fmus = [slow_fmu(tmp_path, name, STEP_DURATION, wait) for name in ("a", "b")]
     for executor in executors():
         print_heading(f"two FMUs in one stage, 1 ms each, {'waiting' if wait else 'busy'}; {executor}", "wall us per step")
-        ways: dict[str, Parallel] = {"one thread": False, "threads": "auto"}
+        modes: dict[str, Parallel] = {"one thread": False, "threads": "auto"}
         ratios = print_rows(
-            "1 ms", measure_rounds({name: lambda w=way, e=executor: wall(fmus, w, e) for name, way in ways.items()})
+            "1 ms", measure_rounds({name: lambda p=mode, e=executor: wall_time(fmus, p, e) for name, mode in modes.items()})
         )
-        # two busy threads gain nothing where other programs keep all processors busy
+        # two busy threads gain nothing if other programs use all processors
         assert ratios["threads"] < (0.8 if wait else 2)

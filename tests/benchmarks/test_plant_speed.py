@@ -1,4 +1,4 @@
-"""What the plant costs per step of 10 ms: one pair in calm and in weather, in flight and landed, and many pairs.
+"""Cost of the plant per step of 10 ms: one pair in calm and in weather, in flight and landed, and many pairs.
 
 Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_plant_speed.py
 """
@@ -22,14 +22,14 @@ from plant_src.world import World
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]
 
 STEP = 0.01
-VEHICLE_STEPS = 4000  # in one measurement, so many steps times pairs
+VEHICLE_STEPS = 4000  # steps times pairs, per measurement
 PAIRS = (1, 2, 4, 8, 16, 32, 64)
-APART = 20.0  # between pairs (m)
+SPACING = 20.0  # between pairs (m)
 HOVER = 345.0  # rad/s
 FLYING, LANDED = 5.0, 0.3249  # height of the quadcopter (m)
 WEATHER = {"seed": 7, "sea_state": 3, "wind": {"speed": 5.0, "turbulence": {}}}
 DRAG = {f"{part}_drag.{axis}": value for part, value in (("rotor", 5e-5), ("body", 0.02)) for axis in "xyz"}
-#: what one pair may cost (us)
+#: largest cost of one pair per step (us) on an idle machine
 LIMITS = {
     "planar, in flight": 20.0,
     "planar, landed": 35.0,
@@ -39,18 +39,18 @@ LIMITS = {
 
 
 def pairs(count: int, height: float, **vessel: Any) -> dict[str, Any]:
-    """Quadcopters above or on the decks of their vessels."""
+    """Return vehicles: quadcopters above or on the decks of their vessels."""
     quadcopter = {"model": "ar_drone", "parameters": DRAG if vessel else {}}
     vehicles: dict[str, Any] = {}
     for k in range(count):
-        x, y = APART * (k % 8), APART * (k // 8)
+        x, y = SPACING * (k % 8), SPACING * (k // 8)
         vehicles[f"uav{k}"] = quadcopter | {"position": [x - 0.0135, y + 0.002, height]}
         vehicles[f"usv{k}"] = {"model": "strider", "position": [x, y], **vessel}
     return vehicles
 
 
-class Bound:
-    """A world as the engine steps it."""
+class BoundWorld:
+    """A world that is bound to arrays and stepped like by the engine."""
 
     def __init__(self, vehicles: Mapping[str, Any], environment: Mapping[str, Any] | None = None, speed: float = 0.0):
         self.world = World("plant", vehicles, {}, environment)
@@ -62,8 +62,8 @@ class Bound:
         for name in vehicles:
             if name.startswith("uav"):
                 self.world.set(f"{name}.rotor_speed", [speed] * 4)
-        self.clock = ctypes.c_double(0.0)
-        (self.call,) = self.world.prepare_step_calls(self.clock, STEP)
+        self.current_time = ctypes.c_double(0.0)
+        (self.call,) = self.world.prepare_step_calls(self.current_time, STEP)
 
     def _ports(self, causality: str) -> Ports:
         variables = [variable for variable in self.world.variables if variable.causality == causality]
@@ -74,29 +74,29 @@ class Bound:
         )
 
     def run(self, steps: int) -> float:
-        """CPU microseconds per step."""
-        function, arguments, clock = self.call.function, self.call.arguments, self.clock
-        begun = process_time()
+        """Return the CPU time (us) per step."""
+        function, arguments, current_time = self.call.function, self.call.arguments, self.current_time
+        start = process_time()
         for _ in range(steps):
             function(*arguments)
-            clock.value += STEP
-        return (process_time() - begun) / steps * 1e6
+            current_time.value += STEP
+        return (process_time() - start) / steps * 1e6
 
 
-def flight(bound: Bound) -> Callable[[], float]:
-    """Steps from the same moment of a flight in each round."""
+def flight(bound: BoundWorld) -> Callable[[], float]:
+    """Return a cost that starts at the same moment of a flight in each round."""
     bound.run(20)
     state = bound.world.get_state()
 
     def cost() -> float:
         bound.world.set_state(state)
-        bound.clock.value = 20 * STEP
+        bound.current_time.value = 20 * STEP
         return bound.run(300)
 
     return cost
 
 
-def landed(bound: Bound) -> Callable[[], float]:
+def landed(bound: BoundWorld) -> Callable[[], float]:
     bound.run(200)
     assert bound.world.get("uav0.contact.vessel")
     return lambda: bound.run(300)
@@ -108,31 +108,33 @@ def test_one_pair() -> None:
     contenders = {
         "PyBullet alone, in flight": raw(1, FLYING),
         "PyBullet alone, landed": raw(1, LANDED),
-        "planar, in flight": flight(Bound(pairs(1, FLYING), speed=HOVER)),
-        "planar, landed": landed(Bound(pairs(1, LANDED))),
-        "6 DOF in a calm, in flight": flight(Bound(pairs(1, FLYING, **six), {}, HOVER)),
-        "6 DOF in weather, in flight": flight(Bound(pairs(1, FLYING, **six), WEATHER, HOVER)),
-        "6 DOF in weather, landed": landed(Bound(pairs(1, LANDED, **six), WEATHER)),
+        "planar, in flight": flight(BoundWorld(pairs(1, FLYING), speed=HOVER)),
+        "planar, landed": landed(BoundWorld(pairs(1, LANDED))),
+        "6 DOF in a calm, in flight": flight(BoundWorld(pairs(1, FLYING, **six), {}, HOVER)),
+        "6 DOF in weather, in flight": flight(BoundWorld(pairs(1, FLYING, **six), WEATHER, HOVER)),
+        "6 DOF in weather, landed": landed(BoundWorld(pairs(1, LANDED, **six), WEATHER)),
     }
     rows = measure_rounds(contenders)
     print_rows("one pair", rows)
     for row in rows:
         if row.name in LIMITS:
-            print(f"  {row.name}: {row.cost:.1f} us, at most {LIMITS[row.name]:g} us wanted on a machine of its own")
+            print(f"  {row.name}: {row.cost:.1f} us, limit on an idle machine {LIMITS[row.name]:g} us")
     ratios = {row.name: row.cost / rows[1].cost for row in rows}
-    assert ratios["planar, in flight"] < 1 and ratios["planar, landed"] < 2.5 and ratios["6 DOF in weather, landed"] < 5
+    assert ratios["planar, in flight"] < 1
+    assert ratios["planar, landed"] < 2.5
+    assert ratios["6 DOF in weather, landed"] < 5
 
 
 def raw(count: int, height: float) -> Callable[[], float]:
-    """PyBullet alone with the same bodies: read every vehicle, push every vehicle, step, ask for contacts."""
+    """Return the cost of PyBullet with the same bodies: read and push every vehicle, step, get contacts."""
     world = World("plant", pairs(count, height))
-    client, shadows = world._client, world._fleet.bodies
+    client, bodies = world._client, world._fleet.bodies
     pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP, physicsClientId=client)
     weight = 9.81 * 0.443892 if height == LANDED else 0.0
-    upwards = {shadow.body_id: weight if shadow.model.is_vessel else -weight for shadow in shadows}
+    upward_forces = {body.body_id: weight if body.model.is_vessel else -weight for body in bodies}
 
     def step() -> None:
-        for body, force in upwards.items():
+        for body, force in upward_forces.items():
             position, _ = pybullet.getBasePositionAndOrientation(body, client)
             pybullet.getBaseVelocity(body, client)
             pybullet.applyExternalForce(body, -1, (0, 0, force), position, pybullet.WORLD_FRAME, client)
@@ -141,24 +143,24 @@ def raw(count: int, height: float) -> Callable[[], float]:
         pybullet.getContactPoints(physicsClientId=client)
 
     def cost() -> float:
-        assert world  # it keeps the client
-        begun, steps = process_time(), max(20, VEHICLE_STEPS // count // 10)
+        assert world  # keeps the client alive
+        start, steps = process_time(), max(20, VEHICLE_STEPS // count // 10)
         for _ in range(steps):
             step()
-        return (process_time() - begun) / steps * 1e6
+        return (process_time() - start) / steps * 1e6
 
     return cost
 
 
 def many(count: int, height: float) -> Callable[[], float]:
-    bound = Bound(pairs(count, height), speed=HOVER if height == FLYING else 0.0)
+    bound = BoundWorld(pairs(count, height), speed=HOVER if height == FLYING else 0.0)
     bound.run(20)
     return lambda: bound.run(max(20, VEHICLE_STEPS // count // 10))
 
 
 @pytest.mark.parametrize("height", [FLYING, LANDED], ids=["in flight", "landed"])
 def test_many_pairs(height: float) -> None:
-    """Linear in the number of pairs."""
+    """The cost is linear in the number of pairs."""
     print_heading(f"N planar pairs, {'in flight' if height == FLYING else 'landed'}")
     costs: dict[int, MedianCost] = {}
     for count in PAIRS:
@@ -171,11 +173,11 @@ def test_many_pairs(height: float) -> None:
 
 
 def test_many_pairs_in_weather() -> None:
-    """Six degrees of freedom, sea state 3, gusts."""
+    """The cost is linear with six degrees of freedom, sea state 3 and gusts."""
     print_heading("N pairs in weather, in flight")
     per_pair = {}
     for count in (1, 4, 16, 64):
-        bound = Bound(pairs(count, FLYING, motion="6dof"), WEATHER, HOVER)
+        bound = BoundWorld(pairs(count, FLYING, motion="6dof"), WEATHER, HOVER)
         bound.run(20)
         (row,) = measure_rounds({"plant": lambda b=bound, n=count: b.run(max(20, 400 // n))}, rounds=3)
         print_rows(f"pairs: {count}", [row])

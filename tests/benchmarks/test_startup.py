@@ -1,4 +1,4 @@
-"""Whole processes, from the shell's point of view, beside a Python that does nothing.
+"""CPU time of whole processes, compared with a Python process that does nothing.
 
 Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_startup.py
 """
@@ -19,7 +19,7 @@ COMMANDS = {
     "cosim --help": ["-m", "cosim", "--help"],
     "cosim run demo1_box": ["-m", "cosim", "run", "demo1_box", "--no-report"],
 }
-#: generous: times a Python that does nothing
+#: largest allowed ratio to a Python process that does nothing (generous)
 LARGEST_RATIO = {'python -c "import cosim"': 10, "cosim --help": 30, "cosim run demo1_box": 500}
 pytestmark = pytest.mark.benchmark
 
@@ -34,7 +34,7 @@ def test_startup(tmp_path):
 
 
 def cpu_milliseconds(command, folder):
-    """User and system time of a process and its children."""
+    """Return the user and system time (ms) of a process and its children."""
     before = os.times()
     subprocess.run(command, cwd=folder, capture_output=True, check=True)
     after = os.times()

@@ -1,4 +1,4 @@
-"""What supervision costs: the stepping loop of Demo 1 in a supervised child against the same loop in this process."""
+"""Cost of supervision: the stepping loop of Demo 1 in a supervised child process and in this process."""
 
 import json
 import subprocess
@@ -23,4 +23,4 @@ def test_supervision(tmp_path):
         for isolation in ("none", "run")
     }
     ratios = print_rows("demo1_box", measure_rounds(contenders, rounds=9))
-    assert ratios["--isolation run"] < 1.2  # noise; the goal is 1.01
+    assert ratios["--isolation run"] < 1.2  # the goal is 1.01; the rest is for noise

@@ -1,4 +1,4 @@
-"""What a sweep costs beside its runs: time per run, and the share of two workers that is used."""
+"""Overhead of a sweep: additional time per run, and the utilisation of two workers."""
 
 import json
 import os
@@ -56,61 +56,60 @@ def prepared_files(scenario):
     return files
 
 
-def bare(job, scenario, files):
-    """A run in this process, of FMUs that are unpacked."""
-    assembly = prepare(scenario, job.settings, loaded_fmus={path: file.lent() for path, file in files.items()})
-    with simulating(assembly.system, assembly.settings) as run:
-        evaluate_kpis(Result(run.recording), assembly.kpis())
+def run_in_process(job, scenario, files):
+    """Run in this process, with FMUs that are already extracted."""
+    prepared = prepare(scenario, job.settings, loaded_fmus={path: file.share() for path, file in files.items()})
+    with simulating(prepared.system, prepared.settings) as run:
+        evaluate_kpis(Result(run.recording), prepared.kpis())
 
 
-def forked(job, engine):
-    """A run of a sweep."""
-    (record,) = engine.results([job])
+def run_in_sweep(job, runner):
+    """Run as a run of a sweep."""
+    (record,) = runner.run_jobs([job])
     assert not record.failure
 
 
-def milliseconds(work, *arguments):
-    began = perf_counter()
-    work(*arguments)
-    return (perf_counter() - began) * 1e3
+def milliseconds(function, *arguments):
+    start = perf_counter()
+    function(*arguments)
+    return (perf_counter() - start) * 1e3
 
 
 def test_overhead_of_a_run():
-    """Runs in turns; the smallest times are those that met the least of what else the machine does."""
+    """The ways to run alternate; the smallest times are the least affected by other load."""
     scenario = find_scenario("demo1_box")
     files = prepared_files(scenario)
-    times = {"bare, FMUs unpacked": [], "cosim.run": [], "a run of a sweep": []}
-    with LocalRunner(StudyContext(scenario, scenario.parent, fmus=tuple(map(str, files))), 1) as engine:
+    times = {"in process, FMUs extracted": [], "cosim.run": [], "a run of a sweep": []}
+    with LocalRunner(StudyContext(scenario, scenario.parent, fmus=tuple(map(str, files))), 1) as runner:
         for number in range(RUNS):
-            times["bare, FMUs unpacked"].append(milliseconds(bare, job(number), scenario, files))
+            times["in process, FMUs extracted"].append(milliseconds(run_in_process, job(number), scenario, files))
             times["cosim.run"].append(milliseconds(cosim.run, scenario, job(number).settings))
-            times["a run of a sweep"].append(milliseconds(forked, job(number), engine))
+            times["a run of a sweep"].append(milliseconds(run_in_sweep, job(number), runner))
     print(f"\n  Demo 1, 35 s with landing, {RUNS} runs, load average {os.getloadavg()[0]:.1f}: wall ms, least and median")
     for name, values in times.items():
-        print(f"  {name:24}{min(values):8.1f}{median(values):8.1f}")
+        print(f"  {name:28}{min(values):8.1f}{median(values):8.1f}")
     least = {name: min(values) for name, values in times.items()}
     assert least["a run of a sweep"] - least["cosim.run"] < 50
 
 
-def wall(order, workers, busy, count=8):
-    """Wall time (s) of runs of 1.2 s each."""
-    with LocalRunner(order, workers) as engine:
-        list(engine.run_jobs([Job("first", {"sleeper.number": -1.0, "/stop_time": 0.01})] * workers))
-        began = perf_counter()
-        made = [Job(str(number), {"sleeper.number": number, "sleeper.busy": busy}) for number in range(count)]
-        assert not any(record.failure for record in engine.run_jobs(made))
-        return perf_counter() - began
+def wall_time(context, workers, busy, count=8):
+    """Return the wall time (s) of `count` runs of 1.2 s each."""
+    with LocalRunner(context, workers) as runner:
+        list(runner.run_jobs([Job("first", {"sleeper.number": -1.0, "/stop_time": 0.01})] * workers))
+        start = perf_counter()
+        jobs = [Job(str(number), {"sleeper.number": number, "sleeper.busy": busy}) for number in range(count)]
+        assert not any(record.failure for record in runner.run_jobs(jobs))
+        return perf_counter() - start
 
 
 @pytest.mark.parametrize("busy", [0.0, 1.0], ids=["waiting", "computing"])
 def test_efficiency_of_two_workers(tmp_path, busy):
-    """Runs that wait show what the engine loses, runs that compute also what the machine does: two threads of one core, others
-    on it."""
+    """Waiting runs show the overhead of the runner; computing runs also show the influence of the machine."""
     (tmp_path / "sleeper.py").write_text(SLEEPER)
     content = {"name": "s", "stop_time": 1.0, "step_size": 0.01, "components": {"sleeper": {"python": "sleeper.py:Sleeper"}}}
     (tmp_path / "s.json").write_text(json.dumps(content))
-    order = StudyContext(tmp_path / "s.json", tmp_path)
-    found = sorted(wall(order, 1, busy) / (2 * wall(order, 2, busy)) for _ in range(3))
+    context = StudyContext(tmp_path / "s.json", tmp_path)
+    found = sorted(wall_time(context, 1, busy) / (2 * wall_time(context, 2, busy)) for _ in range(3))
     print(
         f"\n  efficiency of two workers, {'computing' if busy else 'waiting'}: {found[1]:.3f} ({found[0]:.3f} ... {found[2]:.3f})"
     )

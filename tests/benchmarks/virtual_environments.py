@@ -1,4 +1,4 @@
-"""Virtual environments of the peers, made once below a cache folder."""
+"""Virtual environments of the peers, created once below a cache folder."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _INSTALLED = "installed.txt"
 
 
 def environment(folder: Path, requirements: Sequence[str]) -> Path:
-    """The Python of an environment with these packages. Raises CalledProcessError when they cannot be installed."""
+    """Return the interpreter of an environment with these packages. Raises CalledProcessError if they cannot be installed."""
     python = folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
     marker = folder / _INSTALLED
     if marker.is_file() and marker.read_text().split() == list(requirements):
@@ -23,7 +23,7 @@ def environment(folder: Path, requirements: Sequence[str]) -> Path:
 
 
 def versions(python: Path, packages: Sequence[str]) -> str:
-    """Name and version of each package as the environment has it."""
+    """Return name and version of each package in the environment."""
     code = "import sys; from importlib.metadata import version; print(*(f'{p} {version(p)}' for p in sys.argv[1:]), sep=', ')"
     return _run([python, "-c", code, *packages]).strip()
 

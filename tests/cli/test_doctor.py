@@ -15,7 +15,7 @@ from cosim.engine import native_available as native_available
 
 METADATA = """Metadata-Version: 2.1
 Name: fmi-cosim
-Version: 0.1.0
+Version: 0.2.0
 Provides-Extra: wings
 Requires-Dist: {required}
 Requires-Dist: no-such-feathers>=2; extra == "wings"
@@ -38,7 +38,7 @@ def requiring(tmp_path):
     """An environment in which the distribution requires something else."""
 
     def make(required):
-        folder = tmp_path / "fmi_cosim-0.1.0.dist-info"
+        folder = tmp_path / "fmi_cosim-0.2.0.dist-info"
         folder.mkdir()
         (folder / "METADATA").write_text(METADATA.format(required=required))
         return {"PYTHONPATH": str(tmp_path)}

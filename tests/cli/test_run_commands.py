@@ -47,7 +47,7 @@ def test_a_crash_on_a_thread_names_the_suspects(tmp_path):
     fmus = [slow_fmu(tmp_path, "good", 2e-4, True), slow_fmu(tmp_path, "bad", 2e-4, True, "FATAL_TIME=0.105")]
     code, _, err = cosim_run(tmp_path, fmus, parallel=True)
     assert code == 1
-    assert "one of c0, c1: a step side by side failed at t = 0.11 s: the process was ended by signal 6 (SIGABRT" in err
+    assert "one of c0, c1: parallel step failed at t = 0.11 s: the process was ended by signal 6 (SIGABRT" in err
     assert "12 rows until t = 0.11 s kept in" in err
     err = cosim_run(tmp_path, fmus, "--set", "/algorithm/parallel=false")[2]
     assert "c1: fmi2DoStep failed at t = 0.11 s: the process was ended by signal 6" in err

@@ -1,4 +1,4 @@
-"""Python objects return to what they were, and stay the same objects."""
+"""Snapshots restore the state of Python objects in place."""
 
 import random
 from collections import deque
@@ -21,7 +21,7 @@ class Filter:
 class Controller:
     def __init__(self):
         self.last, self.filter, self.table = 0.0, Filter(), {"gains": [1.0, [2.0]]}
-        self.noise, self.draws = random.Random(7), np.random.default_rng(7)  # noqa: S311
+        self.noise, self.draws = random.Random(7), np.random.default_rng(7)  # noqa: S311 - seeded for reproducible results
         self.weights = self.filter.weights
         self.self = self
 
@@ -31,18 +31,18 @@ class Controller:
         self.table.setdefault("calls", []).append(u)
         return self.filter(u) + self.table["gains"][1][0] + self.noise.random() + self.draws.normal()
 
-    def forget_names(self):
+    def replace_attributes(self):
         del self.filter.names
         self.extra = 1
 
 
-def test_what_was_computed_once_is_computed_again():
+def test_a_restored_object_computes_the_same_results():
     controller = Controller()
     controller.step(0.3)
     restore = snapshot(controller)
     first = [controller.step(u) for u in (1.0, 2.0, 4.0)]
     for _ in range(2):
-        controller.forget_names()
+        controller.replace_attributes()
         restore()
         assert controller.filter.names == {"a", "b"}
         assert not hasattr(controller, "extra")
@@ -50,7 +50,7 @@ def test_what_was_computed_once_is_computed_again():
         assert [controller.step(u) for u in (1.0, 2.0, 4.0)] == first
 
 
-def test_parts_stay_the_objects_that_others_know():
+def test_references_to_parts_stay_valid():
     controller = Controller()
     inner, weights, gains = controller.filter, controller.weights, controller.table["gains"]
     restore = snapshot(controller)
@@ -64,7 +64,7 @@ def test_parts_stay_the_objects_that_others_know():
     assert (list(inner.past), weights.tolist(), gains) == ([1.0, 2.0], [0.5, 0.5], [1.0, [2.0]])
 
 
-def test_what_is_left_out_stays():
+def test_excluded_attributes_are_not_restored():
     controller = Controller()
     restore = snapshot(controller, {"last"})
     controller.step(3.0)

@@ -75,7 +75,7 @@ def test_imports_from_above_the_source_are_rejected(tmp_path: Path) -> None:
     source = oracle(tmp_path / "inner", 1.0)
     (tmp_path / "outer.py").write_text("answer = None\n")
     source.write_text(SOURCE.replace(".parts.helper", "..outer"))
-    with pytest.raises(InputError, match=r"outer\.py: is imported, but an FMU holds only"):
+    with pytest.raises(InputError, match=r"outer\.py: is imported, but an FMU can only contain"):
         write_python_fmu(source, tmp_path / "oracle.fmu")
 
 

@@ -13,7 +13,7 @@ def texts(built):
     return [problem.message for problem in built.problems()]
 
 
-def test_a_sound_system_has_no_problems():
+def test_a_valid_system_has_no_problems():
     assert texts(make_system({"a": gain(), "b": gain()}, "a.y > b.u, b.y > a.u")) == []
 
 
@@ -30,13 +30,13 @@ def test_all_problems_are_found_at_once():
     ]
 
 
-def test_an_output_is_no_target():
+def test_an_output_cannot_be_a_target():
     assert texts(make_system({"a": gain(), "b": gain()}, "a.y > b.y")) == ["b.y is of causality output, expected an input"]
 
 
-def test_a_component_steps_once():
+def test_a_component_in_two_stages_is_refused():
     built = make_system({"a": gain()}, stages=[("a",), ("a",)])
-    assert texts(built) == ['component "a" stands in the stages twice']
+    assert texts(built) == ['component "a" is in the stages twice']
 
 
 def test_different_quantities_are_not_connected():
@@ -46,16 +46,16 @@ def test_different_quantities_are_not_connected():
     assert text == 'a.y cannot feed b.u: units "m" and "rad" measure different quantities'
 
 
-def test_types_that_would_lose_something_are_not_connected():
+def test_types_with_lossy_conversion_are_not_connected():
     for source, target in [("Float64", "Int32"), ("Int64", "Int32"), ("Boolean", "Float64"), ("String", "Float64")]:
         built = make_system({"a": typed("output", source), "b": typed("input", target)}, "a.v > b.v")
-        assert texts(built) == [f"a.v cannot feed b.v: type {source} does not become {target}"]
+        assert texts(built) == [f"a.v cannot feed b.v: type {source} cannot be converted to {target}"]
 
 
-def test_types_that_lose_nothing_are_connected():
+def test_types_with_lossless_conversion_are_connected():
     for source, target in [("Int32", "Float64"), ("Float32", "Float64"), ("Int32", "Int64"), ("Enumeration", "Int64")]:
         assert texts(make_system({"a": typed("output", source), "b": typed("input", target)}, "a.v > b.v")) == []
 
 
-def test_arrays_have_a_slot_for_each_element():
+def test_each_array_element_is_an_endpoint():
     assert Variable("m", shape=(2, 2)).scalar_names == ("m[1,1]", "m[1,2]", "m[2,1]", "m[2,2]")

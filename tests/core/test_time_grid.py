@@ -16,7 +16,7 @@ def test_numbers_are_read_as_a_person_wrote_them():
     assert exact_fraction(1e-9) == Fraction(1, 10**9)
 
 
-def test_points_never_drift():
+def test_communication_points_accumulate_no_rounding_errors():
     points = grid(120, 0.01)
     assert points.count == 12_000
     assert points.time_at(12_000) == 120.0
@@ -29,7 +29,7 @@ def test_ten_million_steps_are_exact_to_the_last_bit():
     assert points.time_at(9_999_999) == float(Fraction(9_999_999, 100))
 
 
-def test_sixty_hertz_has_one_rounding():
+def test_times_of_a_60_hz_grid_are_rounded_once():
     points = grid(10, "1/60")
     for n in (1, 7, 59, 600):
         assert points.time_at(n) == float(Fraction(n, 60))
@@ -46,7 +46,7 @@ def test_a_step_of_zero_is_refused():
         grid(1, 0)
 
 
-def test_a_time_between_points_has_no_index():
+def test_a_time_between_communication_points_is_refused():
     points = grid(1, 0.01)
     assert points.index(exact_fraction(0.29)) == 29
     with pytest.raises(ValueError, match="lies between two communication points"):

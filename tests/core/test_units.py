@@ -29,7 +29,7 @@ def test_revolutions_per_minute_are_an_angular_velocity():
     assert factor == pytest.approx(2 * math.pi / 60, rel=1e-15)
 
 
-def test_rad_per_second_is_no_frequency():
+def test_rad_per_second_does_not_convert_to_hertz():
     assert not parse_unit("rad/s").converts_to(parse_unit("Hz"))
 
 
@@ -38,7 +38,7 @@ def test_the_same_unit_needs_no_conversion():
 
 
 @pytest.mark.parametrize("text", ["parsec", "m/s^2", "kg m", "m//", "(m"])
-def test_what_cannot_be_read_is_refused(text):
+def test_unreadable_input_is_refused(text):
     with pytest.raises(ValueError, match="unit"):
         parse_unit(text)
 

@@ -1,5 +1,5 @@
-/* The foreign FMI 2.0 probe, whose doStep takes BUSY_NS of processor time, or of waiting; FATAL_TIME: when it aborts.
-   i_out: the most instances of this file that ever were in doStep at once; e_out: 1 on another thread than the first one. */
+/* The foreign FMI 2.0 probe with a doStep of BUSY_NS processor time, or waiting time with WAIT; aborts after FATAL_TIME (s).
+   i_out: largest number of instances that were in doStep at once; e_out: 1 if the step ran on another than the main thread. */
 #define _GNU_SOURCE
 #include <stdatomic.h>
 #include <sys/syscall.h>
@@ -10,7 +10,7 @@
 #include "probe2.c"
 #undef fmi2DoStep
 
-static atomic_int inside, most;
+static atomic_int inside, largest;
 
 static void be_busy(void) {
 #ifdef WAIT
@@ -29,11 +29,11 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_se
     if (t > FATAL_TIME) abort();
 #endif
     int now = atomic_fetch_add(&inside, 1) + 1;
-    if (now > atomic_load(&most)) atomic_store(&most, now);
+    if (now > atomic_load(&largest)) atomic_store(&largest, now);
     be_busy();
     atomic_fetch_sub(&inside, 1);
     fmi2Status status = probe_step(c, t, h, no_set_state);
-    ((Probe *)c)->i[1] = atomic_load(&most);
+    ((Probe *)c)->i[1] = atomic_load(&largest);
     ((Probe *)c)->i[3] = syscall(SYS_gettid) != getpid();
     return status;
 }

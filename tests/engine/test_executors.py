@@ -1,4 +1,4 @@
-"""The two executors run the same plan and agree in every bit of every row."""
+"""The two executors run the same plan, and every row is bit-identical."""
 
 import random
 import struct
@@ -15,9 +15,14 @@ from cosim.core.errors import ComponentError
 from cosim.core.system import Connection, Endpoint, Group, System, incompatibility
 from cosim.core.time_grid import exact_fraction
 from cosim.core.units import parse_unit
-from cosim.engine import EXECUTORS, native_available
-from cosim.engine.parallel import ThreadPool
-from cosim.engine.run_loop import Settings, simulate
+from cosim.engine import EXECUTORS, native_available, parallel
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Settings
+from cosim.engine.thread_pool import ThreadPool
+from cosim.process import journal
+
+if native_available():
+    from cosim.engine import _native
 
 pytestmark = pytest.mark.skipif(not native_available(), reason="the native executor was not built")
 
@@ -25,8 +30,8 @@ NUMBERS = [name for name in DTYPES if name not in ("String", "Binary", "Clock")]
 UNITS = {"rad": parse_unit("rad"), "deg": parse_unit("deg")}
 
 
-def machine(seed):
-    """A component with an input and an output of every type; outputs mix inputs, time and random numbers."""
+def random_component(seed):
+    """Return a component with an input and an output of every type; the outputs mix inputs and random numbers."""
     draw = random.Random(seed)  # noqa: S311
     variables = [
         Variable(f"{side}_{name}", name, causality, unit=UNITS[draw.choice(["rad", "deg"])] if name == "Float64" else None)
@@ -34,7 +39,7 @@ def machine(seed):
         for side, causality in (("u", "input"), ("y", "output"))
     ]
 
-    def step(values, t, h):
+    def step(values, _t, _h):
         for name in NUMBERS:
             values[f"y_{name}"] = _mixed(name, values[f"u_{name}"], draw)
         values["y_String"] = values["u_String"][-6:] + draw.choice("abc")
@@ -54,19 +59,19 @@ def _mixed(name, value, draw):
 
 
 def random_system(seed, extra=()):
-    """Machines and FMUs with random connections of all types, delays, periods, stages and groups."""
+    """Return a system with random connections of all types, delays, periods, stages and groups; and its output names."""
     draw = random.Random(seed)  # noqa: S311
-    components = {f"m{i}": machine(100 * seed + i) for i in range(5)} | dict(extra)
+    components = {f"m{i}": random_component(100 * seed + i) for i in range(5)} | dict(extra)
     ends = {
         causality: [
             Endpoint(n, s) for n, c in components.items() for v in c.variables if v.causality == causality for s in v.scalar_names
         ]
         for causality in ("input", "output")
     }
-    places = System(components).find_element
+    find_element = System(components).find_element
     connections = []
     for target in ends["input"]:
-        sources = [e for e in ends["output"] if not incompatibility(places(e).variable, places(target).variable)]
+        sources = [e for e in ends["output"] if not incompatibility(find_element(e).variable, find_element(target).variable)]
         if sources and draw.random() < 0.9:
             connections.append(Connection(draw.choice(sources), target, draw.choice([0, 0, 0, 1, 3])))
     names = draw.sample(list(components), len(components))
@@ -100,32 +105,37 @@ def recorded(kind, build, share=1.0, interval="1/100"):
 
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize(("share", "interval"), [(1.0, "1/100"), (0.2, "3/100")], ids=["everything", "some"])
-def test_random_systems(seed, share, interval):
+def test_random_systems_are_bit_identical(seed, share, interval):
     native, python = (recorded(kind, lambda: random_system(seed), share, interval) for kind in ("native", "python"))
     assert native == python
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_random_systems_with_foreign_fmus_of_all_types(seed, probes):
+def test_random_systems_with_foreign_fmus_are_bit_identical(seed, probes):
     def build(isolation=None):
         files = [FmuFile(path) for path in probes.values()] * 2
         fmus = {f"f{i}": create_component(file, f"f{i}", isolation=isolation) for i, file in enumerate(files)}
         return random_system(seed, fmus)
 
-    def build_apart():
+    def build_isolated():
         return build(Isolation())
 
     native = recorded("native", build)
     assert native == recorded("python", build)
-    assert native == recorded("native", build_apart)
-    assert native == recorded("python", build_apart)
+    assert native == recorded("native", build_isolated)
+    assert native == recorded("python", build_isolated)
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)
 @pytest.mark.parametrize("seed", range(4))
-def test_random_systems_with_fmus_on_threads(seed, kind, probes, monkeypatch):
-    crews = []
-    monkeypatch.setattr("cosim.engine.executor.ThreadPool", lambda *arguments: crews.append(ThreadPool(*arguments)) or crews[-1])
+def test_random_systems_with_fmus_on_threads_are_bit_identical(seed, kind, probes, monkeypatch):
+    thread_pools = []
+
+    def create_thread_pool(size):
+        thread_pools.append(ThreadPool(size))
+        return thread_pools[-1]
+
+    monkeypatch.setattr("cosim.engine.thread_pool.ThreadPool", create_thread_pool)
 
     def build(parallel):
         files = [FmuFile(path) for path in probes.values()]
@@ -133,15 +143,15 @@ def test_random_systems_with_fmus_on_threads(seed, kind, probes, monkeypatch):
         return replace(built, parallel=parallel), outputs
 
     assert recorded(kind, lambda: build(True)) == recorded(kind, lambda: build(False))
-    assert len(crews) == 1
+    assert len(thread_pools) == 1
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)
-def test_a_value_that_is_not_finite_is_blamed_on_its_source(kind):
-    def step(values, t, h):
+def test_an_output_that_is_not_finite_is_named_with_its_source(kind):
+    def step(values, t, _h):
         values["y"] = float("nan") if t > 0.045 else 1.0
 
-    def consume(values, t, h):
+    def consume(values, t, _h):
         if values["u"] != values["u"]:
             raise ComponentError("b", "do_step", "cannot digest this", t)
 
@@ -164,12 +174,12 @@ def test_a_value_that_is_not_finite_is_blamed_on_its_source(kind):
 @pytest.mark.parametrize(("type_", "largest"), [("Float64", np.finfo(np.float64).max), ("Float32", np.finfo(np.float32).max)])
 def test_the_largest_floats_are_finite_and_the_next_ones_are_not(kind, copies, type_, largest):
     def built(last):
-        def step(values, t, h):
+        def step(values, t, _h):
             values.update(dict.fromkeys(values, -float(largest)) | {f"y{copies - 1}": last if t > 0.045 else 0.0})
 
         names = [f"y{i}" for i in range(copies)]
         a = FakeComponent([Variable(name, type_, "output") for name in names], step)
-        b = FakeComponent([Variable(name, type_, "input", start=0.0) for name in names], lambda values, t, h: None)
+        b = FakeComponent([Variable(name, type_, "input", start=0.0) for name in names], lambda _values, _t, _h: None)
         wires = [Connection(Endpoint("a", name), Endpoint("b", name)) for name in names]
         return System({"a": a, "b": b}, wires, [("a", "b")])
 
@@ -177,28 +187,34 @@ def test_the_largest_floats_are_finite_and_the_next_ones_are_not(kind, copies, t
     assert simulate(built(float(largest)), settings).failure is None
     for last in (float("inf"), -float("inf"), float("nan")):
         y = f"y{copies - 1}"
-        blamed = f'a: do_step failed at t = 0.05 s: the output "{y}" is {last}, and b.{y} reads it'
-        assert str(simulate(built(last), settings).failure) == blamed
+        expected = f'a: do_step failed at t = 0.05 s: the output "{y}" is {last}, and b.{y} reads it'
+        assert str(simulate(built(last), settings).failure) == expected
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)
-def test_values_that_nobody_reads_may_be_anything(kind):
-    source = FakeComponent([Variable("y", causality="output")], lambda v, t, h: v.update(y=float("inf")))
+def test_unconnected_outputs_may_be_infinite(kind):
+    source = FakeComponent([Variable("y", causality="output")], lambda v, _t, _h: v.update(y=float("inf")))
     outcome = simulate(
         System({"a": source}, (), (("a",),)),
-        Settings(exact_fraction(0), exact_fraction(1), exact_fraction(0.1), {"a.y": endpoint("a.y")}),
+        Settings(exact_fraction(0), exact_fraction(1), exact_fraction(0.1), {"a.y": endpoint("a.y")}, executor=kind),
     )
     assert outcome.failure is None
     assert np.isinf(outcome.recording.columns["a.y"][1:]).all()
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)
-def test_many_rows_do_not_fit_into_one_chunk(kind, monkeypatch):
+def test_rows_are_complete_when_they_need_several_chunks(kind, monkeypatch):
     monkeypatch.setattr("cosim.process.run_files.row_store.CHUNK_BYTES", 1000)
     monkeypatch.setattr("cosim.process.run_files.row_store.MAX_MEMORY_BYTES", 0)
-    count = FakeComponent([Variable("y", causality="output")], lambda v, t, h: v.update(y=v["y"] + 1), start={"y": 0.0})
+    count = FakeComponent([Variable("y", causality="output")], lambda v, _t, _h: v.update(y=v["y"] + 1), start={"y": 0.0})
     outcome = simulate(
         System({"a": count}, (), (("a",),)),
-        Settings(exact_fraction(0), exact_fraction(10000), exact_fraction(1), {"a.y": endpoint("a.y")}),
+        Settings(exact_fraction(0), exact_fraction(10000), exact_fraction(1), {"a.y": endpoint("a.y")}, executor=kind),
     )
     assert outcome.recording.columns["a.y"].tolist() == list(range(10001))
+
+
+def test_constants_of_the_native_module_are_those_of_python():
+    assert parallel.MEASURED_STEPS == _native.MEASURED_STEPS
+    markers = journal.CALL_NUMBER, journal.STEP_COUNT, journal.ROW_COUNT
+    assert markers == (_native.MARKER_CALL, _native.MARKER_STEPS, _native.MARKER_ROWS)

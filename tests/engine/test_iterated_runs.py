@@ -1,4 +1,4 @@
-"""Iterated systems as a process: a crash while a component returns to its state is that component's, not its neighbour's."""
+"""Iterated systems in a child process: a crash in get_state or set_state is reported with its component."""
 
 import json
 
@@ -48,9 +48,9 @@ def cosim_run(tmp_path):
         "name": "loop",
         "stop_time": 0.1,
         "step_size": 0.01,
-        "components": {"sound": {"python": "parts.py:Half"}, "broken": {"python": "parts.py:Broken"}},
-        "connections": [{"from": "sound.y", "to": "broken.u"}, {"from": "broken.y", "to": "sound.u"}],
-        "algorithm": {"stages": [["broken"], ["sound"]], "iteration": {"tolerance": 1e-9}},
+        "components": {"intact": {"python": "parts.py:Half"}, "broken": {"python": "parts.py:Broken"}},
+        "connections": [{"from": "intact.y", "to": "broken.u"}, {"from": "broken.y", "to": "intact.u"}],
+        "algorithm": {"stages": [["broken"], ["intact"]], "iteration": {"tolerance": 1e-9}},
     }
     (tmp_path / "loop.json").write_text(json.dumps(document))
 
@@ -60,7 +60,7 @@ def cosim_run(tmp_path):
     return run
 
 
-def test_it_runs_to_its_fixed_point(cosim_run, tmp_path):
+def test_the_outputs_converge_to_the_fixed_point(cosim_run, tmp_path):
     done = cosim_run()
     assert done.returncode == 0, done.stderr
     last = (tmp_path / "out/result.csv").read_text().splitlines()[-1].split(",")
@@ -68,7 +68,7 @@ def test_it_runs_to_its_fixed_point(cosim_run, tmp_path):
 
 
 @pytest.mark.parametrize("function", ["get_state", "set_state"])
-def test_a_crash_with_a_state_is_named_with_its_component(cosim_run, function):
+def test_a_crash_in_a_state_function_names_the_component(cosim_run, function):
     done = cosim_run(FAIL_IN=function)
     assert done.returncode == 1
     assert f"broken: {function} failed at t = 0 s: the process was ended by signal 11 (SIGSEGV" in done.stderr

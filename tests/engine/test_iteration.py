@@ -1,4 +1,4 @@
-"""Macro steps repeated from the same state until the components agree."""
+"""Fixed-point iteration of macro steps with rollback."""
 
 import json
 
@@ -16,7 +16,8 @@ from cosim.core.errors import ComponentError, InputError
 from cosim.core.system import Endpoint, Group, Iteration
 from cosim.core.time_grid import exact_fraction
 from cosim.engine import EXECUTORS
-from cosim.engine.run_loop import Settings, simulate
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Settings
 
 TIGHT = Iteration(1e-13, 100)
 FMUS = resources.root() / "fmus"
@@ -25,12 +26,12 @@ FMUS = resources.root() / "fmus"
 def oscillator():
     """x' = v, v' = -x - d v in three components: two explicit Euler integrators and the force."""
     force = FakeComponent(
-        [*inputs("x", "v"), *outputs("y")], lambda values, t, h: values.update(y=-values["x"] - 0.1 * values["v"])
+        [*inputs("x", "v"), *outputs("y")], lambda values, _t, _h: values.update(y=-values["x"] - 0.1 * values["v"])
     )
     return {"x": integrator(1.0), "v": integrator(0.0), "f": force}
 
 
-WIRES = "v.y > x.u, f.y > v.u, x.y > f.x, v.y > f.v"
+CONNECTIONS = "v.y > x.u, f.y > v.u, x.y > f.x, v.y > f.v"
 
 
 def implicit_euler(steps, h):
@@ -44,15 +45,17 @@ def implicit_euler(steps, h):
 
 @pytest.mark.usefixtures("executor")
 @pytest.mark.parametrize("stages", [(("x", "v", "f"),), (("f",), ("v",), ("x",))], ids=["Jacobi", "Gauss-Seidel"])
-def test_the_last_round_solves_the_implicit_equations_whatever_the_order(stages):
-    recording = run_system(make_system(oscillator(), WIRES, [(Group("all", stages, "auto", TIGHT),)]), 2, "1/10", ["x.y", "v.y"])
+def test_the_iteration_solves_the_implicit_equations_in_any_order_of_stages(stages):
+    recording = run_system(
+        make_system(oscillator(), CONNECTIONS, [(Group("all", stages, "auto", TIGHT),)]), 2, "1/10", ["x.y", "v.y"]
+    )
     found = np.column_stack([recording.columns["x.y"], recording.columns["v.y"]])[1:]
     np.testing.assert_allclose(found, implicit_euler(20, 0.1), rtol=0, atol=1e-11)
 
 
 @pytest.mark.usefixtures("executor")
-def test_components_outside_are_not_repeated_and_are_read_once():
-    count = FakeComponent(outputs("y"), lambda values, t, h: values.update(y=values["y"] + 1))
+def test_components_outside_the_loop_step_once_per_macro_step():
+    count = FakeComponent(outputs("y"), lambda values, _t, _h: values.update(y=values["y"] + 1))
     inner = Group("inner", (("a", "b"),), "auto", TIGHT)
     parts = {"count": count, "a": FakeComponent([*inputs("u", "w"), *outputs("y")], _half), "b": gain(0.5)}
     recording = run_system(
@@ -62,13 +65,13 @@ def test_components_outside_are_not_repeated_and_are_read_once():
     np.testing.assert_allclose(recording.columns["a.y"], np.arange(4) / 0.75, atol=1e-12)  # y = u + y / 4
 
 
-def _half(values, t, h):
+def _half(values, _t, _h):
     values["y"] = values["u"] + 0.5 * values["w"]
 
 
 @pytest.mark.usefixtures("executor")
-def test_a_delayed_value_arrives_once_in_a_step_however_many_rounds_it_takes():
-    count = FakeComponent(outputs("y"), lambda values, t, h: values.update(y=values["y"] + 1))
+def test_a_delayed_value_is_delivered_once_per_macro_step_in_an_iteration():
+    count = FakeComponent(outputs("y"), lambda values, _t, _h: values.update(y=values["y"] + 1))
     parts = {"count": count, "a": FakeComponent([*inputs("u", "w"), *outputs("y")], _half), "b": gain(0.5)}
     group = Group("all", (("count", "a", "b"),), "auto", TIGHT)
     recording = run_system(make_system(parts, "count.y >2 a.u, b.y > a.w, a.y > b.u", [(group,)]), 6, 1, ["a.y"])
@@ -76,8 +79,8 @@ def test_a_delayed_value_arrives_once_in_a_step_however_many_rounds_it_takes():
 
 
 @pytest.mark.usefixtures("executor")
-def test_only_the_last_round_may_ask_to_end_the_simulation():
-    """s = 0.8 u and u = 8 - 0.5 s from s = 0: the first guess is u = 8, the solution 8 / 1.4 = 5.7."""
+def test_termination_requests_of_rejected_iterations_are_discarded():
+    """With s = 0.8 u and u = 8 - 0.5 s from s = 0, the first iteration gives u = 8, the solution is 8 / 1.4 = 5.7."""
 
     def step(values, t, h):
         values["y"] = 8 - 0.5 * values["u"] + t
@@ -86,11 +89,13 @@ def test_only_the_last_round_may_ask_to_end_the_simulation():
     parts = {"s": gain(0.8), "h": FakeComponent([*inputs("u"), *outputs("y")], step)}
     built = make_system(parts, "s.y > h.u, h.y > s.u", [(Group("all", (("h",), ("s",)), "auto", TIGHT),)])
     recording = run_system(built, 5, 1, ["h.y"])
-    np.testing.assert_allclose(recording.columns["h.y"][1:], (8 + np.arange(3)) / 1.4, atol=1e-11)  # 5.7, 6.4, 7.1: the end
+    np.testing.assert_allclose(
+        recording.columns["h.y"][1:], (8 + np.arange(3)) / 1.4, atol=1e-11
+    )  # 5.7, 6.4, 7.1 > 6.5: termination
 
 
 class Derivative(Fmi2Slave):
-    """y = -u - 0.05 u', which remembers the last u where nobody registered it."""
+    """y = -u - 0.05 u'; the previous u is an attribute that is not a registered variable."""
 
     def __init__(self, **arguments):
         super().__init__(**arguments)
@@ -98,14 +103,14 @@ class Derivative(Fmi2Slave):
         self.register_variable(Real("u", causality=Fmi2Causality.input))
         self.register_variable(Real("y", causality=Fmi2Causality.output))
 
-    def do_step(self, t, h):
+    def do_step(self, _t, h):
         self.y, self._last = -self.u - 0.05 * (self.u - self._last) / h, self.u
         return True
 
 
 @pytest.mark.usefixtures("executor")
-def test_python_components_return_to_all_that_they_hold():
-    """x' = y by implicit Euler: x (1 + h + 0.05) = last x (1 + 0.05)."""
+def test_the_whole_state_of_a_python_component_is_restored():
+    """x' = y by implicit Euler: x (1 + h + 0.05) = previous x (1 + 0.05)."""
     parts = {"x": integrator(1.0), "d": PythonFmuComponent(Derivative(instance_name="d"), "d")}
     built = make_system(parts, "x.y > d.u, d.y > x.u", [(Group("all", (("d",), ("x",)), "auto", TIGHT),)])
     recording = run_system(built, 1, "1/10", ["x.y"])
@@ -113,24 +118,24 @@ def test_python_components_return_to_all_that_they_hold():
 
 
 @pytest.mark.usefixtures("executor")
-def test_loops_stand_inside_loops():
+def test_a_loop_inside_a_loop_converges():
     inner = Group("inner", (("v", "f"),), "auto", TIGHT)
     outer = Group("outer", ((inner,), ("x",)), "auto", TIGHT)
-    recording = run_system(make_system(oscillator(), WIRES, [(outer,)]), 1, "1/10", ["x.y"])
+    recording = run_system(make_system(oscillator(), CONNECTIONS, [(outer,)]), 1, "1/10", ["x.y"])
     np.testing.assert_allclose(recording.columns["x.y"][1:], implicit_euler(10, 0.1)[:, 0], rtol=0, atol=1e-11)
 
 
 @pytest.mark.usefixtures("executor")
-def test_what_never_agrees_is_named_with_the_place_and_the_time():
-    grows = FakeComponent([*inputs("u"), *outputs("y")], lambda values, t, h: values.update(y=2 * values["u"] + 1))
+def test_a_divergent_loop_is_reported_with_its_outputs_and_the_time():
+    grows = FakeComponent([*inputs("u"), *outputs("y")], lambda values, _t, _h: values.update(y=2 * values["u"] + 1))
     group = Group("loop", (("a",), ("b",)), "auto", Iteration(1e-6, 7))
     with pytest.raises(ComponentError) as failure:
         run_system(make_system({"a": grows, "b": gain()}, "b.y > a.u, a.y > b.u", [(group,)]), 1, "1/10", ["b.y"])
-    expected = "loop: iteration failed at t = 0 s: after 7 rounds these outputs still change by more than 1e-06: b.y, a.y"
-    assert str(failure.value) == expected
+    expected = "no convergence after 7 iterations; outputs that still change by more than 1e-06: b.y, a.y"
+    assert str(failure.value) == f"loop: iteration failed at t = 0 s: {expected}"
 
 
-def test_what_cannot_return_to_a_state_is_refused_and_so_are_periods():
+def test_components_without_state_and_with_periods_are_refused_in_a_loop():
     stuck = gain()
     stuck.has_state = False
     group = Group("loop", (("a", "b"),), "auto", TIGHT)
@@ -159,29 +164,29 @@ def vessel_and_helmsman(folder, iteration):
 
 
 @pytest.fixture
-def voyages(tmp_path):
-    def sail(kind, **iteration):
-        assembly = load(vessel_and_helmsman(tmp_path, iteration))
-        ends = [Endpoint("usv", f"position.{axis}") for axis in "xy"] + [Endpoint("helm", "rudder_angle")]
-        columns = {str(found): found for found in ends}
+def simulate_voyage(tmp_path):
+    def simulate_with(kind, **iteration):
+        prepared = load(vessel_and_helmsman(tmp_path, iteration))
+        endpoints = [Endpoint("usv", f"position.{axis}") for axis in "xy"] + [Endpoint("helm", "rudder_angle")]
+        columns = {str(end): end for end in endpoints}
         outcome = simulate(
-            assembly.system, Settings(exact_fraction(0), exact_fraction(5), exact_fraction("0.05"), columns, executor=kind)
+            prepared.system, Settings(exact_fraction(0), exact_fraction(5), exact_fraction("0.05"), columns, executor=kind)
         )
         assert outcome.failure is None, outcome.failure
         return np.column_stack(list(outcome.recording.columns.values()))
 
-    return sail
+    return simulate_with
 
 
-def test_fmus_agree_within_the_tolerance_and_executors_to_the_last_bit(voyages):
+def test_fmus_converge_within_the_tolerance_and_executors_are_bit_identical(simulate_voyage):
     loose, tight = ({"iteration": {"tolerance": tolerance, "limit": 100}} for tolerance in (1e-6, 1e-12))
-    found = voyages("auto", **tight)
-    assert all(np.array_equal(found, voyages(kind, **tight)) for kind in EXECUTORS)
-    assert 0 < np.abs(found - voyages("auto", **loose)).max() < 1e-3
-    assert np.abs(found - voyages("auto")).max() > 1e-3  # the plain run reads older values
+    found = simulate_voyage("auto", **tight)
+    assert all(np.array_equal(found, simulate_voyage(kind, **tight)) for kind in EXECUTORS)
+    assert 0 < np.abs(found - simulate_voyage("auto", **loose)).max() < 1e-3
+    assert np.abs(found - simulate_voyage("auto")).max() > 1e-3  # without iteration, inputs are older
 
 
-def test_a_scenario_with_nonsense_for_an_iteration_is_refused(tmp_path):
+def test_invalid_iteration_settings_are_refused(tmp_path):
     with pytest.raises(InputError) as refusal:
         load(vessel_and_helmsman(tmp_path, {"iteration": {"tolerance": 0, "limit": 1, "rounds": 3}}))
     assert [problem.where.rpartition("$")[2] for problem in refusal.value.problems] == [

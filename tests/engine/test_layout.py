@@ -1,4 +1,4 @@
-"""Where values lie, so that as few calls as possible move them."""
+"""Layout of values: variables of one type are adjacent, so that one FMI call gets them."""
 
 import numpy as np
 import pytest
@@ -28,8 +28,8 @@ VARIABLES = {
         (["flag", "x", "mode", "m"], ["flag", "x", "mode", "m"]),
     ],
 )
-def test_variables_that_one_fmi_call_can_get_lie_together(chosen, order):
-    component = FakeComponent([VARIABLES[name] for name in chosen], lambda values, t, h: None)
+def test_variables_that_one_fmi_call_can_get_are_adjacent(chosen, order):
+    component = FakeComponent([VARIABLES[name] for name in chosen], lambda _values, _t, _h: None)
     grid = TimeGrid.from_times(exact_fraction(0), exact_fraction(1), exact_fraction(1))
     plan = compile_plan(make_system({"a": component}), grid, [endpoint(f"a.{name}") for name in chosen])
     assert [variable.name for variable in plan.outputs.ports["a"].variables] == order

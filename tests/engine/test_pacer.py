@@ -1,4 +1,4 @@
-"""Runs that keep pace with the clock on the wall."""
+"""Runs paced to real time."""
 
 import os
 import signal
@@ -15,7 +15,8 @@ import cosim.engine.pacer
 from cosim.core.errors import InputError, LateError
 from cosim.core.time_grid import TimeGrid, exact_fraction
 from cosim.engine.pacer import Pacer
-from cosim.engine.run_loop import Settings, simulate
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Settings
 
 pytestmark = pytest.mark.usefixtures("executor")
 
@@ -27,9 +28,9 @@ def paced(component, stop, factor=1.0, **more):
 
 
 def slow(seconds, steps):
-    """Takes so long (s) in each of its first steps."""
+    """Return a component whose first `steps` steps take `seconds` each."""
 
-    def step(values, t, h):
+    def step(values, _t, _h):
         values["y"] += 1
         if values["y"] <= steps:
             time.sleep(seconds)
@@ -39,7 +40,7 @@ def slow(seconds, steps):
 
 @pytest.fixture
 def clock(monkeypatch):
-    """A clock of our own: sleeping takes exactly as long as was asked for."""
+    """A fake clock, on which a sleep takes exactly the requested time."""
 
     class Clock:
         now, slept = 7_000_000_000, []
@@ -51,10 +52,10 @@ def clock(monkeypatch):
         def monotonic_ns(self):
             return self.now
 
-    own = Clock()
-    own.slept = []
-    monkeypatch.setattr(cosim.engine.pacer, "time", own)
-    return own
+    fake = Clock()
+    fake.slept = []
+    monkeypatch.setattr(cosim.engine.pacer, "time", fake)
+    return fake
 
 
 def test_a_run_takes_as_long_as_it_simulates():
@@ -63,7 +64,7 @@ def test_a_run_takes_as_long_as_it_simulates():
     assert paced(counter(), "0.3", factor=10.0).loop_seconds < run.loop_seconds
 
 
-def test_pace_changes_no_result():
+def test_pacing_does_not_change_results():
     fast, real = (paced(counter(), "0.2", factor) for factor in (None, 20.0))
     assert real.recording.columns["a.y"].tolist() == fast.recording.columns["a.y"].tolist()
     assert fast.real_time is None
@@ -93,24 +94,24 @@ def test_lateness_is_measured_and_caught_up(clock):
     assert found["lateness_99_percent"] == pytest.approx(np.percentile(lateness, 99))
 
 
-def test_falling_behind_is_said_once(caplog):
+def test_lateness_is_reported_once(caplog):
     run = paced(slow(0.03, 5), "0.2")
     assert run.failure is None
-    (said,) = [text for text in caplog.messages if text.startswith("real time: ")]
-    assert said.startswith("real time: t = 0.01 s was reached 0.")
-    assert "late, more than one step (0.01 s)" in said
+    (warning,) = [text for text in caplog.messages if text.startswith("real time: ")]
+    assert warning.startswith("real time: t = 0.01 s was reached 0.")
+    assert "late, more than one step (0.01 s)" in warning
     assert run.real_time["late_steps"] >= 5
     assert 0.02 < run.real_time["max_lateness"] < 5
 
 
-def test_falling_behind_may_end_the_run():
+def test_lateness_ends_the_run_if_late_is_fail():
     run = paced(slow(0.05, 100), "1", late="fail")
     assert isinstance(run.failure, LateError)
     assert str(run.failure).startswith("too slow for 1 times real time: t = 0.01 s was reached")
     assert run.recording.columns["a.y"].tolist() == [0, 1]
 
 
-def test_an_interrupt_does_not_wait_for_the_clock():
+def test_an_interrupt_ends_the_waiting():
     Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
     run = paced(counter(), "0.1", factor=0.001)  # 10 s per step
     assert isinstance(run.failure, KeyboardInterrupt)
@@ -118,6 +119,6 @@ def test_an_interrupt_does_not_wait_for_the_clock():
 
 
 @pytest.mark.parametrize("factor", [0.0, -1.0, float("inf"), float("nan")])
-def test_a_factor_that_is_no_pace_is_refused(factor):
+def test_an_invalid_factor_is_refused(factor):
     with pytest.raises(InputError, match="expected a positive factor for real time, found"):
         paced(counter(), "0.1", factor)

@@ -1,4 +1,4 @@
-"""Random systems against the simplest importer there is: it moves one value after the other, in the order that the stages say."""
+"""Random systems compared with a reference importer that copies one value at a time, in the order of the stages."""
 
 import math
 import random
@@ -22,21 +22,21 @@ def mixed(seed, j, t, h, given):
 
 
 def mixer(seed, units):
-    """As many inputs u0, u1, ... and outputs y0, y1, ... as there are units."""
-    places = range(len(units))
+    """Return a component with one input and one output per unit: u0, u1, ... and y0, y1, ..."""
+    indices = range(len(units))
 
     def step(values, t, h):
-        given = [values[f"u{j}"] for j in places]
-        for j in places:
+        given = [values[f"u{j}"] for j in indices]
+        for j in indices:
             values[f"y{j}"] = mixed(seed, j, t, h, given)
 
-    sides = [side(f"{letter}{j}", unit=UNITS[units[j]])[0] for side, letter in ((inputs, "u"), (outputs, "y")) for j in places]
-    return FakeComponent(sides, step, start={f"y{j}": seed + 0.1 * j for j in places})
+    sides = [side(f"{letter}{j}", unit=UNITS[units[j]])[0] for side, letter in ((inputs, "u"), (outputs, "y")) for j in indices]
+    return FakeComponent(sides, step, start={f"y{j}": seed + 0.1 * j for j in indices})
 
 
-def in_stages(draw, members_):
-    """The members in random order, spread over random stages."""
-    left, stages = draw.sample(members_, len(members_)), []
+def in_stages(draw, members):
+    """Distribute the members in random order over random stages."""
+    left, stages = draw.sample(members, len(members)), []
     while left:
         count = draw.randint(1, len(left))
         stages.append(tuple(left[:count]))
@@ -45,7 +45,7 @@ def in_stages(draw, members_):
 
 
 def random_system(seed):
-    """Mixers with units, delays, periods and stages, some of them in a group of their own; and the units."""
+    """Return a random system of mixers with units, delays, periods, stages and a group; and the units by component."""
     draw = random.Random(seed)  # noqa: S311
     names = [f"m{i}" for i in range(draw.randint(2, 5))]
     units = {name: [draw.choice(list(UNITS)) for _ in range(draw.randint(1, 6))] for name in names}
@@ -68,15 +68,15 @@ def _fits(one, other):
     return not one or not other or UNITS[one].converts_to(UNITS[other])
 
 
-class Oracle:
-    """Every value of every step, moved one by one."""
+class ReferenceImporter:
+    """Simulates a system by copying every value of every step one by one."""
 
     def __init__(self, system, units):
         self.system, self.units = system, units
         self.seeds = {name: i for i, name in enumerate(units)}
         self.y = {name: [self.seeds[name] + 0.1 * j for j in range(len(units[name]))] for name in units}
         self.u = {name: [0.0] * len(units[name]) for name in units}
-        self.waiting = {c: [self.y[c.source.component][int(c.source.scalar[1:])]] * c.delay for c in system.connections}
+        self.delayed = {c: [self.y[c.source.component][int(c.source.scalar[1:])]] * c.delay for c in system.connections}
 
     def rows(self):
         rows = [{name: list(values) for name, values in self.y.items()}]
@@ -103,7 +103,7 @@ class Oracle:
     def read(self, connection):
         source, target = connection.source.component, connection.target.component
         i, j = int(connection.source.scalar[1:]), int(connection.target.scalar[1:])
-        queue = self.waiting[connection]
+        queue = self.delayed[connection]
         queue.append(self.y[source][i])
         value, one, other = queue.pop(0), UNITS[self.units[source][i]], UNITS[self.units[target][j]]
         factor, offset = one.conversion(other) if one and other else (1.0, 0.0)
@@ -118,11 +118,11 @@ class Oracle:
 
 
 @pytest.mark.parametrize("first", range(0, 120, 10))
-def test_random_systems_do_what_stages_units_delays_and_periods_say(first):
+def test_random_systems_follow_stages_units_delays_and_periods(first):
     for seed in range(first, first + 10):
         system, units = random_system(seed)
         names = [f"{name}.y{j}" for name in units for j in range(len(units[name]))]
         recording = run_system(system, STEPS * exact_fraction("1/10"), "1/10", names)
-        for n, row in enumerate(Oracle(system, units).rows()):
+        for n, row in enumerate(ReferenceImporter(system, units).rows()):
             found = {name: recording.columns[name][n] for name in names}
             assert found == {f"{name}.y{j}": row[name][j] for name in units for j in range(len(units[name]))}, (seed, n)

@@ -1,4 +1,4 @@
-"""The life cycle around the steps: events, observers, failures, cleaning up."""
+"""The run loop: life cycle, events, observers, failures, cleanup."""
 
 import ctypes
 import platform
@@ -15,7 +15,9 @@ from cosim.components.fmi import FmuFile, create_component
 from cosim.core.component import StepResult, Variable
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.run_loop import Event, Settings, find_problems, simulate
+from cosim.engine.run_checks import find_problems
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Event, Settings
 from cosim.process.float_mode import enabled_traps, is_changed
 
 pytestmark = pytest.mark.usefixtures("executor")
@@ -26,7 +28,7 @@ def settings(stop=3, step=1, record=("a.y",), **more):
 
 
 def failing(at, failure):
-    def step(values, t, h):
+    def step(values, t, _h):
         if t >= at:
             raise failure
         values["y"] += 1
@@ -34,7 +36,7 @@ def failing(at, failure):
     return FakeComponent(outputs("y"), step)
 
 
-def test_the_life_cycle_in_order():
+def test_the_life_cycle_calls_are_in_order():
     component = counter()
     simulate(make_system({"a": component}, start_values={"a": {"y": 5.0}}), settings())
     assert component.calls == ["set y", "enter", "exit", "step 0", "step 1", "step 2", "terminate", "free"]
@@ -46,26 +48,26 @@ def test_row_zero_holds_the_initial_outputs_and_the_last_row_the_stop_time():
     assert recording.columns["a.y"].tolist() == [0, 1, 2, 3]
 
 
-def test_recording_can_be_sparser_than_stepping():
+def test_the_record_interval_may_be_a_multiple_of_the_step_size():
     outcome = simulate(make_system({"a": counter()}), settings(6, record_interval=exact_fraction(3)))
     assert outcome.recording.time.tolist() == [0, 3, 6]
     assert outcome.recording.columns["a.y"].tolist() == [0, 3, 6]
 
 
-def test_an_event_acts_before_the_step_that_starts_there():
+def test_an_event_sets_values_before_the_step_that_starts_there():
     built = make_system({"a": integrator()})
     recording = run_system(built, 4, 1, ["a.y"], [Event(exact_fraction(2), {"a": {"u": 1.0}})])
     assert recording.columns["a.y"].tolist() == [0, 0, 0, 1, 2]
 
 
-def test_an_event_after_the_end_does_not_happen():
+def test_an_event_after_the_stop_time_has_no_effect():
     recording = run_system(make_system({"a": integrator()}), 2, 1, ["a.y"], [Event(exact_fraction(3), {"a": {"u": 1.0}})])
     assert recording.columns["a.y"].tolist() == [0, 0, 0]
 
 
-def test_events_must_lie_on_the_grid_and_set_what_can_be_set():
+def test_events_off_the_grid_or_on_variables_that_cannot_be_set_are_refused():
     fixed = Variable("k", causality="parameter", variability="fixed", start=1.0)
-    a = FakeComponent([*inputs("u", "free"), *outputs("y"), fixed], lambda values, t, h: None)
+    a = FakeComponent([*inputs("u", "free"), *outputs("y"), fixed], lambda _values, _t, _h: None)
     events = [Event(exact_fraction(0.5), {"a": {"free": 1.0}}), Event(exact_fraction(1), {"a": {"u": 1.0, "k": 2.0}})]
     with pytest.raises(InputError) as refusal:
         simulate(make_system({"a": a, "b": gain()}, "b.y > a.u"), settings(events=events))
@@ -86,14 +88,14 @@ def test_periods_must_fit_the_step_and_the_duration():
     ]
 
 
-def test_a_refused_system_is_freed_all_the_same():
+def test_a_refused_system_is_freed():
     component = counter()
     with pytest.raises(InputError):
         simulate(make_system({"a": component}), settings(stop="1/3"))
     assert component.calls == ["free"]
 
 
-def test_a_failure_keeps_the_rows_until_then_and_frees_everybody():
+def test_a_failure_keeps_earlier_rows_and_frees_all_components():
     a, b = failing(2, ComponentError("a", "do_step", "no more", 2.0)), counter()
     outcome = simulate(make_system({"a": a, "b": b}), settings(5))
     assert str(outcome.failure) == "a: do_step failed at t = 2 s: no more"
@@ -101,14 +103,14 @@ def test_a_failure_keeps_the_rows_until_then_and_frees_everybody():
     assert b.calls[-1] == "free"
 
 
-def test_an_interrupt_keeps_the_rows_too():
+def test_an_interrupt_keeps_earlier_rows():
     outcome = simulate(make_system({"a": failing(2, KeyboardInterrupt())}), settings(5))
     assert isinstance(outcome.failure, KeyboardInterrupt)
     assert outcome.recording.time.tolist() == [0, 1, 2]
 
 
-def test_a_component_may_end_the_simulation():
-    def step(values, t, h):
+def test_a_component_may_request_termination():
+    def step(_values, t, h):
         return StepResult(t + h, terminate_requested=True) if t >= 1 else None
 
     outcome = simulate(make_system({"a": FakeComponent(outputs("y"), step), "b": counter()}), settings(5, record=["b.y"]))
@@ -124,15 +126,15 @@ def test_observers_see_progress_and_the_end():
     assert len(seen) == 101
 
 
-def test_what_no_disk_could_hold_is_refused_before_it_is_begun():
-    with pytest.raises(InputError, match=r"3\d* rows of 1 signals take about .* GB are free in .*; make the step longer"):
+def test_a_recording_larger_than_the_disk_is_refused():
+    with pytest.raises(InputError, match=r"3\d* rows of 1 signal take about .* GB are free in .*; make the step longer"):
         simulate(make_system({"a": counter()}), settings(30, exact_fraction("1/1000000000000")))
     sparse = settings(30, exact_fraction("1/1000000000000"), record_interval=exact_fraction(30))
     assert find_problems(make_system({"a": counter()}), sparse) == []
 
 
 def flush_small_numbers(library):
-    """Sets two bits of SSE's control word, which lies at byte 28 of Linux's fenv_t."""
+    """Set two bits of the SSE control word, which is at byte 28 of fenv_t on Linux."""
     environment = ctypes.create_string_buffer(512)
     library.fegetenv(environment)
     (mode,) = struct.unpack_from("I", environment, 28)
@@ -150,7 +152,7 @@ def trap_division_by_zero(library):
 
 @contextmanager
 def floating_point_mode(change):
-    """As left behind by libraries that change it for good when they are imported."""
+    """Change the floating-point mode, like libraries that do so when they are imported."""
     library, before = ctypes.PyDLL(None), ctypes.create_string_buffer(512)
     library.fegetenv(before)
     change(library)
@@ -163,15 +165,15 @@ def floating_point_mode(change):
 @pytest.mark.skipif((sys.platform, platform.machine()) != ("linux", "x86_64"), reason="numbers of <fenv.h>")
 @pytest.mark.parametrize("change", [flush_small_numbers, round_up, trap_division_by_zero])
 def test_results_do_not_depend_on_the_floating_point_mode_of_the_caller(probe, change):
-    """Nor is a component blamed for it; afterwards the caller has his mode again."""
+    """No component is reported for it, and the caller's mode is restored afterwards."""
 
-    def of_a_run():
+    def simulated_bytes():
         built = make_system({"a": create_component(FmuFile(probe), "a")}, start_values={"a": {"u": 1 / 3}})
         return run_system(built, 1, "1/10", ["a.y"]).columns["a.y"].tobytes()
 
-    usual = of_a_run()
+    expected = simulated_bytes()
     with floating_point_mode(change):
         mode = is_changed(), enabled_traps()
-        assert of_a_run() == usual
+        assert simulated_bytes() == expected
         assert (is_changed(), enabled_traps()) == mode != (False, 0)
     assert (is_changed(), enabled_traps()) == (False, 0)

@@ -1,4 +1,4 @@
-"""What one macro step does: who reads what, in which order."""
+"""Data flow of a macro step: stages, groups, periods, delays, units, initialization, results of steps."""
 
 import itertools
 import re
@@ -13,15 +13,16 @@ from cosim.core.errors import ComponentError
 from cosim.core.system import Group
 from cosim.core.time_grid import exact_fraction
 from cosim.core.units import parse_unit
-from cosim.engine.run_loop import Settings, simulate
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Settings
 
 pytestmark = pytest.mark.usefixtures("executor")
 
 
 def chain(n):
-    """Accumulators that count and pass on what they read."""
+    """Return components with y = u + 1."""
 
-    def step(values, t, h):
+    def step(values, _t, _h):
         values["y"] = values["u"] + 1
 
     return {f"c{i}": FakeComponent([*inputs("u"), *outputs("y")], step) for i in range(n)}
@@ -36,11 +37,11 @@ def final(stages, steps=3):
     return [recording.columns[f"{name}.y"][-1] for name in NAMES]
 
 
-def test_in_one_stage_everybody_reads_the_old_values():
+def test_components_of_one_stage_read_old_values():
     assert final([NAMES], steps=1) == [1, 1, 1]
 
 
-def test_in_stages_of_their_own_they_read_what_was_just_computed():
+def test_components_of_later_stages_read_new_values():
     assert final([("c0",), ("c1",), ("c2",)], steps=1) == [1, 2, 3]
 
 
@@ -62,7 +63,7 @@ def test_a_group_reads_outside_values_at_the_start_of_its_stage_and_steps_in_its
     assert [column[-1] for column in recording.columns.values()] == [1, 1, 2, 3]
 
 
-def test_siblings_do_not_see_what_a_group_computed_in_their_stage():
+def test_components_do_not_read_new_values_of_a_group_in_their_stage():
     components = chain(3)
     stages = [(Group("g", (("c0",), ("c1",))), "c2")]
     recording = run_system(make_system(components, "c0.y > c1.u, c1.y > c2.u", stages), 1, 1, ["c1.y", "c2.y"])
@@ -102,18 +103,18 @@ def test_a_delay_inside_a_group_counts_each_macro_step_once():
 
 
 def test_units_are_converted_on_the_way():
-    source = FakeComponent(outputs("y", unit=parse_unit("deg")), lambda values, t, h: None, start={"y": 180.0})
-    sink = FakeComponent([*inputs("u", unit=parse_unit("rad")), *outputs("y")], lambda v, t, h: v.update(y=v["u"]), start={})
+    source = FakeComponent(outputs("y", unit=parse_unit("deg")), lambda _values, _t, _h: None, start={"y": 180.0})
+    sink = FakeComponent([*inputs("u", unit=parse_unit("rad")), *outputs("y")], lambda v, _t, _h: v.update(y=v["u"]), start={})
     recording = run_system(make_system({"a": source, "b": sink}, "a.y > b.u"), 1, 1, ["b.y"])
     assert recording.columns["b.y"][-1] == np.pi
 
 
 def test_a_difference_has_no_offset():
     source = FakeComponent(
-        outputs("y", unit=parse_unit("degC"), relative_quantity=True), lambda values, t, h: None, start={"y": 1.5}
+        outputs("y", unit=parse_unit("degC"), relative_quantity=True), lambda _values, _t, _h: None, start={"y": 1.5}
     )
     sink = FakeComponent(
-        [*inputs("u", unit=parse_unit("K"), relative_quantity=True), *outputs("y")], lambda v, t, h: v.update(y=v["u"])
+        [*inputs("u", unit=parse_unit("K"), relative_quantity=True), *outputs("y")], lambda v, _t, _h: v.update(y=v["u"])
     )
     assert run_system(make_system({"a": source, "b": sink}, "a.y > b.u"), 1, 1, ["b.y"]).columns["b.y"][-1] == 1.5
 
@@ -125,19 +126,19 @@ def test_integers_feed_reals_and_keep_their_own_type_in_the_recording():
     assert recording.columns["a.n"].dtype == np.int32
 
 
-def test_texts_travel_like_numbers():
+def test_strings_are_transferred():
     source = FakeComponent(
-        [Variable("name", "String", "output"), *outputs("y")], lambda v, t, h: v.update(name=f"step {t:g}"), start={"name": "-"}
+        [Variable("name", "String", "output"), *outputs("y")], lambda v, t, _h: v.update(name=f"step {t:g}"), start={"name": "-"}
     )
     sink = FakeComponent(
-        [Variable("text", "String", "input"), Variable("copy", "String", "output")], lambda v, t, h: v.update(copy=v["text"])
+        [Variable("text", "String", "input"), Variable("copy", "String", "output")], lambda v, _t, _h: v.update(copy=v["text"])
     )
     built = make_system({"a": source, "b": sink}, "a.name > b.text", [("a",), ("b",)])
     assert run_system(built, 2, 1, ["b.copy"]).columns["b.copy"].tolist() == ["", "step 0", "step 1"]
 
 
 def test_arrays_are_wired_element_by_element_and_keep_their_start_values_elsewhere():
-    def step(values, t, h):
+    def step(values, _t, _h):
         values["sum"] = sum(values["u"])
 
     vector = FakeComponent([Variable("u", causality="input", shape=(3,), start=(1.0, 10.0, 100.0)), *outputs("sum")], step)
@@ -147,43 +148,43 @@ def test_arrays_are_wired_element_by_element_and_keep_their_start_values_elsewhe
 
 def test_initial_outputs_reach_the_end_of_a_chain_before_the_first_step():
     components = {f"g{i}": gain(2.0) for i in range(4)} | {
-        "source": FakeComponent(outputs("y"), lambda v, t, h: None, start={"y": 1.0})
+        "source": FakeComponent(outputs("y"), lambda _v, _t, _h: None, start={"y": 1.0})
     }
     wires = "source.y > g3.u, g3.y > g2.u, g2.y > g1.u, g1.y > g0.u"
     recording = run_system(make_system(components, wires), 1, 1, ["g0.y"])
     assert recording.columns["g0.y"].tolist() == [16, 16]
 
 
-def test_a_ring_that_starts_in_balance_stays_there():
+def test_a_ring_that_starts_in_equilibrium_stays_there():
     built = make_system({"a": integrator(1.0), "b": gain(-0.0)}, "a.y > b.u, b.y > a.u")
     assert set(run_system(built, 100, 0.01, ["a.y"]).columns["a.y"]) == {1.0}
 
 
 def test_an_algebraic_loop_in_initialization_is_named():
     built = make_system({"a": gain(2.0, start=1.0), "b": gain(2.0, start=1.0), "c": gain()}, "a.y > b.u, b.y > a.u")
-    loop = r"a, b: initialization failed at t = 0 s: an algebraic loop does not settle .*, a\.y -> b\.u, b\.y -> a\.u;"
+    loop = r"a, b: initialization failed at t = 0 s: an algebraic loop does not converge .*: a\.y -> b\.u, b\.y -> a\.u;"
     with pytest.raises(ComponentError, match=loop):
         run_system(built, 1, 1)
 
 
 @pytest.mark.parametrize("wires", ["a.y > b.u, b.y > a.u", "a.y >1 b.u, b.y > a.u"])
-def test_an_algebraic_loop_that_is_a_contraction_settles_in_initialization(wires):
-    """a = 1 - b / 2, b = 0.9 a."""
+def test_an_algebraic_loop_that_is_a_contraction_converges_in_initialization(wires):
+    """Solve a = 1 - b / 2, b = 0.9 a."""
     one = FakeComponent(
-        [*inputs("u"), *outputs("y")], lambda v, t, h: v.update(y=1 - v["u"] / 2), lambda v: v.update(y=1 - v["u"] / 2)
+        [*inputs("u"), *outputs("y")], lambda v, _t, _h: v.update(y=1 - v["u"] / 2), lambda v: v.update(y=1 - v["u"] / 2)
     )
     recording = run_system(make_system({"a": one, "b": gain(0.9)}, wires), 3, 1, ["a.y"])
     np.testing.assert_allclose(recording.columns["a.y"], 1 / 1.45, rtol=1e-11)
 
 
-def test_a_step_that_ends_early_is_an_error_that_says_how_far_it_came():
-    short = FakeComponent(outputs("y"), lambda values, t, h: StepResult(t + h / 2))
+def test_an_early_return_is_an_error_with_the_time_reached():
+    short = FakeComponent(outputs("y"), lambda _values, t, h: StepResult(t + h / 2))
     with pytest.raises(ComponentError, match=r"a: do_step failed at t = 0 s: reached only t = 0\.5 s of 1\.0 s"):
         run_system(make_system({"a": short}), 1, 1)
 
 
-@pytest.mark.parametrize(("part", "rows"), [(1.0, [0, 1, 2, 3]), (0.5, [0, 1, 2])], ids=["at its end", "within"])
-def test_a_step_in_which_the_simulation_ends_counts_when_it_was_made_to_its_end(part, rows):
+@pytest.mark.parametrize(("part", "rows"), [(1.0, [0, 1, 2, 3]), (0.5, [0, 1, 2])], ids=["complete", "incomplete"])
+def test_the_macro_step_of_a_termination_request_counts_if_it_is_complete(part, rows):
     def step(values, t, h):
         values["y"] += 1
         return StepResult(t + part * h, terminate_requested=True) if t == 2 else None
@@ -197,19 +198,19 @@ def test_a_step_in_which_the_simulation_ends_counts_when_it_was_made_to_its_end(
     assert outcome.recording.columns["b.y"].tolist() == rows
 
 
-def test_a_step_that_ends_at_no_time_is_an_error():
-    lost = FakeComponent(outputs("y"), lambda values, t, h: StepResult(float("nan")))
+def test_a_step_that_reaches_nan_is_an_error():
+    faulty = FakeComponent(outputs("y"), lambda _values, _t, _h: StepResult(float("nan")))
     with pytest.raises(ComponentError, match="a: do_step failed at t = 0 s: reached only t = nan s"):
-        run_system(make_system({"a": lost}), 1, 1)
+        run_system(make_system({"a": faulty}), 1, 1)
 
 
-class Unspeakable(Exception):
+class UnprintableError(Exception):
     def __str__(self):
         raise RuntimeError
 
 
 class Panic(BaseException):
-    """As libraries in Rust raise it."""
+    """An exception outside Exception, as Rust libraries raise it."""
 
 
 FAILURES = {
@@ -218,17 +219,17 @@ FAILURES = {
     "no Exception": (Panic("index out of bounds"), "Panic: index out of bounds"),
     "text of no characters": (ValueError("\ud800"), r"ValueError: \\ud800"),
     "endless text": (ValueError("x" * 10**6), "x ... and 998000 characters more"),
-    "no text": (Unspeakable(), "Unspeakable: "),
+    "no text": (UnprintableError(), "UnprintableError: "),
 }
 
 
 @pytest.mark.parametrize("name", FAILURES)
 @pytest.mark.parametrize("method", ["do_step", "bind", "exit_initialization_mode", "terminate", "free"])
-def test_what_a_component_raises_is_its_own_failure(method, name):
+def test_an_exception_names_component_and_function(method, name):
     error, words = FAILURES[name]
     failing = counter()
 
-    def fail(*arguments):
+    def fail(*_arguments):
         raise error
 
     setattr(failing, method, fail)

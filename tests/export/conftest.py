@@ -1,4 +1,4 @@
-"""A small hand-written block with every kind of variable, and its FMUs."""
+"""A small hand-written block with all kinds of variables, and its FMUs."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ VARIABLES = (
 
 @pytest.fixture(scope="session")
 def make_block() -> Callable[..., Block]:
-    """The sample block with texts of its source replaced: `make_block(("old", "new"))`."""
+    """Return a function that creates the sample block with replacements in its source: `make_block(("old", "new"))`."""
 
     def make(*replacements: tuple[str, str]) -> Block:
         source = SOURCE
@@ -123,28 +123,28 @@ def version(request: pytest.FixtureRequest) -> int:
 
 @pytest.fixture(scope="session")
 def fmu(block: Block, version: int, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The sample block as an FMU."""
+    """Return the FMU of the sample block."""
     return write_fmu(block, version, tmp_path_factory.mktemp(f"fmi{version}") / "sample.fmu")
 
 
 class FmuInstance:
-    """An instance of an FMU under FMPy, the same for FMI 2.0 and 3.0: arrays by their names, messages kept."""
+    """An FMPy instance with the same methods for FMI 2.0 and 3.0; arrays are accessed by name, log messages are recorded."""
 
     def __init__(self, folder: str, guid: str | None = None, messages: list[str] | None = None):
         self.description = read_model_description(folder)
         self.version = int(self.description.fmiVersion[0])
         self.variables = {variable.name: variable for variable in self.description.modelVariables}
         self.messages: list[str] = [] if messages is None else messages
-        kind = FMU2Slave if self.version == 2 else FMU3Slave
+        slave_class = FMU2Slave if self.version == 2 else FMU3Slave
         token = self.description.guid if guid is None else guid
-        self.fmu = kind(guid=token, unzipDirectory=folder, modelIdentifier="sample", instanceName="one")
+        self.fmu = slave_class(guid=token, unzipDirectory=folder, modelIdentifier="sample", instanceName="one")
         if self.version == 2:
             # FMPy's own logger would format the messages
             self._callbacks = fmi2CallbackFunctions()
-            self._callbacks.logger = fmi2CallbackLoggerTYPE(lambda e, name, status, category, text: self._log(text))
+            self._callbacks.logger = fmi2CallbackLoggerTYPE(lambda _e, _name, _status, _category, text: self._log(text))
             self.fmu.instantiate(callbacks=self._callbacks)
         else:
-            self.fmu.instantiate(logMessage=lambda environment, status, category, text: self._log(text))
+            self.fmu.instantiate(logMessage=lambda _environment, _status, _category, text: self._log(text))
 
     def _log(self, text: bytes) -> None:
         self.messages.append(text.decode())
@@ -205,7 +205,7 @@ class FmuInstance:
 
 @pytest.fixture
 def instantiate_sample(fmu: Path, tmp_path: Path) -> Iterator[Callable[..., FmuInstance]]:
-    """Instantiates the sample FMU; frees all instances in the end."""
+    """Return a function that instantiates the sample FMU; free all instances at the end."""
     folder = extract(str(fmu), str(tmp_path / "extracted"))
     instances: list[FmuInstance] = []
 

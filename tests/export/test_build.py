@@ -1,4 +1,4 @@
-"""From sources to fmus/ and its manifest, and the check that both agree."""
+"""`cosim build`: export of sources to fmus/, the manifest, and the check of both."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def built_once(tmp_path_factory):
 
 @pytest.fixture
 def root(built_once, tmp_path):
-    """A tree of sources with its built FMUs, free to be spoilt."""
+    """Return a project folder with built FMUs that a test can modify."""
     return Path(shutil.copytree(built_once, tmp_path / "root"))
 
 
@@ -117,7 +117,7 @@ def test_every_source_becomes_its_fmus(built_once):
     assert [problem for fmu in fmus for problem in validate_fmu(str(built_once / fmu))] == []
 
 
-def test_the_manifest_says_what_came_of_what(built_once):
+def test_the_manifest_contains_sources_fmus_and_tools(built_once):
     raft = read_manifest(built_once)["raft"]
     assert list(raft["sources"]) == [f"{VEHICLE}/equations.py", f"{VEHICLE}/parameters.py"]
     assert sorted(raft["fmus"]) == ["fmus/fmi3/raft.fmu", "fmus/raft.fmu"]
@@ -145,21 +145,21 @@ def test_one_source_is_built_alone(root):
     assert read_manifest(root)["python/doubler"] != manifest["python/doubler"]
 
 
-def test_building_all_removes_what_has_no_source(root):
+def test_building_all_removes_fmus_without_a_source(root):
     (root / "controllers/python/doubler.py").unlink()
     build(None, root)
     assert not (root / "fmus/python/doubler.fmu").exists()
     assert list(read_manifest(root)) == ["raft"]
 
 
-def test_what_is_no_source_is_refused_with_the_nearest(root):
-    with pytest.raises(InputError, match=r'doubbler\.py: is no source .*did you mean "controllers/python/doubler\.py"'):
+def test_a_file_that_is_not_a_source_is_refused_with_a_suggestion(root):
+    with pytest.raises(InputError, match=r'doubbler\.py: is not a source .*did you mean "controllers/python/doubler\.py"'):
         build([Path("controllers/python/doubbler.py")], root)
 
 
 def test_two_sources_of_one_fmu_are_refused(root):
     write(root, {"controllers/modelica/Raft.mo": "model Raft end Raft;"})
-    with pytest.raises(InputError, match=r'becomes "raft\.fmu" as .* does; rename one'):
+    with pytest.raises(InputError, match=r'has the same FMU name "raft\.fmu" as .*; rename one'):
         find_sources(root)
 
 
@@ -195,21 +195,21 @@ def test_the_check_finds_an_fmu_without_source_and_a_source_without_fmu(root):
     (root / "controllers/python/doubler.py").rename(root / "controllers/python/twice.py")
     assert sorted(messages(root)) == [
         "controllers/python/twice.py: has no FMU; run `cosim build`",
-        "fmus/fmi3/raft.fmu: belongs to no source",
-        "fmus/python/doubler.fmu: belongs to no source",
-        "fmus/raft.fmu: belongs to no source",
+        "fmus/fmi3/raft.fmu: has no source",
+        "fmus/python/doubler.fmu: has no source",
+        "fmus/raft.fmu: has no source",
     ]
 
 
-def test_the_check_finds_changed_behaviour_behind_equal_hashes(root):
-    """model.c is not listed as a source here, so only running both FMUs can tell."""
+def test_the_check_finds_changed_behaviour_despite_equal_hashes(root):
+    """model.c is not listed as a source here, so that only a simulation of both FMUs shows the difference."""
     write(root, {f"{VEHICLE}/model.c": MODEL.replace("m->x * h", "m->x * h * (m->gain == 1.0 ? 1.0 : 1.000001)")})
     found = messages(root)
     assert [text.split(": ")[0] for text in found] == ["fmus/raft.fmu", "fmus/fmi3/raft.fmu"]
     assert all('differs from a rebuild: output "y" differs at t = ' in text for text in found)
 
 
-def test_the_check_allows_for_rounding(root):
+def test_the_check_tolerates_rounding(root):
     write(root, {f"{VEHICLE}/model.c": MODEL.replace("m->x * h", "m->x * (h * (1 + 1e-13))")})
     assert messages(root) == []
 
@@ -223,36 +223,38 @@ def test_the_check_finds_changed_variables(root):
     assert messages(root)[0] == 'fmus/raft.fmu: differs from a rebuild: variable "x" has start 0.0 and 0.5'
 
 
-def test_the_check_survives_an_fmu_that_crashes(root):
+def test_the_check_reports_an_fmu_that_crashes(root):
     write(root, {f"{VEHICLE}/model.c": MODEL.replace("m->y +=", "if (t > 1) abort(); m->y +=")})
-    assert any("fmus/raft.fmu: differs from a rebuild: the process that ran it" in text for text in messages(root))
+    assert any(
+        "fmus/raft.fmu: differs from a rebuild: the process that simulates the FMUs crashed" in text for text in messages(root)
+    )
 
 
-def test_the_check_says_when_a_source_no_longer_builds(root):
+def test_the_check_reports_a_source_that_can_no_longer_be_built(root):
     write(root, {f"{VEHICLE}/model.c": MODEL.replace("m->gain * m->x", "m->gian")})
     (message,) = messages(root)
-    assert message.startswith(f"{VEHICLE}/equations.py: cannot be built any more: raft: model.c:7:")
+    assert message.startswith(f"{VEHICLE}/equations.py: can no longer be built: raft: model.c:7:")
 
 
 def test_a_damaged_manifest_is_refused(root):
     (root / "fmus/manifest.json").write_text("{")
-    with pytest.raises(InputError, match=r"manifest\.json: is no JSON"):
+    with pytest.raises(InputError, match=r"manifest\.json: is not valid JSON"):
         check_fmus(root)
 
 
-def test_one_file_is_built_anywhere(tmp_path):
+def test_a_single_file_is_built_to_any_target(tmp_path):
     source = write(tmp_path, {"doubler.py": CLASS}) / "doubler.py"
     fmu = build_to(source, None, tmp_path / "elsewhere/d.fmu")
     assert simulate_fmu(str(fmu), stop_time=0.1, output_interval=0.1, start_values={"x": 4.0})["y"][-1] == 8.0
 
 
-def test_python_classes_are_fmi2_only(tmp_path):
+def test_python_classes_support_fmi2_only(tmp_path):
     source = write(tmp_path, {"doubler.py": CLASS}) / "doubler.py"
     with pytest.raises(InputError, match=r"doubler\.py: a PythonFMU class cannot be exported as FMI 3\.0"):
         build_to(source, None, tmp_path / "d.fmu", fmi_version=3)
 
 
-def test_other_files_are_refused(tmp_path):
+def test_other_files_are_refused():
     with pytest.raises(InputError, match=r"controller\.slx: cannot be exported; expected a \.mo or \.py file"):
         classify_source(Path("controller.slx"))
 
@@ -285,7 +287,7 @@ def test_a_missing_extra_is_named():
         ("Vtol", "vtol"),
     ],
 )
-def test_models_become_snake_case_files(model, name):
+def test_fmu_names_are_in_snake_case(model, name):
     assert snake_case(model) == name
 
 
@@ -299,7 +301,8 @@ def test_a_cached_fmu_is_built_once(tmp_path, cache):
     source = write(tmp_path, {"models/SampledPi.mo": MODELICA}) / "models/SampledPi.mo"
     fmu = cached_fmu(source, "SampledPi")
     written = fmu.stat().st_mtime_ns
-    assert fmu.is_relative_to(cache) and fmu.name == "sampled_pi.fmu"
+    assert fmu.is_relative_to(cache)
+    assert fmu.name == "sampled_pi.fmu"
     assert validate_fmu(str(fmu)) == []
     assert cached_fmu(source, "SampledPi") == fmu
     assert fmu.stat().st_mtime_ns == written
@@ -309,7 +312,8 @@ def test_a_cached_fmu_is_built_once(tmp_path, cache):
     )
 
 
-def test_a_cached_fmu_follows_its_source(tmp_path, cache):
+@pytest.mark.usefixtures("cache")
+def test_a_cached_fmu_is_rebuilt_when_its_source_changes(tmp_path):
     source = write(tmp_path, {"models/SampledPi.mo": MODELICA}) / "models/SampledPi.mo"
     before = cached_fmu(source, "SampledPi")
     source.write_text(MODELICA.replace("kp = 2.0", "kp = 3.0"))

@@ -1,4 +1,4 @@
-"""A folder with C files and a hand-written description becomes an FMU."""
+"""Export of C controllers with a hand-written model description."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ KEEPER = root() / "controllers/c/speed_keeper"
 
 @pytest.fixture
 def folder(tmp_path):
-    """A copy of the shipped controller, free to be spoilt."""
+    """Return a copy of the shipped controller that a test can modify."""
     return Path(shutil.copytree(KEEPER, tmp_path / "controllers/c/keeper"))
 
 
@@ -38,7 +38,7 @@ def replace(path, old, new):
     path.write_text(text.replace(old, new))
 
 
-def test_it_validates_and_carries_its_sources(folder, tmp_path):
+def test_the_fmu_is_valid_and_contains_its_sources(folder, tmp_path):
     replace(folder / "speed_keeper.c", '#include "fmi2Functions.h"', '#include "own.h"')
     (folder / "own.h").write_text('#include "fmi2Functions.h"\n')
     (folder / "notes.txt").write_text("not for others")
@@ -51,13 +51,13 @@ def test_it_validates_and_carries_its_sources(folder, tmp_path):
     assert sources == {"speed_keeper.c", "own.h", *headers}
 
 
-def test_the_same_sources_make_the_same_bytes(folder, tmp_path):
+def test_the_same_sources_give_the_same_bytes(folder, tmp_path):
     first, second = (build_to(source, None, tmp_path / f"{source.name}.fmu") for source in (folder, KEEPER))
     assert first.read_bytes() == second.read_bytes()
 
 
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="needs cmake")
-def test_its_sources_alone_build_it_elsewhere(folder, tmp_path):
+def test_the_fmu_can_be_rebuilt_from_its_sources_alone(folder, tmp_path):
     fmu = build_to(folder, None, tmp_path / "keeper.fmu")
     unpacked = Path(extract(str(fmu), str(tmp_path / "unpacked")))
     shutil.rmtree(unpacked / "binaries")
@@ -78,7 +78,7 @@ def test_several_files_are_compiled_together(folder, description, tmp_path):
     assert simulate_fmu(str(fmu), stop_time=0.1, output=["thrust"])["thrust"][-1] == 1.5
 
 
-def test_building_writes_manifest_and_check_agrees(folder, description, tmp_path):
+def test_a_built_fmu_is_in_the_manifest_and_passes_the_check(folder, description, tmp_path):
     (built,) = build([folder], tmp_path)
     assert built.fmus == {2: tmp_path / "fmus/c/keeper.fmu"}
     entry = read_manifest(tmp_path)["c/keeper"]
@@ -141,7 +141,7 @@ def cosim(*arguments, cwd):
     return run_cosim(*arguments, cwd=cwd)
 
 
-def test_the_command_builds_a_source_that_lies_anywhere(folder, tmp_path):
+def test_the_command_builds_a_source_in_any_folder(folder, tmp_path):
     done = cosim("build", folder, "--output", "there/keeper.fmu", cwd=tmp_path)
     assert (done.returncode, done.stdout) == (0, f"{folder} -> there/keeper.fmu\n")
     assert validate_fmu(str(tmp_path / "there/keeper.fmu")) == []
@@ -155,7 +155,7 @@ def test_the_command_builds_a_source_that_lies_anywhere(folder, tmp_path):
         ((".",), ".: cannot be exported"),
     ],
 )
-def test_the_command_refuses_what_is_no_source(tmp_path, sources, message):
+def test_the_command_refuses_a_folder_that_is_not_a_source(tmp_path, sources, message):
     done = cosim("build", *sources, "--output", "x.fmu", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith(message)

@@ -1,10 +1,11 @@
-"""Equations that call functions: as C functions, as loops over tables, and constants that are computed once."""
+"""Function calls in equations, sums over table rows and derived parameters."""
 
 from __future__ import annotations
 
 import platform
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -25,8 +26,8 @@ def parameter(name: str, *values: float) -> Variable:
     return Variable(name, causality="parameter", variability="fixed", start=values if shape else values[0], shape=shape)
 
 
-def model(rate: Callable[..., ca.SX], *parameters: Variable, **more: object) -> ContinuousModel:
-    """x' = rate(x, inputs, parameters) from x = 0, with x as output."""
+def model(rate: Callable[..., ca.SX], *parameters: Variable, **options: Any) -> ContinuousModel:
+    """Create the model x' = rate(x, inputs, parameters) with x(0) = 0 and the output x."""
     variables = (*parameters, Variable("u", causality="input", start=1.0), Variable("x", causality="output"))
     return ContinuousModel(
         "called",
@@ -35,13 +36,13 @@ def model(rate: Callable[..., ca.SX], *parameters: Variable, **more: object) -> 
         ("x",),
         lambda _: ca.SX(0),
         rate,
-        lambda x, u, p: x,
-        **more,  # type: ignore[arg-type]
+        lambda x, _u, _p: x,
+        **options,
     )
 
 
 def waves(cosine: Callable[[ca.SX], ca.SX] = ca.cos) -> Callee:
-    """Sum over rows (amplitude, frequency) of amplitude * cos(frequency * (x + 2 t)), and of amplitudes."""
+    """Create the sum of amplitude * cos(frequency * (x + 2 t)) over rows (amplitude, frequency), and the sum of amplitudes."""
     common, row = ca.SX.sym("common", 2), ca.SX.sym("row", 2)
     term = ca.Function("term", [common, row], [ca.vertcat(row[0] * cosine(row[1] * (common[0] + 2 * common[1])), row[0])])
     return sum_over_rows("waves", term, ROWS)
@@ -52,10 +53,10 @@ def numbers(count: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 16])
-def test_a_sum_over_rows_counts_only_those_in_use(count: int, tmp_path: Path) -> None:
+def test_a_sum_over_rows_uses_only_the_first_rows(count: int, tmp_path: Path) -> None:
     callee, x, n, table = waves(), ca.SX.sym("x", 2), ca.SX.sym("n"), ca.SX.sym("table", ROWS, 2)
     probe = ca.Function("probe", [x, n, table], [3 * callee(x, n, table)])
-    compiled = Compiled(as_block(model(lambda x, u, p: u, callees=[callee]), [probe]), tmp_path)
+    compiled = Compiled(as_block(model(lambda _x, u, _p: u, callees=[callee]), [probe]), tmp_path)
     amplitude, frequency = np.split(numbers(2 * ROWS), 2)
     amplitude[count:] = np.nan
     found = compiled.call("probe", 2, [0.3, 0.2], [float(count)], [*amplitude, *frequency])
@@ -65,19 +66,19 @@ def test_a_sum_over_rows_counts_only_those_in_use(count: int, tmp_path: Path) ->
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="its registers have these names")
 @pytest.mark.parametrize("count", [5, ROWS])
-def test_a_sum_has_the_same_bits_in_registers_of_every_width(count: int, tmp_path: Path) -> None:
-    """As one that chooses by itself; a fused multiplication and addition would be seen."""
+def test_a_sum_is_bit_identical_for_every_simd_width(count: int, tmp_path: Path) -> None:
+    """The function compiled for one SIMD width gives the same bits as the one that chooses its width at run time."""
     callee, x, table = waves(lambda angle: 1 - angle**2 * (0.5 - 0.04 * angle**2)), ca.SX.sym("x", 2), ca.SX.sym("table", ROWS, 2)
     probe = ca.Function("probe", [x, table], [callee(x, ca.SX(count), table)])
-    block = as_block(model(lambda x, u, p: u, callees=[callee]), [probe])
+    block = as_block(model(lambda _x, u, _p: u, callees=[callee]), [probe])
     known = {"sse2", "avx2", "avx512f"} & {*Path("/proc/cpuinfo").read_text().split()}
-    options = {name: [f'-DWIDE=__attribute__((target("{name}")))'] for name in known} | {"by itself": []}
-    found = []
+    options = {name: [f'-DWIDE=__attribute__((target("{name}")))'] for name in known} | {"automatic": []}
+    results = []
     for name, chosen in options.items():
         (folder := tmp_path / name).mkdir()
         compiled = Compiled(block, folder, *chosen)
-        found.append([compiled.call("probe", 2, [x, 0.2], [*numbers(2 * ROWS)]) for x in numbers(30)])
-    assert all(sums == found[0] for sums in found)
+        results.append([compiled.call("probe", 2, [x, 0.2], [*numbers(2 * ROWS)]) for x in numbers(30)])
+    assert all(sums == results[0] for sums in results)
 
 
 def test_casadi_computes_the_same_sum() -> None:
@@ -86,7 +87,7 @@ def test_casadi_computes_the_same_sum() -> None:
     assert found == pytest.approx([(table[:5, 0] * np.cos(0.7 * table[:5, 1])).sum(), table[:5, 0].sum()], rel=1e-14)
 
 
-def test_a_table_that_lies_among_the_arguments_is_not_copied() -> None:
+def test_a_table_of_consecutive_arguments_is_not_copied() -> None:
     callee, parameters = waves(), ca.SX.sym("p", 2 * ROWS + 1)
     total = callee(parameters[0:2], ca.SX(3), ca.reshape(parameters[1:], ROWS, 2))
     text = function_body(ca.Function("probe", [parameters], [total]))
@@ -95,14 +96,14 @@ def test_a_table_that_lies_among_the_arguments_is_not_copied() -> None:
 
 
 def test_a_called_function_is_a_function_in_c(tmp_path: Path) -> None:
-    """Also by one that is called itself, with several arguments and results in any order."""
+    """It is also called by another called function, with several arguments and results in any order."""
     a, b = ca.SX.sym("a", 2), ca.SX.sym("b")
     inner = ca.Function("inner", [a, b], [a * b, a[0] - b])
     scaled, difference = call_in_c(inner, a[[1, 0]], 2 * b)
     outer = ca.Function("outer", [b, a], [ca.sum1(scaled) + difference])
     (total,) = call_in_c(outer, b, a)
     probe = ca.Function("probe", [a, b], [ca.vertcat(total, call_in_c(inner, a, b)[1], call_in_c(inner, a, total)[0])])
-    block = as_block(model(lambda x, u, p: u), [probe])
+    block = as_block(model(lambda _x, u, _p: u), [probe])
     text = block.files["model.c"]
     assert text.count("static void inner(") == text.count("static void outer(") == 1
     assert text.index("static void inner(") < text.index("static void outer(")
@@ -111,19 +112,19 @@ def test_a_called_function_is_a_function_in_c(tmp_path: Path) -> None:
     assert found == [expected, 2.5, 3.0 * expected, 5.0 * expected]
 
 
-def test_a_callee_with_a_body_of_its_own_and_what_it_needs(tmp_path: Path) -> None:
-    """A branch, of which only one side is computed: a square root that would not exist is not taken."""
+def test_a_callee_with_a_hand_written_body_and_its_required_functions(tmp_path: Path) -> None:
+    """Only one branch of the body is executed: the square root of a negative number is not computed."""
     x = ca.SX.sym("x")
     root = ca.Function("root", [x], [ca.sqrt(x)])
     either = ca.Function("either", [x], [ca.if_else(x > 0, ca.sqrt(ca.fabs(x)), -1)])
     branch = Callee(either, "{\n    if (in[0][0] > 0) root(in, out);\n    else out[0][0] = -1;\n}\n", [root])
     probe = ca.Function("probe", [x], [2 * branch(x)])
-    compiled = Compiled(as_block(model(lambda x, u, p: u, callees=[branch]), [probe]), tmp_path)
+    compiled = Compiled(as_block(model(lambda _x, u, _p: u, callees=[branch]), [probe]), tmp_path)
     assert [compiled.call("probe", 1, [value]) for value in (9.0, -4.0)] == [[6.0], [-2.0]]
 
 
-def test_the_loop_is_part_of_the_rate(tmp_path: Path) -> None:
-    """x' = sum of a cos(w (x + 2 t)) with t = u / 2 = 0.5 held: one Runge-Kutta step against the same in Python."""
+def test_a_state_derivative_can_contain_a_sum_over_rows(tmp_path: Path) -> None:
+    """x' = sum of a cos(w (x + 2 t)) with constant t = u / 2 = 0.5: one Runge-Kutta step agrees with Python."""
     callee, (amplitude, frequency) = waves(), np.split(numbers(2 * ROWS), 2)
 
     def rate(x: ca.SX, u: ca.SX, p: ca.SX) -> ca.SX:
@@ -146,9 +147,9 @@ def test_the_loop_is_part_of_the_rate(tmp_path: Path) -> None:
 
 @pytest.fixture
 def exponential(tmp_path: Path) -> Compiled:
-    """x' = u / (time constant), which is computed of mass and damping."""
+    """Create the model x' = u / (time constant); the time constant is derived from mass and damping."""
     model_ = model(
-        lambda x, u, c: u / c[1],
+        lambda _x, u, c: u / c[1],
         parameter("mass", 6.0),
         parameter("damping", 2.0),
         derived_parameters=lambda p: ca.vertcat(p[0], p[0] / p[1], p[1]),
@@ -156,7 +157,7 @@ def exponential(tmp_path: Path) -> Compiled:
     return Compiled(as_block(model_), tmp_path)
 
 
-def test_constants_follow_from_the_parameters_at_initialization(exponential: Compiled) -> None:
+def test_derived_parameters_are_computed_at_the_initialization(exponential: Compiled) -> None:
     exponential.initialize()
     assert list(exponential.model.constant) == [6.0, 3.0, 2.0]
     exponential.model.parameter[1] = 12.0
@@ -165,8 +166,8 @@ def test_constants_follow_from_the_parameters_at_initialization(exponential: Com
     assert exponential.model.output[0] == pytest.approx(0.2, rel=1e-14)
 
 
-def test_a_model_without_constants_has_no_room_for_them(tmp_path: Path) -> None:
-    compiled = Compiled(as_block(model(lambda x, u, p: u * p[0], parameter("gain", 2.0))), tmp_path)
+def test_a_model_without_derived_parameters_has_no_member_for_them(tmp_path: Path) -> None:
+    compiled = Compiled(as_block(model(lambda _x, u, p: u * p[0], parameter("gain", 2.0))), tmp_path)
     assert not hasattr(compiled.model, "constant")
     compiled.initialize()
     compiled.step(0.1)

@@ -1,4 +1,4 @@
-"""CasADi equations as blocks of C code."""
+"""Export of continuous models with CasADi equations as blocks of C code."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SHELL = resources.package_folder() / "export/shell"
 
 
 def oscillator() -> ContinuousModel:
-    """x'' = -stiffness x + force, with an array input, a Boolean output and every kind of variable."""
+    """Create the model x'' = -stiffness x + force, with an array input, a Boolean output and all kinds of variables."""
     return ContinuousModel(
         "oscillator",
         "Two forces on a spring",
@@ -39,12 +39,12 @@ def oscillator() -> ContinuousModel:
         ("x", "v"),
         lambda parameters: ca.vertcat(parameters[1], 0),
         lambda state, inputs, parameters: ca.vertcat(state[1], -parameters[0] * state[0] + inputs[0] + inputs[1]),
-        lambda state, inputs, parameters: ca.vertcat(state[0], state[0] < 0, (parameters[0] * state[0] ** 2 + state[1] ** 2) / 2),
+        lambda state, _, parameters: ca.vertcat(state[0], state[0] < 0, (parameters[0] * state[0] ** 2 + state[1] ** 2) / 2),
     )
 
 
 class Compiled:
-    """A block's C code, compiled and called without FMI; the arrays are those of its `Model`."""
+    """A compiled block that is called without FMI; `model` is its struct `Model`."""
 
     def __init__(self, block: Block, folder: Path, *options: str):
         for name, text in block.files.items():
@@ -85,7 +85,7 @@ def test_the_same_model_gives_the_same_text() -> None:
     assert as_block(oscillator()).files == as_block(oscillator()).files
 
 
-def test_variables_lie_in_the_members_that_the_block_names() -> None:
+def test_variables_are_in_the_struct_members_of_the_block() -> None:
     members = {variable.name: variable.member for variable in as_block(oscillator()).variables}
     assert members == {
         "stiffness": "parameter[0]",
@@ -97,12 +97,12 @@ def test_variables_lie_in_the_members_that_the_block_names() -> None:
     }
 
 
-def test_start_values_are_those_of_the_variables(compiled: Compiled) -> None:
+def test_start_values_are_taken_from_the_variables(compiled: Compiled) -> None:
     assert list(compiled.model.parameter) == [4.0, 1.0]
     assert list(compiled.model.input) == [0.0, 0.5]
 
 
-def test_initialization_follows_from_parameters_and_may_be_repeated(compiled: Compiled) -> None:
+def test_initialization_depends_on_parameters_and_can_be_repeated(compiled: Compiled) -> None:
     for start in (1.0, -2.0):
         compiled.model.parameter[1] = start
         assert compiled.initialize() is None
@@ -112,7 +112,7 @@ def test_initialization_follows_from_parameters_and_may_be_repeated(compiled: Co
 
 
 def exact(time: float) -> float:
-    """Free oscillation from x = 1 with the angular frequency 2 around the rest position 0.5 / 4."""
+    """The model oscillates from x = 1 with the angular frequency 2 around the equilibrium 0.5 / 4."""
     return 0.125 + 0.875 * math.cos(2 * time)
 
 
@@ -123,7 +123,7 @@ def test_steps_follow_the_exact_solution(compiled: Compiled) -> None:
     assert compiled.model.output[0] == pytest.approx(exact(1.0), abs=1e-9)
 
 
-def test_the_error_is_of_fourth_order(tmp_path: Path) -> None:
+def test_the_integration_error_is_of_fourth_order(tmp_path: Path) -> None:
     def error(sub_step: float) -> float:
         model = oscillator()
         folder = tmp_path / str(sub_step)
@@ -147,22 +147,22 @@ def test_a_long_step_equals_its_sub_steps(compiled: Compiled, parts: int) -> Non
     assert list(compiled.model.state) == pytest.approx(expected, rel=1e-15)
 
 
-def test_a_state_that_is_not_finite_is_named(compiled: Compiled) -> None:
+def test_a_state_that_is_not_finite_is_reported_by_name(compiled: Compiled) -> None:
     compiled.initialize()
     compiled.model.input[0] = math.inf
     assert compiled.step(0.01) == b"the state x is not finite"
 
 
 def test_projection_is_applied_after_each_sub_step(tmp_path: Path) -> None:
-    """A point on the unit circle stays there to rounding."""
+    """A point on the unit circle remains on it, except for rounding errors."""
     model = ContinuousModel(
         "circle",
         "Rotation",
         (Variable("x", causality="output"),),
         ("x", "y"),
-        lambda parameters: ca.SX([1, 0]),
-        lambda state, inputs, parameters: ca.vertcat(-state[1], state[0]) * 30,
-        lambda state, inputs, parameters: state[0],
+        lambda _parameters: ca.SX([1, 0]),
+        lambda state, _inputs, _parameters: ca.vertcat(-state[1], state[0]) * 30,
+        lambda state, _inputs, _parameters: state[0],
         lambda state: state / ca.norm_2(state),
     )
     compiled = Compiled(as_block(model), tmp_path)
@@ -173,7 +173,7 @@ def test_projection_is_applied_after_each_sub_step(tmp_path: Path) -> None:
 
 @pytest.fixture
 def spring(tmp_path: Path) -> Compiled:
-    """A force that follows a displacement at once."""
+    """Return a compiled model without states: a force that depends on a displacement."""
     variables = (
         Variable("stiffness", causality="parameter", variability="tunable", start=4.0),
         Variable("x", causality="input", start=0.5, unit=parse_unit("m")),
@@ -184,7 +184,7 @@ def spring(tmp_path: Path) -> Compiled:
     return Compiled(as_block(model), tmp_path)
 
 
-def test_a_model_without_states_has_its_outputs_from_the_start(spring: Compiled) -> None:
+def test_a_model_without_states_has_outputs_after_initialization(spring: Compiled) -> None:
     assert spring.initialize() is None
     assert (list(spring.model.output), list(spring.model.flag)) == ([-2.0], [True])
 
@@ -196,7 +196,7 @@ def test_a_model_without_states_follows_inputs_and_parameters_in_every_step(spri
     assert (list(spring.model.output), list(spring.model.flag)) == ([2.5], [False])
 
 
-def test_a_model_without_states_keeps_none(spring: Compiled) -> None:
+def test_a_model_without_states_has_no_state_member(spring: Compiled) -> None:
     assert not hasattr(spring.model, "state")
 
 
@@ -206,30 +206,30 @@ OPERATIONS: list[tuple[ca.SX, Callable[[float, float], float]]] = [
     (a - b, lambda a, b: a - b),
     (a * b, lambda a, b: a * b),
     (a / b, lambda a, b: a / b),
-    (-a, lambda a, b: -a),
-    (1 / a, lambda a, b: 1 / a),
-    (2 * a, lambda a, b: 2 * a),
-    (a**2, lambda a, b: a * a),
+    (-a, lambda a, _b: -a),
+    (1 / a, lambda a, _b: 1 / a),
+    (2 * a, lambda a, _b: 2 * a),
+    (a**2, lambda a, _b: a * a),
     (ca.fabs(a) ** b, lambda a, b: abs(a) ** b),
-    (ca.fabs(a) ** 1.3, lambda a, b: abs(a) ** 1.3),
-    (ca.sqrt(ca.fabs(a)), lambda a, b: math.sqrt(abs(a))),
-    (ca.exp(a), lambda a, b: math.exp(a)),
-    (ca.log(ca.fabs(a)), lambda a, b: math.log(abs(a))),
+    (ca.fabs(a) ** 1.3, lambda a, _b: abs(a) ** 1.3),
+    (ca.sqrt(ca.fabs(a)), lambda a, _b: math.sqrt(abs(a))),
+    (ca.exp(a), lambda a, _b: math.exp(a)),
+    (ca.log(ca.fabs(a)), lambda a, _b: math.log(abs(a))),
     (ca.sin(a) + ca.cos(b), lambda a, b: math.sin(a) + math.cos(b)),
-    (ca.tan(a), lambda a, b: math.tan(a)),
-    (ca.asin(a / 10), lambda a, b: math.asin(a / 10)),
-    (ca.acos(a / 10), lambda a, b: math.acos(a / 10)),
-    (ca.atan(a), lambda a, b: math.atan(a)),
+    (ca.tan(a), lambda a, _b: math.tan(a)),
+    (ca.asin(a / 10), lambda a, _b: math.asin(a / 10)),
+    (ca.acos(a / 10), lambda a, _b: math.acos(a / 10)),
+    (ca.atan(a), lambda a, _b: math.atan(a)),
     (ca.atan2(a, b), lambda a, b: math.atan2(a, b)),
     (ca.sinh(a) + ca.cosh(b), lambda a, b: math.sinh(a) + math.cosh(b)),
-    (ca.tanh(a), lambda a, b: math.tanh(a)),
+    (ca.tanh(a), lambda a, _b: math.tanh(a)),
     (ca.hypot(a, b), lambda a, b: math.hypot(a, b)),
-    (ca.floor(a), lambda a, b: math.floor(a)),
-    (ca.ceil(a), lambda a, b: math.ceil(a)),
+    (ca.floor(a), lambda a, _b: math.floor(a)),
+    (ca.ceil(a), lambda a, _b: math.ceil(a)),
     (ca.fmod(a, b), lambda a, b: math.fmod(a, b)),
     (ca.fmin(a, b), lambda a, b: min(a, b)),
     (ca.fmax(a, b), lambda a, b: max(a, b)),
-    (ca.sign(a), lambda a, b: float(np.sign(a))),
+    (ca.sign(a), lambda a, _b: float(np.sign(a))),
     (ca.copysign(a, b), lambda a, b: math.copysign(a, b)),
     (ca.if_else(a < b, 1.5, -2.5), lambda a, b: 1.5 if a < b else -2.5),
     (ca.if_else(a <= b, a, b), lambda a, b: a if a <= b else b),
@@ -237,9 +237,9 @@ OPERATIONS: list[tuple[ca.SX, Callable[[float, float], float]]] = [
     (ca.if_else(a != b, 1, 2), lambda a, b: 1 if a != b else 2),
     (ca.logic_and(a > 0, b > 0), lambda a, b: a > 0 and b > 0),
     (ca.logic_or(a > 0, b > 0), lambda a, b: a > 0 or b > 0),
-    (ca.logic_not(a > 0), lambda a, b: not a > 0),
-    (ca.if_else(a > 0, ca.inf, -ca.inf), lambda a, b: math.inf if a > 0 else -math.inf),
-    (ca.SX(0), lambda a, b: 0.0),
+    (ca.logic_not(a > 0), lambda a, _b: not a > 0),
+    (ca.if_else(a > 0, ca.inf, -ca.inf), lambda a, _b: math.inf if a > 0 else -math.inf),
+    (ca.SX(0), lambda _a, _b: 0.0),
 ]
 
 
@@ -258,12 +258,12 @@ def test_matrices_are_passed_by_columns(tmp_path: Path) -> None:
     assert compiled.call("multiply", 2, [1.0, 2.0, 3.0, 4.0], [10.0, 1.0]) == [13.0, 24.0]
 
 
-def test_structural_zeros_are_written(tmp_path: Path) -> None:
+def test_structural_zeros_of_a_result_are_written(tmp_path: Path) -> None:
     function = ca.Function("sparse", [a], [ca.vertcat(a, 0, ca.SX(1, 1), a)])
     compiled = Compiled(as_block(oscillator(), [function]), tmp_path)
     assert compiled.call("sparse", 4, [2.0]) == [2.0, 0.0, 0.0, 2.0]
 
 
-def test_an_operation_without_counterpart_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"probe: CasADi operation .* cannot be written in C"):
+def test_an_operation_without_counterpart_in_c_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"probe: the CasADi operation .* has no counterpart in C"):
         as_block(oscillator(), [ca.Function("probe", [a], [ca.erf(a)])])

@@ -1,4 +1,4 @@
-"""The FMI shells around a hand-written block, for FMI 2.0 and 3.0 alike, run under FMPy."""
+"""FMI 2.0 and 3.0 interface of a hand-written block, called by FMPy."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def test_the_fmu_validates_without_problems(fmu):
     assert validate_fmu(str(fmu)) == []
 
 
-def test_outputs_are_those_of_the_equations(instantiate_sample):
+def test_outputs_follow_the_equations(instantiate_sample):
     instance = instantiate_sample().initialize(gain=3.0, repeat=2, weights=[1.0, -2.0, 0.5], **{X: 0.25})
     random = np.random.default_rng(7)
     integral = 6.0 * 0.25
@@ -38,7 +38,7 @@ def test_outputs_are_those_of_the_equations(instantiate_sample):
     assert instance.get("steps") == 300
 
 
-def test_in_initialization_mode_outputs_follow_what_was_set(instantiate_sample):
+def test_in_initialization_mode_outputs_depend_on_the_values_that_were_set(instantiate_sample):
     instance = instantiate_sample()
     instance.enter()
     instance.set(X, 1.0)
@@ -48,7 +48,7 @@ def test_in_initialization_mode_outputs_follow_what_was_set(instantiate_sample):
     assert instance.get("outputs")[0] == 20.0
 
 
-def test_leaving_initialization_mode_computes_outputs_nobody_asked_for_before(instantiate_sample):
+def test_leaving_initialization_mode_computes_the_outputs(instantiate_sample):
     assert instantiate_sample().initialize(**{X: 2.0}).get("outputs")[0] == 8.0
 
 
@@ -59,7 +59,7 @@ def test_the_start_time_reaches_the_model(instantiate_sample):
     assert instance.get("clock") == 12.51
 
 
-def test_dependent_parameters_follow_in_every_phase(instantiate_sample):
+def test_dependent_parameters_are_updated_in_every_phase(instantiate_sample):
     instance = instantiate_sample()
     instance.set("gain", 3.0)
     assert instance.get("doubled_gain") == 6.0
@@ -81,7 +81,7 @@ def test_enumerations_and_booleans_are_typed(instantiate_sample):
 
 @contextmanager
 def refused(instance, message):
-    """The call inside fails, and the importer's logger gets exactly one message, which contains this one."""
+    """Check that the call in this block fails and logs exactly one message, which contains `message`."""
     assert instance.messages == []
     with pytest.raises(FMICallException, match=r"status 3 \(error\)"):
         yield
@@ -109,7 +109,7 @@ def test_values_that_are_not_finite_are_refused(instantiate_sample, value):
 
 
 @pytest.mark.parametrize("value", [0, 4])
-def test_an_enumeration_takes_only_its_literals(instantiate_sample, value):
+def test_an_enumeration_accepts_only_its_literals(instantiate_sample, value):
     instance = instantiate_sample()
     with refused(instance, f"mode: found {value}, expected 1 to 3"):
         instance.set("mode", value)
@@ -191,7 +191,7 @@ def test_a_failing_model_ends_the_step_with_its_reason(instantiate_sample):
         instance.step(0.0)
 
 
-def test_a_model_that_fails_to_initialize_says_why(instantiate_sample):
+def test_a_failed_initialization_is_reported_with_its_reason(instantiate_sample):
     instance = instantiate_sample()
     instance.set("limit", 0.0)
     instance.enter()
@@ -199,7 +199,7 @@ def test_a_model_that_fails_to_initialize_says_why(instantiate_sample):
         instance.fmu.exitInitializationMode()
 
 
-def test_after_an_error_only_a_saved_state_or_a_reset_helps(instantiate_sample):
+def test_after_an_error_only_a_saved_state_or_a_reset_is_accepted(instantiate_sample):
     instance = instantiate_sample().initialize(**{X: 1.0})
     state = instance.save()
     with refused(instance, "found time 5"):
@@ -235,7 +235,7 @@ def test_rollback_is_exact_and_repeatable(instantiate_sample):
         assert trajectory(instance, 20, 30) == onwards
 
 
-def test_a_serialized_state_moves_to_another_instance(instantiate_sample):
+def test_a_serialized_state_can_be_restored_in_another_instance(instantiate_sample):
     one, other = instantiate_sample().initialize(gain=4.0), instantiate_sample()
     trajectory(one, 0, 20)
     content = one.serialize(one.save())
@@ -275,7 +275,7 @@ def test_a_wrong_token_is_refused(instantiate_sample):
     assert "found token {wrong}, expected {" in messages[0]
 
 
-def test_what_is_not_offered_is_refused(instantiate_sample):
+def test_functions_that_are_not_offered_are_refused(instantiate_sample):
     instance = instantiate_sample()
     if instance.version == 2:
         with refused(instance, "fmi2CancelStep: steps are not asynchronous"):
@@ -299,7 +299,7 @@ def test_the_shells_compile_without_a_warning(block, version, tmp_path, monkeypa
     assert write_fmu(block, version, tmp_path / "strict.fmu").is_file()
 
 
-def test_the_sources_alone_build_the_same_binary(fmu, tmp_path):
+def test_a_binary_from_the_sources_alone_is_identical(fmu, tmp_path):
     from cosim.export.fmu.compiler import compile_library
 
     with ZipFile(fmu) as archive:

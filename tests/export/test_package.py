@@ -1,4 +1,4 @@
-"""The archive of an FMU: what is in it, and that it is the same whenever it is made."""
+"""FMU archives: contents and reproducibility."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_another_model_has_another_token(make_block, version, fmu, tmp_path):
     assert read_model_description(other).guid != read_model_description(fmu).guid
 
 
-def test_the_binary_lies_where_the_standard_wants_it(version, fmu):
+def test_the_binary_is_in_the_folder_that_the_standard_defines(version, fmu):
     from fmpy import platform, platform_tuple, sharedLibraryExtension
 
     with ZipFile(fmu) as archive:
@@ -51,7 +51,7 @@ def test_archives_do_not_depend_on_order_clock_or_umask(tmp_path):
         ]
 
 
-def test_a_file_appears_whole_or_not_at_all(tmp_path):
+def test_an_archive_is_written_atomically(tmp_path):
     write_archive({"a": b"1"}, tmp_path / "x.fmu")
     assert [path.name for path in tmp_path.iterdir()] == ["x.fmu"]
 
@@ -78,9 +78,9 @@ def test_a_missing_model_function_is_found_when_linking(make_block, tmp_path):
         write_fmu(make_block(("const char *model_step", "const char *model_stop")), 2, tmp_path / "broken.fmu")
 
 
-def test_without_a_compiler_it_says_what_to_do(block, tmp_path, monkeypatch):
+def test_a_missing_compiler_is_reported_with_a_hint(block, tmp_path, monkeypatch):
     monkeypatch.setenv("CC", "no-such-compiler")
-    with pytest.raises(InputError, match=r"needs a C compiler and none was found .*no-such-compiler.*; install gcc or set CC"):
+    with pytest.raises(InputError, match=r"needs a C compiler, but none was found .*no-such-compiler.*; install gcc or set CC"):
         write_fmu(block, 2, tmp_path / "sample.fmu")
 
 
@@ -89,8 +89,8 @@ def test_an_unknown_fmi_version_is_refused(block, tmp_path):
         write_fmu(block, 1, tmp_path / "sample.fmu")
 
 
-def test_the_binary_needs_nothing_from_its_host(fmu, tmp_path):
-    """A host in C can load it: all symbols are resolved at once by the libraries it names."""
+def test_the_binary_depends_only_on_its_libraries(fmu, tmp_path):
+    """A C program can load it with immediate binding: its libraries define all symbols."""
     with ZipFile(fmu) as archive:
         library = archive.extract(next(name for name in archive.namelist() if name.startswith("binaries/")), tmp_path)
     host = tmp_path / "host.c"

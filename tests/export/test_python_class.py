@@ -1,4 +1,4 @@
-"""PythonFMU classes as FMUs."""
+"""Export of PythonFMU classes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figures of a mission, checked by the data of the drawn lines."""
+"""Figures of a mission, checked by reading the data back from the drawn lines."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""KPIs of a synthetic mission whose values are known."""
+"""KPIs of a mission, on a synthetic result with known values."""
 
 import math
 
@@ -43,7 +43,7 @@ def test_touchdown_speed_is_relative_to_a_heaving_deck():
     assert landing(heaving, **DECK)["touchdown_speed"] == pytest.approx(DESCENT_RATE + 0.2)
 
 
-def test_values_are_nan_without_a_landing():
+def test_without_a_landing_all_kpis_are_nan():
     kpis = landing(mission_result(**contacts()), **DECK)
     assert (kpis.pop("bounces"), kpis.pop("landed_at_end")) == (0, False)
     assert all(math.isnan(value) for value in kpis.values())
@@ -141,7 +141,7 @@ def test_tracking_lasts_until_the_end_and_leaves_the_start_out():
     assert tracking(mission_result(offset=(0.0, 0.2)), "plant.uav", "plant.usv", start=0.0)["max"] > 5.0
 
 
-def test_tracking_without_rows_is_nan():
+def test_tracking_in_an_empty_window_is_nan():
     assert all(math.isnan(value) for value in tracking(mission_result(), "plant.uav", "plant.usv", start=99.0).values())
 
 

@@ -1,4 +1,4 @@
-"""KPIs of touchdown, descent and cross-track error on synthetic motions whose values are known."""
+"""KPIs of landing and course keeping, on synthetic motions with known values."""
 
 import math
 
@@ -103,7 +103,7 @@ def test_the_peak_of_the_force_is_that_after_touchdown():
     assert touchdown(mission_result(plant__uav__contact__force=hit), **DECK, mass=MASS)["peak_force"] == 30.0
 
 
-def test_values_are_nan_without_a_touchdown():
+def test_without_a_touchdown_all_kpis_are_nan():
     flying = mission_result(plant__uav__contact__vessel=ZERO > 0)
     kpis = touchdown(flying, **DECK, mass=MASS)
     assert kpis.keys() == touchdown(mission_result(), **DECK, mass=MASS).keys()
@@ -164,7 +164,7 @@ def test_a_leg_that_is_not_finished_lasts_to_the_end_and_the_next_is_not_begun()
     assert waypoints(away, "plant.usv", [100.0], [0.0], 0.5)["reached"] == 0
 
 
-def test_what_comes_after_the_last_waypoint_does_not_count():
+def test_rows_after_the_last_waypoint_do_not_count():
     past = sailing(TIME, np.where(TIME > 10.5, 9.0, 0.0))
     assert cross_track(past, "plant.usv", [10.0], [0.0], 0.5)["max"] == 0.0
 

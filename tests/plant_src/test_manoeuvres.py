@@ -1,4 +1,4 @@
-"""The manoeuvres of MSC.137(76) on tracks whose measures are known in closed form."""
+"""Manoeuvres of MSC.137(76) on tracks whose measures are known in closed form."""
 
 import json
 import math
@@ -67,7 +67,7 @@ def test_speed_loss_refers_to_the_last_full_turn():
     assert (kpis["steady_speed"], kpis["speed_loss"], kpis["advance"]) == pytest.approx((0.6, 0.6, 4.0), rel=1e-5)
 
 
-def test_values_that_were_not_reached_are_nan():
+def test_a_measure_that_was_not_reached_is_nan():
     kpis = turning_circle(circle(1, turns=0.2), "usv", ORDER, LENGTH)
     assert kpis["advance"] == pytest.approx(4.0, rel=1e-5)
     unknown = {"tactical_diameter", "tactical_diameter_lengths", "time_to_180"}
@@ -118,7 +118,7 @@ def test_a_wider_zig_zag_counts_its_own_angle():
     assert (kpis["overshoot[1]"], kpis["overshoot[2]"]) == pytest.approx((5 * DEGREE, 8 * DEGREE))
 
 
-def test_an_overshoot_is_unknown_until_the_heading_comes_back():
+def test_an_overshoot_is_nan_until_the_heading_returns():
     kpis = zigzag(zigzags([(0, 0), (4, 14), (9, -16)]), "usv", ORDER)
     assert kpis["overshoot[1]"] == pytest.approx(4 * DEGREE)
     assert math.isnan(kpis["overshoot[2]"])
@@ -126,7 +126,7 @@ def test_an_overshoot_is_unknown_until_the_heading_comes_back():
     assert kpis["execute[2]"] == pytest.approx(4 + 5 * 24 / 30)
 
 
-def test_zigzag_values_are_nan_without_a_turn():
+def test_without_any_turn_all_measures_are_nan():
     assert all(map(math.isnan, zigzag(zigzags([(0, 0), (20, 5)]), "usv", ORDER).values()))
 
 

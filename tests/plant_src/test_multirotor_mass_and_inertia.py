@@ -1,4 +1,4 @@
-"""Multirotors of another mass and inertia than their maker's: a payload, a heavier battery."""
+"""Multirotors with mass and inertia set by parameters, as for a payload or a heavier battery."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_free_of_torque_it_keeps_angular_momentum_and_energy() -> None:
 
 
 def test_it_stands_level_and_presses_with_its_weight() -> None:
-    """Bullet knows it in other axes; its feet are where they were."""
+    """Its axes in Bullet differ, but its feet are at the same place."""
     place = [0.1, -0.2, PLATFORM_TOP + 0.05 + REST_HEIGHT]
     trial = WorldHarness({"uav": quadcopter_settings(place, yaw=0.3, parameters=HEAVY)}, {"pad": PLATFORM}).step(200)
     assert trial["uav.contact.force"] == pytest.approx(MASS * 9.81, rel=1e-6)
@@ -62,8 +62,8 @@ def test_it_stands_level_and_presses_with_its_weight() -> None:
     assert trial["uav.position.z"] == pytest.approx(PLATFORM_TOP + REST_HEIGHT, abs=1e-3)
 
 
-def test_a_blow_on_the_rim_turns_it_about_its_own_axes() -> None:
-    """One of its feet has touched: the change of angular momentum is that of an impulse there."""
+def test_an_impact_at_the_rim_turns_it_about_its_own_axes() -> None:
+    """The change of angular momentum is that of an impulse at the foot that has touched."""
     motion = {"yaw": 0.3, "rates": [0.5, 0.8, 0.0], "velocity_body": [0.0, 0.0, -1.0]}
     uav = quadcopter_settings([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT + 0.12], parameters=HEAVY, **motion)
     trial = WorldHarness({"uav": uav}, {"pad": PLATFORM})
@@ -85,8 +85,8 @@ def test_a_blow_on_the_rim_turns_it_about_its_own_axes() -> None:
     [
         ({"mass": -1.0}, "vehicles.uav.parameters.mass: found -1.0, expected a finite number greater than 0"),
         ({"mass": "heavy"}, "vehicles.uav.parameters.mass: found 'heavy', expected a finite number"),
-        (inertia(np.diag([1.0, 1.0, 3.0])), "vehicles.uav.parameters.inertia.xx: .* none greater than the sum of the others"),
-        ({"inertia.zz": -0.1}, "vehicles.uav.parameters.inertia.xx: .* expected them greater than 0"),
+        (inertia(np.diag([1.0, 1.0, 3.0])), "vehicles.uav.parameters.inertia.xx: .* none greater than the sum of the other two"),
+        ({"inertia.zz": -0.1}, "vehicles.uav.parameters.inertia.xx: .* expected all greater than 0"),
     ],
 )
 def test_impossible_bodies_are_refused_with_their_path(parameters: dict[str, Any], message: str) -> None:

@@ -1,4 +1,4 @@
-"""The world as a component: its arguments, its variables and its failures."""
+"""The world as a component: arguments, variables and errors."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_a_world_needs_a_vehicle() -> None:
     assert "vehicles: found no vehicle, expected at least one" in str(refused(vehicles={}))
 
 
-def test_names_of_vehicles_can_be_parts_of_variable_names() -> None:
+def test_a_vehicle_name_must_be_valid_in_variable_names() -> None:
     assert 'found the name "my.uav"' in str(refused(vehicles={"my.uav": UAV}))
 
 
@@ -95,7 +95,8 @@ def test_all_problems_are_reported_together_with_their_paths() -> None:
 def test_vehicles_may_not_start_inside_each_other() -> None:
     error = refused(vehicles={"uav": quadcopter_settings([0.0, 0.0, 0.27]), "usv": vessel_settings([0.0, 0.0])})
     assert "overlap" in str(error)
-    assert "vehicles.uav" in str(error) and "vehicles.usv" in str(error)
+    assert "vehicles.uav" in str(error)
+    assert "vehicles.usv" in str(error)
 
 
 def test_a_refused_world_leaves_no_client_behind() -> None:
@@ -110,8 +111,8 @@ def test_a_freed_world_leaves_no_client_behind() -> None:
     assert [pybullet.isConnected(k) for k in range(20)] == clients
 
 
-def test_a_world_that_nobody_has_any_more_leaves_no_client_behind() -> None:
-    """As in a notebook: a scenario was loaded and not run."""
+def test_a_collected_world_leaves_no_client_behind() -> None:
+    """For example a scenario in a notebook that was loaded and not run."""
     gc.collect()
     clients = [pybullet.isConnected(k) for k in range(20)]
     WorldHarness({"uav": UAV}).step(3)
@@ -163,10 +164,10 @@ def test_variables_follow_the_contract() -> None:
     [
         ("uav.rotor_speed", [1.0, math.nan, 1.0, 1.0], r"plant: do_step failed at t = 0.03 s: uav.rotor_speed\[2\] is nan"),
         ("usv.rudder_angle", math.inf, "usv.rudder_angle is inf, expected a finite number"),
-        ("uav.external_force.z", 1e200, r"uav.velocity.z became 2.\d+e\+198: the motion has exploded"),
+        ("uav.external_force.z", 1e200, r"uav.velocity.z became 2.\d+e\+198: the motion has diverged"),
     ],
 )
-def test_a_vehicle_that_cannot_go_on_is_named(name: str, value: Any, message: str) -> None:
+def test_a_vehicle_with_an_invalid_state_is_named(name: str, value: Any, message: str) -> None:
     trial = WorldHarness({"uav": UAV, "usv": vessel_settings([0.0, 0.0])}).step(3)
     trial[name] = value
     with pytest.raises(ComponentError, match=message):

@@ -1,4 +1,4 @@
-"""The world as an FMU is the world, to the last bit."""
+"""The world as an FMU gives the same results as the world, to the last bit."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Importer:
-    """The FMU in FMPy: stepped by names, looked at as a whole."""
+    """The FMU in FMPy, set by names and read as a whole."""
 
     def __init__(self, file: Path, folder: Path):
         description = read_model_description(file)
@@ -78,7 +78,7 @@ def speeds() -> list[float]:
 
 
 def in_process(names: list[str]) -> Iterator[list[Any]]:
-    """What the world itself publishes on the same flight, the initial values first."""
+    """Return the outputs of the world itself on the same flight, beginning with the initial values."""
     trial = WorldHarness(**ARGUMENTS)
     trial["usv.thrust"] = 1.0
     yield [trial[name] for name in names]
@@ -97,11 +97,13 @@ def test_the_fmu_computes_what_the_world_does(importer: Importer, measured: Meas
     height, touching = (
         np.array([row[names.index(name)] for row in expected]) for name in ("uav.position.z", "uav.contact.force")
     )
-    assert height.max() > 1.0 and touching[-1] > 0 and (touching == 0).sum() > 100
+    assert height.max() > 1.0
+    assert touching[-1] > 0
+    assert (touching == 0).sum() > 100
 
 
 @pytest.mark.parametrize("begun", [0, 60, 140, 152, 230])
-def test_states_are_returned_to_bit_for_bit(importer: Importer, begun: int, measured: MeasurementCheck) -> None:
+def test_states_are_restored_bit_for_bit(importer: Importer, begun: int, measured: MeasurementCheck) -> None:
     """On the platform, in flight, about touchdown, at rest."""
     plan = speeds()
     for speed in plan[:begun]:
@@ -135,7 +137,7 @@ def test_demo1_lands_with_it(fmu: Path, tmp_path: Path) -> None:
 
 
 def test_another_world_can_be_chosen(tmp_path: Path) -> None:
-    """The JSON file beside the source goes in, and says which variables there are."""
+    """The JSON file beside the source determines the variables."""
     shutil.copytree(ROOT / "plant_src", tmp_path / "plant_src", ignore=shutil.ignore_patterns("__pycache__"))
     other = {"vehicles": {"boat": {"model": "strider", "position": [0, 0]}}, "environment": {"wind": {"speed": 2.0}}}
     (tmp_path / "plant_src/world_fmu.json").write_text(json.dumps(other))

@@ -1,4 +1,4 @@
-"""Reading long arrays piece by piece."""
+"""Reading of long arrays in slices."""
 
 import resource
 from pathlib import Path
@@ -12,7 +12,7 @@ STATISTICS = Path("/proc/self/statm")
 
 
 @pytest.mark.parametrize("count", [0, 1, 9, 10, 11, 25])
-def test_pieces_cover_everything_once(count):
+def test_slices_cover_each_row_once(count):
     values = np.arange(count)
     parts = [values[piece] for piece in iterate_chunks([values, values], 10)]
     assert [x for part in parts for x in part.tolist()] == list(range(count))
@@ -20,12 +20,12 @@ def test_pieces_cover_everything_once(count):
 
 
 def resident():
-    """Bytes of this process in memory."""
+    """Return the resident memory of this process (bytes)."""
     return int(STATISTICS.read_text().split()[1]) * resource.getpagesize()
 
 
 @pytest.mark.skipif(not STATISTICS.exists(), reason="only Linux tells how much memory is in use this way")
-def test_a_file_that_was_read_takes_no_memory_any_more(tmp_path):
+def test_memory_of_a_mapped_file_is_released_after_reading(tmp_path):
     rows = np.dtype([("x", np.float64), ("y", np.float64)])
     np.full(2_000_000, 1.0).tofile(tmp_path / "rows")
     values = np.memmap(tmp_path / "rows", rows, "r")["y"]
@@ -36,7 +36,7 @@ def test_a_file_that_was_read_takes_no_memory_any_more(tmp_path):
     assert resident() - before < 8_000_000  # of 16 000 000
 
 
-def test_values_are_there_again_when_they_are_read_again(tmp_path):
+def test_a_mapped_file_can_be_read_again(tmp_path):
     np.arange(100_000.0).tofile(tmp_path / "rows")
     values = np.memmap(tmp_path / "rows", np.float64, "r")
     sums = [sum(values[piece].sum() for piece in iterate_chunks([values], 1000)) for _ in range(2)]

@@ -1,4 +1,4 @@
-"""Recordings go to CSV and come back with the same numbers; what cannot be read is refused with its place."""
+"""CSV files: exact round trip of recordings, and locations of errors."""
 
 import csv
 import math
@@ -21,7 +21,7 @@ def written(tmp_path, text):
     return path
 
 
-def test_the_file_reads_as_promised(tmp_path):
+def test_csv_has_the_documented_format(tmp_path):
     columns = {
         "plant.uav.position.x": np.array([0.1, -2.5e-7]),
         "plant.uav.contact.vessel": np.array([False, True]),
@@ -66,7 +66,7 @@ def test_whole_integers_return_as_integers(tmp_path):
     assert all(columns[name].tolist() == limits[name].tolist() for name in "iub")
 
 
-def test_texts_return_as_they_were(tmp_path):
+def test_strings_survive_a_round_trip(tmp_path):
     texts = np.array(["a,b", 'c "d"', "", "line\nbreak", "ä"], object)
     write_csv(recording(range(5), text=texts), tmp_path / "x.csv")
     assert read_csv(tmp_path / "x.csv").columns["text"].tolist() == texts.tolist()
@@ -87,12 +87,12 @@ def test_a_run_without_rows_keeps_its_columns(tmp_path):
     assert list(empty.columns) == ["x"]
 
 
-def test_folders_are_made_and_nothing_else_is_left(tmp_path):
+def test_missing_folders_are_created_and_no_temporary_file_remains(tmp_path):
     write_csv(recording([0.0], x=[1.0]), tmp_path / "runs" / "demo" / "result.csv")
     assert [path.name for path in (tmp_path / "runs" / "demo").iterdir()] == ["result.csv"]
 
 
-def test_a_failure_leaves_the_former_file_alone(tmp_path):
+def test_a_failed_write_keeps_the_existing_file(tmp_path):
     path = tmp_path / "result.csv"
     path.write_text("former")
     with pytest.raises(ValueError, match="zip"):
@@ -127,7 +127,7 @@ def test_files_of_other_programs_are_read(tmp_path):
         ("time,x\n0,1\n0.2,2\n0.1,2\n", r"time goes back from 0\.2 s to 0\.1 s"),
     ],
 )
-def test_what_cannot_be_read_is_refused(tmp_path, text, message):
+def test_unreadable_input_is_refused(tmp_path, text, message):
     with pytest.raises(InputError, match=message):
         read_csv(written(tmp_path, text))
 

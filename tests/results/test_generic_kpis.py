@@ -1,4 +1,4 @@
-"""The KPIs of any signal, against closed forms of first- and second-order systems."""
+"""KPIs of any signal compared with closed forms of first- and second-order systems."""
 
 import json
 import math
@@ -39,7 +39,7 @@ def test_rise_time_of_first_order_is_tau_log_nine():
     assert value(kpis.rise_time, "first", low=0.0, high=1 - math.exp(-1)) == pytest.approx(TAU, rel=1e-7)
 
 
-def test_steps_go_from_anywhere_to_anywhere():
+def test_step_response_with_given_initial_value_and_target():
     assert value(kpis.rise_time, "step") == pytest.approx(TAU * math.log(9), rel=1e-7)
     shifted = run(TIME + 3, late=np.where(TIME < 1, 0.2, first_order))
     assert value(kpis.rise_time, "late", result=shifted, start=4.0, initial=0.0, target=1.0) == pytest.approx(
@@ -67,19 +67,19 @@ def test_a_downward_step_overshoots_downwards():
 
 
 def test_settling_of_second_order_ends_with_its_last_swing():
-    """After it the envelope exp(-zeta omega t) / sqrt(1 - zeta^2) may be outside, the response is not."""
+    """Afterwards the envelope exp(-zeta omega t) / sqrt(1 - zeta^2) may be outside the band, but not the response."""
     settled = value(kpis.settling_time, "second", target=1.0)
     assert settled <= math.log(1 / (0.02 * math.sqrt(1 - ZETA**2))) / (ZETA * OMEGA)
     assert np.abs(np.interp(settled, TIME, second_order) - 1) == pytest.approx(0.02)
     assert np.abs(second_order[settled + 1e-9 < TIME] - 1).max() < 0.02
 
 
-def test_what_never_settles_has_no_settling_time():
+def test_settling_time_is_nan_without_settling():
     assert math.isnan(value(kpis.settling_time, "sine", target=1.0))
     assert value(kpis.settling_time, "first", initial=0.0, target=1.0, start=10.0) == 0.0
 
 
-def test_no_step_has_no_step_response():
+def test_step_kpis_are_nan_without_a_step():
     flat = run(x=np.ones_like(TIME))
     for function in (kpis.rise_time, kpis.overshoot, kpis.settling_time):
         assert math.isnan(value(function, "x", result=flat))
@@ -108,20 +108,20 @@ def test_time_in_itae_begins_with_the_window():
     assert value(kpis.itae, "first", 1.0, result=late, start=100.0) == pytest.approx(TAU**2, rel=1e-6)
 
 
-def test_a_sine_has_its_textbook_figures():
+def test_kpis_of_a_sine_match_closed_forms():
     assert value(kpis.rms, "sine") == pytest.approx(3 / math.sqrt(2))
     assert value(kpis.mean, "sine") == pytest.approx(0, abs=1e-12)
     assert value(kpis.mean, "sine", stop=0.5) == pytest.approx(6 / math.pi, rel=1e-6)
     assert (value(kpis.maximum, "sine"), value(kpis.minimum, "sine"), value(kpis.peak, "sine", 1.0)) == pytest.approx((3, -3, 4))
 
 
-def test_errors_are_those_to_another_signal():
+def test_target_can_be_another_signal():
     two = run(x=first_order + 0.25, reference=first_order)
     assert value(kpis.rms, "x", "reference", result=two) == pytest.approx(0.25)
     assert value(kpis.final, "x", "reference", result=two) == pytest.approx(0.25)
 
 
-def test_rows_count_by_the_time_they_stand_for():
+def test_averages_weight_rows_by_their_duration():
     uneven = run([0, 1, 1, 4], x=[0.0, 0.0, 2.0, 2.0])
     assert value(kpis.mean, "x", result=uneven) == 1.5
     assert value(kpis.rms, "x", result=uneven) == pytest.approx(math.sqrt(3))
@@ -139,7 +139,7 @@ def test_energy_is_the_integral_of_power():
     assert value(kpis.energy, "t", -2.0, stop=3.0) == pytest.approx(-9)
 
 
-def test_what_is_not_a_number_is_neither_settled_nor_unsaturated():
+def test_nan_makes_settling_and_saturation_nan():
     for place in (3, -1):
         values = np.array([0.0, 0.5, 1.0, 1.0, 1.0, 1.0])
         values[place] = math.nan
@@ -159,7 +159,7 @@ FUNCTIONS = [
 
 
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda function: function.__name__)
-def test_outside_the_run_there_are_no_numbers(function):
+def test_kpis_outside_the_run_are_nan(function):
     arguments = {"level": 0.5} if function is kpis.time_to_reach else {}
     window = {"stop": -1.0} if function is kpis.final else {"start": 30.0}
     assert math.isnan(value(function, "first", **arguments, **window))
@@ -183,7 +183,7 @@ def scenario(folder, **kpi):
     return run_cosim("run", "saw.json", "--isolation", "none", cwd=folder)
 
 
-def test_scenarios_name_them_by_their_module(tmp_path):
+def test_a_scenario_names_a_kpi_by_its_module(tmp_path):
     done = scenario(tmp_path, python="cosim.kpis:time_to_reach", arguments={"signal": "a.y", "level": 0.75})
     assert done.returncode == 0, done.stderr
     assert json.loads((tmp_path / "runs/saw/kpis.json").read_text()) == {"x.value": 0.75}
@@ -200,7 +200,7 @@ def test_scenarios_name_them_by_their_module(tmp_path):
         ("cosim/kpis:rms", {}, 'expected "file.py:function" or "package.module:function", found "cosim/kpis:rms"'),
     ],
 )
-def test_what_is_not_there_is_refused_before_the_run(tmp_path, python, arguments, message):
+def test_unknown_kpis_and_signals_are_refused_before_the_run(tmp_path, python, arguments, message):
     done = scenario(tmp_path, python=python, arguments=arguments)
     assert done.returncode == 2
     assert message in done.stderr

@@ -1,4 +1,4 @@
-"""KPIs are functions of a result; checks hold their numbers against limits."""
+"""Evaluation of KPIs and checks."""
 
 import math
 
@@ -21,7 +21,7 @@ def extent(result, signal, above=0.0):
     return {"largest": values.max(), "exceeds": values.max() > above, "rows": np.int32(len(values))}
 
 
-def test_numbers_are_named_and_become_plain():
+def test_kpi_values_are_named_python_numbers():
     values = evaluate_kpis(RESULT, [("all", extent, {"signal": "x"}), ("high", extent, {"signal": "x", "above": 5})])
     assert values == {
         **{"all.largest": 4.0, "all.exceeds": True, "all.rows": 3},
@@ -108,7 +108,7 @@ def test_anything_but_numbers_is_refused(returned, message):
         ({"equals": math.nan}, math.nan, False),
     ],
 )
-def test_limits_hold_their_own_value(limits, value, passed):
+def test_limits_include_their_own_value(limits, value, passed):
     check = {"kpi": "landing.error", **limits}
     assert evaluate_checks({"landing.error": value}, [check]) == [(check, value, passed)]
 
@@ -124,8 +124,8 @@ def test_all_bad_checks_are_refused_together():
     ]
 
 
-def test_a_check_of_a_kpi_that_was_not_evaluated_is_not_met():
-    """In a result no check may be missing, and a misspelt one is none that passed."""
+def test_a_check_of_a_missing_kpi_fails():
+    """A result contains every check, also one with a misspelt name."""
     eror, error = evaluate_all_checks(
         {"landing.error": 0.0}, [{"kpi": "landing.eror", "max": 1}, {"kpi": "landing.error", "max": 1}]
     )
@@ -133,7 +133,7 @@ def test_a_check_of_a_kpi_that_was_not_evaluated_is_not_met():
     assert str(eror) == "landing.eror is nan, expected max 1"
 
 
-def test_a_run_from_python_tells_which_checks_it_did_not_meet():
+def test_repr_of_a_result_lists_failed_checks():
     result = cosim.run("demo1_box", stop_time=0.1)
     failed = {outcome.check["kpi"] for outcome in result.checks if not outcome.passed}
     assert len(result.checks) == 5 and "landing.landed_at_end" in failed

@@ -1,4 +1,4 @@
-"""Recordings as MCAP, read back by the reference reader of the format and the reference decoder of its protobuf messages."""
+"""MCAP files, read by the reference implementations of MCAP and protobuf."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_poses_are_transforms_from_the_world(file):
         assert turn == [given.columns[f"plant.uav.orientation.{axis}"][row] for axis in "wxyz"]
 
 
-def test_what_has_no_orientation_has_no_pose():
+def test_a_position_without_orientation_is_no_pose():
     assert find_poses(recording()) == ["plant.uav"]
 
 
@@ -145,7 +145,7 @@ def test_the_run_is_described(file):
     assert about.metadata == {"name": '"demo"', "versions": '{"cosim": "1"}'}
 
 
-def test_the_file_is_whole_and_the_same_each_time(file, tmp_path):
+def test_the_same_recording_gives_the_same_mcap_file(file, tmp_path):
     with file.open("rb") as stream:
         statistics = mcap_reader.make_reader(stream, validate_crcs=True).get_summary().statistics
     assert (statistics.message_count, statistics.message_end_time) == (1 + 4 * ROWS, 240_000_000)
@@ -158,19 +158,19 @@ def test_runs_that_start_before_zero_are_shifted(tmp_path):
     assert [message.log_time for _, message, _ in messages(tmp_path / "early.mcap", "/tf")][:2] == [0, 10_000_000]
 
 
-def test_pieces_fit_together(tmp_path, monkeypatch):
+def test_chunks_are_joined_without_gaps(tmp_path, monkeypatch):
     monkeypatch.setattr(mcap_files, "ROWS_PER_CHUNK", 10)
     write_mcap(recording(), tmp_path / "r.mcap")
     assert [values["mode"]["value"] for _, _, values in json_messages(tmp_path / "r.mcap", "/signals/uav")] == list(range(ROWS))
 
 
-def test_nothing_recorded_is_an_empty_file(tmp_path):
+def test_an_empty_recording_gives_an_empty_file(tmp_path):
     Result(Recording(np.empty(0), {}, {})).to_mcap(tmp_path / "empty.mcap", SCENE)
     with (tmp_path / "empty.mcap").open("rb") as stream:
         assert mcap_reader.make_reader(stream).get_summary().statistics.message_count == 0
 
 
-def test_the_package_is_asked_for_when_it_is_missing(tmp_path, monkeypatch):
+def test_a_missing_package_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "foxglove", None)
     with pytest.raises(InputError, match=r'pip install "fmi-cosim\[mcap\]"'):
         write_mcap(recording(), tmp_path / "r.mcap")

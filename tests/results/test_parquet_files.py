@@ -1,4 +1,4 @@
-"""Recordings as Parquet, read back by pyarrow itself."""
+"""Parquet files, read by pyarrow."""
 
 import sys
 
@@ -33,7 +33,7 @@ def test_every_column_returns_in_its_own_type(tmp_path):
         assert table[name].to_pylist() == values.tolist()
 
 
-def test_units_stand_in_the_schema(tmp_path):
+def test_units_are_in_the_schema(tmp_path):
     write_parquet(recording(), tmp_path / "r.parquet")
     schema = parquet.read_schema(tmp_path / "r.parquet")
     assert [schema.field(name).metadata[b"unit"] for name in ("time", "a.x", "a.n")] == [b"s", b"m/s", b""]
@@ -54,7 +54,7 @@ def test_a_slice_of_structured_rows_is_written_as_it_is(tmp_path):
     assert parquet.read_table(tmp_path / "r.parquet")["n"].to_pylist() == list(range(10))
 
 
-def test_no_rows_are_a_file_too(tmp_path):
+def test_a_recording_without_rows_gives_a_file(tmp_path):
     write_parquet(recording(0), tmp_path / "r.parquet")
     assert parquet.read_table(tmp_path / "r.parquet").num_rows == 0
 

@@ -1,4 +1,4 @@
-"""A result is asked for signals by name or pattern, and writes itself to a folder."""
+"""Results: access to signals, text representation, files."""
 
 import json
 import math
@@ -44,7 +44,7 @@ def test_an_unknown_signal_is_a_key_error_too(result):
     assert "wind" not in result
 
 
-def test_who_asks_for_the_time_as_a_signal_is_sent_to_it(result):
+def test_the_time_as_signal_is_refused_with_a_hint(result):
     with pytest.raises(InputError, match=r"the time of each row is in `result.time`$"):
         result["time"]
 
@@ -71,7 +71,7 @@ def test_a_star_matches_dots_and_brackets(result, pattern, places):
     assert result.signals(pattern) == [list(result)[place] for place in places]
 
 
-def test_a_result_is_shown_as_what_ran_and_its_kpis(result):
+def test_repr_shows_name_size_failure_and_kpis(result):
     assert repr(result) == "Result: 2 rows of 5 signals, 0 s to 0.01 s"
     kpis = {"landing.lateral_error": 0.05, "landing.landed_at_end": True, "landing.bounces": 2}
     about = {"name": "demo", "failure": "uav: fmi2DoStep failed", "kpi_units": {"landing.lateral_error": "m"}}
@@ -98,7 +98,7 @@ def test_csv_keeps_every_signal(result, tmp_path):
     assert np.array_equal(returned.time, result.time)
 
 
-def test_a_run_is_three_files(result, tmp_path):
+def test_write_run_writes_three_files(result, tmp_path):
     kpis = {"landing.lateral_error": 0.05, "landing.slide": math.nan, "landing.landed_at_end": True, "landing.bounces": 2}
     metadata = {"name": "demo", "seeds": np.array([1, 2]), "limit": np.float64(math.inf), "scenario": Path("a/b.json")}
     write_run(Result(result.recording, kpis, {"loop_seconds": 0.5}, metadata), tmp_path / "runs" / "demo")

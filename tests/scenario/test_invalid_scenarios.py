@@ -230,10 +230,10 @@ def test_incompatible_units_and_types_are_refused(folder, probes):
         connection("a.i_out", "b.f_in"),
     ]
     assert [line.split(": ", 2)[2] for line in refused(folder, xml, wires)] == [
-        "a.s_out cannot feed b.u: type String does not become Float64",
-        "a.b_out cannot feed b.int8_in: type Boolean does not become Int8",
-        "b.uint64_out cannot feed a.u: type UInt64 does not become Float64",
-        "a.i_out cannot feed b.f_in: type Int32 does not become Float32",
+        "a.s_out cannot feed b.u: type String cannot be converted to Float64",
+        "a.b_out cannot feed b.int8_in: type Boolean cannot be converted to Int8",
+        "b.uint64_out cannot feed a.u: type UInt64 cannot be converted to Float64",
+        "a.i_out cannot feed b.f_in: type Int32 cannot be converted to Float32",
     ]
 
 

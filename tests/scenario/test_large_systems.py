@@ -3,7 +3,7 @@
 import json
 
 import cosim
-import cosim.components.fmi.file
+from cosim.components.fmi import file, instance
 
 
 def ring(folder, probe, size):
@@ -24,13 +24,9 @@ def ring(folder, probe, size):
 
 def test_one_file_is_extracted_and_loaded_once(tmp_path, probe, monkeypatch):
     extracted, loaded = [], []
-    extract, open_library = cosim.components.fmi.file.extract, cosim.components.fmi.instance.FmuInstance._load_library
-    monkeypatch.setattr(cosim.components.fmi.file, "extract", lambda *args: extracted.append(args) or extract(*args))
-    monkeypatch.setattr(
-        cosim.components.fmi.instance.FmuInstance,
-        "_load_library",
-        lambda self, *args: loaded.append(args) or open_library(self, *args),
-    )
+    extract, load_library = file.extract, instance.load_library
+    monkeypatch.setattr(file, "extract", lambda *args: extracted.append(args) or extract(*args))
+    monkeypatch.setattr(instance, "load_library", lambda *args: loaded.append(args) or load_library(*args))
     result = cosim.run(ring(tmp_path, probe, 20))
     assert (len(extracted), len(loaded)) == (1, 1)
     assert all(result[f"p{i}.y"][-1] == 1.0 for i in range(20))

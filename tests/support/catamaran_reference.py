@@ -1,7 +1,7 @@
-"""The catamaran in six degrees of freedom a second time, in plain numpy with a rotation matrix, for comparison with the plant.
+"""Independent NumPy implementation of the Strider in six degrees of freedom.
 
-Nothing here is shared with the plant but the numbers of hull and sea: rigid body and added mass as matrices, Coriolis loads as
-matrices (Fossen 2021, equations 3.60 and 6.43), waves with the functions of numpy, and an eighth-order method.
+Only the parameters of hull and sea are shared with the plant. The attitude is a rotation matrix, mass and Coriolis terms are
+matrices (Fossen 2021, eqs. 3.60 and 6.43), and the equations are integrated with an eighth-order method.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ def skew(v: np.ndarray) -> np.ndarray:
 
 
 def wave_kinematics(sea: Sea, x: float, y: float, yaw: float, time: float) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-    """Elevation, slopes, velocity and acceleration of the water, as the hull feels them."""
+    """Return elevation, slopes, velocity and acceleration of the water averaged over the hull."""
     k = sea.frequency**2 / GRAVITY
     kx, ky = k * np.cos(sea.direction), k * np.sin(sea.direction)
     ahead, abeam = k * np.cos(sea.direction - yaw), k * np.sin(sea.direction - yaw)
-    smooth = np.exp(-(ahead**2 * RADII_SQUARED[0] + abeam**2 * RADII_SQUARED[1]) / 2 - k * p.DRAUGHT)
-    a, angle, w = sea.amplitude * smooth, kx * x + ky * y - sea.frequency * time + sea.phase, sea.frequency
+    attenuation = np.exp(-(ahead**2 * RADII_SQUARED[0] + abeam**2 * RADII_SQUARED[1]) / 2 - k * p.DRAUGHT)
+    a, angle, w = sea.amplitude * attenuation, kx * x + ky * y - sea.frequency * time + sea.phase, sea.frequency
     along = np.array([np.cos(sea.direction), np.sin(sea.direction)])
     velocity = np.array([*(along * (a * w * np.cos(angle))).sum(axis=1), (a * w * np.sin(angle)).sum()])
     acceleration = np.array([*(along * (a * w**2 * np.sin(angle))).sum(axis=1), -(a * w**2 * np.cos(angle)).sum()])
@@ -53,7 +53,7 @@ def flow_coriolis(relative: np.ndarray) -> np.ndarray:
 
 @dataclass
 class Catamaran:
-    """Held inputs and surroundings."""
+    """Constant inputs and environment."""
 
     sea: Sea = CALM
     thrust: float = 0.0

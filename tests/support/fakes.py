@@ -1,4 +1,4 @@
-"""Small components for tests: real implementations of the contract, made from a function."""
+"""Small components for tests, made from functions: complete implementations of `Component`."""
 
 from __future__ import annotations
 
@@ -11,17 +11,20 @@ from cosim.core.component import Component, Ports, StepResult, Variable
 
 
 def inputs(*names: str, **attributes: Any) -> list[Variable]:
+    """Return input variables with start value 0."""
     return [Variable(name, causality="input", start=0.0, **attributes) for name in names]
 
 
 def outputs(*names: str, **attributes: Any) -> list[Variable]:
+    """Return output variables."""
     return [Variable(name, causality="output", **attributes) for name in names]
 
 
 class FakeComponent(Component):
-    """Steps by `step(values, time, step_size)`, which changes `values` (by variable name) in place.
+    """Component whose step is a function.
 
-    `feed(values)`, if given, makes outputs follow inputs already in initialization mode.
+    `step(values, time, step_size)` changes the values (by variable name) in place. `feed_through(values)` computes outputs
+    directly from inputs, in initialization mode too. `calls` lists the calls of the life cycle.
     """
 
     binds_everything = False
@@ -31,7 +34,7 @@ class FakeComponent(Component):
         self,
         variables: Sequence[Variable],
         step: Callable[[dict[str, Any], float, float], StepResult | None],
-        feed_through: Callable[[dict[str, Any]], None] = lambda values: None,
+        feed_through: Callable[[dict[str, Any]], None] = lambda _: None,
         start: Mapping[str, Any] | None = None,
     ):
         self.variables = list(variables)
@@ -52,7 +55,7 @@ class FakeComponent(Component):
     def get(self, name: str) -> Any:
         return self.values[name]
 
-    def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
+    def enter_initialization_mode(self, _start_time: float, _stop_time: float) -> None:
         self.calls.append("enter")
 
     def exit_initialization_mode(self) -> None:
@@ -90,35 +93,36 @@ class FakeComponent(Component):
 
 
 def _variables_with_values(ports: Ports) -> list[tuple[str, np.ndarray]]:
-    filled = dict.fromkeys(ports.arrays, 0)
-    pieces = []
+    """Pair each variable's name with its part of the bound array."""
+    next_index = dict.fromkeys(ports.arrays, 0)
+    parts = []
     for variable in ports.variables:
-        begin, size = filled[variable.dtype], len(variable.scalar_names)
-        pieces.append((variable.name, ports.arrays[variable.dtype][begin : begin + size]))
-        filled[variable.dtype] += size
-    return pieces
+        begin, size = next_index[variable.dtype], len(variable.scalar_names)
+        parts.append((variable.name, ports.arrays[variable.dtype][begin : begin + size]))
+        next_index[variable.dtype] += size
+    return parts
 
 
 def gain(factor: float = 1.0, start: float = 0.0) -> FakeComponent:
-    """y = factor * u, direct feed-through, also in initialization mode."""
+    """Return a component with y = factor * u (direct feed-through, in initialization mode too)."""
 
     def feed(values: dict[str, Any]) -> None:
         values["y"] = factor * values["u"]
 
-    return FakeComponent([*inputs("u"), *outputs("y")], lambda values, t, h: feed(values), feed, {"y": start})
+    return FakeComponent([*inputs("u"), *outputs("y")], lambda values, _, __: feed(values), feed, {"y": start})
 
 
 def integrator(start: float = 0.0) -> FakeComponent:
-    """y' = u by explicit Euler."""
+    """Return a component with y' = u, integrated by explicit Euler."""
 
-    def step(values: dict[str, Any], t: float, h: float) -> None:
+    def step(values: dict[str, Any], _: float, h: float) -> None:
         values["y"] += h * values["u"]
 
     return FakeComponent([*inputs("u"), *outputs("y")], step, start={"y": start})
 
 
 def clock() -> FakeComponent:
-    """y = the time at the end of the step."""
+    """Return a component with y = time (s) at the end of the step."""
 
     def step(values: dict[str, Any], t: float, h: float) -> None:
         values["y"] = t + h
@@ -127,9 +131,9 @@ def clock() -> FakeComponent:
 
 
 def counter() -> FakeComponent:
-    """y counts steps, n is the same as an Integer."""
+    """Return a component that counts its steps: y as a float, n as an integer."""
 
-    def step(values: dict[str, Any], t: float, h: float) -> None:
+    def step(values: dict[str, Any], _: float, __: float) -> None:
         values["y"] += 1.0
         values["n"] += 1
 

@@ -1,8 +1,8 @@
-"""Multirotors a second time, from their data sheets, for comparison with the plant: nothing here is shared with it.
+"""Independent implementation of the multirotors from their data sheets; no code is shared with the plant.
 
-The body is a rotation matrix in a frame forward-right-down at the centre of mass, the rotor speeds are states that lag behind
-the commands, the ground effect is the published formula for a square of rotors and its counterpart for a hexagon, and
-everything is integrated with an eighth-order method and tight tolerances.
+The attitude is a rotation matrix, the body frame is forward-right-down at the centre of mass, and the rotor speeds are states
+that lag behind their commands. The ground effect is the published formula for a square of rotors and its counterpart for a
+hexagon. The equations are integrated with an eighth-order method and tight tolerances.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ RPM = 2 * np.pi / 60
 
 @dataclass(frozen=True)
 class Vehicle:
-    """Data in forward-left-up; `turning` is the sense in which each rotor itself turns, seen from above: +1 counter-clockwise."""
+    """Data sheet, body frame forward-left-up; `spin_directions` of the rotors seen from above: +1 counter-clockwise."""
 
     mass: float
     inertia: np.ndarray
@@ -30,7 +30,7 @@ class Vehicle:
     torque: float
     max_rotor_speed: float
     radius: float
-    inflow_reduction: Callable[[float], float]  # height -> share of the inflow that the surface takes away
+    inflow_reduction: Callable[[float], float]  # height (m) -> relative reduction of the inflow by the surface
     time_constant: float
     rotor_inertia: float
     rotor_drag: np.ndarray
@@ -44,25 +44,25 @@ class Vehicle:
 def square_ground_effect(radius: float, side: float) -> Callable[[float], float]:
     """Sanchez-Cuevas, Heredia and Ollero 2017, equation 4, for four rotors at the corners of a square."""
 
-    def blowing(z: float) -> float:
+    def inflow_reduction(z: float) -> float:
         own, beside = (radius / (4 * z)) ** 2, radius**2 * z / np.sqrt((side**2 + 4 * z**2) ** 3)
         return own + beside + radius**2 / 2 * z / np.sqrt((2 * side**2 + 4 * z**2) ** 3)
 
-    return blowing
+    return inflow_reduction
 
 
 def hexagon_ground_effect(radius: float, arm: float) -> Callable[[float], float]:
-    """The same for six rotors: two at the distance of an arm, two at sqrt(3) arms and one opposite."""
+    """Ground effect of six rotors on a hexagon: two neighbours at one arm length, two at sqrt(3) and one at 2."""
 
-    def blowing(z: float) -> float:
+    def inflow_reduction(z: float) -> float:
         image = lambda d: radius**2 / 2 * z / (d**2 + 4 * z**2) ** 1.5  # noqa: E731
         return (radius / (4 * z)) ** 2 + 2 * image(arm) + 2 * image(np.sqrt(3) * arm) + image(2 * arm)
 
-    return blowing
+    return inflow_reduction
 
 
 def _hexagon_inertia() -> np.ndarray:
-    """Of the survey hexacopter, from its component list by moments about the frame's middle and the parallel axis theorem."""
+    """Inertia of the survey hexacopter from its components, by moments about the frame's centre and the parallel axis theorem."""
     hub, battery, camera, arm, motor, length = 1.4, 1.5, 0.5, 0.08, 0.15, 0.34
     mass = hub + battery + camera + 6 * (arm + motor)
     centre = (battery * -0.06 + camera * -0.14 + 6 * motor * 0.02) / mass
@@ -113,7 +113,7 @@ VEHICLES = {
 
 @dataclass(frozen=True)
 class HeldInputs:
-    """What acts during a segment of a flight: commands, loads and wind (world frame), height above a surface."""
+    """Constant inputs during a segment of a flight: commands, loads and wind (world frame), height above a surface (m)."""
 
     duration: float
     command: np.ndarray
@@ -126,20 +126,20 @@ class HeldInputs:
 def initial_state(
     position: Sequence[float], velocity: Sequence[float], rates: Sequence[float], speed: float, count: int
 ) -> np.ndarray:
-    """A level vehicle with its nose along x: position and velocity (world), rotation and rates (forward-right-down), rotors."""
+    """Return the state of a level vehicle heading along x; velocity in the world frame, rates forward-left-up."""
     return np.concatenate([position, velocity, FLIP.ravel(), FLIP @ rates, np.full(count, speed)])
 
 
-#: number of a segment; velocity (world), upward direction and rates (forward-left-up) at its start -> what acts in it
+#: function of segment number, velocity (world), up axis and rates (forward-left-up) at its start -> inputs
 InputFunction = Callable[[int, np.ndarray, np.ndarray, np.ndarray], HeldInputs]
 
 
 def simulate_flight(vehicle: Vehicle, state: np.ndarray, count: int, pilot: InputFunction) -> np.ndarray:
-    """The state after each of so many segments."""
+    """Return the state after each of `count` segments."""
     states = []
     for k in range(count):
         held = pilot(k, state[3:6], FLIP @ state[12:15], FLIP @ state[15:18])
-        rate = lambda t, x, held=held: _rate(vehicle, x, held)  # noqa: E731
+        rate = lambda _t, x, held=held: _rate(vehicle, x, held)  # noqa: E731
         state = solve_ivp(rate, (0, held.duration), state, "DOP853", rtol=1e-11, atol=1e-11).y[:, -1]
         states.append(state)
     return np.array(states)

@@ -1,7 +1,7 @@
-"""The vehicles' equations a second time, from the fact sheet of the original system, for comparison with the plant.
+"""Independent implementation of the AR.Drone and the planar Strider from the fact sheet of the original system.
 
-Nothing here is shared with the plant. The quadcopter is written in the original's body frame (x forward, y right, z down) with
-a rotation matrix instead of a quaternion, both are integrated with an eighth-order method and tight tolerances.
+No code is shared with the plant. The quadcopter uses the original's body frame (x forward, y right, z down) and a rotation matrix
+instead of a quaternion. Both vehicles are integrated with an eighth-order method and tight tolerances.
 """
 
 from __future__ import annotations
@@ -39,23 +39,23 @@ Segments = Sequence[tuple[float, np.ndarray]]  # (duration, held inputs)
 
 
 def integrate(rate: Callable[[np.ndarray, np.ndarray], np.ndarray], state: np.ndarray, segments: Segments) -> np.ndarray:
-    """The state at the end of each segment."""
+    """Return the state at the end of each segment."""
     states = []
     for duration, inputs in segments:
-        held = lambda t, x, inputs=inputs: rate(x, inputs)  # noqa: E731
+        held = lambda _t, x, inputs=inputs: rate(x, inputs)  # noqa: E731
         state = solve_ivp(held, (0, duration), state, "DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
         states.append(state)
     return np.array(states)
 
 
 def quadcopter_state(position: Sequence[float], yaw: float, velocity: Sequence[float], rates: Sequence[float]) -> np.ndarray:
-    """Position and velocity (world), rotation matrix and rates (forward-right-down), from rates given forward-left-up."""
+    """Return position and velocity (world), rotation matrix and rates (forward-right-down); `rates` are forward-left-up."""
     turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
     return np.concatenate([position, velocity, (turn @ FLIP).ravel(), FLIP @ rates])
 
 
 def quadcopter_rate(state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-    """Newton and Euler; inputs: four rotor speeds, external force and torque (world)."""
+    """Return the time derivative by Newton-Euler; inputs: four rotor speeds, external force and torque (world)."""
     velocity, to_world, rates = state[3:6], state[6:15].reshape(3, 3), state[15:18]
     squared = np.clip(inputs[:4], 0, MAX_ROTOR_SPEED) ** 2
     force, torque = np.zeros(3), np.zeros(3)
@@ -72,16 +72,16 @@ def quadcopter_rate(state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
 
 
 def rotational_energy(rates: np.ndarray) -> float:
-    """Kinetic energy (J) of the quadcopter's rotation, from rates forward-left-up."""
-    turning = FLIP @ rates
-    return float(turning @ _INERTIA @ turning) / 2
+    """Return the rotational energy (J) of the quadcopter for rates in forward-left-up."""
+    flipped = FLIP @ rates
+    return float(flipped @ _INERTIA @ flipped) / 2
 
 
 VESSEL_MASS, VESSEL_MOMENT = 4.11, 0.6391
 
 
 def vessel_rate(state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-    """State: x, y, yaw, surge, sway, yaw rate; inputs: thrust, rudder angle, external force and torque (world)."""
+    """Return the time derivative of x, y, yaw, surge, sway, yaw rate; inputs: thrust, rudder angle, force and torque (world)."""
     yaw, u, v, r = state[2:]
     thrust, delta = inputs[:2]
     heading = np.array([np.cos(yaw), np.sin(yaw)])

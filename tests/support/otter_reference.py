@@ -1,7 +1,7 @@
-"""The Otter USV a second time, in its original frames (north-east-down, forward-starboard-down), for comparison with the plant.
+"""Independent NumPy implementation of the Otter in its original frames (north-east-down, forward-starboard-down).
 
-Written from the description of Fossen's Marine Systems Simulator (`otter`, revision of 2026-06-27; Fossen 2021), in plain numpy
-with Euler angles and the classical Runge-Kutta method; nothing here is shared with the plant.
+It follows the model `otter` of Fossen's Marine Systems Simulator (revision of 2026-06-27; Fossen 2021) with Euler angles and the
+classical Runge-Kutta method. No code is shared with the plant.
 """
 
 from __future__ import annotations

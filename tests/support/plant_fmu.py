@@ -1,4 +1,4 @@
-"""One of the project's plant FMUs (FMI 2.0), run by FMPy."""
+"""Plant FMUs of the project (FMI 2.0), run by FMPy."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def unpack_fmu(name: str) -> str:
 
 
 class PlantFmu:
-    """An initialized instance, driven by names."""
+    """An initialized instance, accessed by variable names."""
 
     def __init__(self, name: str, start: Mapping[str, float]):
         folder = unpack_fmu(name)

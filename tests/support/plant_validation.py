@@ -1,10 +1,11 @@
-"""How the plant is validated: tests state quantities beside their references, and docs/validation.md is made of what they say.
+"""Validation of the plant: tests compare quantities with references, and docs/validation.md lists the comparisons.
 
-A test asks for the fixture `measured` and states
+A test requests the fixture `measured` and calls
 
     measured("Otter", "speed at 100/100 rad/s", found, expected, "m/s", "golden value of MSS `otter.m`", within=5e-6)
 
-which fails unless both agree. `pytest tests -m "" --validation FILE` runs the tests that do so and writes the document.
+which fails if the values differ by more than the limit. `pytest tests -m "" --validation FILE` runs these tests and writes the
+document.
 """
 
 from __future__ import annotations
@@ -43,27 +44,27 @@ MODELS = (
 
 INTRODUCTION = """# Validation
 
-Every model of the plant beside a reference that is independent of it, with the numbers that the tests measured. Written by
+Comparison of every plant model with an independent reference, with the values that the tests measured. This page is written by
 
 ```text
 pytest tests -m "" --validation docs/validation.md
 ```
 
-never by hand: a statement that is not met fails its test, and `tests/test_validation_document.py` fails where this page
-lists other statements than the tests make. Speed has a page of its own: [performance.md](performance.md).
+Do not edit it by hand. A comparison that exceeds its limit fails its test. `tests/test_validation_document.py` fails if this page
+and the tests list different comparisons. Speed is documented in [performance.md](performance.md).
 
-* *Reference* and *measured* are left out where the quantity is a deviation by itself. Of several values the worst stands here.
-* *Deviation* is absolute, or a share of the reference where it says "rel."; what is below 1e-12 is rounding. *Exact*: to the
-  last bit.
-* *DOP853* is the eighth-order Runge-Kutta method of SciPy with tolerances of 1e-11 and less, on equations written a second
-  time in NumPy.
+* *Reference* and *measured* are empty if the quantity is itself a deviation. Of several values the worst one is listed.
+* *Deviation* is absolute, or relative to the reference if it is marked "rel."; values below 1e-12 are rounding errors. *Exact*
+  means equal to the last bit.
+* *DOP853* is the eighth-order Runge-Kutta method of SciPy with tolerances of 1e-11 or less, applied to an independent
+  implementation of the equations in NumPy.
 """
 COLUMNS = ("quantity", "unit", "reference", "measured", "deviation", "limit", "source", "test")
 
 
 @dataclass(frozen=True)
 class Statement:
-    """What a test says that it measures; `test` is its file (below tests/) and function, `limit` as the document shows it."""
+    """A comparison without its values; `test` is its file (below tests/) and function, `limit` the text in the document."""
 
     model: str
     quantity: str
@@ -74,8 +75,8 @@ class Statement:
 
 
 def statement(test: str, model: str, what: str, unit: str, source: str, within: float = 0.0, relative: float = 0.0) -> Statement:
-    """The statement that these arguments of `measured` make."""
-    assert model in MODELS, f"{model} is none of {MODELS}"
+    """Return the statement of a call of `measured`."""
+    assert model in MODELS, f"unknown model {model}, expected one of {MODELS}"
     return Statement(model, what, unit, f"{relative:g} rel." if relative else f"{within:g}" if within else "exact", source, test)
 
 
@@ -98,17 +99,19 @@ class MeasurementCheck:
         relative: float = 0.0,
         case: str = "",
     ) -> None:
-        """Assert |found - expected| <= within, or relative |expected|, in every element; the test may state several cases."""
+        """Assert |found - expected| <= within, or <= relative |expected|, in every element; `case` names one of several cases."""
         test = f"{self.node.path.relative_to(TESTS).as_posix()}::{self.node.originalname}"
-        said = statement(test, model, what, unit, source, within, relative)
+        comparison = statement(test, model, what, unit, source, within, relative)
         values = worst_deviation(found, expected, bool(relative))
         where = {"case": case, "line": sys._getframe(1).f_lineno}
-        self.node.user_properties.append(("measured", {**asdict(said), **where, **values}))
-        assert values["deviation"] <= (relative or within), f"{model}: {what} {case}: {values}, expected within {said.limit}"
+        self.node.user_properties.append(("measured", {**asdict(comparison), **where, **values}))
+        assert values["deviation"] <= (relative or within), (
+            f"{model}: {what} {case}: {values}, expected within {comparison.limit}"
+        )
 
 
 def worst_deviation(found: ArrayLike, expected: ArrayLike, relative: bool) -> dict[str, float]:
-    """The pair that disagrees most."""
+    """Return the pair of values with the largest deviation."""
     pairs = np.broadcast_arrays(np.asarray(found, float), np.asarray(expected, float))
     values, references = (np.ravel(pair) for pair in pairs)
     deviations = np.abs(values - references) / (np.abs(references) if relative else 1.0)
@@ -117,7 +120,7 @@ def worst_deviation(found: ArrayLike, expected: ArrayLike, relative: bool) -> di
 
 
 def render_document(records: Sequence[dict[str, Any]]) -> str:
-    """The page: a table for each model, in the order of files, lines, statements and cases."""
+    """Return the document: a table for each model, ordered by files, lines and cases."""
     lines = [INTRODUCTION]
     sections = {model: list(table_rows(record for record in records if record["model"] == model)) for model in MODELS}
     for model, section in sections.items():
@@ -131,13 +134,13 @@ def table_line(cells: Iterable[str]) -> str:
 
 
 def table_rows(records: Iterable[dict[str, Any]]) -> Iterator[list[str]]:
-    """A row for each case of each quantity, with the largest deviation."""
+    """Yield a row for each case of each quantity, with the largest deviation."""
     for _, case in groupby(sorted(records, key=sort_key), sort_key):
         yield table_row(max(case, key=lambda record: record["deviation"]))
 
 
 def sort_key(record: dict[str, Any]) -> tuple[str, int, str]:
-    """File and line of a statement, and its case, so that 2 comes before 10."""
+    """Return file, line and case of a record, with numbers padded so that 2 comes before 10."""
     case = re.sub(r"\d+", lambda number: number[0].zfill(9), record["case"])
     return record["test"].partition("::")[0], record["line"], case
 
@@ -162,7 +165,7 @@ def format_deviation(deviation: float) -> str:
 
 
 class ValidationReport:
-    """Collects what tests measured, in this process or in those of pytest-xdist, and writes the page if all of them passed."""
+    """pytest plugin that collects the records, also of pytest-xdist workers, and writes the document if all tests passed."""
 
     def __init__(self, target: Path):
         self.target, self.records = target, []
@@ -177,5 +180,5 @@ class ValidationReport:
             self.target.write_text(render_document(self.records))
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter, exitstatus: int) -> None:
-        said = "written" if exitstatus == 0 else "not written, because tests failed"
-        terminalreporter.write_line(f"{self.target}: {said}")
+        outcome = "written" if exitstatus == 0 else "not written, because tests failed"
+        terminalreporter.write_line(f"{self.target}: {outcome}")

@@ -1,4 +1,4 @@
-"""Builds the hand-written foreign FMUs once per test session."""
+"""Probe FMUs: small FMUs of both FMI versions, hand-written in C and built once per test session."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
 def build_probe_fmu(version: int, folder: Path, identifier: str = "probe") -> Path:
-    """The probe as FMU of the given FMI version."""
+    """Build the probe FMU of an FMI major version; `identifier` is the file name of its library."""
     compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
     library, target = folder / f"probe{version}.so", folder / f"probe{version}.fmu"
     source = PROBE_SOURCES / f"probe{version}.c"
@@ -30,12 +30,13 @@ def build_probe_fmu(version: int, folder: Path, identifier: str = "probe") -> Pa
 
 @pytest.fixture(scope="session")
 def probes(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+    """Paths of the probe FMUs by FMI major version."""
     folder = tmp_path_factory.mktemp("probes")
     return {version: build_probe_fmu(version, folder) for version in (2, 3)}
 
 
 @pytest.fixture(params=[2, 3], ids=["FMI2", "FMI3"])
 def probe(request: pytest.FixtureRequest, probes: dict[int, Path]) -> Path:
-    """The foreign FMU, in each FMI version."""
+    """Path of the probe FMU, for each FMI version."""
     path: Path = probes[request.param]
     return path

@@ -1,4 +1,4 @@
-"""FMUs whose steps take long, for what runs on threads."""
+"""FMUs with slow steps, for tests of parallel execution."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ SOURCE = Path(__file__).parents[1] / "engine/slow_probe.c"
 
 
 def slow_fmu(folder: Path, name: str, seconds: float, wait: bool = False, *macros: str) -> Path:
-    """The FMI 2.0 probe with a doStep that takes so long, working or waiting (see slow_probe.c, also for further macros)."""
+    """Build the FMI 2.0 probe with a slow doStep.
+
+    Each step takes `seconds` (s) of computing, or of sleeping if `wait`. Further macros are defined in slow_probe.c.
+    """
     compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
     library, target = folder / f"{name}.so", folder / f"{name}.fmu"
     defined = [f"BUSY_NS={round(seconds * 1e9)}LL", *(["WAIT"] if wait else []), *macros]

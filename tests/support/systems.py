@@ -1,4 +1,4 @@
-"""Short ways to say what a test wants."""
+"""Helpers that build and run small systems from short texts."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from cosim.core.component import Component
 from cosim.core.recording import Recording
 from cosim.core.system import Connection, Endpoint, Stage, System
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.run_loop import Event, Settings, simulate
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Event, Settings
 
 
 def endpoint(name: str) -> Endpoint:
-    """ "a.y" as an endpoint; everything before the last dot is the component."""
-    component, _, slot = name.rpartition(".")
-    return Endpoint(component, slot)
+    """Return the endpoint of a name such as "a.y"; the text before the last dot is the component."""
+    component, _, scalar = name.rpartition(".")
+    return Endpoint(component, scalar)
 
 
 def make_system(components: Mapping[str, Component], wires: str = "", stages: Sequence[Stage] = (), **more: Any) -> System:
-    """A system from wires such as "a.y > b.u, b.y >2 a.u" (delay 2); default: all components in one stage."""
+    """Return a system with connections such as "a.y > b.u, b.y >2 a.u" (delay 2); default: all components in one stage."""
     connections = []
     for wire in filter(None, (part.strip() for part in wires.split(","))):
         source, arrow, target = wire.split()
@@ -31,7 +32,7 @@ def make_system(components: Mapping[str, Component], wires: str = "", stages: Se
 def run_system(
     system: System, stop: float | str, step: float | str = "1/100", record: Sequence[str] = (), events: Sequence[Event] = ()
 ) -> Recording:
-    """Simulate from 0 and return what was recorded; failures are raised."""
+    """Simulate from 0 s and return the recording; a failure is raised."""
     columns = {name: endpoint(name) for name in record}
     outcome = simulate(system, Settings(Fraction(0), exact_fraction(stop), exact_fraction(step), columns, events=events))
     if outcome.failure:
@@ -40,5 +41,5 @@ def run_system(
 
 
 def connection(source: str, target: str, **more: Any) -> dict[str, Any]:
-    """A connection as it stands in a scenario file."""
+    """Return a connection in the form of a scenario file."""
     return {"from": source, "to": target, **more}

@@ -1,4 +1,4 @@
-"""Worlds to try things in: bound like the engine binds them, driven by names."""
+"""Worlds for tests, bound as by the engine and accessed by variable names."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from cosim.engine.initialization import copy_start_values
 from plant_src.world import World
 
 DECK_TOP = 0.2689  # m above the water
-REST_HEIGHT = 0.0566 - 0.000577  # m of the quadcopter's centre of mass above what it stands on
+REST_HEIGHT = 0.0566 - 0.000577  # m; centre of mass of the quadcopter above the surface on which it stands
 PLATFORM = {"size": [4.0, 4.0, 0.05], "position": [0.0, 0.0, 0.475]}
 PLATFORM_TOP = 0.5
 
 
 class WorldHarness:
-    """A world with its bound arrays: step it and look at it."""
+    """A world with bound arrays; variables are read and set by `harness[name]`."""
 
     def __init__(
         self,
@@ -54,7 +54,7 @@ class WorldHarness:
 
     @property
     def bytes(self) -> bytes:
-        """Everything that is published, bit for bit."""
+        """All outputs as bytes, for bitwise comparison."""
         return b"".join(array.tobytes() for array in self.outputs.arrays.values())
 
 

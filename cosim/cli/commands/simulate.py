@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ...core.component import Component
     from ...core.recording import Recording
     from ...core.system import System
-    from ...engine.run_loop import Settings
+    from ...engine.settings import Settings
 
 FMU_NAME, PROFILE_NAME = "fmu", "profile"
 
@@ -110,7 +110,7 @@ def _build_system(
     """The FMU, and the profile if there is one, as a system of their own."""
     from ...components.fmi import FmuFile, create_component
     from ...core.system import Connection, Endpoint, System
-    from ...engine.run_loop import Settings
+    from ...engine.settings import Settings
 
     file = FmuFile(fmu)
     experiment = file.description.default_experiment

@@ -1,4 +1,4 @@
-"""FMUs as components; the only room that knows FMPy."""
+"""FMUs as components; the only package that uses FMPy at run time."""
 
 from ...core.component import Component
 from .description import DefaultExperiment, FmuDescription
@@ -13,13 +13,22 @@ __all__ = ["DefaultExperiment", "FmuDescription", "FmuFile", "Isolation", "creat
 def create_component(
     file: FmuFile, instance_name: str, logging_on: bool = False, isolation: Isolation | None = None
 ) -> Component:
-    """A component for the FMU, with `isolation` in a process of its own; no code of the FMU runs before `bind`.
+    """Create a component for one instance of an FMU.
 
-    Raises InputError when the FMU cannot run on this machine.
+    No code of the FMU runs here: its binary is loaded by `Component.instantiate`.
+
+    Args:
+        file: The FMU; instances of the same FMU share one `FmuFile`.
+        instance_name: Name of the FMU instance, used in messages too.
+        logging_on: Value of `loggingOn`, which enables the FMU's debug messages.
+        isolation: Settings of a worker process for the FMU; None runs the FMU in the importer's process.
+
+    Raises:
+        InputError: The FMU has no usable binary for this platform, or a worker process is not possible on it.
     """
-    kind = Fmi2Instance if file.description.major == 2 else Fmi3Instance
+    instance_class = Fmi2Instance if file.description.major == 2 else Fmi3Instance
     if isolation:
         from .isolated.isolated_fmu import IsolatedFmu
 
-        return IsolatedFmu(kind, file, instance_name, logging_on, isolation)
-    return kind(file, instance_name, logging_on)
+        return IsolatedFmu(instance_class, file, instance_name, logging_on, isolation)
+    return instance_class(file, instance_name, logging_on)

@@ -1,4 +1,4 @@
-"""The model description of an FMU in cosim's own terms."""
+"""Model description of an FMU as the importer uses it: variables with units and shapes, and capabilities."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
-from ...core.component import Variable
+from ...core.component import DTYPES, Causality, Variability, Variable
 from ...core.time_grid import exact_fraction
 from ...core.units import BASE_UNITS, Unit, parse_unit
 from .preflight import DEFAULT_LIMITS, Examination, PreflightLimits, examine, raise_errors
@@ -21,13 +21,16 @@ from .preflight.model_description import ModelDescription, ModelVariable, UnitDe
 from .preflight.rules_values import dimension_size, read_limit
 from .preflight.values import parse_value
 
+#: valid causalities and variabilities by name, to convert text to their literal types
+_CAUSALITIES: Mapping[str, Causality] = {name: name for name in get_args(Causality)}
+_VARIABILITIES: Mapping[str, Variability] = {name: name for name in get_args(Variability)}
 _C_INT = np.dtype(np.int32)
 _TRUE = ("true", "1")
 
 
 @dataclass(frozen=True)
 class DefaultExperiment:
-    """What the FMU proposes for a simulation (s, exact); None where it proposes nothing."""
+    """Default experiment of an FMU: exact times (s), None where an attribute is missing."""
 
     start_time: Fraction | None = None
     stop_time: Fraction | None = None
@@ -36,7 +39,23 @@ class DefaultExperiment:
 
 @dataclass(frozen=True)
 class FmuDescription:
-    """What an FMU says about itself. `references` maps variable names to value references."""
+    """Model description of an FMU.
+
+    Attributes:
+        fmi_version: `fmiVersion`, such as "2.0".
+        model_name: `modelName`.
+        model_identifier: `modelIdentifier` of the Co-Simulation interface.
+        instantiation_token: `instantiationToken` of FMI 3.0, `guid` of FMI 2.0.
+        description: `description`.
+        generation_tool: `generationTool`.
+        variables: All variables, including the aliases of FMI 3.0.
+        value_references: Value references by variable name, including aliases.
+        default_experiment: `DefaultExperiment`.
+        has_state: `canGetAndSetFMUState`.
+        once_per_process: `canBeInstantiatedOnlyOncePerProcess`.
+        needs_execution_tool: `needsExecutionTool`.
+        platforms: Platforms with a binary, as the FMU names their folders, and "c-code" if it contains sources.
+    """
 
     fmi_version: str
     model_name: str
@@ -54,23 +73,39 @@ class FmuDescription:
 
     @property
     def major(self) -> int:
+        """FMI major version, 2 or 3."""
         return int(self.fmi_version.split(".")[0])
 
 
 def read_description(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> FmuDescription:
-    """Read an FMU's description after the FMU was examined; nothing is extracted.
+    """Check an FMU and read its model description, without extracting anything.
 
-    Raises InputError with everything that is wrong when the file is no FMU, no safe one, or none that offers FMI 2.0 or
-    3.0 Co-Simulation. Whether it has a binary for this machine does not matter here.
+    The FMU needs no binary for this platform.
+
+    Args:
+        path: The FMU.
+        limits: Limits of the preflight check.
+
+    Raises:
+        InputError: The file is missing, is not a valid or safe FMU, or has no Co-Simulation interface of FMI 2.0 or 3.0.
     """
     return build_description(path, examine(path, limits))
 
 
 def build_description(path: Path, examination: Examination) -> FmuDescription:
-    """The description of an FMU that was examined. Raises InputError with the errors that were found."""
+    """Build the description of an examined FMU.
+
+    Args:
+        path: The FMU, for messages.
+        examination: Result of the preflight check.
+
+    Raises:
+        InputError: The examination found errors.
+    """
     raise_errors(path, examination.findings)
     model = examination.model
-    assert model is not None and model.co_simulation is not None  # anything else is an error that was found
+    assert model is not None  # otherwise the examination has found an error
+    assert model.co_simulation is not None
     units = {unit.name: _build_unit(unit) for unit in model.units}
     variables = [variable for source in model.variables for variable in _build_variables(model, source, units)]
     return FmuDescription(
@@ -93,7 +128,7 @@ def build_description(path: Path, examination: Examination) -> FmuDescription:
 def _build_unit(definition: UnitDefinition) -> Unit | None:
     base = definition.base_unit
     if base is None:
-        with suppress(ValueError):  # FMI leaves open what it means; as a rule what its name says
+        with suppress(ValueError):  # FMI does not define a unit without BaseUnit; its name usually does
             return parse_unit(definition.name)
         return None
     exponents = tuple(int(base.get(name, 0)) for name in BASE_UNITS)
@@ -105,35 +140,35 @@ def _names_with_aliases(source: ModelVariable) -> list[str]:
 
 
 def _build_variables(model: ModelDescription, source: ModelVariable, units: Mapping[str, Unit | None]) -> list[Variable]:
-    """The variable and its aliases."""
-    as_c_int = model.major == 2 and source.kind in ("Boolean", "Enumeration")
-    texts = [source.attribute("description"), *(alias.get("description") for alias in source.aliases)]
+    """Build a variable and its aliases."""
+    is_c_int = model.major == 2 and source.kind in ("Boolean", "Enumeration")
+    descriptions = [source.attribute("description"), *(alias.get("description") for alias in source.aliases)]
     return [
         Variable(
             name,
             source.kind,
-            source.causality,  # type: ignore[arg-type]
-            source.variability,  # type: ignore[arg-type]
+            _CAUSALITIES[source.causality],
+            _VARIABILITIES[source.variability],
             _parse_start(source),
             units.get(source.attribute("unit") or ""),
             tuple(dimension_size(model, dimension) or 0 for dimension in source.dimensions),
-            text or texts[0] or "",
+            description or descriptions[0] or "",
             _finite_limit(source, "min"),
             _finite_limit(source, "max"),
             _enumeration_items(source),
             source.attribute("relativeQuantity") in _TRUE,
-            _C_INT if as_c_int else None,  # type: ignore[arg-type]
+            _C_INT if is_c_int else DTYPES[source.kind],
         )
-        for name, text in zip(_names_with_aliases(source), texts, strict=True)
+        for name, description in zip(_names_with_aliases(source), descriptions, strict=True)
     ]
 
 
 def _parse_start(source: ModelVariable) -> Any:
-    """One value, or a tuple of them in row-major order."""
+    """Return the start value, a tuple in row-major order if there are several, or None."""
     if not source.start_words:
         return None
-    texts = source.kind in ("String", "Binary", "Clock")
-    values = [word if texts else parse_value(word, source.kind) for word in source.start_words]
+    is_text = source.kind in ("String", "Binary", "Clock")
+    values = [word if is_text else parse_value(word, source.kind) for word in source.start_words]
     return values[0] if len(values) == 1 else tuple(values)
 
 
@@ -155,7 +190,7 @@ def _build_default_experiment(experiment: Mapping[str, str]) -> DefaultExperimen
 
 
 def _parse_time(text: str) -> Fraction | None:
-    """A time that can be simulated."""
+    """Return an exact time (s), or None if the text is not a finite number."""
     with suppress(ValueError):
         return exact_fraction(text)
     return None

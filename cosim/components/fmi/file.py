@@ -1,4 +1,4 @@
-"""An FMU file: examined and described once, extracted once, however many instances it has."""
+"""FMU file on disk: checked, described, extracted and loaded once for all its instances."""
 
 from __future__ import annotations
 
@@ -18,53 +18,71 @@ from .preflight import DEFAULT_LIMITS, Examination, PreflightLimits, examine, ex
 
 @dataclass(frozen=True)
 class _BorrowedFolder:
-    """An extracted FMU that somebody else removes."""
+    """Folder of an extracted FMU that another process owns and removes."""
 
     name: str
 
     def cleanup(self) -> None:
-        pass
+        """Do nothing: the folder is not owned."""
 
 
 class FmuFile:
-    """One FMU on disk. Instances `acquire` the extracted folder and `release` it; the last one unloads and removes it.
+    """FMU file with its extracted folder and its loaded library, shared by all instances.
 
-    Nothing of the FMU is extracted before it was examined and found to be good; `limits` bound what that may cost.
+    Each instance calls `acquire` before it uses the folder and `release` afterwards; the last `release` unloads the library and
+    removes the folder. The FMU passes the preflight check before anything is extracted.
     """
 
     def __init__(self, path: Path, limits: PreflightLimits = DEFAULT_LIMITS):
+        """Prepare access to an FMU; the file is not opened yet.
+
+        Args:
+            path: The FMU.
+            limits: Limits of the preflight check.
+        """
         self.path, self.limits = path, limits
         self._folder: LockedFolder | _BorrowedFolder | None = None
         self._reference_count = 0
-        #: FMPy's object with the loaded library, which all instances share
+        #: FMPy's slave object with the loaded library, None while no instance has loaded it
         self.library: Any = None
-        #: an instance reported a fatal error: nothing of this FMU may be called any more
+        #: an instance returned fatal: no function of this FMU may be called any more (FMI 3.0 section 2.2.3)
         self.has_fatal_error = False
 
     @cached_property
     def examination(self) -> Examination:
+        """Result of the preflight check."""
         return examine(self.path, self.limits)
 
     @cached_property
     def description(self) -> FmuDescription:
+        """Model description; InputError if the preflight check found errors."""
         return build_description(self.path, self.examination)
 
     @cached_property
     def sha256(self) -> str:
+        """SHA-256 of the file, in hexadecimal."""
         with open_regular_file(self.path) as file:
             return file_digest(file, "sha256").hexdigest()
 
     def check_binary(self) -> None:
-        """Raises InputError when the FMU has no binary for this machine, or one that cannot be loaded."""
+        """Check that the FMU can be loaded on this platform.
+
+        Raises:
+            InputError: The FMU has errors, no binary for this platform, or one that cannot be loaded.
+        """
         raise_errors(self.path, [*self.examination.findings, *self.examination.binary_findings])
 
     def acquire(self) -> Path:
-        """The folder with the extracted FMU, until it is released. Raises InputError when it cannot be extracted."""
+        """Extract the FMU if necessary and return the folder, which exists until the matching `release`.
+
+        Raises:
+            InputError: The FMU does not pass the preflight check or cannot be extracted.
+        """
         if self._folder is None:
             self.check_binary()
             folder = LockedFolder(FMU_PREFIX)
             try:
-                with suspending_deadline():  # a large archive takes its time, which is no fault of the component
+                with suspending_deadline():  # extracting a large archive must not count as time of the component
                     extract(self.path, self.examination, Path(folder.name), self.limits)
             except OSError as error:
                 folder.cleanup()
@@ -77,18 +95,15 @@ class FmuFile:
         return Path(self._folder.name)
 
     def share(self) -> FmuFile:
-        """The same extracted FMU for another process, which loads the library itself."""
+        """Return a copy for a worker process: it uses the same extracted folder but loads the library itself."""
         assert self._folder is not None
         other = copy(self)
-        other._folder, other._reference_count, other.library, other.has_fatal_error = (
-            _BorrowedFolder(self._folder.name),
-            0,
-            None,
-            False,
-        )
+        other._folder, other._reference_count = _BorrowedFolder(self._folder.name), 0
+        other.library, other.has_fatal_error = None, False
         return other
 
     def release(self) -> None:
+        """Give up one use of the folder; the last one unloads the library and removes the folder."""
         self._reference_count -= 1
         if self._reference_count == 0 and self.library is not None and not self.has_fatal_error:
             self.library.freeLibrary()

@@ -1,1 +1,1 @@
-"""CasADi equations exported as FMUs."""
+"""Export of continuous models whose equations are CasADi expressions."""

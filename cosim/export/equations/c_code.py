@@ -1,7 +1,7 @@
-"""C code of a CasADi function: one line for each operation, in single assignment form.
+"""C code generation for CasADi functions: one statement per operation, in static single assignment form.
 
-CasADi's own generator emits a large interface beside the function; here only the function is wanted, so that the C code is
-readable, compiles without warnings and depends on nothing but the C mathematical library.
+CasADi's own code generator also emits a large interface around each function. This one emits the function only. The code is
+readable, compiles without warnings and depends only on the C mathematical library.
 """
 
 from __future__ import annotations
@@ -25,31 +25,12 @@ _OPERATIONS = {
     ca.OP_INV: "1.0 / {}",
     ca.OP_TWICE: "2.0 * {}",
     ca.OP_SQ: "{0} * {0}",
-    ca.OP_SQRT: "sqrt({})",
     ca.OP_POW: "pow({}, {})",
     ca.OP_CONSTPOW: "pow({}, {})",
-    ca.OP_EXP: "exp({})",
-    ca.OP_LOG: "log({})",
-    ca.OP_SIN: "sin({})",
-    ca.OP_COS: "cos({})",
-    ca.OP_TAN: "tan({})",
-    ca.OP_ASIN: "asin({})",
-    ca.OP_ACOS: "acos({})",
-    ca.OP_ATAN: "atan({})",
-    ca.OP_ATAN2: "atan2({}, {})",
-    ca.OP_SINH: "sinh({})",
-    ca.OP_COSH: "cosh({})",
-    ca.OP_TANH: "tanh({})",
-    ca.OP_HYPOT: "hypot({}, {})",
-    ca.OP_FABS: "fabs({})",
-    ca.OP_FLOOR: "floor({})",
-    ca.OP_CEIL: "ceil({})",
-    ca.OP_FMOD: "fmod({}, {})",
-    # not fmin and fmax: compilers call these, and they hide what is not a number
+    # not fmin and fmax: compilers do not inline them, and they suppress NaN
     ca.OP_FMIN: "{0} < {1} ? {0} : {1}",
     ca.OP_FMAX: "{0} > {1} ? {0} : {1}",
     ca.OP_SIGN: "(double)({0} > 0) - (double)({0} < 0)",
-    ca.OP_COPYSIGN: "copysign({}, {})",
     ca.OP_LT: "{} < {}",
     ca.OP_LE: "{} <= {}",
     ca.OP_EQ: "{} == {}",
@@ -59,36 +40,40 @@ _OPERATIONS = {
     ca.OP_OR: "{} || {}",
     ca.OP_IF_ELSE_ZERO: "{} != 0 ? {} : 0",
 }
-
+_TRIGONOMETRIC_FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")
+_UNARY_FUNCTIONS = (*_TRIGONOMETRIC_FUNCTIONS, "sqrt", "exp", "log", "fabs", "floor", "ceil")
+_OPERATIONS |= {getattr(ca, f"OP_{name.upper()}"): f"{name}({{}})" for name in _UNARY_FUNCTIONS}
+_OPERATIONS |= {getattr(ca, f"OP_{name.upper()}"): f"{name}({{}}, {{}})" for name in ("atan2", "hypot", "fmod", "copysign")}
 
 _SIGNATURE = "void {}(const double *const in[], double *const out[])"
 
 
 @dataclass(frozen=True)
 class Callee:
-    """A function that expressions call, with its body in C.
+    """A function with a hand-written C body that expressions call."""
 
-    `function` says what it computes, with one result. `body` reads `in[i][j]`, writes `out[i][j]` and may call the functions
-    that it `needs`. `attributes` stand before its definition.
-    """
-
+    #: the same function in CasADi, with one result
     function: ca.Function
+    #: C body, in braces: reads `in[i][j]` and writes `out[i][j]`, element j of argument i and of result i
     body: str
+    #: functions that the body calls
     required_functions: Sequence[ca.Function] = ()
+    #: C text in front of the definition
     attributes: str = ""
 
     def __call__(self, *arguments: ca.SX) -> ca.SX:
-        """The result, by a call that stays one in C."""
+        """Return the result as an expression that remains a function call in the generated C code."""
         return call_in_c(self.function, *arguments)[0]
 
 
 def call_in_c(function: ca.Function, *arguments: ca.SX) -> list[ca.SX]:
-    """The results of a function that is called in C instead of becoming part of the caller."""
-    return function.call(list(arguments), False, True)
+    """Return the results of a function as expressions that remain a function call in the generated C code (no inlining)."""
+    results: list[ca.SX] = function.call(list(arguments), False, True)
+    return results
 
 
 class ElementAccess(NamedTuple):
-    """Where element j of argument i and of result i lie in C."""
+    """C expressions for element j of argument i and element j of result i of a function, as functions of (i, j)."""
 
     argument: Callable[[int, int], str]
     result: Callable[[int, int], str]
@@ -97,18 +82,30 @@ class ElementAccess(NamedTuple):
 _POINTER_ACCESS = ElementAccess(lambda i, j: f"in[{i}][{j}]", lambda i, j: f"out[{i}][{j}]")
 
 
-def callee_definitions(functions: Iterable[ca.Function], known: Sequence[Callee] = ()) -> dict[str, str]:
-    """Name -> definition of the functions that these call, each after those that it calls itself."""
-    given = {callee.function.name(): callee for callee in known}
-    found: dict[str, str] = {}
+def callee_definitions(functions: Iterable[ca.Function], callees: Sequence[Callee] = ()) -> dict[str, str]:
+    """Generate the C functions that the given functions call, directly or indirectly.
+
+    Args:
+        functions: The calling functions.
+        callees: The called functions with a hand-written C body; the body of all others is generated.
+
+    Returns:
+        Function name -> C definition, each after the functions that it calls.
+
+    Raises:
+        ValueError: An operation has no counterpart in C.
+    """
+    hand_written = {callee.function.name(): callee for callee in callees}
+    definitions: dict[str, str] = {}
     for function in functions:
-        for inner in function.find_functions(0):
-            callee = given.get(inner.name())
-            found |= callee_definitions([inner] if callee is None else [], known)
-            for needed in callee.required_functions if callee else ():
-                found |= callee_definitions([needed], known) | {needed.name(): function_definition("static", needed)}
-            found[inner.name()] = _callee_definition(callee) if callee else function_definition("static", inner)
-    return found
+        for called in function.find_functions(0):
+            callee = hand_written.get(called.name())
+            definitions |= callee_definitions([called] if callee is None else [], callees)
+            for required in callee.required_functions if callee else ():
+                definitions |= callee_definitions([required], callees)
+                definitions |= {required.name(): function_definition("static", required)}
+            definitions[called.name()] = _callee_definition(callee) if callee else function_definition("static", called)
+    return definitions
 
 
 def _callee_definition(callee: Callee) -> str:
@@ -116,41 +113,56 @@ def _callee_definition(callee: Callee) -> str:
 
 
 def function_definition(linkage: str, function: ca.Function) -> str:
-    """The function in C, after a word about its linkage. Raises ValueError as `c_function` does."""
+    """Generate the C definition of a function.
+
+    Args:
+        linkage: Specifiers in front of the definition, for example "static".
+        function: The function, with scalar operations only (SX).
+
+    Raises:
+        ValueError: An operation has no counterpart in C.
+    """
     return f"{linkage} {_SIGNATURE.format(function.name())}\n{function_body(function)}"
 
 
 def function_body(function: ca.Function) -> str:
-    """The body of the function: reads `in[i][j]` and writes `out[i][j]`, element j of argument and result i.
+    """Generate the C body of a function, which reads `in[i][j]` and writes `out[i][j]`: element j of argument and result i.
 
-    What it calls by `called` is called (`callees` has the bodies).
-    Raises ValueError for an operation that has no counterpart in C.
+    Calls made by `call_in_c` remain calls; `callee_definitions` generates the called functions.
+
+    Raises:
+        ValueError: An operation has no counterpart in C.
     """
     return "{\n" + "".join(f"    {statement};\n" for statement in StatementGenerator(densify(function))) + "}\n"
 
 
 def densify(function: ca.Function) -> ca.Function:
-    """The function without structural zeros and common subexpressions."""
+    """Return the function with dense results and without common subexpressions."""
     arguments = [ca.SX.sym(f"a{i}", function.size_in(i)) for i in range(function.n_in())]
     results = ca.cse([ca.densify(result) for result in function.call(arguments)])
     return ca.Function(function.name(), arguments, results)
 
 
 class StatementGenerator:
-    """The statements of a function, each an assignment or a call.
+    """Iterable of the C statements of a function, each an assignment or a call, without semicolons.
 
-    `_values` maps places in CasADi's work vector to the C expression that holds their present value.
+    Args:
+        function: The function, without structural zeros (see `densify`).
+        access: C expressions of its arguments and results.
     """
 
-    def __init__(self, function: ca.Function, places: ElementAccess = _POINTER_ACCESS):
-        self._function, self._places = function, places
+    def __init__(self, function: ca.Function, access: ElementAccess = _POINTER_ACCESS):
+        self._function, self._access = function, access
+        #: index in CasADi's work vector -> C expression of its current value
         self._values: dict[int, str] = {}
         self._constants: dict[str, float] = {}
-        self._called = {inner.name(): inner for inner in function.find_functions(0)}
-        text = function.str(True).partition("Algorithm:\n")[2].splitlines() if self._called else []
-        self._names = [line.partition(" = ")[2].partition("(")[0] for line in text]
+        self._called = {called.name(): called for called in function.find_functions(0)}
+        # CasADi gives the name of the function that an instruction calls only in its listing of the algorithm
+        listing = function.str(True).partition("Algorithm:\n")[2].splitlines() if self._called else []
+        self._callee_names = [line.partition(" = ")[2].partition("(")[0] for line in listing]
 
     def __iter__(self) -> Iterator[str]:
+        """Generate the statements in order of execution."""
         for k in range(self._function.n_instructions()):
             operation = self._function.instruction_id(k)
             if operation == ca.OP_CALL:
@@ -164,7 +176,7 @@ class StatementGenerator:
 
     def _load_argument(self, k: int) -> None:
         argument, element = self._function.instruction_input(k)
-        self._values[self._function.instruction_output(k)[0]] = self._places.argument(argument, element)
+        self._values[self._function.instruction_output(k)[0]] = self._access.argument(argument, element)
 
     def _load_constant(self, k: int) -> None:
         value = self._function.instruction_constant(k)
@@ -173,25 +185,25 @@ class StatementGenerator:
 
     def _assign(self, k: int, operation: int) -> str:
         targets, operands = self._function.instruction_output(k), self._function.instruction_input(k)
-        values = [self._values[place] for place in operands]
+        values = [self._values[index] for index in operands]
         if operation == ca.OP_OUTPUT:
-            return f"{self._places.result(*targets)} = {values[0]}"
+            return f"{self._access.result(*targets)} = {values[0]}"
         self._values[targets[0]] = f"v{k}"
         return f"const double v{k} = {self._expression(operation, values)}"
 
     def _expression(self, operation: int, operands: list[str]) -> str:
-        """The expression of an operation; dividing by a constant takes four times as long as multiplying by its inverse."""
+        """Return the C expression of an operation; a division by a constant becomes a multiplication, which is faster."""
         divisor = self._constants.get(operands[-1]) if operation == ca.OP_DIV else None
         if divisor and math.isfinite(1 / divisor):
             return f"{operands[0]} * {_literal(1 / divisor)}"
         return _operation(self._function, operation).format(*operands)
 
     def _call(self, k: int) -> Iterator[str]:
-        """A call; arguments that lie side by side among those of this function are not copied."""
-        callee = self._called[self._names[k]]
-        places, arguments = iter(self._function.instruction_input(k)), []
+        """Generate a call; arguments that are consecutive elements of an argument of this function are not copied."""
+        callee = self._called[self._callee_names[k]]
+        operands, arguments = iter(self._function.instruction_input(k)), []
         for i in range(callee.n_in()):
-            values = [self._values[place] for place in islice(places, callee.nnz_in(i))]
+            values = [self._values[index] for index in islice(operands, callee.nnz_in(i))]
             arguments.append(pointer := _pointer(values) or f"c{k}_{i}")
             if pointer == f"c{k}_{i}":
                 yield f"const double {pointer}[] = {{{', '.join(values)}}}"
@@ -205,18 +217,18 @@ class StatementGenerator:
 
 
 def _pointer(values: Sequence[str]) -> str | None:
-    """The address of consecutive elements of an argument, if these are such."""
+    """Return the C address of values that are consecutive elements of one argument, else None."""
     match = re.fullmatch(r"in\[(\d+)\]\[(\d+)\]", values[0])
     if match is None:
         return None
     argument, first = match[1], int(match[2])
-    side_by_side = [f"in[{argument}][{first + k}]" for k in range(len(values))]
-    return f"in[{argument}] + {first}" if list(values) == side_by_side else None
+    consecutive = [f"in[{argument}][{first + k}]" for k in range(len(values))]
+    return f"in[{argument}] + {first}" if list(values) == consecutive else None
 
 
 def _operation(function: ca.Function, operation: int) -> str:
     if operation not in _OPERATIONS:
-        raise ValueError(f"{function.name()}: CasADi operation {operation} cannot be written in C")
+        raise ValueError(f"{function.name()}: the CasADi operation {operation} has no counterpart in C")
     return _OPERATIONS[operation]
 
 

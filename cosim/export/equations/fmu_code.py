@@ -1,4 +1,4 @@
-"""Export of a continuous model as a `Block`: generated functions and the C code of the block interface around them."""
+"""Conversion of a continuous model to a `Block`: generated functions and the functions of the block interface."""
 
 from __future__ import annotations
 
@@ -14,7 +14,15 @@ from .model import ContinuousModel
 
 
 def as_block(model: ContinuousModel, exported: Sequence[ca.Function] = ()) -> Block:
-    """The model as a block of C code, with further functions exported from its binary; equal models give equal text."""
+    """Convert a continuous model to a block of C code; equal models give equal text.
+
+    Args:
+        model: The model.
+        exported: Further CasADi functions that other programs can call in the FMU's binary (see `equations/model.py`).
+
+    Raises:
+        ValueError: An operation has no counterpart in C.
+    """
     return Block(
         model.identifier,
         model.description,
@@ -26,12 +34,12 @@ def as_block(model: ContinuousModel, exported: Sequence[ca.Function] = ()) -> Bl
 
 
 def _struct_members(model: ContinuousModel) -> Iterator[tuple[Variable, str]]:
-    """Every variable with the member of `Model` where its first element lies."""
-    filled: dict[str, int] = {}
+    """Yield every variable with the member of `Model` that holds its first element."""
+    sizes: dict[str, int] = {}
     for variable in model.variables:
         array = "flag" if variable.type == "Boolean" else variable.causality
-        first = filled.get(array, 0)
-        filled[array] = first + len(variable.scalar_names)
+        first = sizes.get(array, 0)
+        sizes[array] = first + len(variable.scalar_names)
         yield variable, f"{array}[{first}]"
 
 
@@ -68,24 +76,25 @@ def _header_text(model: ContinuousModel) -> str:
 
 
 def _source_text(model: ContinuousModel, exported: Sequence[ca.Function]) -> str:
-    """The text of model.c."""
-    own = _casadi_functions(model)
-    functions = [*callee_definitions([*own, *exported], model.callees).values()]
-    functions += [function_definition("static", function) for function in own]
+    """Return the text of model.c."""
+    internal = _casadi_functions(model)
+    functions = [*callee_definitions([*internal, *exported], model.callees).values()]
+    functions += [function_definition("static", function) for function in internal]
     functions += [function_definition("MODEL_EXPORT", function) for function in exported]
     return "\n".join([_INCLUDES, *functions, _block_interface(model)])
 
 
 def _casadi_functions(model: ContinuousModel) -> list[ca.Function]:
+    """Return the functions that the block interface calls: `observe` and, with states, `initial_state` and `sub_step`."""
     parameters, constants = ca.SX.sym("parameters", len(model.elements("parameter"))), model.derived_parameter_symbols()
     inputs = ca.SX.sym("inputs", len(model.elements("input")))
     state = ca.SX.sym("state", len(model.states))
     step = ca.SX.sym("step")
     outputs = ca.vertsplit(model.outputs(state, inputs, constants))
     flags = model.boolean_outputs()
-    numbers = ca.vertcat(*(y for y, flag in zip(outputs, flags, strict=True) if not flag))
-    truths = ca.vertcat(*(y for y, flag in zip(outputs, flags, strict=True) if flag))
-    observe = ca.Function("observe", [state, inputs, constants], [numbers, truths])
+    real_outputs = ca.vertcat(*(y for y, flag in zip(outputs, flags, strict=True) if not flag))
+    boolean_outputs = ca.vertcat(*(y for y, flag in zip(outputs, flags, strict=True) if flag))
+    observe = ca.Function("observe", [state, inputs, constants], [real_outputs, boolean_outputs])
     if not model.states:
         return [observe]
     prepare = [ca.Function("prepare", [parameters], [model.derived_parameters(parameters)])] if model.derived_parameters else []
@@ -98,11 +107,11 @@ def _casadi_functions(model: ContinuousModel) -> list[ca.Function]:
 
 
 def _block_interface(model: ContinuousModel) -> str:
-    """The functions of the block's interface; they call `observe` and, with states, `initial_state` and `sub_step`."""
+    """Return the C functions of the block interface."""
     messages = ",\n".join(f'    "the state {name} is not finite"' for name in model.states)
     member = {kind: f"m->{kind}" if model.elements(kind) else "NULL" for kind in ("parameter", "input")}
     flags = sum(model.boolean_outputs())
-    numbers = "m->output" if flags < len(model.boolean_outputs()) else "NULL"
+    real_outputs = "m->output" if flags < len(model.boolean_outputs()) else "NULL"
     return (_WITH_STATES if model.states else _WITHOUT_STATES) % {
         "messages": messages,
         "states": len(model.states),
@@ -110,7 +119,7 @@ def _block_interface(model: ContinuousModel) -> str:
         "constant": "m->constant" if model.derived_parameters else member["parameter"],
         "prepare": _PREPARE if model.derived_parameters else "",
         "input": member["input"],
-        "output": numbers,
+        "output": real_outputs,
         "flag_slots": max(flags, 1),
         "take_flags": f"    for (int i = 0; i < {flags}; ++i) m->flag[i] = flags[i] != 0;\n" if flags else "",
         "starts": _start_assignments(model),
@@ -119,7 +128,7 @@ def _block_interface(model: ContinuousModel) -> str:
 
 
 def _start_assignments(model: ContinuousModel) -> str:
-    """Assignments of the start values that differ from zero; the rest of the structure is cleared before."""
+    """Return C assignments of the start values other than zero; `model_start` sets all other members to zero."""
     lines = []
     for kind in ("parameter", "input"):
         values = [start for v in model.variables if v.causality == kind for start in _start_values(v)]

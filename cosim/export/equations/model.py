@@ -1,12 +1,15 @@
-"""Equations written with CasADi -> C -> a `Block`.
+"""Continuous models whose equations are CasADi expressions.
 
-A `ContinuousModel` describes x' = f(x, u, p) with y = g(x, u, p); x may be empty (`static_model`). The generated `model_step`
-integrates it with the classical Runge-Kutta method of fourth order in sub-steps of at most `max_sub_step`. Further CasADi
-functions can be exported from the same binary, for programs that use the equations without FMI: each becomes
+A `ContinuousModel` describes x' = f(x, u, p) and y = g(x, u, p) with state x, inputs u, parameters p and outputs y. It may
+have no state (`static_model`). The generated `model_step` integrates it with the classical Runge-Kutta method of order 4, in
+sub-steps of at most `max_sub_step`.
+
+Further CasADi functions can be exported from the FMU's binary for programs that use the equations without FMI. Each becomes
 
     void NAME(const double *const in[], double *const out[]);
 
-where `in[i]` and `out[i]` point to the elements of the i-th argument and result (column-major; no aliasing between them).
+where `in[i]` and `out[i]` point to the elements of argument i and result i in column-major order. Arguments and results must
+not overlap in memory.
 """
 
 from __future__ import annotations
@@ -23,70 +26,91 @@ from .c_code import Callee
 
 @dataclass(frozen=True)
 class ContinuousModel:
-    """A continuous model with held inputs.
+    """A continuous model with inputs that are constant during a step.
 
-    `variables` are its parameters, inputs and outputs. Vectors passed to the callables hold the slots of all variables of
-    that causality in this order; `outputs` returns them likewise, Boolean outputs as 0 or 1. `states` names the elements of
-    the state for messages. `project` is applied after each sub-step (to normalise a quaternion).
+    The callables take and return column vectors. A vector of inputs, parameters or outputs contains the elements of all
+    variables of this causality in the order of `variables`.
     """
 
+    #: C identifier
     identifier: str
     description: str
+    #: parameters, inputs and outputs
     variables: Sequence[Variable]
+    #: names of the elements of the state, for error messages
     states: Sequence[str]
-    #: parameters -> state at the start
+    #: parameters -> initial state
     initial_state: Callable[[ca.SX], ca.SX]
     #: state, inputs, parameters -> time derivative of the state
     derivatives: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
-    #: state, inputs, parameters -> outputs
+    #: state, inputs, parameters -> outputs; Boolean outputs as 0 or 1
     outputs: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
+    #: state -> state, applied after each sub-step, for example to normalize a quaternion
     project: Callable[[ca.SX], ca.SX] = lambda state: state
+    #: preferred communication step size (s)
     step_size: float = 0.01
+    #: longest integration step (s)
     max_sub_step: float = 0.005
+    #: name in the FMU's `resources/` folder -> file
     resources: Mapping[str, Path] = field(default_factory=dict)
-    #: parameters -> what the other callables are given in their place, computed once when the model is initialized
+    #: parameters -> derived parameters, computed once at initialization; the other callables get these instead of `parameters`
     derived_parameters: Callable[[ca.SX], ca.SX] | None = None
-    #: how functions that the expressions call are written in C, where it is not their own text
+    #: functions with a hand-written C body that the expressions call
     callees: Sequence[Callee] = ()
 
     def derived_parameter_symbols(self) -> ca.SX:
-        """Symbols for what the callables are given as parameters."""
+        """Return symbols for the derived parameters, or for the parameters themselves if there are no derived ones."""
         parameters = ca.SX.sym("parameters", len(self.elements("parameter")))
         return ca.SX.sym("constants", self.derived_parameters(parameters).numel()) if self.derived_parameters else parameters
 
     def integrate(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1) -> ca.SX:
-        """The state after `step` (s) with held inputs, in `sub_steps` equal Runge-Kutta steps."""
+        """Return the state after a step with constant inputs.
+
+        Args:
+            state: The state at the start of the step.
+            inputs: The inputs.
+            parameters: The derived parameters if the model has them, else the parameters.
+            step: The step size (s).
+            sub_steps: The number of equal Runge-Kutta steps.
+        """
         for _ in range(sub_steps):
             state = self.project(runge_kutta_4(lambda x: self.derivatives(x, inputs, parameters), state, step / sub_steps))
         return state
 
     def elements(self, causality: str) -> list[Variable]:
-        """Variables of a causality, repeated for each of their elements."""
+        """Return the variables of a causality, each repeated for every element of its array."""
         return [variable for variable in self.variables if variable.causality == causality for _ in variable.scalar_names]
 
     def boolean_outputs(self) -> list[bool]:
-        """For each output slot whether it is Boolean."""
+        """Return for each element of the output vector whether it is Boolean."""
         return [variable.type == "Boolean" for variable in self.elements("output")]
 
 
 def static_model(
     identifier: str, description: str, variables: Sequence[Variable], outputs: Callable[[ca.SX, ca.SX], ca.SX]
 ) -> ContinuousModel:
-    """A model without states, y = g(u, p): `outputs` maps inputs and parameters to outputs."""
-    nothing = ca.SX(0, 1)
+    """Create a model without states, y = g(u, p).
+
+    Args:
+        identifier: The model identifier, a C identifier.
+        description: The description of the model.
+        variables: Its parameters, inputs and outputs.
+        outputs: inputs, parameters -> outputs, as column vectors.
+    """
+    no_state = ca.SX(0, 1)
     return ContinuousModel(
         identifier,
         description,
         variables,
         (),
-        lambda parameters: nothing,
-        lambda state, inputs, parameters: nothing,
-        lambda state, inputs, parameters: outputs(inputs, parameters),
+        lambda _parameters: no_state,
+        lambda _state, _inputs, _parameters: no_state,
+        lambda _state, inputs, parameters: outputs(inputs, parameters),
     )
 
 
 def runge_kutta_4(rate: Callable[[ca.SX], ca.SX], state: ca.SX, step: ca.SX) -> ca.SX:
-    """One step of the classical Runge-Kutta method of fourth order for x' = rate(x)."""
+    """Return the state after one step of the classical Runge-Kutta method of order 4 for x' = rate(x)."""
     k1 = rate(state)
     k2 = rate(state + step / 2 * k1)
     k3 = rate(state + step / 2 * k2)

@@ -1,4 +1,4 @@
-"""Sums over the rows of a table in the equations: loops in C that compute rows side by side."""
+"""Sums over the rows of a table as vectorizable loops in C (SIMD)."""
 
 from __future__ import annotations
 
@@ -8,24 +8,33 @@ from .c_code import Callee, ElementAccess, StatementGenerator, densify
 
 
 def sum_over_rows(name: str, term: ca.Function, rows: int) -> Callee:
-    """The sum of `term` over the rows of a table, in C a loop.
+    """Create a function that sums a term over the first rows of a table.
 
-    `term` maps (common, row) to a vector. The function of the result maps (common, count, table), with a table (rows, columns)
-    of which only the first `count` rows are used, to the sum of the terms. `rows` is a multiple of 8: so many terms are computed
-    side by side, which compilers make use of if the term is plain arithmetic, and so many sums, which are added in the end.
+    Eight terms at a time are computed in one loop, which compilers vectorize if the term is plain arithmetic. They are
+    accumulated in eight partial sums, which are added at the end.
+
+    Args:
+        name: The name of the function, a C identifier.
+        term: (common, row) -> vector; `common` are the arguments that all rows share.
+        rows: The number of rows of the table, a multiple of 8.
+
+    Returns:
+        The function (common, count, table) -> sum of the terms, where `table` has the shape (rows, columns) and only its first
+        `count` rows are used.
     """
     common, table = ca.SX.sym("common", term.size1_in(0)), ca.SX.sym("table", rows, term.size1_in(1))
     count = ca.SX.sym("count")
     terms = [ca.if_else(count > k, term(common, table[k, :].T), 0) for k in range(rows)]
     total = ca.Function(name, [common, count, table], [sum(terms)])
-    places = ElementAccess(lambda i, j: f"row[{rows * j} + k]" if i else f"common[{j}]", lambda i, j: f"value[{j}][k]")
-    statements = "".join(f"            {statement};\n" for statement in StatementGenerator(densify(term), places))
+    access = ElementAccess(lambda i, j: f"row[{rows * j} + k]" if i else f"common[{j}]", lambda _, j: f"value[{j}][k]")
+    statements = "".join(f"            {statement};\n" for statement in StatementGenerator(densify(term), access))
     sizes = {"size": term.size1_out(0), "rows": rows, "common": term.size1_in(0)}
     return Callee(total, _SUM_TEMPLATE % {**sizes, "statements": statements}, attributes=_TARGET_CLONES)
 
 
-#: compiled for each width of registers; the processor it runs on chooses. The bits are the same: every row has the same
-#: operations in the same order, whatever is computed beside it. Not for 512 bits: many processors run slower after these
+#: The function is compiled for several SIMD widths; the processor at run time determines which one is called. The results are
+#: bit-identical, because the operations of each row and their order do not depend on the width. AVX-512 is omitted: many
+#: processors lower their clock frequency for it.
 _TARGET_CLONES = """#ifndef WIDE
 #if defined __x86_64__ && defined __GLIBC__ && !defined __clang__
 #define WIDE __attribute__((target_clones("avx2", "default")))

@@ -1,1 +1,1 @@
-"""Parts that every exported FMU has: model description, C interface, archive."""
+"""Packaging of a block of C code as an FMU: model description, table of variables, compilation and archive."""

@@ -1,4 +1,4 @@
-"""FMU archives that are the same bytes whenever they are written, and the token that identifies their contents."""
+"""Reproducible FMU archives: equal contents give equal bytes, and the instantiation token is a hash of the contents."""
 
 from __future__ import annotations
 
@@ -14,7 +14,15 @@ _UNIX, _REGULAR_FILE = 3, 0o100644 << 16
 
 
 def write_archive(files: Mapping[str, bytes], target: Path) -> Path:
-    """Write `files` (names inside the archive -> contents) to `target`, in order of their names and all at once."""
+    """Write an FMU archive atomically.
+
+    Args:
+        files: Name inside the archive -> contents. The members are written in the order of their names.
+        target: The file to write; its folder is created.
+
+    Returns:
+        `target`.
+    """
     target.parent.mkdir(parents=True, exist_ok=True)
     content = BytesIO()
     with ZipFile(content, "w") as archive:
@@ -34,6 +42,6 @@ def _member(name: str) -> ZipInfo:
 
 
 def content_token(parts: Iterable[bytes]) -> str:
-    """GUID (FMI 2.0) or instantiation token (FMI 3.0) that is a hash of the FMU's contents: equal contents have equal tokens."""
+    """Return the GUID (FMI 2.0) or instantiation token (FMI 3.0) of an FMU: a hash of its contents."""
     digest = sha256(b"\0".join(parts)).hexdigest()
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"

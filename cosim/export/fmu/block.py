@@ -1,20 +1,26 @@
-"""The seam of the exporter: a block of C code with described variables.
+"""Intermediate form of the exporter: a block of C code with described variables.
 
-Front ends (Modelica, CasADi equations, hand-written C) produce a `Block`; the FMI shells wrap it, for FMI 2.0 and 3.0 alike.
-Its C code consists of `model.h`, which defines `typedef struct {...} Model;` (flat memory, no pointers: a copy of the struct is
-the FMU state), and of sources that define
+The front ends (Modelica, CasADi equations) produce a `Block`. The C files in `export/shell/` wrap it with the functions of
+FMI 2.0 or 3.0. The C code of a block consists of `model.h` and of source files.
 
-    void model_start(Model *m);                       every variable to its start value
-    void model_parameters(Model *m);                  dependent parameters; called after parameters were set
+`model.h` defines `typedef struct {...} Model;`. The struct contains no pointers, so that a copy of it is the FMU state.
+
+The source files define these functions:
+
+    void model_start(Model *m);
+        Set every variable to its start value.
+    void model_parameters(Model *m);
+        Compute the dependent parameters; called after parameters were set.
     const char *model_initialize(Model *m, double time);
-        states and outputs from parameters, start values and inputs at the start time; called whenever something is read
-        in initialization mode after something was set, and when that mode is left: so it may run several times
+        Compute states and outputs at the start time from parameters, start values and inputs. In initialization mode it is
+        called when a variable is read after another one was set, and when the mode is left: it may run several times.
     const char *model_step(Model *m, double time, double step_size);
-        advance with held inputs; outputs afterwards belong to the new time (continuous models) or are those computed at the
-        last tick in [time, time + step_size) (sampled models)
+        Advance from `time` by `step_size` with constant inputs. Afterwards the outputs of a continuous model belong to the
+        new time; those of a sampled model were computed at the last tick in [time, time + step_size).
 
-The functions that return text return NULL when all is well, else the reason of the failure (static text), which becomes
-fmi?Error and a log message. Symbols that others load from the binary are marked `MODEL_EXPORT` (from the shell's `export.h`).
+The last two functions return NULL on success, else the reason for the failure (static text). It is logged, and the FMI
+function returns fmi2Error or fmi3Error. Functions that other programs load from the binary are marked `MODEL_EXPORT`
+(defined in `export.h` of the shell).
 """
 
 from __future__ import annotations
@@ -29,39 +35,41 @@ from ...core.component import Causality, Variability
 
 @dataclass(frozen=True, slots=True)
 class BlockVariable:
-    """One variable: its FMI side, and the member of `Model` that holds it (`double`, `int32_t` or `bool`).
+    """A variable of a block: its FMI attributes and the member of `Model` that holds its value.
 
-    Arrays are one variable with a shape: one FMI 3.0 array, or the FMI 2.0 scalars "name[1]", "name[2]" (in C row-major).
-    `start` is a scalar, or a flat tuple for arrays. `unit` is Modelica syntax ("m/s"), "" for none.
-    `enumeration` lists (name, description) of the literals, whose values are 1, 2, ...
+    An array is one variable with a shape. It becomes one array in FMI 3.0 and the scalars "name[1]", "name[2]", ... in FMI 2.0.
     """
 
     name: str
+    #: C expression of the member of `Model`, for example "state[3]": a double, int32_t or bool, or a row-major array of them
     member: str
-    type: str  # "Float64", "Int32", "Boolean" or "Enumeration" (an int32_t)
+    #: "Float64", "Int32", "Boolean" or "Enumeration" (an int32_t in C)
+    type: str
     causality: Causality
     variability: Variability
+    #: a scalar, or a flat tuple for an array; None means zero, false or the first literal
     start: Any = None
+    #: unit in Modelica syntax ("m/s"), or ""
     unit: str = ""
     shape: tuple[int, ...] = ()
     description: str = ""
     minimum: float | None = None
     maximum: float | None = None
+    #: (name, description) of the enumeration literals, whose values are 1, 2, ...
     enumeration: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
 class Block:
-    """Everything an FMU is made of, but for the FMI version.
+    """Contents of an FMU that do not depend on the FMI version."""
 
-    `identifier` is a C identifier and the name of the FMU file; `step_size` (s) is the sample period or the preferred
-    communication step; `files` maps names of C files to their text; `resources` are the original sources, put into the
-    FMU's `resources/` folder under the given names.
-    """
-
+    #: model identifier, a C identifier
     identifier: str
     description: str
     variables: Sequence[BlockVariable]
+    #: sample period or preferred communication step size (s)
     step_size: float
+    #: C file name -> text
     files: Mapping[str, str]
+    #: name in the FMU's `resources/` folder -> file, for the original sources
     resources: Mapping[str, Path] = field(default_factory=dict)

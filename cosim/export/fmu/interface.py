@@ -1,4 +1,4 @@
-"""How the variables of a block appear in an FMU: which value reference, where in memory, and whether the block is sound."""
+"""Variables of a block in an FMU: value references, memory offsets and validation of the block."""
 
 from __future__ import annotations
 
@@ -20,14 +20,15 @@ _DEFAULT_START = {"Float64": 0.0, "Int32": 0, "Boolean": False, "Enumeration": 1
 
 
 class TableRow(NamedTuple):
-    """One row of the table of variables; its value reference is its position. `element` counts within the array `member`."""
+    """A row of the table of variables; its index is the value reference in FMI 2.0 and the value reference - 1 in FMI 3.0."""
 
     variable: BlockVariable
+    #: index of the element in the array `variable.member`
     element: int = 0
 
 
 def variable_table(block: Block, fmi_version: int) -> list[TableRow]:
-    """The variables as an FMI version sees them: FMI 2.0 has a scalar for each element of an array."""
+    """Return the table of variables for an FMI version; for FMI 2.0 each element of an array is a scalar variable."""
     if fmi_version == 3:
         return [TableRow(variable) for variable in block.variables]
     return [row for variable in block.variables for row in _scalar_rows(variable)]
@@ -40,14 +41,14 @@ def _scalar_rows(variable: BlockVariable) -> Iterator[TableRow]:
 
 
 def start_values(variable: BlockVariable) -> tuple[Any, ...]:
-    """The start values of all elements; zero, false or the first literal where the block gives none."""
+    """Return the start values of all elements; the default is zero, false or the first literal."""
     if variable.start is None:
         return (_DEFAULT_START[variable.type],) * math.prod(variable.shape)
     return variable.start if isinstance(variable.start, tuple) else (variable.start,)
 
 
 def c_variable_table(block: Block, fmi_version: int) -> str:
-    """The C table of variables that the shell reads (`variables.h`), without the FMU's token."""
+    """Return the text of `variables.h`, the C table of variables for the shell, without the instantiation token."""
     entries = [_c_row(row, fmi_version) for row in variable_table(block, fmi_version)]
     if fmi_version == 3:
         entries.insert(0, '{"time", FLOAT64, READ_ONLY, offsetof(State, time), 1, 0}')
@@ -58,13 +59,14 @@ def c_variable_table(block: Block, fmi_version: int) -> str:
 
 def _c_row(row: TableRow, fmi_version: int) -> str:
     variable = row.variable
-    # FMI 2.0 reads and writes enumerations as integers
-    kind = "Int32" if fmi_version == 2 and variable.type == "Enumeration" else variable.type
+    # FMI 2.0 reads and writes enumerations by the functions for Integer
+    type_name = "Int32" if fmi_version == 2 and variable.type == "Enumeration" else variable.type
     offset = f"offsetof(State, model.{variable.member})"
     if row.element:
         offset += f" + {row.element} * sizeof({C_TYPES[variable.type]})"
     name = json.dumps(variable.name, ensure_ascii=False)
-    return f"{{{name}, {kind.upper()}, {_c_role(variable)}, {offset}, {math.prod(variable.shape)}, {len(variable.enumeration)}}}"
+    count, literals = math.prod(variable.shape), len(variable.enumeration)
+    return f"{{{name}, {type_name.upper()}, {_c_role(variable)}, {offset}, {count}, {literals}}}"
 
 
 def _c_role(variable: BlockVariable) -> str:
@@ -74,12 +76,16 @@ def _c_role(variable: BlockVariable) -> str:
 
 
 def check_block(block: Block) -> None:
-    """Raises InputError with everything that keeps a block from becoming a valid FMU."""
-    problems = [] if block.identifier.isidentifier() else [f'"{block.identifier}" is no C identifier']
+    """Check that a block can be exported as a valid FMU.
+
+    Raises:
+        InputError: The block has faults (one problem for each).
+    """
+    problems = [] if block.identifier.isidentifier() else [f'"{block.identifier}" is not a C identifier']
     if not block.variables:
         problems.append("has no variables")
     counts = Counter(["time", *(variable.name for variable in block.variables)])
-    problems += [f'variable name "{name}" is used {count} times' for name, count in counts.items() if count > 1]
+    problems += [f'the variable name "{name}" is used {count} times' for name, count in counts.items() if count > 1]
     for variable in block.variables:
         problems += [f'variable "{variable.name}": {problem}' for problem in _variable_problems(variable)]
     if problems:
@@ -93,12 +99,12 @@ def _variable_problems(variable: BlockVariable) -> Iterator[str]:
     if variable.causality not in CAUSALITIES:
         yield f'unknown causality "{variable.causality}"{did_you_mean(variable.causality, CAUSALITIES)}'
     if variable.type != "Float64" and variable.variability == "continuous":
-        yield f"type {variable.type} cannot be continuous"
+        yield f"found variability continuous for the type {variable.type}, expected discrete"
     if variable.type == "Enumeration" and not variable.enumeration:
         yield "the enumeration has no literals"
     found, expected = len(start_values(variable)), math.prod(variable.shape)
     if found != expected:
-        yield f"found {found} start values, expected {expected}"
+        yield f"found {found} start {'value' if found == 1 else 'values'}, expected {expected}"
     try:
         units.parse_unit(variable.unit or "1")
     except ValueError as error:

@@ -1,8 +1,8 @@
-"""Block -> modelDescription.xml for FMI 2.0 and 3.0, and buildDescription.xml for FMI 3.0."""
+"""modelDescription.xml (FMI 2.0 and 3.0) and buildDescription.xml (FMI 3.0) of a block."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 from xml.etree import ElementTree
 
@@ -16,12 +16,19 @@ _FMI2_TYPES = {"Float64": "Real", "Int32": "Integer"}
 
 
 def model_description_xml(block: Block, fmi_version: int, token: str, c_files: Sequence[str]) -> bytes:
-    """The XML text that describes the FMU of a block; `c_files` are the sources that have to be compiled."""
-    return to_bytes((_fmi2_description if fmi_version == 2 else _fmi3_description)(block, token, c_files))
+    """Return the modelDescription.xml of a block.
+
+    Args:
+        block: The block.
+        fmi_version: 2 or 3.
+        token: The GUID (FMI 2.0) or instantiation token (FMI 3.0).
+        c_files: Names of the C files to compile. FMI 2.0 lists them here, FMI 3.0 in buildDescription.xml.
+    """
+    return to_bytes(_fmi2_description(block, token, c_files) if fmi_version == 2 else _fmi3_description(block, token))
 
 
 def build_description_xml(block: Block, c_files: Sequence[str]) -> bytes:
-    """How the sources of an FMI 3.0 FMU are built (FMI 3.0 section 2.5.2)."""
+    """Return the buildDescription.xml of a source code FMU (FMI 3.0, section 2.5.2)."""
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = _add_element(root, "BuildConfiguration", modelIdentifier=block.identifier)
     file_set = _add_element(configuration, "SourceFileSet", language="C11")
@@ -31,7 +38,7 @@ def build_description_xml(block: Block, c_files: Sequence[str]) -> bytes:
 
 
 def to_bytes(root: Element) -> bytes:
-    """An indented XML document; the same tree gives the same bytes."""
+    """Serialize a tree as an indented XML document; equal trees give equal bytes."""
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
@@ -76,7 +83,7 @@ def _add_fmi2_variable(parent: Element, reference: int, variable: BlockVariable,
 # -- FMI 3.0 ---------------------------------------------------------------------------------------------------------------
 
 
-def _fmi3_description(block: Block, token: str, c_files: Sequence[str]) -> Element:
+def _fmi3_description(block: Block, token: str) -> Element:
     root = _root_element(block, "3.0", instantiationToken=token)
     _add_element(
         root,
@@ -103,7 +110,7 @@ def _fmi3_description(block: Block, token: str, c_files: Sequence[str]) -> Eleme
     return root
 
 
-# -- what both have in common ----------------------------------------------------------------------------------------------
+# -- common to both versions -----------------------------------------------------------------------------------------------
 
 
 def _root_element(block: Block, fmi_version: str, **token: str) -> Element:
@@ -126,7 +133,8 @@ def _add_common_elements(root: Element, block: Block, fmi_version: int) -> None:
     _add_element(root, "DefaultExperiment", stepSize=block.step_size)
 
 
-def add_units(root: Element, names: Iterable[str]) -> None:
+def add_units(root: Element, names: Collection[str]) -> None:
+    """Append `UnitDefinitions` with the named units (Modelica syntax) to a model description; nothing if there are none."""
     if not names:
         return
     definitions = _add_element(root, "UnitDefinitions")
@@ -138,7 +146,7 @@ def add_units(root: Element, names: Iterable[str]) -> None:
 
 
 def _declared_types(block: Block) -> dict[Any, str]:
-    """Enumerations by their literals; each is named after the first variable that has it."""
+    """Return the type name of each enumeration (a tuple of literals), derived from the first variable of this type."""
     names: dict[Any, str] = {}
     for variable in block.variables:
         if variable.enumeration:
@@ -181,13 +189,13 @@ def _type_attributes(variable: BlockVariable, declared: dict[Any, str]) -> dict[
     number = float if variable.type == "Float64" else int
     literals = len(variable.enumeration)
     minimum, maximum = (1, literals) if literals else (variable.minimum, variable.maximum)
-    known_before = _initial(variable) != "calculated"
+    has_start = _initial(variable) != "calculated"
     return {
         "declaredType": declared.get(variable.enumeration),
         "unit": variable.unit or None if variable.type == "Float64" else None,
         "min": None if minimum is None else number(minimum),
         "max": None if maximum is None else number(maximum),
-        "start": " ".join(_format_value(_cast(variable, value)) for value in start_values(variable)) if known_before else None,
+        "start": " ".join(_format_value(_cast(variable, value)) for value in start_values(variable)) if has_start else None,
     }
 
 

@@ -1,4 +1,4 @@
-"""Block -> .fmu: sources, description, binary and resources in one archive."""
+"""Packaging of a block as an FMU: sources, model description, binary and resources in one archive."""
 
 from __future__ import annotations
 
@@ -23,10 +23,18 @@ _FMI_HEADERS = {
 
 
 def write_fmu(block: Block, fmi_version: int, target: Path) -> Path:
-    """Write the Co-Simulation FMU of a block for FMI 2.0 or 3.0 (`fmi_version` 2 or 3) to `target`.
+    """Write the Co-Simulation FMU of a block; the same block and compiler give the same bytes.
 
-    The same block and compiler give the same bytes. Raises InputError when the block or its C code is faulty, or there is
-    no C compiler.
+    Args:
+        block: The block.
+        fmi_version: 2 or 3.
+        target: The FMU to write.
+
+    Returns:
+        `target`.
+
+    Raises:
+        InputError: The block or its C code is faulty, or there is no C compiler.
     """
     if fmi_version not in _SHELL_FILES:
         raise InputError(f"found FMI version {fmi_version}, expected 2 or 3")
@@ -39,7 +47,7 @@ def write_fmu(block: Block, fmi_version: int, target: Path) -> Path:
 
 
 def _description_and_sources(block: Block, fmi_version: int) -> dict[str, bytes]:
-    """Description and sources; the token that ties them together is a hash of both."""
+    """Return model description and sources; their instantiation token is a hash of both."""
     sources = _collect_sources(block, fmi_version)
     c_files = _c_files(sources)
     token = content_token([model_description_xml(block, fmi_version, "", c_files), *(sources[name] for name in sorted(sources))])
@@ -51,7 +59,7 @@ def _description_and_sources(block: Block, fmi_version: int) -> dict[str, bytes]
 
 
 def _collect_sources(block: Block, fmi_version: int) -> dict[str, bytes]:
-    """All that is needed to compile the FMU anywhere, FMI's own headers included."""
+    """Return all source files and headers that are needed to compile the FMU, without the instantiation token."""
     sources = {name: text.encode() for name, text in block.files.items()}
     sources |= {name: (SHELL_FOLDER / name).read_bytes() for name in _SHELL_FILES[fmi_version]}
     sources |= fmi_headers(fmi_version)
@@ -60,10 +68,14 @@ def _collect_sources(block: Block, fmi_version: int) -> dict[str, bytes]:
 
 
 def fmi_headers(fmi_version: int) -> dict[str, bytes]:
-    """FMI's own C headers, by name."""
+    """Return the C headers of the FMI standard (name -> contents).
+
+    Raises:
+        InputError: FMPy, which contains the headers, is not installed.
+    """
     fmpy = find_spec("fmpy")
     if fmpy is None or fmpy.origin is None:
-        raise InputError('exporting takes the FMI headers from FMPy, which is missing: pip install "fmi-cosim[build]"')
+        raise InputError('export needs the FMI headers of FMPy, which is not installed: pip install "fmi-cosim[build]"')
     folder = Path(fmpy.origin).parent / "c-code"
     return {name: (folder / name).read_bytes() for name in _FMI_HEADERS[fmi_version]}
 
@@ -73,7 +85,20 @@ def _c_files(sources: Mapping[str, bytes]) -> list[str]:
 
 
 def compile_binary(identifier: str, fmi_version: int, sources: Mapping[str, bytes], c_files: Sequence[str]) -> dict[str, bytes]:
-    """The shared library of `c_files` for this machine, under its name in the FMU; `sources` holds them and their headers."""
+    """Compile the shared library of an FMU for this platform.
+
+    Args:
+        identifier: The model identifier.
+        fmi_version: 2 or 3; determines the folder of the binary in the FMU.
+        sources: Name -> contents of the C files and headers.
+        c_files: Names of the C files to compile.
+
+    Returns:
+        The path of the library in the FMU -> its contents.
+
+    Raises:
+        InputError: There is no compiler, or it reports errors.
+    """
     from fmpy import platform, platform_tuple, sharedLibraryExtension
 
     name = f"{identifier}{sharedLibraryExtension}"

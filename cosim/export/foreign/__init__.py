@@ -1,1 +1,1 @@
-"""Python classes and C sources packed as FMUs."""
+"""Export of sources that implement FMI themselves: PythonFMU classes and C controllers."""

@@ -1,4 +1,4 @@
-"""A folder with C files and a modelDescription.xml -> .fmu: for controllers that implement FMI 2.0 themselves."""
+"""Export of C controllers that implement FMI 2.0: a folder with C files and a modelDescription.xml."""
 
 from __future__ import annotations
 
@@ -12,30 +12,38 @@ from ..fmu.validation import DESCRIPTION_FILE, validate_description
 
 
 def write_c_fmu(description: Path, target: Path) -> list[Path]:
-    """Write the FMI 2.0 Co-Simulation FMU that a hand-written modelDescription.xml describes to `target`.
+    """Write the FMI 2.0 Co-Simulation FMU of a C controller.
 
-    Its `<SourceFiles>` name the files beside it that are compiled, against FMI's headers; all .c and .h files beside it go
-    into the FMU's `sources/`. Returns the files that went in. Raises InputError when the description or the C code is faulty.
+    Args:
+        description: A hand-written modelDescription.xml. Its `<SourceFiles>` name the files beside it that are compiled
+            together with the FMI headers. All .c and .h files beside it are packed into the FMU's `sources/`.
+        target: The FMU to write.
+
+    Returns:
+        The files that the FMU was made from.
+
+    Raises:
+        InputError: The description or the C code is faulty.
     """
-    identifier, compiled = _read_co_simulation_element(description)
-    own = sorted(path for path in description.parent.iterdir() if path.suffix in (".c", ".h"))
-    _check_files(description, compiled, {path.name for path in own})
-    sources = fmi_headers(2) | {path.name: path.read_bytes() for path in own}
+    identifier, c_files = _read_co_simulation_element(description)
+    source_files = sorted(path for path in description.parent.iterdir() if path.suffix in (".c", ".h"))
+    _check_files(description, c_files, {path.name for path in source_files})
+    sources = fmi_headers(2) | {path.name: path.read_bytes() for path in source_files}
     files = {DESCRIPTION_FILE: description.read_bytes()} | {f"sources/{name}": text for name, text in sources.items()}
-    write_archive(files | compile_binary(identifier, 2, sources, compiled), target)
-    return [description, *own]
+    write_archive(files | compile_binary(identifier, 2, sources, c_files), target)
+    return [description, *source_files]
 
 
 def _read_co_simulation_element(description: Path) -> tuple[str, list[str]]:
-    """The model identifier and the names of the files to compile."""
+    """Return the model identifier and the names of the files to compile."""
     try:
         text = description.read_bytes()
-        root = ElementTree.fromstring(text)  # noqa: S314 - a source file of the user's own
+        root = ElementTree.fromstring(text)  # noqa: S314 - a source file of the user
     except (OSError, ElementTree.ParseError) as error:
         raise InputError(Problem(f"cannot be read: {error}", str(description))) from None
-    found = root.get("fmiVersion", "none")
-    if found != "2.0":
-        raise InputError(Problem(f'found fmiVersion "{found}", expected "2.0"', str(description)))
+    version = root.get("fmiVersion", "none")
+    if version != "2.0":
+        raise InputError(Problem(f'found fmiVersion "{version}", expected "2.0"', str(description)))
     validate_description(text, description)
     interface = root.find("CoSimulation")
     if interface is None:
@@ -43,9 +51,9 @@ def _read_co_simulation_element(description: Path) -> tuple[str, list[str]]:
     return interface.get("modelIdentifier", ""), [file.get("name", "") for file in interface.iterfind("SourceFiles/File")]
 
 
-def _check_files(description: Path, compiled: list[str], present: set[str]) -> None:
-    if not compiled:
+def _check_files(description: Path, c_files: list[str], present: set[str]) -> None:
+    if not c_files:
         raise InputError(Problem("names no file in <CoSimulation><SourceFiles>", str(description)))
-    problems = [f'<File name="{name}"> does not exist{did_you_mean(name, present)}' for name in compiled if name not in present]
+    problems = [f'<File name="{name}"> does not exist{did_you_mean(name, present)}' for name in c_files if name not in present]
     if problems:
         raise InputError([Problem(problem, str(description)) for problem in problems])

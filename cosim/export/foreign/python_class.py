@@ -1,10 +1,11 @@
-"""A file with a PythonFMU class -> .fmu, with the description completed and the same bytes for the same source.
+"""Reproducible export of PythonFMU classes, with a completed model description.
 
-PythonFMU knows FMI 2.0 only. Its own builder does the work, in a process of its own because it imports into this one.
-The FMU's state is what the class registers as variables: register internal states as `local` variables.
+PythonFMU supports FMI 2.0 only. Its builder runs in a separate process, because it imports the source. The FMU state consists
+of the variables that the class registers: register internal states as `local` variables.
 
-All Python FMUs of a process share one interpreter and one table of modules. So the source becomes a package whose name is a
-hash of all contents, and the siblings it imports its members: FMUs with modules of the same name do not meet.
+All Python FMUs of a process share one interpreter and one `sys.modules`. Therefore the source becomes a package, whose name
+contains a hash of all contents, and the modules that it imports become members of this package: FMUs with modules of the same
+name do not conflict.
 """
 
 from __future__ import annotations
@@ -25,18 +26,32 @@ from ..fmu.model_description import Element, add_units, to_bytes
 from ..fmu.validation import DESCRIPTION_FILE, validate_description
 from .relative_imports import with_relative_imports
 
-#: makes a module the package of the files beside it
+#: turns a module into a package whose members are the files beside it
 _PACKAGE_STATEMENT = "__path__, __package__ = [__import__('os').path.dirname(__file__)], __name__  # inserted by cosim"
 
 
 def write_python_fmu(source: Path, target: Path) -> Path:
-    """Write the FMI 2.0 FMU of the one `Fmi2Slave` class in `source` to `target`.
+    """Write the FMI 2.0 FMU of the `Fmi2Slave` class in a Python file.
 
-    It contains the source, the files of its folder that it imports relatively (`from .pid import Pid`), the JSON file of the
-    same name beside it if there is one, PythonFMU itself and its binaries for linux64 and win64; the host needs Python, and what
-    the source imports else. A variable with an attribute
-    `unit` writes it itself (`to_xml`); the definitions of units are added. Raises InputError when the class cannot be exported
-    or its variables make no valid description.
+    The FMU contains
+
+    - the source,
+    - the files of its folder that it imports relatively (`from .pid import Pid`),
+    - the JSON file with the same name beside it, if there is one,
+    - PythonFMU and its binaries for linux64 and win64.
+
+    The importing host needs Python and all other packages that the source imports. Unit definitions are added for all units
+    that the variables declare (attribute `unit`, written by `to_xml` of the variable).
+
+    Args:
+        source: The Python file; it defines exactly one subclass of `Fmi2Slave`.
+        target: The FMU to write.
+
+    Returns:
+        `target`.
+
+    Raises:
+        InputError: The class cannot be exported, or its model description is invalid.
     """
     files = _build_with_pythonfmu(source)
     root = ElementTree.fromstring(files[DESCRIPTION_FILE])  # noqa: S314 - just written by PythonFMU
@@ -48,28 +63,28 @@ def write_python_fmu(source: Path, target: Path) -> Path:
 
 
 def files_of_python_fmu(source: Path) -> list[Path]:
-    """The files that go into the FMU."""
+    """Return the files that the FMU of a Python source is made from."""
     data = source.resolve().with_suffix(".json")
     return [*with_relative_imports(source), *([data] if data.is_file() else [])]
 
 
 def _build_with_pythonfmu(source: Path) -> dict[str, bytes]:
-    """The members of the FMU as PythonFMU's builder makes it."""
+    """Return the members of the FMU that PythonFMU builds (name -> contents)."""
     modules = _read_modules(source)
     with TemporaryDirectory(prefix="cosim-build-") as folder, TemporaryDirectory(prefix="cosim-build-") as target:
-        loader, files = _stage_files(modules, source.stem, Path(folder))
-        command = [sys.executable, "-m", "pythonfmu", "build", "-f", loader, "-d", target, "--handle-state", *files]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+        package, files = _stage_files(modules, source.stem, Path(folder))
+        command = [sys.executable, "-m", "pythonfmu", "build", "-f", package, "-d", target, "--handle-state", *files]
+        process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
         built = list(Path(target).glob("*.fmu"))
-        if done.returncode or not built:
-            reason = (done.stderr.strip() or "PythonFMU built nothing").splitlines()[-1]
+        if process.returncode or not built:
+            reason = (process.stderr.strip() or "PythonFMU has built no FMU").splitlines()[-1]
             raise InputError(Problem(f"cannot be exported: {reason}", str(source)))
         with ZipFile(built[0]) as archive:
             return {name: archive.read(name) for name in archive.namelist()}
 
 
 def _read_modules(source: Path) -> dict[Path, bytes]:
-    """The files of a source, by their paths from its folder."""
+    """Return the files of a source (path relative to its folder -> contents)."""
     folder = source.resolve().parent
     try:
         files = sorted(file.resolve() for file in files_of_python_fmu(source))
@@ -77,13 +92,13 @@ def _read_modules(source: Path) -> dict[Path, bytes]:
         raise InputError(Problem(f"cannot be exported: {error}", str(source))) from None
     outside = [file for file in files if not file.is_relative_to(folder)]
     if outside:
-        reason = "is imported, but an FMU holds only what lies in the folder of its source"
+        reason = "is imported, but an FMU can only contain files from the folder of its source"
         raise InputError([Problem(reason, str(file)) for file in outside])
     return {file.relative_to(folder): file.read_bytes() for file in files}
 
 
 def _stage_files(modules: Mapping[Path, bytes], name: str, folder: Path) -> tuple[str, list[str]]:
-    """Write the modules, and the source once more as their package; returns the name of that and what else goes into the FMU."""
+    """Write the modules and the package module to `folder`; return the package file and the other members for PythonFMU."""
     package = f"{name}_{sha256(repr(sorted(modules.items())).encode()).hexdigest()[:12]}"
     for path, content in modules.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
@@ -93,7 +108,7 @@ def _stage_files(modules: Mapping[Path, bytes], name: str, folder: Path) -> tupl
 
 
 def _as_package(text: str) -> str:
-    """A source whose relative imports work although PythonFMU imports it alone: the line goes behind `from __future__`."""
+    """Insert the package statement after the `from __future__` imports, so that relative imports work in the FMU."""
     future = [node for node in ast.parse(text).body if isinstance(node, ast.ImportFrom) and node.module == "__future__"]
     line = future[-1].end_lineno or 0 if future else 0
     lines = text.splitlines()
@@ -101,7 +116,7 @@ def _as_package(text: str) -> str:
 
 
 def _complete_description(root: Element) -> None:
-    """What FMI 2.0 demands and PythonFMU leaves out; the date goes, because it would make every build different."""
+    """Add the attributes and elements that FMI 2.0 requires and PythonFMU omits; remove the date, for reproducible builds."""
     root.attrib.pop("generationDateAndTime", None)
     root.set("guid", "")
     _define_units(root)
@@ -119,7 +134,7 @@ def _complete_description(root: Element) -> None:
 
 
 def _define_units(root: Element) -> None:
-    """`UnitDefinitions` stands behind `CoSimulation`."""
+    """Insert `UnitDefinitions` after `CoSimulation`, as the FMI 2.0 schema requires."""
     names = {real.get("unit", "") for real in root.iter("Real")} - {""}
     add_units(root, names)
     if names:
@@ -129,7 +144,7 @@ def _define_units(root: Element) -> None:
 
 
 def _set_default_variability(variable: Element) -> None:
-    """FMI's default "continuous" is legal for Real variables that are no parameters only."""
+    """Set the variability where FMI's default "continuous" is not allowed: for parameters and for types other than Real."""
     if "arameter" in variable.get("causality", "local"):
         variable.set("variability", "fixed")
     elif variable.find("Real") is None:
@@ -139,5 +154,5 @@ def _set_default_variability(variable: Element) -> None:
 def _is_initial_unknown(attributes: Mapping[str, str]) -> bool:
     if attributes.get("causality") == "calculatedParameter":
         return True
-    known = attributes.get("variability") == "constant" or attributes.get("initial") == "exact"
-    return attributes.get("causality") == "output" and not known
+    has_exact_start = attributes.get("variability") == "constant" or attributes.get("initial") == "exact"
+    return attributes.get("causality") == "output" and not has_exact_start

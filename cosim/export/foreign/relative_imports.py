@@ -1,4 +1,4 @@
-"""Which files of its package a Python source imports."""
+"""Relative imports of a Python file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,13 @@ from pathlib import Path
 
 
 def with_relative_imports(path: Path) -> list[Path]:
-    """A Python file and the files of its package that it imports, directly or not; other files stand alone."""
+    """Return a file and all files that it imports relatively, directly or indirectly.
+
+    A file that is not a Python file has no imports.
+
+    Raises:
+        SyntaxError: A Python file cannot be parsed.
+    """
     files, new = [path], [path] if path.suffix == ".py" else []
     while new:
         imported = {file.resolve() for known in new for file in _relative_imports(known)}
@@ -22,14 +28,14 @@ def _relative_imports(path: Path) -> Iterator[Path]:
         if isinstance(node, ast.ImportFrom) and node.level:
             folder = path.resolve().parents[node.level - 1]
             base = folder.joinpath(*(node.module or "").split("."))
-            named = (base / alias.name for alias in node.names)
-            modules = (file for module in (base, *named) if (file := module.with_suffix(".py")).is_file())
+            submodules = (base / alias.name for alias in node.names)
+            modules = (file for module in (base, *submodules) if (file := module.with_suffix(".py")).is_file())
             yield from modules
             yield from _package_files(folder, base)
 
 
 def _package_files(folder: Path, base: Path) -> Iterator[Path]:
-    """The `__init__.py` of every package on the way from `folder` (without it) to `base`."""
+    """Yield the `__init__.py` of every package below `folder` that contains `base`."""
     for package in (base, *base.parents):
         if package == folder:
             return

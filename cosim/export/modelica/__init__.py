@@ -1,27 +1,45 @@
-"""Modelica to a Block of C: rumoca parses, checks and flattens; sorting and the C are made here.
+"""Compiler from Modelica models to blocks of C code.
 
-    front       runs rumoca, finds the files            sort        order of computation (matching, triggers)
-    reader      its JSON as frozen data (flat)          emit        C (header, statements, expressions, functions)
-    states      der(x) as a variable                    steps       C of model_step: ticks, integration
-    roles       which parameters can be set             interpret   the same model in plain Python
-    omc         another way: export by OpenModelica
+The package rumoca parses, checks and flattens a model. The order of computation and the C code are generated here.
 
-Semantics. Sampled models: `when sample(start, period)` runs at every tick t_k = start + k*period that lies in
-[t, t + h), in order, with held inputs; ticks are counted as integers, the first one is not before the start time. All other
-equations and assertions are computed at every tick, and once for the initialization, where when-clauses are inactive unless
-they name initial(). A when-clause on a condition runs at the tick at which the condition has become true. A model without
-any sample() is computed once per step at t + h. pre(x) is the value before the tick. Declared min and max are described,
-not applied. Real arithmetic is IEEE 754; an output or remembered value that is not finite, an Integer overflow, an Integer
-division by zero, a subscript outside its array and a violated assert() make the step fail, with the reason.
+| Folder       | Modules                                                                                                    |
+| ------------ | ---------------------------------------------------------------------------------------------------------- |
+| `frontend/`  | `rumoca_frontend`: run rumoca; `reader` (`expression_reader`, `statement_reader`, `unrolling`): convert    |
+|              | its JSON to the flat model; `constants`: inline constants; `folded_branches`: reject models that rumoca    |
+|              | simplifies wrongly; `openmodelica`: export with OpenModelica instead                                       |
+| `model/`     | `flat_model`, `syntax_tree`: the data structure; `traversal`; `evaluate`, `arithmetic`: evaluation in      |
+|              | Python                                                                                                     |
+| `causality/` | `continuous_states`: replace der(x) by a variable; `matching`: which variable an equation defines;         |
+|              | `when_conditions`: clocks and edge detectors; `topological_sort`; `schedule`: the order of computation;    |
+|              | `parameter_roles`: which parameters can be set; `interpreter`: simulation of a model in Python             |
+| `c_code/`    | `emit`: model.c; `header`: model.h; `model_step`: clock ticks and integration; `functions`, `statements`,  |
+|              | `expressions`, `subscripts`, `builtin_functions`, `lowering`, `c_values`, `formatting`: parts of model.c   |
+| (here)       | `assemble`: a Modelica file to a block, with the FMI variables                                             |
 
-Continuous states (der(x) = ...) advance from tick to tick and to t + h, where everything is computed once more: outputs belong
-to t + h. The method is the classical Runge-Kutta method of order 4, between two events of distance d in ceil(d/0.005 - 1e-9)
-equal steps; continuous equations are computed at each of its stages, with held inputs and held sampled values. There are no
-state events: if-expressions are evaluated as they are at each stage, and when-clauses on conditions (with reinit(), too) act at
-ticks and at the ends of steps only; assertions are checked there. States begin with `start`, fixed or not, or with an initial
-equation `x = ...`.
+Sampled models, in a communication step from t to t + h:
+
+- A clause `when sample(start, period)` is active at every tick t_k = start + k*period in [t, t + h), with constant inputs. The
+  first tick is the first one that is not before the start time. Ticks are counted as integers.
+- All other equations and assertions are computed at every tick and at the initialization.
+- At the initialization, when-clauses are inactive unless their condition contains initial().
+- A when-clause with another condition is active at the tick at which this condition has become true.
+- A model without sample() is computed once per step, at t + h.
+- pre(x) is the value of x before the tick.
+- Declared minima and maxima are written to the model description; they are not enforced.
+- Real arithmetic is that of IEEE 754. The step fails, with the reason, if an output or a value used by pre() is not finite, and
+  on an Integer overflow, an Integer division by zero, a subscript outside its array or a violated assert().
+
+Models with continuous states (`der(x) = ...`):
+
+- The states advance from tick to tick, and from the last tick to t + h. All equations are computed once more at t + h, and the
+  outputs belong to this time.
+- The integration method is the classical Runge-Kutta method of order 4. The interval d between two events is divided into
+  ceil(d/0.005 - 1e-9) equal integration steps. Inputs and sampled values are constant between two events.
+- There are no state events. If-expressions are evaluated at each stage of the integration method. When-clauses with conditions
+  (and reinit() in them) and assertions are evaluated at ticks and at t + h only.
+- The initial value of a state is its `start` value, whether `fixed` or not, or that of an initial equation `x = ...`.
 """
 
 from .assemble import load_block, load_interpreter
 
-__all__ = ["load_interpreter", "load_block"]
+__all__ = ["load_block", "load_interpreter"]

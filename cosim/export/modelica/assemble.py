@@ -1,4 +1,4 @@
-"""From a Modelica file to a Block: which variables the FMU shows, and how."""
+"""Compilation of a Modelica file to a block, and the FMI attributes of its variables."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from .frontend.constants import inline_constants
 from .frontend.folded_branches import check_folded_branches
 from .frontend.reader import ModelReader
 from .frontend.rumoca_frontend import ModelicaSources, flatten_model
-from .model.flat_model import Model, Variable, raise_model_error
+from .model.flat_model import Model, Variable
+from .model.syntax_tree import raise_model_error
 
 _FMI_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 _DEFAULT_STEP_SIZE = 0.01
@@ -29,10 +30,14 @@ FmiRole = tuple[Causality, Variability]
 
 
 def load_block(path: Path, model: str | None = None) -> Block:
-    """The Modelica model `model` (default: named as the file) of a file as C code with described variables.
+    """Compile a Modelica model to a block.
 
-    The file may use the packages in folders beside it. Raises InputError, with file and line, for everything that is wrong or
-    not supported; nothing is ever left out.
+    Args:
+        path: The Modelica file. It may use the packages in folders beside it.
+        model: Name of the model. None selects the model with the name of the file.
+
+    Raises:
+        InputError: The model has errors or uses unsupported features; the error contains the file and line.
     """
     defaults, sources = _flatten(path, model)
     folder = _source_root(sources.files)
@@ -48,7 +53,15 @@ def load_block(path: Path, model: str | None = None) -> Block:
 
 
 def load_interpreter(path: Path, model: str | None = None) -> Interpreter:
-    """The same model in plain Python, with default parameters."""
+    """Create an interpreter of a Modelica model with default parameters.
+
+    Args:
+        path: The Modelica file.
+        model: Name of the model. None selects the model with the name of the file.
+
+    Raises:
+        InputError: The model has errors or uses unsupported features.
+    """
     return _flatten(path, model)[0]
 
 
@@ -69,18 +82,22 @@ def _check_types(model: Model) -> None:
 
 
 def _source_root(files: Sequence[Path]) -> Path:
-    """The folder that holds the model's file, or the outermost package."""
+    """Return the folder that contains all files of the model."""
     return min((file.parent.parent if file.name == "package.mo" else file.parent for file in files), key=lambda f: len(f.parts))
 
 
 def _block_variables(defaults: Interpreter) -> list[BlockVariable]:
     names = struct_members(defaults.model)
-    shown = ((v, _fmi_role(v, defaults)) for v in defaults.model.variables.values())
-    return [_block_variable(v, names[v.name], role, defaults) for v, role in shown if role]
+    roles = ((v, _fmi_role(v, defaults)) for v in defaults.model.variables.values())
+    return [_block_variable(v, names[v.name], role, defaults) for v, role in roles if role]
 
 
 def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
-    """Causality and variability of a variable that the FMU shows; inner ones and what has another owner stay hidden."""
+    """Return causality and variability of a variable in the FMU, or None if the FMU does not contain it.
+
+    The FMU contains the inputs and outputs of the model itself, and all parameters that are neither protected nor set by a
+    modifier.
+    """
     roles = defaults.parameter_roles
     if variable.name in roles.settable:
         return "parameter", "fixed" if variable.name in roles.clock_parameters else "tunable"
@@ -112,12 +129,12 @@ def _block_variable(variable: Variable, member: str, role: FmiRole, defaults: In
 
 
 def _literals(variable: Variable, model: Model) -> tuple[str, ...]:
-    """The literals of the variable's enumeration type, which may be named without its package."""
+    """Return the literals of a variable's enumeration type; the type name may lack the package."""
     name = variable.enumeration
-    found = {literals for owner, literals in model.enumerations.items() if name and f".{owner}".endswith(f".{name}")}
-    if len(found) > 1:
+    candidates = {literals for key, literals in model.enumerations.items() if name and f".{key}".endswith(f".{name}")}
+    if len(candidates) > 1:
         raise_model_error(f'{variable.name}: several enumerations are named "{name}"; give them different names', variable.where)
-    return next(iter(found), ())
+    return next(iter(candidates), ())
 
 
 def _to_python(value: Any) -> Any:

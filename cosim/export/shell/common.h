@@ -1,8 +1,9 @@
-/* What the FMI 2.0 and 3.0 shells have in common: the life cycle, access to variables and the FMU state.
+/* Functions that the FMI 2.0 and 3.0 shells share: life cycle, access to variables and FMU state.
  *
- * A shell includes its FMI header, defines `Logger` (the type of the importer's callback) and `ARRAYS` (whether variables may
- * have several elements) and includes this file, then defines `report` (below) and the functions of its FMI version. All
- * functions here return true when all is well; after `refuse` they return false, which the shell turns into an error status.
+ * A shell includes the FMI header, defines `Logger` (type of the importer's log callback) and `ARRAYS` (true if variables may
+ * have several elements) and includes this file. Then it defines `report` (below) and the functions of its FMI version. The
+ * functions in this file return true on success. On failure they call `refuse` and return false, and the shell returns an
+ * error status.
  */
 #include <float.h>
 #include <math.h>
@@ -22,23 +23,23 @@ void model_parameters(Model *m);
 const char *model_initialize(Model *m, double time);
 const char *model_step(Model *m, double time, double step_size);
 
-/* The standard fixes the parameters of its functions; not every function needs all of them. */
+/* The FMI standard defines the parameters of its functions; not all of them are used. */
 #ifdef __GNUC__
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
 /* ---- instances ------------------------------------------------------------------------------------------------------- */
 
-/* Where an instance stands in its life; bits, so that a set of phases is an integer. */
+/* Phases of the life cycle of an instance; bits, so that an integer represents a set of phases. */
 typedef enum { INSTANTIATED = 1, INITIALIZING = 2, STEPPING = 4, TERMINATED = 8, FAILED = 16 } Phase;
 
-/* Everything that a saved FMU state consists of: flat memory, so a copy is a snapshot. */
+/* The FMU state; it contains no pointers, so that it is saved by a copy. */
 typedef struct {
     Model model;
-    double time;      /* the communication point reached */
-    double stop_time; /* infinite if the importer gave none */
+    double time;      /* current communication point */
+    double stop_time; /* infinite if undefined */
     Phase phase;
-    bool stale;       /* something was set in initialization mode after model_initialize */
+    bool stale;       /* a variable was set in initialization mode after model_initialize */
 } State;
 
 typedef struct {
@@ -53,7 +54,7 @@ typedef struct {
 typedef enum { FLOAT64, INT32, BOOLEAN, ENUMERATION } Type;
 typedef enum { READ_ONLY, FIXED_PARAMETER, TUNABLE_PARAMETER, INPUT } Role;
 
-/* One variable; its value reference is its row in the table. An enumeration has the values 1 ... literals. */
+/* A variable; its value reference is its index in the table. An enumeration has the values 1 to `literals`. */
 typedef struct {
     const char *name;
     Type type;
@@ -69,10 +70,10 @@ typedef struct {
 
 /* ---- failures -------------------------------------------------------------------------------------------------------- */
 
-/* Hands a message to the importer as an error; defined by each shell. */
+/* Passes an error message to the log callback of the importer; defined by each shell. */
 static void report(const Instance *instance, const char *message);
 
-/* Logs why a call failed. From now on only reading, restoring a saved state, reset and free make sense. */
+/* Logs the reason for the failure of a call. After it only reading, restoring a saved state, reset and free are allowed. */
 static bool refuse(Instance *instance, const char *function, const char *format, ...)
 {
     char message[512];
@@ -107,7 +108,7 @@ static inline bool expect(Instance *instance, const char *function, int phases)
     return (instance->state.phase & phases) || not_expected(instance, function);
 }
 
-/* The outcome of a model function: NULL, or the reason why it failed. */
+/* Checks the result of a function of the model: NULL, or the reason for its failure. */
 static bool succeeded(Instance *instance, const char *function, const char *reason)
 {
     return reason == NULL || refuse(instance, function, "%s", reason);
@@ -118,14 +119,14 @@ static bool succeeded(Instance *instance, const char *function, const char *reas
 static void reset(Instance *instance)
 {
     State *state = &instance->state;
-    memset(state, 0, sizeof *state); /* padding too: equal states are equal bytes */
+    memset(state, 0, sizeof *state); /* also the padding, so that equal states have equal bytes */
     model_start(&state->model);
     model_parameters(&state->model);
     state->stop_time = INFINITY;
     state->phase = INSTANTIATED;
 }
 
-/* A new instance, or NULL after a message to the logger. */
+/* Returns a new instance, or NULL after an error message. */
 static Instance *create(const char *function, const char *name, const char *token, Logger logger, void *environment)
 {
     Instance nobody = {.logger = logger, .environment = environment, .name = (char *)(name ? name : "")};
@@ -172,7 +173,7 @@ static bool enter_initialization(Instance *instance, const char *function)
     return true;
 }
 
-/* In initialization mode values follow from what was set, when they are asked for. */
+/* In initialization mode, computes the model before a variable is read if another one was set before. */
 static bool refresh(Instance *instance, const char *function)
 {
     State *state = &instance->state;
@@ -191,7 +192,7 @@ static bool exit_initialization(Instance *instance, const char *function)
 static bool step(Instance *instance, const char *function, double time, double step_size)
 {
     State *state = &instance->state;
-    const double slack = 1e-6 * step_size + 4 * DBL_EPSILON * fabs(state->time); /* n * h is rounded otherwise than t + h */
+    const double slack = 1e-6 * step_size + 4 * DBL_EPSILON * fabs(state->time); /* n * h and t + h have different rounding */
     if (!expect(instance, function, STEPPING)) return false;
     if (!(step_size > 0) || !isfinite(step_size))
         return refuse(instance, function, "found step size %.12g, expected a positive one", step_size);
@@ -213,7 +214,7 @@ static bool terminate(Instance *instance, const char *function)
 
 /* ---- access to variables --------------------------------------------------------------------------------------------- */
 
-/* What is refused is told by functions of its own: those that check are then so short that compilers put them into the loops. */
+/* Error messages are created in separate functions, so that the functions that check are short and compilers inline them. */
 static const Variable *not_found(Instance *instance, const char *function, unsigned reference, Type type)
 {
     static const char *const TYPES[] = {"Float64", "Int32", "Boolean", "Enumeration"};
@@ -266,7 +267,7 @@ static inline size_t elements(const Variable *variable)
     return ARRAYS ? variable->count : 1;
 }
 
-/* Whether the importer's array has (still) room for, or values of, a variable; scalars have one place each. */
+/* Checks the number of values in the importer's array; for scalars (ARRAYS == 0) it equals the number of variables. */
 static inline bool fits(Instance *instance, const char *function, size_t expected, size_t found, bool complete)
 {
     if (!ARRAYS || (complete ? found == expected : found >= expected)) return true;
@@ -280,7 +281,7 @@ static bool after_writing(Instance *instance, bool parameters)
     return true;
 }
 
-/* Defines read_NAME and write_NAME: between the importer's values (Outside) and members of the model (Inside). */
+/* Defines read_NAME and write_NAME, which copy between the importer's values (Outside) and members of the model (Inside). */
 #define DEFINE_ACCESS(NAME, TYPE, Outside, Inside)                                                                          \
     static bool read_##NAME(Instance *instance, const char *function, const unsigned references[], size_t count,            \
                             Outside values[], size_t value_count)                                                           \
@@ -318,7 +319,7 @@ static bool after_writing(Instance *instance, bool parameters)
 
 /* ---- the FMU state --------------------------------------------------------------------------------------------------- */
 
-/* A serialized state: the token, so that only the same FMU reads it, and the bytes of State. */
+/* A serialized state consists of the token, which identifies the FMU, and the bytes of State. */
 enum { SERIALIZED_SIZE = sizeof TOKEN + sizeof(State) };
 
 /* Copies a state into `*saved`, which is allocated when NULL. */

@@ -1,4 +1,4 @@
-/* Marks functions of a model that others load from the FMU's binary. */
+/* MODEL_EXPORT marks functions of a model that other programs load from the FMU's binary. */
 #ifndef EXPORT_H
 #define EXPORT_H
 

@@ -1,11 +1,11 @@
-/* The FMI 2.0 Co-Simulation shell around a model. */
+/* FMI 2.0 Co-Simulation interface of a model. */
 #include "fmi2Functions.h"
 
 typedef fmi2CallbackLogger Logger;
 #define ARRAYS 0
 #include "common.h"
 
-/* Messages of FMI 2.0 are format strings with "%" directives and "#" references: both are doubled to stand for themselves. */
+/* FMI 2.0 messages are format strings with "%" directives and "#" references; both characters are escaped by doubling. */
 static void report(const Instance *instance, const char *message)
 {
     char escaped[1024];
@@ -35,7 +35,7 @@ const char *fmi2GetVersion(void)
     return "2.0";
 }
 
-/* Errors are logged always and there is nothing else to log. */
+/* Errors are always logged; there are no other messages. */
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t count, const fmi2String categories[])
 {
     return fmi2OK;
@@ -150,7 +150,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
     return status(deserialize(c, "fmi2DeSerializeFMUstate", bytes, size, saved));
 }
 
-/* ---- the status of a step: steps never stay pending ------------------------------------------------------------------ */
+/* ---- the status of a step: steps are never pending ------------------------------------------------------------------- */
 
 fmi2Status fmi2CancelStep(fmi2Component c)
 {

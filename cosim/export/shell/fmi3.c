@@ -1,4 +1,4 @@
-/* The FMI 3.0 Co-Simulation shell around a model. */
+/* FMI 3.0 Co-Simulation interface of a model. */
 #include "fmi3Functions.h"
 
 typedef fmi3LogMessageCallback Logger;
@@ -22,7 +22,7 @@ const char *fmi3GetVersion(void)
     return fmi3Version;
 }
 
-/* Errors are logged always and there is nothing else to log. */
+/* Errors are always logged; there are no other messages. */
 fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean on, size_t count, const fmi3String categories[])
 {
     return fmi3OK;
@@ -145,7 +145,7 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte bytes[]
     return status(deserialize(instance, "fmi3DeserializeFMUState", bytes, size, saved));
 }
 
-/* ---- not offered: importers demand every symbol of the standard ------------------------------------------------------ */
+/* ---- not offered: importers require all functions of the standard ---------------------------------------------------- */
 
 #define NOT_OFFERED(function, ...)                                                                                          \
     fmi3Status function(__VA_ARGS__) { return status(refuse(instance, #function, "not offered")); }

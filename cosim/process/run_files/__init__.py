@@ -1,1 +1,1 @@
-"""Files that a run keeps on disk while it goes on."""
+"""Files on disk of a run in progress."""

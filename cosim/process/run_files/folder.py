@@ -1,7 +1,9 @@
-"""A run's folder while it is going on: rows as they are recorded, and what is needed to read them.
+"""Folder of a run in progress, from which another process recovers the recording after a crash.
 
-`header.json` says what a row is and which calls are made, `rows` holds the rows (see `engine.rows`), `texts` what is no number
-in them (see `text_rows`). After a crash another process makes a recording of it.
+- `header.json`: layout of a row and names of the calls
+- `rows`: rows of numbers (see `row_store`)
+- `texts`: string signals, written when they change (see `engine.saving_recorder`)
+- `metadata.json`: description of the run
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from ...core.json_values import decode_object
 from ..journal import current_journal
 
 if TYPE_CHECKING:
@@ -31,7 +34,7 @@ ROWS_FILE, TEXTS_FILE, HEADER_FILE, METADATA_FILE = "rows", "texts", "header.jso
 
 @dataclass(frozen=True)
 class Column:
-    """One recorded signal: its place in a row (bytes), its dtype, and what a user wants to know."""
+    """Numeric signal in a row: offset (bytes), NumPy dtype such as "<f8", and unit."""
 
     name: str
     dtype: str
@@ -42,11 +45,19 @@ class Column:
 
 @dataclass(frozen=True)
 class RowsHeader:
-    """What the rows of an unfinished run mean.
+    """Layout of the rows of an unfinished run.
 
-    Row k holds the values of communication point n = k * `every`, at (`origin` + n * `stride`) / `denominator` s. `calls` names
-    (component, function) by the number in the marker, `texts` the recorded signals that are no numbers and so not in the rows,
-    each with its place among all columns.
+    Row k belongs to communication point n = k * `steps_per_row`, whose time is (`origin` + n * `stride`) / `denominator` (s).
+
+    Attributes:
+        origin: See above.
+        stride: See above.
+        denominator: See above.
+        steps_per_row: Macro steps per row.
+        row_size: Size of a row (bytes).
+        columns: Numeric signals.
+        calls: Component and function of each call, by the number in the marker.
+        texts: String signals, each with its index among all signals.
     """
 
     origin: int
@@ -60,19 +71,19 @@ class RowsHeader:
 
     @property
     def names(self) -> list[str]:
-        """All columns in the order in which they were asked for."""
+        """Names of all signals in recorded order."""
         return self.merge_columns([column.name for column in self.columns], [name for _, name in self.texts])
 
     def merge_columns(self, numbers: Iterable[Value], texts: Iterable[Value]) -> list[Value]:
-        """What belongs to the columns of numbers and to those of texts, in the order of all columns."""
-        whole = list(numbers)
-        for (place, _), text in zip(self.texts, texts, strict=True):
-            whole.insert(place, text)
-        return whole
+        """Merge one value per numeric signal and one per string signal into recorded order."""
+        merged = list(numbers)
+        for (index, _), text in zip(self.texts, texts, strict=True):
+            merged.insert(index, text)
+        return merged
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """A row as a structured dtype."""
+        """Structured dtype of a row."""
         import numpy as np
 
         return np.dtype(
@@ -85,11 +96,11 @@ class RowsHeader:
         )
 
     def time_at(self, n: int) -> float:
-        """Time of communication point n."""
+        """Return the time of communication point n (s)."""
         return (self.origin + n * self.stride) / self.denominator
 
     def times(self, rows: int) -> np.ndarray:
-        """Times of the first rows (s), shape (rows,)."""
+        """Return the times of the first `rows` rows (s), shape (rows,)."""
         from ...core.time_grid import TimeGrid
 
         start, step = Fraction(self.origin, self.denominator), Fraction(self.stride, self.denominator)
@@ -98,7 +109,7 @@ class RowsHeader:
 
 
 def read_header(folder: Path | None) -> RowsHeader | None:
-    """The header of a run; None when it did not come that far."""
+    """Read the header in the folder of a run; None if it was not written."""
     if folder is None:
         return None
     try:
@@ -111,7 +122,7 @@ def read_header(folder: Path | None) -> RowsHeader | None:
 
 
 class TextReader:
-    """Follows the texts of an unfinished run row by row, as far as they are written."""
+    """Reader of the string signals of an unfinished run."""
 
     def __init__(self, folder: Path, header: RowsHeader):
         self._file = (folder / TEXTS_FILE).open("rb") if header.texts else io.BytesIO()
@@ -119,40 +130,37 @@ class TextReader:
         self._rewind()
 
     def _rewind(self) -> None:
+        """Return to the first row."""
         self._file.seek(0)
         self._row, self._pending_change = -1, (-1, dict[str, Any]())
         self._texts: dict[str, Any] = dict.fromkeys(self._names, "")
 
     def read_row(self, number: int) -> list[Any]:
-        """The texts in a row; rows are best asked for one after the other."""
+        """Return the string signals of a row; fast if rows are read in ascending order."""
         if number < self._row:
             self._rewind()
         self._row = number
         while self._pending_change[0] <= number:
             self._texts |= self._pending_change[1]
             line = self._file.readline()
-            if not line.endswith(b"\n"):
+            if not line.endswith(b"\n"):  # end of file, or a line that is being written
                 self._file.seek(-len(line), os.SEEK_CUR)
                 self._pending_change = (-1, {})
                 break
-            first, texts = json.loads(line, object_hook=_decode_bytes)
+            first, texts = json.loads(line, object_hook=decode_object)
             self._pending_change = (first, texts)
         return list(self._texts.values())
 
 
-def _decode_bytes(value: dict[str, Any]) -> Any:
-    return bytes.fromhex(value["bytes"]) if value.keys() == {"bytes"} else value
-
-
 def write_metadata(metadata: dict[str, Any]) -> None:
-    """Keep what describes the run, if a supervisor wants to see it."""
+    """Write the description of the run to its folder, if this process has a supervisor."""
     journal = current_journal()
     if journal and journal.folder:
         (journal.folder / METADATA_FILE).write_text(json.dumps(metadata, default=str), encoding="utf-8")
 
 
 def read_metadata(folder: Path) -> dict[str, Any]:
-    """What describes the run, as far as it is known."""
+    """Read the description of a run; empty if it was not written."""
     try:
         return dict(json.loads((folder / METADATA_FILE).read_text(encoding="utf-8")))
     except (OSError, ValueError):
@@ -161,7 +169,12 @@ def read_metadata(folder: Path) -> dict[str, Any]:
 
 @contextmanager
 def keeping_run_files(folder: Path, csv: Path | None = None) -> Iterator[None]:
-    """While the block lasts, the run of this process keeps its files in `folder`, if a supervisor wants to see them."""
+    """Keep the files of a run in `folder` during the block, if this process has a supervisor; remove them if it succeeds.
+
+    Args:
+        folder: Folder that is created; an existing one is replaced.
+        csv: CSV file that the supervisor updates during the run; None for none.
+    """
     journal = current_journal()
     if journal is None:
         yield
@@ -174,14 +187,22 @@ def keeping_run_files(folder: Path, csv: Path | None = None) -> Iterator[None]:
 
 
 def remove_run_files() -> None:
-    """The rows of this process's run are where the user wants them: its folder is not needed any more."""
+    """Remove the folder of the run of this process, after its results were written."""
     journal = current_journal()
     if journal and journal.folder:
         shutil.rmtree(journal.folder, ignore_errors=True)
 
 
 def recover_recording(folder: Path | None, rows: int) -> Recording:
-    """The first `rows` rows of an unfinished run as a recording; fewer if foreign code has made their file shorter."""
+    """Read the recording of an unfinished run.
+
+    Args:
+        folder: Folder of the run; None if it had none.
+        rows: Number of recorded rows.
+
+    Returns:
+        A recording with fewer rows if foreign code has truncated the file, empty if there is no header.
+    """
     import numpy as np
 
     from ...core.recording import Recording
@@ -204,7 +225,7 @@ def recover_recording(folder: Path | None, rows: int) -> Recording:
 
 
 def _count_readable_rows(folder: Path, header: RowsHeader, rows: int) -> int:
-    """How many of so many rows can be read."""
+    """Return the number of rows, up to `rows`, that the file contains."""
     try:
         return min(rows, (folder / ROWS_FILE).stat().st_size // header.row_size) if header.row_size else rows
     except OSError:

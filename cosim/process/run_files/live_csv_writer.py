@@ -1,7 +1,7 @@
-"""A run's rows as CSV while it goes on, so that even the loss of both processes leaves a readable file.
+"""CSV file of a run in progress, which remains readable even if both processes are killed.
 
-The file the user sees is whole at every moment: new lines are appended to a second copy, which then takes its place in one
-step. So the copies take turns. The final file replaces it.
+The result file is complete at any time: new lines are appended to one of two copies, which then replaces it atomically; the next
+update uses the other copy. The final file replaces it at the end of the run.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ from pathlib import Path
 from shutil import copyfileobj
 from typing import IO
 
+from ...core.csv_text import format_header, quote_cell
 from ..journal import ROW_COUNT, Journal
 from .folder import ROWS_FILE, RowsHeader, TextReader, read_header
 
-#: short runs are left alone for this long, long ones get new lines this often, and no longer than this at a time (s)
+#: time until the first update, time between updates, maximum duration of an update (s)
 FIRST_UPDATE_DELAY, UPDATE_INTERVAL, MAX_UPDATE_TIME = 0.2, 0.3, 0.2
 
 _ROWS_PER_CHUNK = 500
@@ -26,14 +27,14 @@ _ROWS_PER_CHUNK = 500
 
 @dataclass
 class _CsvCopy:
-    """A file, and how much of it is sound (bytes)."""
+    """A file and its valid size (bytes)."""
 
     path: Path
     size: int = 0
 
 
 class LiveCsvWriter:
-    """Appends to the journal's CSV file what was recorded since the last update; without NumPy, which is slow to import."""
+    """Writer of the journal's CSV file; does without NumPy, which is slow to import."""
 
     def __init__(self, journal: Journal):
         self._journal = journal
@@ -41,7 +42,7 @@ class LiveCsvWriter:
         self._lines: CsvLineReader | None = None
 
     def update(self) -> None:
-        """Append what is new, if it is time; a file that cannot be written is the business of the run itself."""
+        """Append new rows if an update is due; stop updating after a write error, which the run itself reports."""
         now = time.monotonic()
         if not self._journal.phase.in_loop or now < self._next_update:
             return
@@ -53,6 +54,7 @@ class LiveCsvWriter:
             self._next_update = float("inf")
 
     def _open_copies(self, now: float) -> bool:
+        """Create both copies; return False if it is too early or the run has no header yet."""
         if self._next_update == 0.0:
             self._next_update = now + FIRST_UPDATE_DELAY
             return False
@@ -69,9 +71,9 @@ class LiveCsvWriter:
         return True
 
     def _append_rows(self, until: float) -> None:
-        """Bring the hidden copy up to date, as far as time allows, and show it."""
+        """Append rows to the back copy until the time `until` and publish it."""
         assert self._lines is not None
-        written, rows = self._lines.row_count, self._journal[ROW_COUNT]
+        former_count, rows = self._lines.row_count, self._journal[ROW_COUNT]
         try:
             with self._back.path.open("r+b") as target:
                 self._synchronize_back(target)
@@ -79,25 +81,25 @@ class LiveCsvWriter:
                     while self._lines.row_count < rows and time.monotonic() < until:
                         target.write(self._lines.read_lines(source, rows))
                 self._back.size = target.tell()
-            shown = self._publish_back()
+            published = self._publish_back()
         except BaseException:
-            self._lines.row_count = written
+            self._lines.row_count = former_count
             raise
-        if shown:
+        if published:
             self._front, self._back = self._back, self._front
         self._next_update = time.monotonic() + (UPDATE_INTERVAL if self._lines.row_count == rows else 0)
 
     def _synchronize_back(self, target: IO[bytes]) -> None:
-        """What the shown copy has and the hidden one lacks; an append that was interrupted is undone."""
+        """Copy to the back copy what only the front copy has, and undo an interrupted append."""
         size = min(self._back.size, self._front.size)
         target.truncate(size)
         target.seek(size)
-        with self._front.path.open("rb") as shown:
-            shown.seek(size)
-            copyfileobj(shown, target)
+        with self._front.path.open("rb") as source:
+            source.seek(size)
+            copyfileobj(source, target)
 
     def _publish_back(self) -> bool:
-        """Put the hidden copy in its place, unless the run has left the stepping loop: then the final file is on its way."""
+        """Replace the result file by the back copy, unless the run has left the stepping loop and writes the final file."""
         link = self._back.path.with_suffix(".link")
         link.unlink(missing_ok=True)
         os.link(self._back.path, link)
@@ -108,23 +110,31 @@ class LiveCsvWriter:
 
 
 class CsvLineReader:
-    """The rows of a run as lines of CSV, in the format of `results.csv_files`."""
+    """Converter of the rows of a run to lines of CSV, in the format of `results.csv_files`."""
 
     def __init__(self, header: RowsHeader, texts: TextReader):
         self._header, self._texts = header, texts
-        places = sorted({column.offset for column in header.columns})
-        order = [places.index(column.offset) for column in header.columns]
+        offsets = sorted({column.offset for column in header.columns})
+        order = [offsets.index(column.offset) for column in header.columns]
         self._order_columns = itemgetter(*order) if len(order) > 1 else lambda values: tuple(values[i] for i in order)
         self._unpack = struct.Struct(_row_format(header)).iter_unpack
-        #: rows that were given out
+        #: number of rows that were converted
         self.row_count = 0
 
     def header_line(self) -> bytes:
-        """The line of names."""
-        return ",".join(map(_quote_csv, ("time", *self._header.names))).encode() + b"\n"
+        """Return the line with the names of the columns."""
+        return format_header(self._header.names).encode()
 
     def read_lines(self, source: IO[bytes], rows: int) -> bytes:
-        """Lines of some of the rows that follow, of `rows` that there are in the file."""
+        """Convert the next rows, at most `_ROWS_PER_CHUNK`.
+
+        Args:
+            source: File of rows.
+            rows: Number of rows in the file.
+
+        Raises:
+            OSError: The file is shorter than expected.
+        """
         from pydantic_core import to_json
 
         header, first = self._header, self.row_count
@@ -132,7 +142,7 @@ class CsvLineReader:
         source.seek(first * header.row_size)
         data = source.read(count * header.row_size)
         if len(data) < count * header.row_size:
-            raise OSError("rows are missing: foreign code has made their file shorter")
+            raise OSError("rows are missing: foreign code has truncated their file")
         values = self._unpack(data) if header.row_size else [()] * count
         table = [
             (header.time_at(n * header.steps_per_row), *self._order_columns(row)) for n, row in enumerate(values, start=first)
@@ -142,22 +152,18 @@ class CsvLineReader:
         return self._insert_texts(lines, first) if header.texts else lines
 
     def _insert_texts(self, lines: bytes, first: int) -> bytes:
-        """The lines of numbers, the first of them with this number, with texts between them."""
-        whole = []
+        """Insert the string signals into lines of numbers; `first` is the number of the first row."""
+        complete = []
         for row, line in enumerate(lines.decode().splitlines(), start=first):
             time, *numbers = line.split(",")
-            whole.append(
-                ",".join([time, *self._header.merge_columns(numbers, map(_quote_csv, self._texts.read_row(row)))]) + "\n"
+            complete.append(
+                ",".join([time, *self._header.merge_columns(numbers, map(quote_cell, self._texts.read_row(row)))]) + "\n"
             )
-        return "".join(whole).encode()
-
-
-def _quote_csv(text: str) -> str:
-    return '"' + str(text).replace('"', '""') + '"'
+        return "".join(complete).encode()
 
 
 def _row_format(header: RowsHeader) -> str:
-    """The row as a format of the struct module, columns by position."""
+    """Return the format of a row for the struct module, with columns in ascending order of their offsets."""
     parts, position = ["="], 0
     for offset, kind in sorted({(column.offset, struct_format_character(column.dtype)) for column in header.columns}):
         parts += [f"{offset - position}x", kind]
@@ -166,9 +172,9 @@ def _row_format(header: RowsHeader) -> str:
 
 
 def struct_format_character(dtype: str) -> str:
-    """The struct module's character for a numpy dtype such as "<f8"; Booleans are 0 and 1.
+    """Return the format character of the struct module for a NumPy dtype; Booleans are unsigned bytes.
 
-    >>> struct_kind("<f8"), struct_kind("|b1"), struct_kind("<u4")
+    >>> struct_format_character("<f8"), struct_format_character("|b1"), struct_format_character("<u4")
     ('d', 'B', 'I')
     """
     kind, size = dtype[1], int(dtype[2:])

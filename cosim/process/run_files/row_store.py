@@ -1,4 +1,4 @@
-"""Where recorded rows lie: in memory, or chunk by chunk in a file that outlives a crash and may be larger than memory."""
+"""Storage of recorded rows in memory, or in a file that survives a crash and may be larger than memory."""
 
 from __future__ import annotations
 
@@ -12,37 +12,41 @@ from weakref import finalize
 
 import numpy as np
 
-#: a chunk of a file is at most this large (bytes); so many values are computed at a time
+#: maximum size of a chunk of a file (bytes); number of values computed at a time
 CHUNK_BYTES, BATCH_VALUES = 1 << 24, 1 << 18
 
-#: more than this (bytes) is not kept in memory
+#: maximum size of rows in memory (bytes)
 MAX_MEMORY_BYTES = 1 << 26
 
 
 class RowStore:
-    """Rows of one structured dtype, in memory; `expected` rows are all that will come."""
+    """Rows of one structured dtype in memory.
+
+    Attributes:
+        dtype: Structured dtype of a row.
+        chunk_rows: Number of rows of a chunk.
+    """
 
     def __init__(self, dtype: np.dtype[Any], expected: int):
         self.dtype = dtype
-        #: rows of a chunk
         self.chunk_rows = max(1, expected)
         self._chunk = np.zeros(0, dtype)
 
     def add_chunk(self) -> np.ndarray:
-        """A new chunk at the end, to be filled."""
+        """Append a chunk of zeros and return it, shape (chunk_rows,)."""
         self._chunk = np.zeros(self.chunk_rows, self.dtype)
         return self._chunk
 
     def read_first(self, count: int) -> np.ndarray:
-        """The first `count` rows."""
+        """Return the first `count` rows, shape (count,)."""
         return self._chunk[:count]
 
 
 class FileRowStore(RowStore):
-    """Rows in a file, one after the other: what was recorded is in it even when the process is killed.
+    """Rows in a file, which contains all recorded rows even if the process is killed.
 
-    Only the chunk that is being filled occupies memory. The disk's space is claimed chunk by chunk, so that a full disk is an
-    OSError and no crash.
+    Only the last chunk occupies memory. Disk space is allocated chunk by chunk, so that a full disk raises OSError instead of
+    crashing the process (SIGBUS).
     """
 
     def __init__(self, dtype: np.dtype[Any], expected: int, file: IO[bytes]):
@@ -51,6 +55,7 @@ class FileRowStore(RowStore):
         finalize(self, file.close)
 
     def add_chunk(self) -> np.ndarray:
+        """Append a chunk of zeros and return it, shape (chunk_rows,), mapped to the file."""
         if not self.dtype.itemsize:
             return np.zeros(self.chunk_rows, self.dtype)
         begin = self._rows * self.dtype.itemsize
@@ -62,18 +67,34 @@ class FileRowStore(RowStore):
         return np.frombuffer(mapped, self.dtype, self.chunk_rows, begin - page)
 
     def read_first(self, count: int) -> np.ndarray:
+        """Return the first `count` rows, shape (count,), mapped to the file."""
         return read_rows(self._file, self.dtype, count)
 
 
 def open_row_store(dtype: np.dtype[Any], expected: int, path: Path | None) -> RowStore:
-    """Rows in the file at `path`; without one in memory, or in a temporary file that nobody sees when they are many."""
+    """Return a store in the file at `path`, else in memory, or in an unnamed temporary file if it exceeds `MAX_MEMORY_BYTES`.
+
+    Args:
+        dtype: Structured dtype of a row.
+        expected: Number of rows that will be added.
+        path: File that is created; None for none.
+    """
     if path is None and expected * dtype.itemsize <= MAX_MEMORY_BYTES:
         return RowStore(dtype, expected)
-    return FileRowStore(dtype, expected, path.open("w+b") if path else TemporaryFile())  # type: ignore[arg-type]
+    return FileRowStore(dtype, expected, path.open("w+b") if path else TemporaryFile())
 
 
 def compute_in_chunks(count: int, fill: Callable[[range], np.ndarray], dtype: np.dtype[Any]) -> np.ndarray:
-    """The values 0 ... count - 1 that `fill` makes piece by piece; many of them lie in a temporary file."""
+    """Compute an array piece by piece; a large one is stored in a temporary file.
+
+    Args:
+        count: Number of values.
+        fill: Returns the values at a range of indices.
+        dtype: Type of the values.
+
+    Returns:
+        All values, shape (count,).
+    """
     store = open_row_store(dtype, count, None)
     for begin in range(0, count, store.chunk_rows):
         chunk = store.add_chunk()[: count - begin]
@@ -84,12 +105,12 @@ def compute_in_chunks(count: int, fill: Callable[[range], np.ndarray], dtype: np
 
 
 def read_rows(file: Path | IO[bytes], dtype: np.dtype[Any], count: int) -> np.ndarray:
-    """The first `count` rows of a file of rows, read when they are used."""
+    """Return the first `count` rows of a file, shape (count,), mapped to memory."""
     return np.memmap(file, dtype, "r", shape=(count,)) if count and dtype.itemsize else np.zeros(count, dtype)
 
 
 def _allocate_disk_space(file: int, begin: int, end: int) -> None:
-    """Make the file `end` bytes long with disk space behind every byte."""
+    """Extend the file to `end` bytes and allocate disk space from `begin` on."""
     if hasattr(os, "posix_fallocate") and end > begin:
         os.posix_fallocate(file, begin, end - begin)
     else:

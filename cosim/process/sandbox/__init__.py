@@ -1,16 +1,23 @@
-"""What a worker process does to itself before it loads foreign code.
+"""Restrictions that a worker process imposes on itself before it loads foreign code.
 
-    enter(Settings(readable=(fmu_folder, *interpreter_folders()), writable=(temporary,), confine="required"))
+    enter_sandbox(SandboxSettings(readable=(fmu_folder, *interpreter_folders()), writable=(temporary,), confine="required"))
 
-Always: limits of memory, files and processor time; no core file; a session of its own (unless it leads a group already); the
-end of the parent is its own end; standard input is empty; no privileges can be gained. With `confine`: files are read, and
-programs started, only below `readable`; files are written only below `writable`; TCP needs `network` (Landlock, Linux 5.13, its
-TCP rules 6.7).
+Always in force:
 
-What remains: Landlock blocks neither UDP, raw sockets and Unix sockets that have a path, nor looking at names, sizes and modes
-of files, nor changing the modes of one's own. `command` (bubblewrap, strict mode) shows no other files and processes and no
-network at all. A worker can use up its limits, leave children behind in sessions of their own, which the parent has to end, and
-lie in its outputs.
+- limits of memory, open files, file size and processor time; no core file
+- a separate session (unless the process already leads a process group) that ends with the parent
+- empty standard input
+- no way to gain privileges
+
+With `confine` (Landlock, Linux 5.13):
+
+- files are read and programs executed only below `readable`
+- files are written only below `writable`
+- TCP is closed unless `network` is set (Linux 6.7)
+
+Not prevented: Landlock does not block UDP, raw sockets and named Unix sockets, nor reading names, sizes and modes of files, nor
+changing the modes of the user's files. `bubblewrap_command` (strict mode) hides all other files, all processes and the network. A
+worker can exhaust its limits, leave children in other sessions, which the parent has to kill, and return wrong outputs.
 """
 
 from __future__ import annotations
@@ -29,12 +36,12 @@ __all__ = [
     "ActiveRestrictions",
     "AvailableSandboxes",
     "SandboxSettings",
-    "probe_restrictions",
-    "find_available_sandboxes",
-    "find_bubblewrap",
     "bubblewrap_command",
     "enter_sandbox",
+    "find_available_sandboxes",
+    "find_bubblewrap",
     "interpreter_folders",
+    "probe_restrictions",
 ]
 
 GIBIBYTE = 1 << 30
@@ -42,12 +49,18 @@ GIBIBYTE = 1 << 30
 
 @dataclass(frozen=True)
 class SandboxSettings:
-    """Limits of a worker process.
+    """Restrictions of a worker process.
 
-    `memory`: bytes of address space beyond what is mapped already; `file_size`: bytes of one written file; `cpu_seconds`:
-    processor time of the process. `readable` and `writable`: folders or files that exist; what is writable is readable.
-    `confine`: whether file and network access is confined to what is listed: "never", where it is "available", or "required".
-    `parent`: process id without which the worker must not go on.
+    Attributes:
+        memory: Address space in addition to the present one (bytes).
+        open_files: Number of open files.
+        file_size: Size of a written file (bytes).
+        cpu_seconds: Processor time of the process (s); None for no limit.
+        readable: Existing folders and files that may be read.
+        writable: Existing folders and files that may be read and written.
+        network: Permit TCP.
+        confine: Confine access to the listed files: "never", if "available", or "required".
+        parent: Process id of the parent, with which the worker ends; None for no check that it still exists.
     """
 
     memory: int = 2 * GIBIBYTE
@@ -62,10 +75,14 @@ class SandboxSettings:
 
 
 def enter_sandbox(settings: SandboxSettings) -> None:
-    """Put this process under the settings; nothing of it can be undone.
+    """Apply the restrictions to this process, irrevocably.
 
-    To be called where the process has one thread only. Raises InputError, before anything is changed, when confinement is
-    required and this kernel has none, or none for the network, or when a listed folder does not exist.
+    Args:
+        settings: The restrictions.
+
+    Raises:
+        InputError: The process is to be confined, but a listed path does not exist, the process has several threads, or the
+            kernel does not support the required confinement. Nothing was changed.
     """
     confined = settings.confine == "required" or (settings.confine == "available" and landlock.abi_version() > 0)
     if confined and (reason := _unmet_requirement(settings)):
@@ -77,15 +94,15 @@ def enter_sandbox(settings: SandboxSettings) -> None:
 
 
 def _unmet_requirement(settings: SandboxSettings) -> str:
-    """Why the settings cannot be met; empty when they can."""
+    """Return the reason why the process cannot be confined; "" if it can."""
     missing = [str(path) for path in (*settings.readable, *settings.writable) if not path.exists()]
     if missing:
         return f"{', '.join(missing)} does not exist"
-    found = landlock.abi_version()
-    if not found:
+    available = landlock.abi_version()
+    if not available:
         return "Landlock is needed (Linux 5.13 or newer, enabled); this kernel has none"
-    if settings.confine == "required" and not settings.network and found < landlock.NETWORK_ABI:
-        return f"to close the network needs Landlock {landlock.NETWORK_ABI} (Linux 6.7); this kernel has {found}"
+    if settings.confine == "required" and not settings.network and available < landlock.NETWORK_ABI:
+        return f"closing the network needs Landlock {landlock.NETWORK_ABI} (Linux 6.7); this kernel has {available}"
     if limits.thread_count() > 1:
-        return "the process has more than one thread, and the others would stay free"
+        return "the process has more than one thread, and the others would not be confined"
     return ""

@@ -1,4 +1,4 @@
-"""Strict mode: bubblewrap starts a command with its own processes, users, network and files."""
+"""Strict sandbox: bubblewrap runs a command with separate process ids, users, network and files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _MOUNT_OPTIONS = ("--proc", "/proc", "--dev", "/dev", "--tmpfs", "/tmp")  # noqa
 
 
 def find_bubblewrap() -> str:
-    """Path of the program `bwrap`; empty where it is not installed or may not do its work."""
+    """Return the path of the program `bwrap`; "" if it is not installed or lacks permissions."""
     program = shutil.which("bwrap")
     if program is None:
         return ""
@@ -29,23 +29,30 @@ def find_bubblewrap() -> str:
 def bubblewrap_command(
     arguments: Sequence[str], readable: Iterable[Path], writable: Iterable[Path] = (), *, status: int | None = None
 ) -> list[str]:
-    """The command that runs `arguments` in this folder seeing nothing but the listed ones, under their own paths.
+    """Return a command line that runs a command in bubblewrap, in the current folder.
 
-    No network at all, no process of outside, an empty /tmp; everything ends with the caller. Where folders lie in each other,
-    the inner one counts; `writable` counts more than `readable`. To the descriptor `status` bubblewrap writes lines of JSON
-    with "child-pid", and "exit-code" at the end of a command that was started. Raises InputError where bubblewrap is missing
-    or not permitted.
+    The command has no network, an empty /tmp, only the listed files under their usual paths, and ends with the caller. If one
+    listed folder contains another, the permission of the inner one applies to it.
+
+    Args:
+        arguments: Program and arguments.
+        readable: Folders and files that may be read.
+        writable: Folders and files that may be read and written; they take precedence over `readable`.
+        status: Descriptor to which bubblewrap writes lines of JSON with "child-pid" and, at the end, "exit-code".
+
+    Raises:
+        InputError: bubblewrap is not installed or lacks permissions.
     """
     program = find_bubblewrap()
     if not program:
         raise InputError(
             "the strict sandbox needs bubblewrap (program bwrap, package bubblewrap) and user namespaces; found none that works"
         )
-    words = [program, *_ISOLATION_OPTIONS, *_MOUNT_OPTIONS]
+    command = [program, *_ISOLATION_OPTIONS, *_MOUNT_OPTIONS]
     bound = {**dict.fromkeys(readable, "--ro-bind"), **dict.fromkeys(writable, "--bind")}
     for path in sorted(bound):
-        words += [bound[path], str(path), str(path)]
+        command += [bound[path], str(path), str(path)]
     if status is not None:
-        words += ["--json-status-fd", str(status)]
-    here = str(Path.cwd())
-    return [*words, "--dir", here, "--chdir", here, "--", *arguments]
+        command += ["--json-status-fd", str(status)]
+    folder = str(Path.cwd())
+    return [*command, "--dir", folder, "--chdir", folder, "--", *arguments]

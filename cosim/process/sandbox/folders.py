@@ -1,4 +1,4 @@
-"""What a Python process must be able to read."""
+"""Files that a Python process has to read."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ...core.resources import package_folder
 
-#: shared libraries and what the loader and C library look up
+#: shared libraries, and files that the loader and the C library read
 _SYSTEM_PATHS = (
     "/usr/lib",
     "/usr/lib64",
@@ -21,11 +21,10 @@ _SYSTEM_PATHS = (
 
 
 def interpreter_folders() -> tuple[Path, ...]:
-    """Existing folders and files that this interpreter, its packages and shared libraries are read from.
+    """Return the existing folders and files of this interpreter, its packages and shared libraries.
 
-    Not the current folder, which Python searches, too, when it is started as `python -m cosim`.
+    The current folder is excluded, although `python -m cosim` adds it to `sys.path`.
     """
-    own = package_folder()
-    searched = [path for path in map(Path, sys.path) if path.absolute() != Path.cwd()]
-    places = [*map(Path, (*_SYSTEM_PATHS, sys.prefix, sys.base_prefix)), *searched, own]
-    return tuple(dict.fromkeys(path.absolute() for path in places if path.exists()))
+    module_folders = [path for path in map(Path, sys.path) if path.absolute() != Path.cwd()]
+    paths = [*map(Path, (*_SYSTEM_PATHS, sys.prefix, sys.base_prefix)), *module_folders, package_folder()]
+    return tuple(dict.fromkeys(path.absolute() for path in paths if path.exists()))

@@ -1,4 +1,4 @@
-"""Landlock: a Linux process gives up access to files and TCP, for itself and all its children, without being root.
+"""Landlock: a Linux process restricts its own and its children's access to files and TCP, without root privileges.
 
 Three system calls, by number (the same on every architecture); constants from linux/landlock.h.
 """
@@ -14,14 +14,14 @@ from pathlib import Path
 
 CREATE_RULESET, ADD_RULE, RESTRICT_SELF = 444, 445, 446
 CREATE_RULESET_VERSION, RULE_PATH_BENEATH = 1, 1
-#: first version with rules for TCP; for signals and abstract sockets
+#: first versions with rules for TCP, and for signals and abstract sockets
 NETWORK_ABI, SCOPE_ABI = 4, 6
 
 EXECUTE, WRITE_FILE, READ_FILE, READ_DIR = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 TRUNCATE, IOCTL_DEV = 1 << 14, 1 << 15
-#: rights that a single file can have
+#: rights that apply to a file, the others apply to folders
 FILE_ACCESS_RIGHTS = EXECUTE | WRITE_FILE | READ_FILE | TRUNCATE | IOCTL_DEV
-#: version -> number of rights over files that it knows
+#: number of file system rights in each version
 FILE_RIGHT_COUNTS = {1: 13, 2: 14, 3: 15, 4: 15, 5: 16}
 TCP_RIGHTS = 1 << 0 | 1 << 1
 SCOPED_SIGNALS_AND_SOCKETS = 1 << 0 | 1 << 1
@@ -39,25 +39,33 @@ class _PathBeneath(ctypes.Structure):
 
 
 def abi_version() -> int:
-    """The Landlock version of this kernel; 0 where there is none."""
+    """Return the Landlock version of this kernel; 0 if it has none."""
     if sys.platform != "linux":
         return 0
-    found: int = _LIBC.syscall(CREATE_RULESET, None, ctypes.c_size_t(0), ctypes.c_uint32(CREATE_RULESET_VERSION))
-    return max(found, 0)
+    version: int = _LIBC.syscall(CREATE_RULESET, None, ctypes.c_size_t(0), ctypes.c_uint32(CREATE_RULESET_VERSION))
+    return max(version, 0)
 
 
 def confine(readable: Iterable[Path], writable: Iterable[Path], *, network: bool) -> None:
-    """From now on this thread and its children read and execute only below `readable` and write only below `writable`.
+    """Confine this thread and its children to the listed files, irrevocably.
 
-    Without `network` TCP is closed (version 4), and signals and abstract sockets do not leave the confinement (version 6).
-    Open files stay open. The process must have given up new privileges, or be privileged. Raises OSError when the kernel refuses.
+    Open files stay open. The process must have set no_new_privs (see `limits.detach`) or be privileged. From version 6 on,
+    signals and abstract sockets do not reach processes outside.
+
+    Args:
+        readable: Folders and files that may be read and executed.
+        writable: Folders and files that may be read and written, not executed.
+        network: Permit TCP; it is closed from version 4 on otherwise.
+
+    Raises:
+        OSError: The kernel refused, or a path does not exist.
     """
-    found = abi_version()
-    rights = (1 << FILE_RIGHT_COUNTS[min(found, max(FILE_RIGHT_COUNTS))]) - 1
-    tcp = TCP_RIGHTS if found >= NETWORK_ABI and not network else 0
-    scoped = SCOPED_SIGNALS_AND_SOCKETS if found >= SCOPE_ABI else 0
+    version = abi_version()
+    rights = (1 << FILE_RIGHT_COUNTS[min(version, max(FILE_RIGHT_COUNTS))]) - 1
+    tcp = TCP_RIGHTS if version >= NETWORK_ABI and not network else 0
+    scoped = SCOPED_SIGNALS_AND_SOCKETS if version >= SCOPE_ABI else 0
     attributes = _Ruleset(rights, tcp, scoped)
-    size = 8 if found < NETWORK_ABI else 16 if found < SCOPE_ABI else 24
+    size = 8 if version < NETWORK_ABI else 16 if version < SCOPE_ABI else 24
     ruleset = _system_call(CREATE_RULESET, ctypes.byref(attributes), ctypes.c_size_t(size), ctypes.c_uint32(0))
     try:
         for path in readable:
@@ -71,14 +79,14 @@ def confine(readable: Iterable[Path], writable: Iterable[Path], *, network: bool
 
 
 def _add_path_rule(ruleset: int, path: Path, rights: int) -> None:
-    place = os.open(path, os.O_PATH | os.O_CLOEXEC)
+    descriptor = os.open(path, os.O_PATH | os.O_CLOEXEC)
     try:
-        if not stat.S_ISDIR(os.fstat(place).st_mode):
+        if not stat.S_ISDIR(os.fstat(descriptor).st_mode):
             rights &= FILE_ACCESS_RIGHTS
-        rule = _PathBeneath(rights, place)
+        rule = _PathBeneath(rights, descriptor)
         _system_call(ADD_RULE, ctypes.c_int(ruleset), ctypes.c_int(RULE_PATH_BENEATH), ctypes.byref(rule), ctypes.c_uint32(0))
     finally:
-        os.close(place)
+        os.close(descriptor)
 
 
 def _system_call(number: int, *arguments: object) -> int:

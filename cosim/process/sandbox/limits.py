@@ -1,4 +1,4 @@
-"""A process on its own: session, end with its parent, empty input, limits."""
+"""Session and resource limits of a child process."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ PR_SET_PDEATHSIG, PR_SET_NO_NEW_PRIVS, PR_GET_NO_NEW_PRIVS = 1, 38, 39
 
 
 def detach(parent: int | None) -> None:
-    """A session of its own, killed when the parent's thread that started it ends (Linux), no new privileges, nothing to read.
+    """Enter a new session, give up gaining privileges, and connect standard input to /dev/null.
 
-    Ends the process when `parent` is gone already.
+    On Linux the process is killed when the thread that started it ends.
+
+    Args:
+        parent: Process id of the parent; the process ends at once if it is no longer its parent. None: no check.
     """
     if os.getpgrp() != os.getpid():
         os.setsid()
@@ -23,14 +26,21 @@ def detach(parent: int | None) -> None:
     if parent is not None and os.getppid() != parent:
         os.kill(os.getpid(), signal.SIGKILL)
     _prctl(PR_SET_NO_NEW_PRIVS, 1)
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    if nothing != 0:
-        os.close(nothing)
+    null = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(null, 0)
+    if null != 0:
+        os.close(null)
 
 
 def set_limits(memory: int, open_files: int, file_size: int, cpu_seconds: int | None) -> None:
-    """Lower the limits of this process; `memory` in bytes beyond what is mapped already. No core file is written."""
+    """Lower the limits of this process and disable core files.
+
+    Args:
+        memory: Address space in addition to the present one (bytes).
+        open_files: Number of open files.
+        file_size: Size of a written file (bytes).
+        cpu_seconds: Processor time (s); None for no limit.
+    """
     lower_limit(resource.RLIMIT_AS, mapped_size() + memory)
     lower_limit(resource.RLIMIT_NOFILE, open_files)
     lower_limit(resource.RLIMIT_FSIZE, file_size)
@@ -40,29 +50,29 @@ def set_limits(memory: int, open_files: int, file_size: int, cpu_seconds: int | 
 
 
 def lower_limit(kind: int, value: int) -> None:
-    """Soft and hard limit; a hard limit that is lower already stays."""
+    """Set the soft and the hard limit of a resource (`resource.RLIMIT_*`); a lower hard limit is kept."""
     _, hard = resource.getrlimit(kind)
     value = value if hard == resource.RLIM_INFINITY else min(value, hard)
     resource.setrlimit(kind, (value, value))
 
 
 def no_new_privileges() -> bool:
-    """Whether this process has given up to gain privileges."""
+    """Return whether this process has given up gaining privileges."""
     return _prctl(PR_GET_NO_NEW_PRIVS, 0) == 1
 
 
 def _prctl(option: int, value: int) -> int:
-    """prctl, which only Linux has."""
+    """Call prctl; return -1 on systems other than Linux."""
     return int(ctypes.CDLL(None).prctl(option, value, 0, 0, 0)) if sys.platform == "linux" else -1
 
 
 def mapped_size() -> int:
-    """Address space of this process in bytes (0 where the system does not say)."""
+    """Return the address space of this process (bytes); 0 on systems other than Linux."""
     if sys.platform != "linux":
         return 0
     return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 
 
 def thread_count() -> int:
-    """Number of threads of this process."""
+    """Return the number of threads of this process."""
     return len(list(Path("/proc/self/task").iterdir()))

@@ -1,4 +1,4 @@
-"""What this machine offers and what holds for this process, each tried out and not assumed."""
+"""Sandboxes that this machine supports, and restrictions in force for this process, found by trying them."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from . import landlock, limits
 from .bubblewrap import find_bubblewrap
 
-#: the discard port: nobody listens, so that a connection which is permitted is refused at once
+#: port 9 (discard), which is normally closed: a permitted connection is refused at once
 _DISCARD_ADDRESS = ("127.0.0.1", 9)
 
 
 @dataclass(frozen=True)
 class AvailableSandboxes:
-    """What sandboxes can be built from here: Landlock version (0: none) and path of a working bubblewrap (empty: none)."""
+    """Supported sandboxes: Landlock version (0: none) and path of a working bubblewrap ("": none)."""
 
     landlock: int
     bubblewrap: str
@@ -25,9 +25,17 @@ class AvailableSandboxes:
 
 @dataclass(frozen=True)
 class ActiveRestrictions:
-    """What holds for this process. Limits are None where there is none; memory and file size in bytes, time in s.
+    """Restrictions in force for this process.
 
-    `files_confined`: by Landlock; bubblewrap shows other files instead.
+    Attributes:
+        files_confined: Landlock confines access to files; False in bubblewrap, which hides files instead.
+        tcp_closed: TCP connections are not permitted.
+        own_session: The process leads a session.
+        no_new_privileges: The process cannot gain privileges.
+        memory: Limit of the address space (bytes); None for no limit.
+        open_files: Limit of open files; None for no limit.
+        file_size: Limit of the size of a written file (bytes); None for no limit.
+        cpu_seconds: Limit of the processor time (s); None for no limit.
     """
 
     files_confined: bool
@@ -41,11 +49,12 @@ class ActiveRestrictions:
 
 
 def find_available_sandboxes() -> AvailableSandboxes:
+    """Return the sandboxes that this machine supports."""
     return AvailableSandboxes(landlock.abi_version(), find_bubblewrap())
 
 
 def probe_restrictions() -> ActiveRestrictions:
-    """Look and try: lists the root folder and knocks at a port of this machine."""
+    """Determine the restrictions in force by trying to open the root folder and to connect to a port of this machine."""
     return ActiveRestrictions(
         files_confined=_is_root_unreadable(),
         tcp_closed=_is_tcp_denied(),
@@ -59,7 +68,7 @@ def probe_restrictions() -> ActiveRestrictions:
 
 
 def _is_root_unreadable() -> bool:
-    """Anyone may list the root folder unless Landlock forbids it."""
+    """Return whether Landlock forbids to open the root folder, which every user may read otherwise."""
     try:
         os.close(os.open("/", os.O_RDONLY | os.O_DIRECTORY))
     except PermissionError:
@@ -68,9 +77,9 @@ def _is_root_unreadable() -> bool:
 
 
 def _is_tcp_denied() -> bool:
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as knocking:
-        knocking.settimeout(0.5)
-        return knocking.connect_ex(_DISCARD_ADDRESS) in (errno.EACCES, errno.EPERM, errno.ENETUNREACH)
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as connection:
+        connection.settimeout(0.5)
+        return connection.connect_ex(_DISCARD_ADDRESS) in (errno.EACCES, errno.EPERM, errno.ENETUNREACH)
 
 
 def _soft_limit(kind: int) -> int | None:

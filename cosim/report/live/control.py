@@ -19,7 +19,7 @@ from ...core.errors import ComponentError, InputError, did_you_mean
 from ...core.system import System
 from ...core.time_grid import TimeGrid
 from ...engine.pacer import Pacer
-from ...engine.run_loop import settable_variables
+from ...engine.run_checks import settable_variables
 from ...process.journal import calling_component, current_journal, suspending_deadline
 from ...process.run_files.folder import read_metadata, write_metadata
 from ...scenario.name_resolution import check_assignment

@@ -1,4 +1,4 @@
-"""Is a run still the one that its reference records? Every signal has to stay in a tube around it."""
+"""Comparison of a result with a reference: every signal has to stay in a tube around the reference."""
 
 from .comparison import Comparison, Verdict, compare
 from .tube import Tolerance, Tube

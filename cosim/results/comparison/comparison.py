@@ -1,4 +1,4 @@
-"""A result against its reference, signal by signal."""
+"""Comparison of a result with its reference, signal by signal."""
 
 from __future__ import annotations
 
@@ -15,16 +15,19 @@ from ...core.errors import InputError, did_you_mean
 from .. import Result
 from .tube import ComparisonPoints, TimeWindows, Tolerance, Tube, UniformTimeWindows, time_tolerance, uniform_spacing
 
-#: a share of all points that is quicker to look at on its own
+#: share of all points up to which it is faster to compute the tube only at these points
 DENSE_FRACTION = 0.1
 
 
 class Verdict(NamedTuple):
-    """What became of one signal: `problem` says how it fails, "" when it does not.
+    """Verdict on one signal.
 
-    `time` (s) is when it first does: -inf when that has no time, inf when it never does. `excess` is the largest distance
-    outside the tube in half widths of the tube, inf where nothing can be compared or the tube has no width. Where nothing is
-    outside, it is at most 0, and says how far values are from the reference at their own time: -1 on it.
+    Attributes:
+        signal: Name of the signal.
+        problem: Description of the first deviation; "" if the signal passes.
+        time: Time of the first deviation (s): -inf if it has no time, inf if there is none.
+        excess: Largest distance outside the tube in half heights of the tube; inf if nothing can be compared or the height is 0.
+            If no point is outside, a number from -1 (on the reference) to 0 (half a height from it).
     """
 
     signal: str
@@ -34,6 +37,7 @@ class Verdict(NamedTuple):
 
     @property
     def passed(self) -> bool:
+        """Whether the signal has no problem."""
         return not self.problem
 
     def __str__(self) -> str:
@@ -42,27 +46,27 @@ class Verdict(NamedTuple):
 
 @dataclass(frozen=True)
 class Comparison:
-    """The verdicts on all signals, in the order of the reference; what could not be compared comes first."""
+    """Verdicts on all signals in the order of the reference, after those on patterns and on the whole comparison."""
 
     verdicts: tuple[Verdict, ...]
 
     @property
     def passed(self) -> bool:
-        """Whether something was compared and nothing fails."""
+        """Whether at least one signal was compared and all passed."""
         return bool(self.verdicts) and all(verdict.passed for verdict in self.verdicts)
 
     @property
     def failures(self) -> list[Verdict]:
-        """Those that fail, the earliest first."""
+        """Verdicts that failed, the earliest first."""
         return sorted((verdict for verdict in self.verdicts if not verdict.passed), key=lambda verdict: verdict.time)
 
     @property
     def worst(self) -> list[Verdict]:
-        """All signals with a tube that the result has too, the one farthest out of it first."""
+        """Verdicts on all signals that were compared with a tube, the largest excess first."""
         return sorted((verdict for verdict in self.verdicts if verdict.time > -math.inf), key=lambda verdict: -verdict.excess)
 
     def __str__(self) -> str:
-        """One line for the whole, and one for each failure."""
+        """Return a summary in one line, and one line per failure."""
         failures = self.failures
         if not self.verdicts:
             return "nothing was compared"
@@ -72,24 +76,30 @@ class Comparison:
 
 
 def compare(result: Result, reference: Result, tolerances: Mapping[str, Tolerance]) -> Comparison:
-    """Hold the signals of `reference` that match a pattern of `tolerances` against those of `result`.
+    """Compare the signals of a reference that match a pattern with those of a result.
 
-    "*" in a pattern matches anything, dots too; of several patterns that match, the last one counts. A signal fails when it
-    leaves its tube (see `tube`), is missing, does not cover the time of the reference, or is NaN or infinite in either; texts
-    fail where they are not equal. A pattern that matches nothing fails as well, so a comparison of nothing does not pass.
-    Raises InputError for tolerances that are negative, NaN or infinite.
+    A signal fails if it leaves its tube (see `tube`), is missing, does not cover the time of the reference, or is NaN or infinite
+    in either. Strings fail if they differ. A pattern that matches no signal fails as well.
+
+    Args:
+        result: The result.
+        reference: The reference.
+        tolerances: Tolerance by pattern. "*" in a pattern matches any text, also dots. The last matching pattern counts.
+
+    Raises:
+        InputError: A tolerance is negative, NaN or infinite.
     """
     if problems := list(_find_tolerance_problems(tolerances)):
         raise InputError(problems)
-    chosen = match_tolerances(tolerances, list(reference))
-    idle = [pattern for pattern in tolerances if not reference.signals(pattern)]
+    selected = match_tolerances(tolerances, list(reference))
+    unmatched = [pattern for pattern in tolerances if not reference.signals(pattern)]
     general = [
-        Verdict(f'"{pattern}"', f"matches no signal of the reference{did_you_mean(pattern, reference)}") for pattern in idle
+        Verdict(f'"{pattern}"', f"matches no signal of the reference{did_you_mean(pattern, reference)}") for pattern in unmatched
     ]
     if not len(reference.time) or not len(result.time):
         return Comparison((*general, Verdict("the reference" if not len(reference.time) else "the result", "has no rows")))
     comparer = Comparer(result, reference)
-    return Comparison((*general, *(comparer.compare_signal(name, tolerance) for name, tolerance in chosen.items())))
+    return Comparison((*general, *(comparer.compare_signal(name, tolerance) for name, tolerance in selected.items())))
 
 
 def _find_tolerance_problems(tolerances: Mapping[str, Tolerance]) -> Iterator[str]:
@@ -100,26 +110,27 @@ def _find_tolerance_problems(tolerances: Mapping[str, Tolerance]) -> Iterator[st
 
 
 def match_tolerances(tolerances: Mapping[str, Tolerance], names: list[str]) -> dict[str, Tolerance]:
-    """The tolerance of each of `names` that matches a pattern, in their order."""
+    """Return the tolerance of each name that matches a pattern, in the order of `names`; the last matching pattern counts."""
     patterns = [
         (re.compile(".*".join(map(re.escape, pattern.split("*")))), tolerance) for pattern, tolerance in tolerances.items()
     ]
-    found = ((name, [tolerance for pattern, tolerance in patterns if pattern.fullmatch(name)]) for name in names)
-    return {name: matches[-1] for name, matches in found if matches}
+    matching = ((name, [tolerance for pattern, tolerance in patterns if pattern.fullmatch(name)]) for name in names)
+    return {name: matches[-1] for name, matches in matching if matches}
 
 
 class Comparer:
-    """Compares signals of two results, neither of them without rows; what depends on times alone is worked out once."""
+    """Comparison of the signals of two results that have rows; everything that depends only on times is computed once."""
 
     def __init__(self, result: Result, reference: Result):
         self._result, self._reference = result, reference
 
     @cached_property
     def points(self) -> ComparisonPoints:
+        """Points at which the result is compared."""
         return ComparisonPoints(self._result.time, self._reference.time)
 
     def tube(self, name: str, tolerance: Tolerance, rows: slice | np.ndarray = slice(None)) -> Tube:
-        """The tube around a signal of the reference at `points`, or at some of them."""
+        """Return the tube around a signal of the reference, at all `points` or at those selected by `rows`."""
         time = self.points.time[rows]
         reference = _to_floats(self._reference, name)
         if self._spacing and isinstance(rows, slice):
@@ -131,15 +142,16 @@ class Comparer:
 
     @cached_property
     def _spacing(self) -> float:
-        """The distance between points (s) where they are the rows of the reference, all at even distances, else 0."""
+        """Distance between points (s) if they are the evenly spaced rows of the reference, else 0."""
         return uniform_spacing(self.points.time) if np.array_equal(self.points.time, self._reference.time) else 0.0
 
     def is_outside(self, name: str, tolerance: Tolerance) -> np.ndarray:
-        """Whether the result is outside the tube around a signal, at each of `points`."""
+        """Return at each of `points` whether the result is outside the tube around a signal, shape (points,)."""
         tube, values = self.tube(name, tolerance), self.points.interpolate_result(_to_floats(self._result, name))
         return (values < tube.lower) | (values > tube.upper)
 
     def compare_signal(self, name: str, tolerance: Tolerance) -> Verdict:
+        """Return the verdict on one signal of the reference."""
         if problem := next(self._find_comparison_problems(name), None):
             return problem
         if self._result[name].dtype == object:
@@ -147,14 +159,14 @@ class Comparer:
         return self._compare_numbers(name, tolerance)
 
     def _find_comparison_problems(self, name: str) -> Iterator[Verdict]:
-        """Why a signal cannot be compared."""
+        """Yield the reasons why a signal cannot be compared."""
         if name not in self._result:
             yield Verdict(name, f"is missing{did_you_mean(name, self._result)}")
             return
         if text := self._coverage_problem:
             yield Verdict(name, text)
         runs = {"result": self._result, "reference": self._reference}
-        texts = [who for who, run in runs.items() if run[name].dtype == object]
+        texts = [role for role, run in runs.items() if run[name].dtype == object]
         if len(texts) == 1:
             yield Verdict(name, f"holds text in the {texts[0]}, and numbers in the other")
         if not texts:
@@ -165,46 +177,48 @@ class Comparer:
 
     @cached_property
     def _coverage_problem(self) -> str:
-        """How the result is too short, "" when it is not."""
-        own, other = self._result.time, self._reference.time
-        margin = time_tolerance(other)
-        if own[0] - margin <= other[0] and other[-1] <= own[-1] + margin:
+        """Description of a result that does not cover the time of the reference; "" if it does."""
+        time, expected = self._result.time, self._reference.time
+        margin = time_tolerance(expected)
+        if time[0] - margin <= expected[0] and expected[-1] <= time[-1] + margin:
             return ""
-        return f"covers {own[0]:g} s to {own[-1]:g} s only, the reference {other[0]:g} s to {other[-1]:g} s"
+        return f"covers {time[0]:g} s to {time[-1]:g} s only, the reference {expected[0]:g} s to {expected[-1]:g} s"
 
     @staticmethod
-    def _find_non_finite(name: str, who: str, time: np.ndarray, values: np.ndarray) -> Iterator[Verdict]:
+    def _find_non_finite(name: str, role: str, time: np.ndarray, values: np.ndarray) -> Iterator[Verdict]:
+        """Yield a verdict on the first value that is NaN or infinite."""
         rows = np.flatnonzero(~np.isfinite(values))
         if rows.size:
             row = rows[0]
-            yield Verdict(name, f"is {values[row]} at t = {time[row]:g} s in the {who}", float(time[row]))
+            yield Verdict(name, f"is {values[row]} at t = {time[row]:g} s in the {role}", float(time[row]))
 
     def _compare_texts(self, name: str) -> Verdict:
-        """Texts hold until the next row; at the rows of both they have to be equal."""
+        """Compare strings, which hold until the next row, at the rows of both runs."""
         own, other = self._result.time, self._reference.time
         covered = own[(own >= other[0] - time_tolerance(other)) & (own <= other[-1] + time_tolerance(other))]
         time = np.union1d(covered, other)
-        found, expected = (_sample_and_hold(run, name, time) for run in (self._result, self._reference))
-        different = np.flatnonzero(found != expected)
+        actual, expected = (_sample_and_hold(run, name, time) for run in (self._result, self._reference))
+        different = np.flatnonzero(actual != expected)
         if not different.size:
             return Verdict(name, excess=-math.inf)
         row = different[0]
-        return Verdict(name, f'is "{found[row]}" at t = {time[row]:g} s, expected "{expected[row]}"', float(time[row]))
+        return Verdict(name, f'is "{actual[row]}" at t = {time[row]:g} s, expected "{expected[row]}"', float(time[row]))
 
     def _compare_numbers(self, name: str, tolerance: Tolerance) -> Verdict:
-        """Most points are close to the reference at their own time: the others alone are held against the tube."""
+        """Compare numbers; the tube is computed only at points that are not close to the reference at their own time."""
         values, reference = self.points.interpolate_result(_to_floats(self._result, name)), _to_floats(self._reference, name)
         half_width = tolerance.half_width(reference)
-        off = np.abs(values - self.points.interpolate_reference(reference))
-        doubtful = np.flatnonzero(off > half_width)
-        rows = doubtful if doubtful.size < DENSE_FRACTION * off.size else slice(None)
+        deviation = np.abs(values - self.points.interpolate_reference(reference))
+        distant = np.flatnonzero(deviation > half_width)
+        rows = distant if distant.size < DENSE_FRACTION * deviation.size else slice(None)
         tube = self.tube(name, tolerance, rows)
         distance = np.maximum(tube.lower - values[rows], values[rows] - tube.upper)
         if distance.max(initial=0) > 0:
             return self._tube_violation(name, tube, values[rows], distance, half_width)
-        return Verdict(name, time=math.inf, excess=_relative_excess(min(float(off.max()) - half_width, 0.0), half_width))
+        return Verdict(name, time=math.inf, excess=_relative_excess(min(float(deviation.max()) - half_width, 0.0), half_width))
 
     def _tube_violation(self, name: str, tube: Tube, values: np.ndarray, distance: np.ndarray, half_width: float) -> Verdict:
+        """Return the verdict on a signal whose `distance` outside the tube is positive at some points."""
         outside = np.flatnonzero(distance > 0)
         row, worst, unit = outside[0], int(distance.argmax()), self._unit_suffix(name)
         side, bound = ("above", tube.upper) if values[row] > tube.upper[row] else ("below", tube.lower)
@@ -225,7 +239,7 @@ def _to_floats(run: Result, name: str) -> np.ndarray:
 
 
 def _sample_and_hold(run: Result, name: str, time: np.ndarray) -> np.ndarray:
-    """Texts at these times."""
+    """Return the strings that hold at these times (s), shape (times,)."""
     return run[name][np.searchsorted(run.time, time + time_tolerance(time), "right") - 1]
 
 

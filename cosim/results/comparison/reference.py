@@ -1,4 +1,4 @@
-"""References: the few numbers of a run that later runs are held against, and a note of what made them."""
+"""References: few rows of a run with which later runs are compared, and their provenance."""
 
 from __future__ import annotations
 
@@ -15,25 +15,34 @@ from ..files import write_json
 from .comparison import Comparer, compare, match_tolerances
 from .tube import Tolerance
 
-#: of so many rows at least one is kept, and more where the run itself would leave SHARE of its tolerances around them
+#: largest distance between selected rows
 MAX_ROW_DISTANCE = 64
+#: fraction of the tolerances that the run itself may deviate from its reference
 TOLERANCE_FRACTION = 0.25
 
 _PROVENANCE_KEYS = ("versions", "machine", "sha256")
 
 
 def decimate(result: Result, tolerances: Mapping[str, Tolerance]) -> Result:
-    """The signals that match a pattern of `tolerances`, at as few rows as describe them; the first and the last are among them.
+    """Select few rows that describe a run within a fraction of the tolerances, among them the first and the last one.
 
-    Raises CheckError when the run would not pass against it: a pattern matches nothing, a signal is not finite.
+    Args:
+        result: The run.
+        tolerances: Tolerance by pattern of signals, see `compare`.
+
+    Returns:
+        The matching signals at the selected rows.
+
+    Raises:
+        CheckError: The run cannot be a reference: a pattern matches no signal, or a value is not finite.
     """
-    chosen = match_tolerances(tolerances, list(result))
-    whole = _select_rows(np.arange(len(result.time)), result, chosen)
+    selected = match_tolerances(tolerances, list(result))
+    whole = _select_rows(np.arange(len(result.time)), result, selected)
     comparison = compare(result, whole, tolerances)
     if not comparison.passed:
         raise CheckError(f"this run is no reference: {comparison}")
     rows = np.unique(np.append(np.arange(0, len(result.time), MAX_ROW_DISTANCE), len(result.time) - 1))
-    while (outside := _find_rows_outside(result, reference := _select_rows(rows, result, chosen), chosen, rows)).size:
+    while (outside := _find_rows_outside(result, reference := _select_rows(rows, result, selected), selected, rows)).size:
         gaps = np.searchsorted(rows, outside) - 1
         rows = np.union1d(rows, (rows[gaps] + rows[gaps + 1]) // 2)
     return reference
@@ -44,8 +53,8 @@ def _select_rows(rows: np.ndarray, result: Result, names: Iterable[str]) -> Resu
     return Result(Recording(result.time[rows], columns, {name: result.units[name] for name in names}))
 
 
-def _find_rows_outside(result: Result, reference: Result, tolerances: Mapping[str, Tolerance], kept: np.ndarray) -> np.ndarray:
-    """The rows of the result that are not within SHARE of the tolerances around a reference made of the rows `kept`."""
+def _find_rows_outside(result: Result, reference: Result, tolerances: Mapping[str, Tolerance], rows: np.ndarray) -> np.ndarray:
+    """Return the rows of the result outside a fraction of the tolerances around a reference that consists of `rows`."""
     comparer = Comparer(result, reference)
     last = np.searchsorted(reference.time, result.time, "right") - 1
     outside = np.zeros(len(result.time), dtype=bool)
@@ -54,15 +63,25 @@ def _find_rows_outside(result: Result, reference: Result, tolerances: Mapping[st
             outside |= result[name] != reference[name][last]
         else:
             outside |= comparer.is_outside(name, tolerance.scaled(TOLERANCE_FRACTION))
-    outside[kept] = False
+    outside[rows] = False
     return np.flatnonzero(outside)
 
 
 def write_reference(result: Result, path: Path, tolerances: Mapping[str, Tolerance]) -> Result:
-    """Write `path` (CSV), and beside it as JSON what made it: versions, machine and the hashes of all files.
+    """Write a reference (CSV) and its provenance (JSON with the same name): versions, machine and hashes of all files.
 
-    Returns what it holds. The same run writes the same bytes. Raises CheckError as `thinned`, InputError when the files
-    cannot be written.
+    Args:
+        result: The run; the same run gives the same bytes.
+        path: The CSV file.
+        tolerances: Tolerance by pattern of signals, see `compare`.
+
+    Returns:
+        The written rows.
+
+    Raises:
+        CheckError: The run cannot be a reference, see `decimate`.
+        InputError: The files cannot be written.
+        OutputError: The disk is full or defective.
     """
     reference = decimate(result, tolerances)
     reference.to_csv(path)
@@ -72,10 +91,15 @@ def write_reference(result: Result, path: Path, tolerances: Mapping[str, Toleran
 
 
 def describe_provenance_changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
-    """What differs between what made a reference and what made a run (their JSON), by name, as "numpy 2.1 -> 2.2"."""
-    found = []
+    """Return the differences between the provenance of a reference and of a run, such as "numpy 2.1 -> 2.2".
+
+    Args:
+        before: Provenance of the reference, as in its JSON file.
+        after: Metadata of the run.
+    """
+    changes = []
     for key in _PROVENANCE_KEYS:
         old, new = before.get(key) or {}, after.get(key) or {}
         names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
-        found += [name if key == "sha256" else f"{name} {old.get(name)} -> {new.get(name)}" for name in names]
-    return found
+        changes += [name if key == "sha256" else f"{name} {old.get(name)} -> {new.get(name)}" for name in names]
+    return changes

@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from ...components.python_class import package_files, package_root
+from ...components.python_import import package_files, package_root
 from ...core import paths, resources
 from ...core.errors import InputError, Problem
 from ...core.version import __version__

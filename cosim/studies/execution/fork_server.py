@@ -21,7 +21,7 @@ from signal import SIGKILL
 from typing import Any
 
 from ...components.fmi import FmuFile
-from ...components.python_class import load_object
+from ...components.python_import import load_object
 from ...core.errors import CosimError
 from ...process.sandbox.limits import detach, thread_count
 from ...process.temporary_folders import temporary_run_folder

@@ -1,4 +1,4 @@
-"""The equations of motion of the quadcopter: those of `multirotor.py` for its airframe."""
+"""Equations of motion of the quadcopter: those of `multirotor_equations.py` for its airframe."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from .parameters import AIRFRAME
 
 
 def block() -> Block:
-    """The quadcopter in free flight."""
+    """Return the quadcopter for export."""
     return multirotor_equations.multirotor_block(AIRFRAME, "AR.Drone 2.0 quadcopter in free flight")

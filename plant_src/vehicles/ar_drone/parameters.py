@@ -1,9 +1,10 @@
-"""Numbers of the quadcopter, SI units, body frame x forward, y left, z up.
+"""Parameters of the quadcopter with their sources, in SI units. Body frame: x forward, y left, z up.
 
 Sources: [model] the simulation model published with the paper "An Open Simulation Strategy for Rapid Control Design in Aerial
 and Maritime Drone Teams" (github.com/OmarVelascoAnrar/UAV_USV_Simulator, commit 1eee757), converted from its body frame
 x forward, y right, z down: y and z of vectors and the products of inertia Ixy, Ixz change their sign. "Forward" is the arm
-of rotor 1; the hull lies along the diagonal between two arms, hence the large Ixy. [maker] Parrot's data of the AR.Drone 2.0.
+of rotor 1; the hull lies along the diagonal between two arms, hence the large Ixy. [maker] Parrot's data sheet of the
+AR.Drone 2.0.
 """
 
 from __future__ import annotations
@@ -12,10 +13,10 @@ import numpy as np
 
 from ..multirotor.airframe import Airframe, Rotor
 
-#: body and four propellers [model]: 0.4038924 kg + 4 * 0.010 kg, as summed there (kg)
+#: mass of body and four propellers [model]: 0.4038924 kg + 4 * 0.010 kg as summed there (kg)
 MASS = 0.443892
 
-#: about the centre of mass, propellers locked [model] (kg m2)
+#: inertia tensor about the centre of mass with locked propellers [model] (kg m2)
 INERTIA = np.array(
     [
         [0.002835, 0.000978, 0.000116],
@@ -24,10 +25,10 @@ INERTIA = np.array(
     ]
 )
 
-#: centre of mass from the origin of the model's body frame [model] (m)
+#: centre of mass in the body frame of the published model [model] (m)
 CENTRE_OF_MASS = np.array([-0.003329, 0.001981, -0.000577])
 
-#: rotors front, left, rear, right from the centre of mass [model] (m)
+#: positions of the rotors front, left, rear, right from the centre of mass [model] (m)
 ROTORS = np.array(
     [
         [0.181777, -0.000828, 0.006153],
@@ -37,7 +38,7 @@ ROTORS = np.array(
     ]
 )
 
-#: sense of the reaction torque of each rotor on the body about its z axis [model]
+#: sign of the reaction torque of each rotor on the body about its z axis [model]
 ROTOR_SENSES = (1.0, -1.0, 1.0, -1.0)
 
 #: thrust = THRUST_COEFFICIENT * speed^2 [model; Table 2 of the paper misprints the power] (N s2/rad2)
@@ -49,10 +50,10 @@ TORQUE_COEFFICIENT = 2.38e-7
 #: 5000 revolutions per minute, rounded as in the model [model, paper] (rad/s)
 MAX_ROTOR_SPEED = 5000 * 0.10471976
 
-#: of the 8 inch propellers [maker]; matters to the ground effect only (m)
+#: radius of the 8 inch propellers [maker], used by the ground effect only (m)
 ROTOR_RADIUS = 0.1016
 
-#: [model] (m/s2)
+#: gravitational acceleration [model] (m/s2)
 GRAVITY = 9.81
 
 
@@ -61,8 +62,8 @@ AIRFRAME = Airframe(
     mass=MASS,
     inertia=INERTIA,
     rotors=tuple(
-        Rotor(place, tuple(position), sense)
-        for place, position, sense in zip(("front", "left", "rear", "right"), ROTORS.tolist(), ROTOR_SENSES, strict=True)
+        Rotor(label, tuple(position), sign)
+        for label, position, sign in zip(("front", "left", "rear", "right"), ROTORS.tolist(), ROTOR_SENSES, strict=True)
     ),
     thrust_coefficient=THRUST_COEFFICIENT,
     torque_coefficient=TORQUE_COEFFICIENT,

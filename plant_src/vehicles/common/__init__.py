@@ -1,1 +1,1 @@
-"""Parts that all vehicles share: interface, kinematics, shapes, contact equations."""
+"""Modules that all vehicles share: interface, kinematics, shapes, contact functions."""

@@ -1,5 +1,8 @@
-"""Sine, cosine, arctangent and exponential in plain arithmetic, as CasADi expressions: faster than those of the C library where
-many are needed, accurate to 1e-13 or better, and the same on every machine."""
+"""Sine, cosine, arctangent and exponential in plain arithmetic, as CasADi expressions.
+
+They are accurate to 1e-13 or better. Unlike those of the C library they are bit-identical on all machines, and the compiler
+vectorizes them.
+"""
 
 from __future__ import annotations
 
@@ -14,18 +17,18 @@ _COSINE = tuple((-1) ** k / math.factorial(2 * k) for k in range(9))
 _ARCTANGENT = tuple((-1) ** k / (2 * k + 1) for k in range(20))
 _EXPONENTIAL = tuple(1 / math.factorial(k) for k in range(7))
 
-#: a whole turn in two parts, the first with so few digits that its multiples are exact
+#: 2 pi as the sum of two numbers; the multiples of the first one are exact in binary
 _TWO_PI_HIGH = 6.28125
 _TWO_PI_LOW = 0.001935307179586476925286766559
 
-#: what is taken away from it is rounded to a whole number: it is so large that its last place counts 1
+#: subtracting a number from this one rounds the number to an integer, because the last bit has the value 1
 _ROUNDING_MAGIC = 1.5 * 2.0**52
 
 _SQUARINGS = 8
 
 
 def sine_and_cosine(angle: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Of an angle (rad) below 1e6: series for a quarter of what is left of it without whole turns, doubled twice."""
+    """Return sin and cos of |angle| < 1e6 rad: reduce modulo 2 pi, evaluate the series at a quarter, double twice."""
     turns = _ROUNDING_MAGIC - (_ROUNDING_MAGIC - angle * (1 / (2 * math.pi)))
     quarter = ((angle - turns * _TWO_PI_HIGH) - turns * _TWO_PI_LOW) * 0.25
     square = quarter * quarter
@@ -36,14 +39,16 @@ def sine_and_cosine(angle: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def sine_of_right_angle_share(share: ca.SX) -> ca.SX:
-    """The sine of a share, from -1 to 1, of a right angle; to 1e-15."""
+    """Return sin(share pi / 2) for |share| <= 1, accurate to 1e-15."""
     angle = share * (math.pi / 2)
     return angle * _polynomial(_SINE, angle * angle)
 
 
 def arctangent(y: ca.SX, x: ca.SX) -> ca.SX:
-    """The angle (rad) of (x, y), x >= 0, from the x axis, to 1e-15; 0 in the origin. A series for what is left of it without
-    0, 45 or 90 degrees."""
+    """Return atan2(y, x) (rad) for x >= 0, accurate to 1e-15, and 0 at the origin.
+
+    The angle is reduced to the nearest of 0, 45 and 90 degrees, and the series is evaluated for the difference.
+    """
     size = ca.fabs(y)
     flat, steep = size <= (math.sqrt(2) - 1) * x, size > (math.sqrt(2) + 1) * x
     top = ca.if_else(flat, size, ca.if_else(steep, -x, size - x))
@@ -54,7 +59,7 @@ def arctangent(y: ca.SX, x: ca.SX) -> ca.SX:
 
 
 def exponential(x: ca.SX) -> ca.SX:
-    """Of a number of moderate size (|x| < 3 for 1e-13): a power of a series."""
+    """Return exp(x), accurate to 1e-13 for |x| < 3: evaluate the series at x / 256, square eight times."""
     power = _polynomial(_EXPONENTIAL, x * 2.0**-_SQUARINGS)
     for _ in range(_SQUARINGS):
         power = power * power
@@ -62,7 +67,7 @@ def exponential(x: ca.SX) -> ca.SX:
 
 
 def _polynomial(coefficients: Sequence[float], x: ca.SX) -> ca.SX:
-    """A polynomial, the lowest power first, in pairs (Estrin's scheme): they do not wait for each other."""
+    """Evaluate a polynomial, lowest power first, by Estrin's scheme, whose operations can run in parallel."""
     terms = [ca.SX(coefficient) for coefficient in coefficients]
     while len(terms) > 1:
         terms = [low + high * x for low, high in zip_longest(terms[::2], terms[1::2], fillvalue=ca.SX(0))]

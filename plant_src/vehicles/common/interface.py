@@ -1,7 +1,7 @@
-"""Variables that vehicles have in common: their names, units and order, for the plant FMUs and for the world alike.
+"""Variables that vehicles have in common: names, units and order, for the plant FMUs and for the world.
 
-World frame: x, y horizontal, z up. Body frame: x forward, y left, z up, origin at the centre of mass. Right-hand rule
-throughout: positive roll lifts the left side, positive pitch lowers the nose, positive yaw is counter-clockwise from above.
+World frame: x east, y north, z up. Body frame: x forward, y left, z up, origin at the centre of mass. Rotations follow the
+right-hand rule: positive roll lifts the left side, positive pitch lowers the nose, positive yaw is counter-clockwise from above.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from cosim.core.units import parse_unit
 def vector_variables(
     name: str, axes: Sequence[str], unit: str, description: str, causality: Causality = "output"
 ) -> tuple[Variable, ...]:
-    """Scalar variables `name.axis`, one for each axis."""
+    """Return real scalar variables `name.axis`, one for each axis; inputs and parameters start at 0."""
     variability: Variability = "fixed" if causality == "parameter" else "continuous"
     start = None if causality == "output" else 0.0
     return tuple(
@@ -27,14 +27,14 @@ def vector_variables(
 
 
 def scalar_variable(name: str, unit: str, description: str, causality: Causality = "input", start: float = 0.0) -> Variable:
-    """One real variable."""
+    """Return a real scalar variable."""
     variability: Variability = "fixed" if causality == "parameter" else "continuous"
     return Variable(name, "Float64", causality, variability, start, parse_unit(unit), description=description)
 
 
 EULER_ANGLES = ("roll", "pitch", "yaw")
 
-#: how a vehicle moves
+#: motion of a vehicle
 MOTION_OUTPUTS = (
     *vector_variables("position", "xyz", "m", "centre of mass, world frame"),
     *vector_variables("orientation", "wxyz", "1", "unit quaternion, body to world"),
@@ -44,7 +44,7 @@ MOTION_OUTPUTS = (
     *vector_variables("rates", "pqr", "rad/s", "angular velocity, body frame"),
 )
 
-#: the landing deck of a vessel
+#: motion of the landing deck of a vessel
 DECK_OUTPUTS = (
     *vector_variables("deck.position", "xyz", "m", "centre of the top of the landing deck, world frame"),
     *vector_variables("deck.velocity", "xyz", "m/s", "centre of the top of the landing deck, world frame"),
@@ -56,25 +56,26 @@ CONTACT_OUTPUTS = (
     Variable("contact.vessel", "Boolean", "output", "discrete", description="contact with a vessel"),
 )
 
-#: loads from outside, at the centre of mass
+#: external loads at the centre of mass
 EXTERNAL_LOADS = (
     *vector_variables("external_force", "xyz", "N", "force at the centre of mass, world frame", "input"),
     *vector_variables("external_torque", "xyz", "N.m", "torque, world frame", "input"),
 )
 
-#: what the environment does to a vehicle: the last inputs of a model, written by the environment where there is one
+#: environment inputs, the last inputs of a model; in a world the environment writes them
 WIND_INPUTS = vector_variables("wind", "xyz", "m/s", "velocity of the air at the vehicle, world frame", "input")
 CURRENT_INPUTS = vector_variables("current", "xy", "m/s", "velocity of the water, world frame", "input")
 WAVE_GAIN_INPUT = (scalar_variable("wave_gain", "1", "factor on the amplitudes of all waves", start=1.0),)
 GROUND_DISTANCE_INPUT = (
-    scalar_variable("ground_distance", "m", "height of the centre of the rotor plane above the next surface below", start=1e3),
+    scalar_variable("ground_distance", "m", "height of the rotor centre above the surface below", start=1e3),
 )
+#: names of all environment inputs
 ENVIRONMENT_INPUTS = frozenset(
     variable.name for variable in (*WIND_INPUTS, *CURRENT_INPUTS, *WAVE_GAIN_INPUT, *GROUND_DISTANCE_INPUT)
 )
 
 
-#: how many components the sea can have
+#: upper limit of the number of wave components
 MAX_WAVE_COMPONENTS = 64
 
 
@@ -84,7 +85,7 @@ def _wave_parameter(name: str, unit: str, description: str, minimum: float | Non
     return Variable(name, "Float64", "parameter", "fixed", start, parse_unit(unit), shape, description, minimum)
 
 
-#: the sea; the components after the first `wave.count` are not used
+#: wave components; those after the first `wave.count` are not used
 WAVE_PARAMETERS = (
     Variable(
         "wave.count",
@@ -100,11 +101,11 @@ WAVE_PARAMETERS = (
     ),
     _wave_parameter("wave.amplitude", "m", "amplitude of each wave component", 0.0),
     _wave_parameter("wave.frequency", "rad/s", "angular frequency of each wave component", 0.0),
-    _wave_parameter("wave.direction", "rad", "where each wave component runs to, counter-clockwise from x"),
+    _wave_parameter("wave.direction", "rad", "direction of propagation of each wave component, counter-clockwise from x"),
     _wave_parameter("wave.phase", "rad", "phase of each wave component at the origin"),
 )
 
-#: the states of a vessel in six degrees of freedom, those of its actuators follow
+#: states of a vessel in six degrees of freedom; actuator states follow them
 VESSEL_STATES = (
     *(f"origin.{axis}" for axis in "xyz"),
     *(f"orientation.{axis}" for axis in "wxyz"),
@@ -113,17 +114,17 @@ VESSEL_STATES = (
     "time",
 )
 
-#: how a floating vessel starts, level and at rest but for these
+#: initial deviation of a floating vessel from its equilibrium
 FLOATING_INITIAL_PARAMETERS = (
-    scalar_variable("initial.heave", "m", "initial height above that at rest", "parameter"),
-    scalar_variable("initial.roll", "rad", "initial roll angle from that at rest", "parameter"),
-    scalar_variable("initial.pitch", "rad", "initial pitch angle from that at rest", "parameter"),
-    scalar_variable("initial.time", "s", "time of the waves at the start", "parameter"),
+    scalar_variable("initial.heave", "m", "initial height relative to the equilibrium", "parameter"),
+    scalar_variable("initial.roll", "rad", "initial roll angle relative to the equilibrium", "parameter"),
+    scalar_variable("initial.pitch", "rad", "initial pitch angle relative to the equilibrium", "parameter"),
+    scalar_variable("initial.time", "s", "time of the waves at the start of the simulation", "parameter"),
 )
 
 
 def initial_variables(position_axes: str, velocity_axes: str, rate_axes: str) -> tuple[Variable, ...]:
-    """Parameters that say where and how fast a vehicle starts, level and with its nose at a yaw angle."""
+    """Return the parameters of the initial position, yaw angle, velocity and rates; roll and pitch start at 0."""
     return (
         *vector_variables("initial.position", position_axes, "m", "initial centre of mass, world frame", "parameter"),
         scalar_variable("initial.yaw", "rad", "initial yaw angle", "parameter"),

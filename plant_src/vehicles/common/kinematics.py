@@ -1,4 +1,4 @@
-"""Rotations as CasADi expressions. Quaternions are (w, x, y, z) and turn body vectors into world vectors."""
+"""Rotations as CasADi expressions. Quaternions are (w, x, y, z) and rotate body vectors into the world frame."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ import casadi as ca
 
 
 def quaternion_product(a: ca.SX, b: ca.SX) -> ca.SX:
-    """Quaternion product: the rotation b, then the rotation a."""
+    """Return the quaternion product a * b: rotation b followed by rotation a."""
     w, v = a[0], a[1:4]
     return ca.vertcat(w * b[0] - ca.dot(v, b[1:4]), w * b[1:4] + b[0] * v + ca.cross(v, b[1:4]))
 
 
 def conjugate(q: ca.SX) -> ca.SX:
-    """The inverse rotation of a unit quaternion."""
+    """Return the conjugate, the inverse rotation of a unit quaternion."""
     return ca.vertcat(q[0], -q[1:4])
 
 
 def normalised_quaternion(q: ca.SX) -> ca.SX:
-    """The unit quaternion of the same direction."""
+    """Return q / |q|."""
     return q * (1 / ca.norm_2(q))
 
 
 def rotation_matrix(q: ca.SX) -> ca.SX:
-    """Rotation matrix (3, 3) of a unit quaternion."""
+    """Return the rotation matrix (3, 3), body to world frame, of a unit quaternion."""
     w, x, y, z = ca.vertsplit(q)
     return ca.vertcat(
         ca.horzcat(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -32,45 +32,45 @@ def rotation_matrix(q: ca.SX) -> ca.SX:
 
 
 def quaternion_rate(q: ca.SX, rates: ca.SX) -> ca.SX:
-    """Time derivative of the quaternion for the angular velocity `rates` in the body frame."""
+    """Return the time derivative of a quaternion for an angular velocity (rad/s, body frame)."""
     return quaternion_product(q, ca.vertcat(0, rates)) / 2
 
 
 def quaternion_about_z(angle: ca.SX) -> ca.SX:
-    """The rotation by an angle about the z axis."""
+    """Return the rotation by an angle (rad) about the z axis."""
     return ca.vertcat(ca.cos(angle / 2), 0, 0, ca.sin(angle / 2))
 
 
 def quaternion_from_euler(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
-    """The quaternion of the sequence yaw, pitch, roll (ZYX), rad."""
+    """Return the quaternion of ZYX Euler angles (rad)."""
     about_x = ca.vertcat(ca.cos(roll / 2), ca.sin(roll / 2), 0, 0)
     about_y = ca.vertcat(ca.cos(pitch / 2), 0, ca.sin(pitch / 2), 0)
     return quaternion_product(quaternion_about_z(yaw), quaternion_product(about_y, about_x))
 
 
 def euler_angles(q: ca.SX) -> ca.SX:
-    """Roll, pitch and yaw of the sequence yaw, pitch, roll (ZYX), rad."""
+    """Return the ZYX Euler angles roll, pitch and yaw (rad), shape (3,)."""
     r = rotation_matrix(q)
     return ca.vertcat(ca.atan2(r[2, 1], r[2, 2]), ca.asin(ca.fmin(1, ca.fmax(-1, -r[2, 0]))), ca.atan2(r[1, 0], r[0, 0]))
 
 
 def euler_to_body_rates(roll: ca.SX, pitch: ca.SX) -> ca.SX:
-    """The matrix (3, 3) that makes rates (body) of the time derivatives of roll, pitch and yaw."""
+    """Return the matrix (3, 3) from the time derivatives of roll, pitch and yaw to the rates p, q, r in the body frame."""
     cos, sin = ca.cos(roll), ca.sin(roll)
     about_y, about_z = ca.vertcat(0, cos, -sin), ca.vertcat(-ca.sin(pitch), sin * ca.cos(pitch), cos * ca.cos(pitch))
     return ca.horzcat(ca.SX([1, 0, 0]), about_y, about_z)
 
 
 def body_to_euler_rates(roll: ca.SX, pitch: ca.SX) -> ca.SX:
-    """The matrix (3, 3) that makes time derivatives of roll, pitch and yaw of rates (body); singular at a pitch of 90 degrees."""
-    cos, sin, steepness = ca.cos(roll), ca.sin(roll), ca.tan(pitch)
-    about_y = ca.vertcat(sin * steepness, cos, sin / ca.cos(pitch))
-    about_z = ca.vertcat(cos * steepness, -sin, cos / ca.cos(pitch))
+    """Return the inverse of `euler_to_body_rates`, shape (3, 3), singular at a pitch of 90 degrees."""
+    cos, sin, tan_pitch = ca.cos(roll), ca.sin(roll), ca.tan(pitch)
+    about_y = ca.vertcat(sin * tan_pitch, cos, sin / ca.cos(pitch))
+    about_z = ca.vertcat(cos * tan_pitch, -sin, cos / ca.cos(pitch))
     return ca.horzcat(ca.SX([1, 0, 0]), about_y, about_z)
 
 
 def rotation_vector(q: ca.SX) -> ca.SX:
-    """Axis times angle (rad) of a unit quaternion, by the shorter way; a series where the angle is tiny."""
+    """Return the rotation vector (axis times angle, rad) with the smaller angle, by a series for tiny angles."""
     shorter = ca.if_else(q[0] < 0, -1, 1) * q
     sine_squared = ca.dot(shorter[1:4], shorter[1:4])
     sine = ca.sqrt(sine_squared + 1e-300)
@@ -79,7 +79,7 @@ def rotation_vector(q: ca.SX) -> ca.SX:
 
 
 def quaternion_from_rotation_vector(vector: ca.SX) -> ca.SX:
-    """The quaternion of a rotation vector (axis times angle, rad); a series where the angle is tiny."""
+    """Return the quaternion of a rotation vector (axis times angle, rad), by a series for tiny angles."""
     angle_squared = ca.dot(vector, vector)
     angle = ca.sqrt(angle_squared + 1e-300)
     factor = ca.if_else(angle_squared < 1e-6, 0.5 - angle_squared / 48 + angle_squared**2 / 3840, ca.sin(angle / 2) / angle)
@@ -87,6 +87,13 @@ def quaternion_from_rotation_vector(vector: ca.SX) -> ca.SX:
 
 
 def motion_outputs(position: ca.SX, orientation: ca.SX, velocity: ca.SX, rates: ca.SX) -> ca.SX:
-    """The published motion of a vehicle (the order of `interface.MOTION`) from world velocity and body rates."""
+    """Return the motion outputs of a vehicle (`interface.MOTION_OUTPUTS`).
+
+    Args:
+        position: Centre of mass (m, world frame).
+        orientation: Unit quaternion.
+        velocity: Velocity of the centre of mass (m/s, world frame).
+        rates: Angular velocity (rad/s, body frame).
+    """
     velocity_body = ca.mtimes(rotation_matrix(orientation).T, velocity)
     return ca.vertcat(position, orientation, euler_angles(orientation), velocity, velocity_body, rates)

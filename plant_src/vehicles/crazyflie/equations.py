@@ -1,4 +1,4 @@
-"""The equations of motion of the nano quadcopter: those of `multirotor.py` for its airframe."""
+"""Equations of motion of the nano quadcopter: those of `multirotor_equations.py` for its airframe."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from .parameters import AIRFRAME
 
 
 def block() -> Block:
-    """The nano quadcopter in free flight."""
+    """Return the nano quadcopter for export."""
     return multirotor_equations.multirotor_block(AIRFRAME, "Crazyflie 2.x nano quadcopter in free flight")

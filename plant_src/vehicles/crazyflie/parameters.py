@@ -1,10 +1,12 @@
-"""Numbers of the nano quadcopter, SI units, body frame x forward, y left, z up, origin at the centre of mass.
+"""Parameters of the nano quadcopter with their sources, in SI units.
+
+Body frame: x forward, y left, z up, origin at the centre of mass.
 
 Sources: [foerster] J. Förster, "System Identification of the Crazyflie 2.0 Nano Quadrocopter", ETH Zurich, 2015; [rotorpy]
 rotorpy/vehicles/crazyflie_params.py of Folk, Paulos and Kumar, "RotorPy" (github.com/spencerfolk/rotorpy), which cites
-[foerster]; [pybullet-drones] assets/cf2x.urdf of Panerati et al., "Learning to Fly", IROS 2021
-(github.com/utiasDSL/gym-pybullet-drones); [rotors] crazyflie2.xacro of ethz-asl/rotors_simulator; [bitcraze] the maker's data
-sheet. What has none of these names is an assumption.
+[foerster]; [pybullet-drones] assets/cf2x.urdf of Panerati et al., "Learning to Fly", IROS 2021 (github.com/utiasDSL/gym-
+pybullet-drones); [rotors] crazyflie2.xacro of ethz-asl/rotors_simulator; [bitcraze] the maker's data sheet. Values without a
+source are assumptions.
 """
 
 from __future__ import annotations
@@ -15,10 +17,10 @@ import numpy as np
 
 from ..multirotor.airframe import Airframe, Rotor, RotorEffects
 
-#: with battery [pybullet-drones, bitcraze] (kg)
+#: mass with battery [pybullet-drones, bitcraze] (kg)
 MASS = 0.027
 
-#: about the centre of mass; measured at 0.028 kg [foerster] (kg m2)
+#: inertia tensor about the centre of mass, measured at a mass of 0.028 kg [foerster] (kg m2)
 INERTIA = np.array(
     [
         [16.571710e-6, 0.830806e-6, 0.718277e-6],
@@ -27,13 +29,13 @@ INERTIA = np.array(
     ]
 )
 
-#: of the rotors from the x and y axes [pybullet-drones] (m)
+#: distance of the rotors from the x and y axes [pybullet-drones] (m)
 ARM = 0.028
 
-#: of the rotors above the centre of mass: assumed, about that of the motors' tops (m)
+#: height of the rotors above the centre of mass, assumed: about the top of the motors (m)
 ROTOR_HEIGHT = 0.008
 
-#: half of 45 mm [bitcraze, rotors] (m)
+#: half of the diameter of 45 mm [bitcraze, rotors] (m)
 ROTOR_RADIUS = 0.0225
 
 _PER_RPM_SQUARED = (60 / (2 * math.pi)) ** 2  # rpm2 in a rad2/s2
@@ -44,7 +46,7 @@ THRUST_COEFFICIENT = 3.16e-10 * _PER_RPM_SQUARED
 #: 7.94e-12 N m/rpm2 [pybullet-drones] (N m s2/rad2)
 TORQUE_COEFFICIENT = 7.94e-12 * _PER_RPM_SQUARED
 
-#: at which the thrust is 2.25 times the weight [pybullet-drones]: 2274 rad/s (rad/s)
+#: speed at which the thrust is 2.25 times the weight [pybullet-drones], 2274 (rad/s)
 MAX_ROTOR_SPEED = math.sqrt(2.25 * MASS * 9.81 / (4 * THRUST_COEFFICIENT))
 
 EFFECTS = RotorEffects(
@@ -54,8 +56,8 @@ EFFECTS = RotorEffects(
     ground_effect=1.0,
 )
 
-#: rotors 1 to 4 as the maker numbers them, seen from above clockwise from the front right; 1 and 3 turn counter-clockwise, so
-#: that their reaction turns the body clockwise [bitcraze]
+#: rotors 1 to 4 in the maker's order, clockwise from the front right seen from above; 1 and 3 turn counter-clockwise, so that
+#: their reaction torque on the body is clockwise [bitcraze]
 AIRFRAME = Airframe(
     name="crazyflie",
     mass=MASS,

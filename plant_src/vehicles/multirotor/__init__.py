@@ -1,1 +1,1 @@
-"""Parts of multirotors: airframe, interface, equations, ground effect."""
+"""Modules of multirotors: airframe, interface, equations, loads, ground effect."""

@@ -1,4 +1,4 @@
-"""What a multirotor is made of, as data: any number of rotors of one kind on a rigid body.
+"""Data of a multirotor: a rigid body with any number of identical rotors.
 
 Body frame: x forward, y left, z up, origin at the centre of mass. SI units.
 """
@@ -21,8 +21,14 @@ BODY_UP = (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True)
 class Rotor:
-    """Its place in words and its position (m); the unit vector `axis` of its thrust, about which it turns; the sense (+1 or -1)
-    in which its reaction turns the body about that axis."""
+    """One rotor.
+
+    Attributes:
+        label: Place of the rotor in words, for example "front left".
+        position: Hub from the centre of mass (m, body frame).
+        torque_sign: Sign (+1 or -1) of the reaction torque on the body about `axis`.
+        axis: Unit vector of the thrust (body frame), which is also the axis of rotation.
+    """
 
     label: str
     position: Vector
@@ -32,11 +38,14 @@ class Rotor:
 
 @dataclass(frozen=True)
 class RotorEffects:
-    """Start values of the parameters that switch the effects beyond thrust and torque; zero leaves an effect out.
+    """Start values of the parameters of all effects beyond thrust and torque; zero switches an effect off.
 
-    `rotor_time_constant` s: first-order lag of the rotor speeds. `rotor_inertia` kg m2: of a rotor with its motor about its
-    axis. `rotor_drag` kg/rad: force per rotor speed and air speed along x, y and z. `body_drag` kg/m: force per squared air
-    speed along x, y and z. `ground_effect`: share of the thrust that the ground effect adds.
+    Attributes:
+        rotor_time_constant: Time constant of the first-order lag of the rotor speeds (s).
+        rotor_inertia: Moment of inertia of a rotor with its motor about its axis (kg m2).
+        rotor_drag: Force per rotor speed and air speed along x, y and z (kg/rad, body frame).
+        body_drag: Force per squared air speed along x, y and z (kg/m, body frame).
+        ground_effect: Fraction of the ground effect's thrust that is applied (0 to 1).
     """
 
     rotor_time_constant: float = 0.0
@@ -50,9 +59,20 @@ class RotorEffects:
 class Airframe:
     """A rigid body with rotors.
 
-    `mass` kg; `inertia` (3, 3) kg m2 about the centre of mass, rotors locked; a rotor at the speed n (rad/s, 0 to
-    `max_rotor_speed`) pulls with thrust_coefficient n^2 (N s2/rad2) along its axis and turns the body with
-    torque_coefficient n^2 (N m s2/rad2); `rotor_radius` m; `gravity` m/s2. Raises InputError with everything that is impossible.
+    Attributes:
+        name: Name of the model.
+        mass: Total mass (kg).
+        inertia: Inertia tensor about the centre of mass with locked rotors (kg m2, body frame), shape (3, 3).
+        rotors: All rotors.
+        thrust_coefficient: Thrust of a rotor over its squared speed (N s2/rad2).
+        torque_coefficient: Reaction torque of a rotor over its squared speed (N m s2/rad2).
+        max_rotor_speed: Upper limit of the rotor speeds (rad/s); the lower limit is 0.
+        rotor_radius: Radius of a rotor (m).
+        effects: Start values of the further effects.
+        gravity: Gravitational acceleration (m/s2).
+
+    Raises:
+        InputError: For physically impossible values, all together; a problem's subject begins with the name of the attribute.
     """
 
     name: str
@@ -67,68 +87,76 @@ class Airframe:
     gravity: float = 9.81
 
     def __post_init__(self) -> None:
-        found = (*self._number_problems(), *self._inertia_problems(), *self._rotor_problems())
-        if found:
-            raise InputError([Problem(text, f"airframe {self.name}") for text in found])
+        problems = [*self._number_problems(), *self._inertia_problems(), *self._rotor_problems()]
+        if problems:
+            raise InputError(problems)
 
     @property
     def rotor_centre(self) -> Vector:
-        """Centre of the rotors (m)."""
+        """Mean position of the rotors (m, body frame)."""
         x, y, z = np.mean([rotor.position for rotor in self.rotors], axis=0).tolist()
         return x, y, z
 
-    def _number_problems(self) -> Iterator[str]:
+    def _problem(self, text: str, *subject: str) -> Problem:
+        return Problem(text, f"airframe {self.name}: {'.'.join(subject)}", subject)
+
+    def _number_problems(self) -> Iterator[Problem]:
         positive = ("mass", "thrust_coefficient", "torque_coefficient", "max_rotor_speed", "rotor_radius", "gravity")
         for name in positive:
             if not 0 < getattr(self, name) < math.inf:
-                yield f"{name}: found {getattr(self, name)!r}, expected a finite number greater than 0"
+                yield self._problem(f"found {getattr(self, name)!r}, expected a finite number greater than 0", name)
         for name, value in vars(self.effects).items():
             if not all(0 <= number < math.inf for number in np.ravel(value)):
-                yield f"effects.{name}: found {value!r}, expected finite numbers of at least 0"
+                yield self._problem(f"found {value!r}, expected finite numbers of at least 0", "effects", name)
 
-    def _inertia_problems(self) -> Iterator[str]:
+    def _inertia_problems(self) -> Iterator[Problem]:
         tensor = np.asarray(self.inertia, float)
         if tensor.shape != (3, 3) or not np.isfinite(tensor).all():
-            yield f"inertia: found {tensor.tolist()}, expected 3 rows of 3 finite numbers"
+            yield self._problem(f"found {tensor.tolist()}, expected 3 rows of 3 finite numbers", "inertia")
         elif not np.allclose(tensor, tensor.T, rtol=1e-12, atol=0):
-            yield f"inertia: found {tensor.tolist()}, expected a symmetric tensor"
+            yield self._problem(f"found {tensor.tolist()}, expected a symmetric tensor", "inertia")
         else:
-            yield from _principal_moment_problems(np.linalg.eigvalsh(tensor))
+            small, middle, large = moments = np.linalg.eigvalsh(tensor).tolist()  # in ascending order
+            if small <= 0:
+                yield self._problem(f"found the principal moments {moments}, expected all greater than 0", "inertia")
+            elif large > (small + middle) * (1 + 1e-9):
+                expected = "expected none greater than the sum of the other two"
+                yield self._problem(f"found the principal moments {moments}, {expected}", "inertia")
 
-    def _rotor_problems(self) -> Iterator[str]:
+    def _rotor_problems(self) -> Iterator[Problem]:
         if not self.rotors:
-            yield "rotors: found none, expected at least one"
+            yield self._problem("found none, expected at least one", "rotors")
         for number, rotor in enumerate(self.rotors, 1):
+            name = f"rotors[{number}]"
             if rotor.torque_sign not in (1, -1):
-                yield f"rotors[{number}].sense: found {rotor.torque_sign!r}, expected 1 or -1"
+                yield self._problem(f"found {rotor.torque_sign!r}, expected 1 or -1", name, "torque_sign")
             if not math.isclose(math.hypot(*rotor.axis), 1, rel_tol=1e-9):
-                yield f"rotors[{number}].axis: found {rotor.axis}, expected a unit vector"
+                yield self._problem(f"found {rotor.axis}, expected a unit vector", name, "axis")
             if not all(map(math.isfinite, rotor.position)):
-                yield f"rotors[{number}].position: found {rotor.position}, expected finite numbers"
+                yield self._problem(f"found {rotor.position}, expected finite numbers", name, "position")
 
     def principal_axes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Principal moments of inertia (3,) and the rotation (3, 3), by clearly less than half a turn, from their frame to the
-        body frame; the moments ascend as far as that is possible."""
+        """Return the principal moments of inertia and their axes.
+
+        Returns:
+            Moments of inertia (kg m2), shape (3,), and the rotation matrix from the principal axes to the body frame, shape
+            (3, 3). Its angle is less than 120 degrees; subject to that, the moments ascend.
+        """
         moments, axes = np.linalg.eigh(self.inertia)
         for order in permutations(range(3)):
             ordered = axes[:, order] * np.where(np.diag(axes[:, order]) < 0, -1.0, 1.0)
             for signs in product((1.0, -1.0), repeat=3):
-                turn = ordered * signs[::-1]
-                if np.linalg.det(turn) > 0 and np.trace(turn) > 0:
-                    return moments[list(order)], turn
-        raise AssertionError("one of the 24 frames of the principal axes is turned by less than 63 degrees")
+                to_body = ordered * signs[::-1]
+                if np.linalg.det(to_body) > 0 and np.trace(to_body) > 0:
+                    return moments[list(order)], to_body
+        raise AssertionError("one of the 24 frames of the principal axes is rotated by less than 63 degrees")
 
     def body(self, boxes: Callable[[np.ndarray], tuple[Box, ...]]) -> Body:
-        """What Bullet knows of it, in the principal-axis frame; `boxes` are made for the rotation (3, 3) to the body frame."""
+        """Return the rigid body for Bullet, in the principal axes.
+
+        Args:
+            boxes: Function from the rotation matrix (3, 3) principal axes to body frame to the boxes in the principal axes.
+        """
         moments, to_body = self.principal_axes()
         x, y, z = moments.tolist()
         return Body(self.mass, (x, y, z), boxes(to_body), axes=quaternion_from_matrix(to_body))
-
-
-def _principal_moment_problems(moments: np.ndarray) -> Iterator[str]:
-    """What is wrong with principal moments of inertia in ascending order; no body has one above the sum of the others."""
-    small, middle, large = moments.tolist()
-    if small <= 0:
-        yield f"inertia: found the principal moments {moments.tolist()}, expected them greater than 0"
-    elif large > (small + middle) * (1 + 1e-9):
-        yield f"inertia: found the principal moments {moments.tolist()}, expected none greater than the sum of the others"

@@ -1,4 +1,4 @@
-"""The variables of a multirotor, in the order of its equations' vectors."""
+"""Variables of a multirotor, in the order of the equations."""
 
 from __future__ import annotations
 
@@ -18,15 +18,14 @@ from ..common.interface import (
 )
 from .airframe import Airframe
 
-#: parameter -> its place in the inertia tensor, and by symmetry the one mirrored
+#: parameter -> row and column in the symmetric inertia tensor
 INERTIA_INDICES = {f"inertia.{'xyz'[i]}{'xyz'[j]}": (i, j) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))}
 
 
 def variables(airframe: Airframe) -> tuple[Variable, ...]:
-    """Parameters, inputs and outputs; the start values of all but the initial ones are the airframe's."""
-    start = initial_variables("xyz", "uvw", "pqr")
+    """Return parameters, inputs and outputs; parameters other than `initial.*` start at the values of the airframe."""
     return (
-        *start,
+        *initial_variables("xyz", "uvw", "pqr"),
         *_rigid_body_variables(airframe),
         *_effect_variables(airframe),
         _rotor_speed_variable(airframe),
@@ -39,20 +38,20 @@ def variables(airframe: Airframe) -> tuple[Variable, ...]:
 
 
 def states(airframe: Airframe) -> tuple[str, ...]:
-    """Names of the states: those of the rigid body, then the rotor speeds."""
+    """Return the names of the states: those of the rigid body, then the rotor speeds."""
     groups = {"position": "xyz", "orientation": "wxyz", "velocity": "xyz", "rates": "pqr"}
     rigid = [f"{group}.{axis}" for group, axes in groups.items() for axis in axes]
     return (*rigid, *(f"rotor_speed[{number}]" for number in range(1, len(airframe.rotors) + 1)))
 
 
 def constant_count(airframe: Airframe) -> int:
-    """How many numbers the equations are given: the parameters and the inverse of the inertia tensor."""
+    """Return the number of constants of the equations: the parameters and the inverse of the inertia tensor."""
     return 9 + sum(len(variable.scalar_names) for variable in variables(airframe) if variable.causality == "parameter")
 
 
 def _rigid_body_variables(airframe: Airframe) -> tuple[Variable, ...]:
-    """Mass and inertia, of which `airframe.Airframe` says what is possible."""
-    mass = scalar_variable("mass", "kg", "with rotors and everything on board", "parameter", airframe.mass)
+    """Return mass and inertia; `airframe.Airframe` checks their values."""
+    mass = scalar_variable("mass", "kg", "total mass with rotors and payload", "parameter", airframe.mass)
     text = "inertia tensor about the centre of mass, body frame, rotors locked"
     elements = {name: float(airframe.inertia[place]) for name, place in INERTIA_INDICES.items()}
     tensor = (scalar_variable(name, "kg.m2", f"{text}: {name[-2:]}", "parameter", value) for name, value in elements.items())
@@ -60,8 +59,8 @@ def _rigid_body_variables(airframe: Airframe) -> tuple[Variable, ...]:
 
 
 def _rotor_speed_variable(airframe: Airframe) -> Variable:
-    places = ", ".join(rotor.label for rotor in airframe.rotors)
-    text = f"commanded speed of the rotors {places}; limited to what the motors reach"
+    labels = ", ".join(rotor.label for rotor in airframe.rotors)
+    text = f"commanded rotor speeds ({labels}), limited to 0 ... {airframe.max_rotor_speed:.4g} rad/s"
     count = len(airframe.rotors)
     return Variable(
         "rotor_speed", "Float64", "input", start=(0.0,) * count, unit=parse_unit("rad/s"), shape=(count,), description=text
@@ -71,12 +70,17 @@ def _rotor_speed_variable(airframe: Airframe) -> Variable:
 def _effect_variables(airframe: Airframe) -> tuple[Variable, ...]:
     effects = airframe.effects
     return (
-        _parameter("initial_rotor_speed", "rad/s", "initial speed of all rotors where they lag", 0.0, airframe.max_rotor_speed),
-        _parameter("rotor_time_constant", "s", "lag of the rotor speeds; 0: none", effects.rotor_time_constant),
-        _parameter("rotor_inertia", "kg.m2", "of a rotor with its motor; 0: no gyroscopic torque", effects.rotor_inertia),
-        *_axis_parameters("rotor_drag", "kg/rad", "drag of a rotor per its speed and air speed", effects.rotor_drag),
-        *_axis_parameters("body_drag", "kg/m", "drag of the body per squared air speed", effects.body_drag),
-        _parameter("ground_effect", "1", "share of the thrust gained near a surface; 0: none", effects.ground_effect, 1.0),
+        _parameter("initial_rotor_speed", "rad/s", "initial speed of all rotors, if they lag", 0.0, airframe.max_rotor_speed),
+        _parameter("rotor_time_constant", "s", "time constant of the rotor speeds; 0: no lag", effects.rotor_time_constant),
+        _parameter(
+            "rotor_inertia",
+            "kg.m2",
+            "moment of inertia of a rotor with its motor; 0: no gyroscopic torque",
+            effects.rotor_inertia,
+        ),
+        *_axis_parameters("rotor_drag", "kg/rad", "drag of a rotor over its speed and air speed", effects.rotor_drag),
+        *_axis_parameters("body_drag", "kg/m", "drag of the body over squared air speed", effects.body_drag),
+        _parameter("ground_effect", "1", "fraction of the ground effect; 0: none", effects.ground_effect, 1.0),
     )
 
 

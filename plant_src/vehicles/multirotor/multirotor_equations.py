@@ -1,29 +1,31 @@
-"""Equations of motion of multirotors: a rigid body in six degrees of freedom under any number of rotors.
+"""Equations of motion of a multirotor: a rigid body in six degrees of freedom with any number of rotors.
 
-State: position p and velocity v (world frame), unit quaternion q (body to world), angular velocity w (body frame) and rotor
-speeds n_i. With all effects:
+State: position p (m) and velocity v (m/s) in the world frame, unit quaternion q (body to world), angular velocity w (rad/s, body
+frame) and rotor speeds n_i (rad/s). With all effects:
 
-    p' = v                                     u = R(q)^T (v - wind)                   velocity through the air, body frame
-    q' = q * (0, w) / 2                        u_i = u + w x r_i                       the same at rotor i
+    p' = v                                     u = R(q)^T (v - wind)                   air-relative velocity, body frame
+    q' = q * (0, w) / 2                        u_i = u + w x r_i                       air-relative velocity at rotor i
     v' = (R F + F_ext) / m - g e_z             F = sum_i F_i - |u| diag(body_drag) u
     w' = I^-1 (T + R^T T_ext - w x (I w + H) - H')
     F_i = g_i c_T n_i^2 a_i - n_i diag(rotor_drag) u_i
     T = sum_i (r_i x F_i + s_i c_D n_i^2 a_i)  H = -J sum_i s_i n_i a_i                angular momentum of the rotors
     n_i' = (command_i - n_i) / rotor_time_constant
 
-with the position r_i, the thrust axis a_i and the sense s_i of rotor i and the factor g_i of `ground_effect.py`. The drag of
-the rotors, at each hub, and that of the body are those of Folk, Paulos and Kumar, "RotorPy", 2023; the former is the lumped
-rotor drag of Faessler, Franchi and Scaramuzza, "Differential Flatness of Quadrotor Dynamics Subject to Rotor Drag", 2018,
-resolved over the rotors. Without a time constant the rotors turn as commanded at once, and H' is left out.
+r_i is the position of rotor i, a_i its thrust axis, s_i the sign of its reaction torque and g_i its ground-effect factor
+(`ground_effect.py`). Rotor drag, applied at each hub, and body drag follow Folk, Paulos and Kumar, "RotorPy", 2023. The rotor
+drag is the lumped model of Faessler, Franchi and Scaramuzza, "Differential Flatness of Quadrotor Dynamics Subject to Rotor
+Drag", 2018, distributed over the rotors. With a rotor time constant of 0 the rotor speeds equal their commands, and H' is
+neglected.
 
-The rotor speeds follow held commands exactly; the rest is integrated by the method of Runge and Kutta with the rotor speeds at
-the times of its stages, so that no time constant is too short. Where all effects are switched off, shorter code is run.
+The rotor speeds are the exact solution for held commands. The rigid body is integrated by the classical Runge-Kutta method,
+which evaluates the rotor speeds at the times of its stages; a short time constant therefore does not limit the step. If all
+effects are off, a shorter compiled function is called.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass, field, fields
+from functools import cached_property
 
 import casadi as ca
 
@@ -33,208 +35,158 @@ from cosim.export.equations.model import ContinuousModel, runge_kutta_4
 from cosim.export.fmu.block import Block
 
 from ..common import contact_maps, kinematics
-from .airframe import Airframe
-from .ground_effect import thrust_factors
+from ..common.named_values import ConstantsMap, NamedValues, values_by_name, variables_of
+from .airframe import Airframe, RotorEffects
 from .interface import states, variables
+from .loads import RotorSpeeds, aerodynamic_loads, gyroscopic_torque, rotor_loads
 
-#: how many states belong to the rigid body; the rotor speeds come after them
+#: number of rigid-body states; the rotor speeds follow them in the state vector
 RIGID_BODY_STATE_COUNT = 13
 
-#: where the constants of the equations lie: parameters as in `multirotor_interface.py`, and the inverse of the inertia tensor
-MASS_INDEX, INERTIA_SLICE, ROTOR_SPEED_INDEX, EFFECTS_SLICE, INVERSE_INERTIA_SLICE = (
-    10,
-    slice(11, 17),
-    17,
-    slice(18, 27),
-    slice(27, 36),
-)
+_EFFECTS = [effect.name for effect in fields(RotorEffects)]
 
 
-class ExternalInputs(NamedTuple):
-    """What acts on a multirotor from outside: loads and wind in the world frame, and its height above a surface."""
-
-    force: ca.SX
-    torque: ca.SX
-    wind: ca.SX
-    ground_distance: ca.SX
+def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
+    """Return the parameters and the inverse of the inertia tensor."""
+    return {**parameters, "inverse_inertia": ca.inv(_symmetric_matrix(parameters["inertia"]))}
 
 
-class EffectParameters(NamedTuple):
-    """The parameters of the effects, as `airframe.Effects` names them."""
-
-    rotor_time_constant: ca.SX
-    rotor_inertia: ca.SX
-    rotor_drag: ca.SX
-    body_drag: ca.SX
-    ground_effect: ca.SX
-
-
-class RotorSpeeds(NamedTuple):
-    """Rotor speeds (rad/s) and how fast they change (rad/s2)."""
-
-    speed: ca.SX
-    rate: ca.SX
-
-
-def derive_constants(parameters: ca.SX) -> ca.SX:
-    """The parameters, and what follows from them once."""
-    return ca.vertcat(parameters, ca.vec(ca.inv(_symmetric_matrix(parameters[INERTIA_SLICE]))))
-
-
-def rigid_body(constants: ca.SX) -> contact_maps.RigidBody:
-    """Mass and inertia."""
-    return contact_maps.RigidBody(
-        constants[MASS_INDEX], _symmetric_matrix(constants[INERTIA_SLICE]), ca.reshape(constants[INVERSE_INERTIA_SLICE], 3, 3)
-    )
+def rigid_body(constants: NamedValues) -> contact_maps.RigidBody:
+    """Return mass and inertia."""
+    return contact_maps.RigidBody(constants["mass"], _symmetric_matrix(constants["inertia"]), constants["inverse_inertia"])
 
 
 def _symmetric_matrix(elements: ca.SX) -> ca.SX:
-    """The tensor (3, 3) with the elements xx, yy, zz, xy, xz, yz."""
+    """Return the symmetric matrix (3, 3) with the elements xx, yy, zz, xy, xz, yz."""
     xx, yy, zz, xy, xz, yz = ca.vertsplit(elements)
     return ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
 
 
 def rigid_body_rate(
-    body: contact_maps.RigidBody, gravity: float, state: ca.SX, acting: ExternalInputs, force: ca.SX, torque: ca.SX
+    body: contact_maps.RigidBody, gravity: float, state: ca.SX, inputs: NamedValues, force: ca.SX, torque: ca.SX
 ) -> ca.SX:
-    """Time derivative of (position, orientation, world velocity, body rates) under loads in the body frame (N, N m)."""
+    """Return the time derivative of the rigid-body states.
+
+    Args:
+        body: Mass and inertia.
+        gravity: Gravitational acceleration (m/s2).
+        state: Position, quaternion, velocity (world frame) and rates (body frame), shape (13,).
+        inputs: Inputs by name; the external force and torque are used.
+        force: Force without weight and external force (N, body frame).
+        torque: Torque about the centre of mass without external torque (N m, body frame).
+    """
     orientation, velocity, rates = state[3:7], state[7:10], state[10:13]
     to_world = kinematics.rotation_matrix(orientation)
-    acceleration = (to_world @ force + acting.force) / body.mass - ca.vertcat(0, 0, gravity)
-    moment = torque + to_world.T @ acting.torque - ca.cross(rates, body.inertia @ rates)
+    acceleration = (to_world @ force + inputs["external_force"]) / body.mass - ca.vertcat(0, 0, gravity)
+    moment = torque + to_world.T @ inputs["external_torque"] - ca.cross(rates, body.inertia @ rates)
     return ca.vertcat(velocity, kinematics.quaternion_rate(orientation, rates), acceleration, body.inverse_inertia @ moment)
-
-
-def rotor_loads(airframe: Airframe, speed: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Force (N) and torque about the centre of mass (N m) of the rotors in still air, body frame."""
-    force, torque = ca.SX.zeros(3), ca.SX.zeros(3)
-    for i, rotor in enumerate(airframe.rotors):
-        thrust = airframe.thrust_coefficient * speed[i] ** 2 * ca.SX(rotor.axis)
-        reaction = rotor.torque_sign * airframe.torque_coefficient * speed[i] ** 2 * ca.SX(rotor.axis)
-        force += thrust
-        torque += ca.cross(ca.SX(rotor.position), thrust) + reaction
-    return force, torque
-
-
-def aerodynamic_loads(
-    airframe: Airframe, state: ca.SX, speed: ca.SX, acting: ExternalInputs, effects: EffectParameters
-) -> tuple[ca.SX, ca.SX]:
-    """Force (N) and torque (N m) that ground effect, rotor drag and body drag add to `rotor_loads`, body frame."""
-    air = kinematics.rotation_matrix(state[3:7]).T @ (state[7:10] - acting.wind)
-    force, torque = -ca.norm_2(air) * effects.body_drag * air, ca.SX.zeros(3)
-    factors = thrust_factors(airframe, acting.ground_distance)
-    for i, rotor in enumerate(airframe.rotors):
-        position = ca.SX(rotor.position)
-        gain = effects.ground_effect * (factors[i] - 1) * airframe.thrust_coefficient * speed[i] ** 2
-        load = gain * ca.SX(rotor.axis) - speed[i] * effects.rotor_drag * (air + ca.cross(state[10:13], position))
-        force += load
-        torque += ca.cross(position, load)
-    return force, torque
-
-
-def gyroscopic_torque(airframe: Airframe, rates: ca.SX, rotors: RotorSpeeds, inertia: ca.SX) -> ca.SX:
-    """Torque (N m) on the body, body frame, of spinning rotors when it turns and when their speeds change."""
-    axes = ca.horzcat(*(-rotor.torque_sign * ca.SX(rotor.axis) for rotor in airframe.rotors))
-    return -inertia * (ca.cross(rates, axes @ rotors.speed) + axes @ rotors.rate)
 
 
 @dataclass(frozen=True)
 class MultirotorEquations:
-    """The equations of an airframe, for vectors in the order of `multirotor_interface.py`; `parameters` are its `constants`."""
+    """Equations of an airframe; the vectors hold the variables of `interface.variables(airframe)` in order.
+
+    `inputs` and `constants` are vectors in the public methods and named values in the private ones.
+    """
 
     airframe: Airframe
 
-    def external_inputs(self, inputs: ca.SX) -> ExternalInputs:
-        """What the inputs after the rotor speeds say."""
-        return ExternalInputs(*ca.vertsplit(inputs[len(self.airframe.rotors) :], [0, 3, 6, 9, 10]))
+    @cached_property
+    def constants(self) -> ConstantsMap:
+        """Map from the parameters to the constants of the equations."""
+        return ConstantsMap(variables(self.airframe), derive_constants)
 
-    def commanded_speeds(self, inputs: ca.SX) -> ca.SX:
-        """The rotor speeds (rad/s), limited to what the motors reach."""
-        return ca.fmin(ca.fmax(inputs[: len(self.airframe.rotors)], 0), self.airframe.max_rotor_speed)
+    def _inputs(self, vector: ca.SX) -> NamedValues:
+        return values_by_name(vector, variables_of(variables(self.airframe), "input"))
 
-    def effect_parameters(self, parameters: ca.SX) -> EffectParameters:
-        """The parameters of the effects."""
-        return EffectParameters(*ca.vertsplit(parameters[EFFECTS_SLICE], [0, 1, 2, 5, 8, 9]))
+    def initial_state(self, constants: ca.SX) -> ca.SX:
+        """Return the state at the start."""
+        initial = self.constants.by_name(constants)
+        orientation = kinematics.quaternion_about_z(initial["initial.yaw"])
+        velocity = kinematics.rotation_matrix(orientation) @ initial["initial.velocity_body"]
+        rotors = ca.repmat(initial["initial_rotor_speed"], len(self.airframe.rotors))
+        return ca.vertcat(initial["initial.position"], orientation, velocity, initial["initial.rates"], rotors)
 
-    def initial_state(self, parameters: ca.SX) -> ca.SX:
-        """The state from initial position, yaw, body velocity, rates and rotor speed."""
-        orientation = kinematics.quaternion_about_z(parameters[3])
-        velocity = kinematics.rotation_matrix(orientation) @ parameters[4:7]
-        rotors = ca.repmat(parameters[ROTOR_SPEED_INDEX], len(self.airframe.rotors))
-        return ca.vertcat(parameters[0:3], orientation, velocity, parameters[7:10], rotors)
+    def rate(self, state: ca.SX, inputs: ca.SX, constants: ca.SX) -> ca.SX:
+        """Return the time derivative of the state of a multirotor whose rotors lag."""
+        given, known = self._inputs(inputs), self.constants.by_name(constants)
+        rotors = self._rotor_speeds(state[RIGID_BODY_STATE_COUNT:], given, known)
+        return ca.vertcat(self._body_rate(state[:RIGID_BODY_STATE_COUNT], rotors, given, known), rotors.rate)
 
-    def body_rate(self, state: ca.SX, rotors: RotorSpeeds, inputs: ca.SX, parameters: ca.SX) -> ca.SX:
-        """Time derivative of the rigid body's states with all effects."""
-        acting, effects = self.external_inputs(inputs), self.effect_parameters(parameters)
-        force, torque = rotor_loads(self.airframe, rotors.speed)
-        more_force, more_torque = aerodynamic_loads(self.airframe, state, rotors.speed, acting, effects)
-        more_torque += gyroscopic_torque(self.airframe, state[10:13], rotors, effects.rotor_inertia)
-        return rigid_body_rate(
-            rigid_body(parameters), self.airframe.gravity, state, acting, force + more_force, torque + more_torque
-        )
-
-    def rotor_speeds(self, speed: ca.SX, inputs: ca.SX, parameters: ca.SX) -> RotorSpeeds:
-        """Rotors at these speeds on the way to the commanded ones."""
-        lag = self.effect_parameters(parameters).rotor_time_constant
-        return RotorSpeeds(speed, ca.if_else(lag > 0, (self.commanded_speeds(inputs) - speed) / lag, 0))
-
-    def rate(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX) -> ca.SX:
-        """Time derivative of the state where the rotors lag."""
-        rotors = self.rotor_speeds(state[RIGID_BODY_STATE_COUNT:], inputs, parameters)
-        return ca.vertcat(self.body_rate(state[:RIGID_BODY_STATE_COUNT], rotors, inputs, parameters), rotors.rate)
-
-    def step_without_effects(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX) -> ca.SX:
-        """The state after a step without any effect."""
-        acting, speed, body = self.external_inputs(inputs), self.commanded_speeds(inputs), rigid_body(parameters)
+    def step_without_effects(self, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX) -> ca.SX:
+        """Return the state after a step (s) with all effects off."""
+        given, body = self._inputs(inputs), rigid_body(self.constants.by_name(constants))
+        speed = self._commanded_speeds(given)
         force, torque = rotor_loads(self.airframe, speed)
         end = runge_kutta_4(
-            lambda x: rigid_body_rate(body, self.airframe.gravity, x, acting, force, torque), state[:RIGID_BODY_STATE_COUNT], step
+            lambda x: rigid_body_rate(body, self.airframe.gravity, x, given, force, torque), state[:RIGID_BODY_STATE_COUNT], step
         )
         return ca.vertcat(normalised_state(end), speed)
 
-    def step_with_effects(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX) -> ca.SX:
-        """The state after a step with all effects."""
-        target, lag = self.commanded_speeds(inputs), self.effect_parameters(parameters).rotor_time_constant
+    def step_with_effects(self, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX) -> ca.SX:
+        """Return the state after a step (s) with all effects."""
+        given, known = self._inputs(inputs), self.constants.by_name(constants)
+        target, lag = self._commanded_speeds(given), known["rotor_time_constant"]
         start = ca.if_else(lag > 0, state[RIGID_BODY_STATE_COUNT:], target)
-        share = ca.exp(-step / 2 / lag)  # of the way to go that is left after half a step; zero without a lag
-        middle, end = (target + left * (start - target) for left in (share, share**2))
-        stages = (self.rotor_speeds(speed, inputs, parameters) for speed in (start, middle, middle, end))
-        moved = runge_kutta_4(lambda x: self.body_rate(x, next(stages), inputs, parameters), state[:RIGID_BODY_STATE_COUNT], step)
-        return ca.vertcat(normalised_state(moved), end)
+        remaining = ca.exp(-step / 2 / lag)  # fraction of the difference left after half a step; 0 without a lag
+        middle, end = (target + fraction * (start - target) for fraction in (remaining, remaining**2))
+        stages = (self._rotor_speeds(speed, given, known) for speed in (start, middle, middle, end))
+        body = runge_kutta_4(lambda x: self._body_rate(x, next(stages), given, known), state[:RIGID_BODY_STATE_COUNT], step)
+        return ca.vertcat(normalised_state(body), end)
+
+    def _commanded_speeds(self, inputs: NamedValues) -> ca.SX:
+        """Return the commanded rotor speeds (rad/s), limited to 0 ... `max_rotor_speed`."""
+        return ca.fmin(ca.fmax(inputs["rotor_speed"], 0), self.airframe.max_rotor_speed)
+
+    def _rotor_speeds(self, speed: ca.SX, inputs: NamedValues, constants: NamedValues) -> RotorSpeeds:
+        """Return the rotor speeds with their first-order rates towards the commands."""
+        lag = constants["rotor_time_constant"]
+        return RotorSpeeds(speed, ca.if_else(lag > 0, (self._commanded_speeds(inputs) - speed) / lag, 0))
+
+    def _body_rate(self, state: ca.SX, rotors: RotorSpeeds, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+        """Return the time derivative of the rigid-body states with all effects."""
+        force, torque = rotor_loads(self.airframe, rotors.speed)
+        more_force, more_torque = aerodynamic_loads(self.airframe, state, rotors.speed, inputs, constants)
+        more_torque += gyroscopic_torque(self.airframe, state[10:13], rotors, constants["rotor_inertia"])
+        return rigid_body_rate(
+            rigid_body(constants), self.airframe.gravity, state, inputs, force + more_force, torque + more_torque
+        )
 
 
 def normalised_state(state: ca.SX) -> ca.SX:
-    """The states of the rigid body with a unit quaternion."""
+    """Return the rigid-body states with a unit quaternion."""
     return ca.vertcat(state[0:3], kinematics.normalised_quaternion(state[3:7]), state[7:RIGID_BODY_STATE_COUNT])
 
 
 def motion_of_state(state: ca.SX) -> ca.SX:
-    """The published motion."""
+    """Return the published motion (`interface.MOTION_OUTPUTS`)."""
     return kinematics.motion_outputs(state[0:3], state[3:7], state[7:10], state[10:RIGID_BODY_STATE_COUNT])
 
 
 @dataclass(frozen=True)
 class Multirotor(ContinuousModel):
-    """A multirotor in free flight, whose step is one of the compiled function `free_step`."""
+    """A multirotor in free flight that is integrated by the compiled function `free_step`."""
 
     free_step: ca.Function = field(kw_only=True)
 
     def integrate(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1) -> ca.SX:
-        """The state after `step` (s) with held inputs, in equal sub-steps."""
+        """Return the state after `step` (s) with held inputs, in equal sub-steps."""
         for _ in range(sub_steps):
             state = self.free_step(state, inputs, parameters, step / sub_steps)
         return state
 
 
-def free_step(airframe: Airframe) -> Callee:
-    """The state after a step; the shorter code is run where no effect is switched on."""
-    equations, count = MultirotorEquations(airframe), len(airframe.rotors)
-    sizes = {"state": RIGID_BODY_STATE_COUNT + count, "inputs": count + 10, "parameters": INVERSE_INERTIA_SLICE.stop, "step": 1}
-    state, inputs, parameters, step = arguments = [ca.SX.sym(name, size) for name, size in sizes.items()]
+def free_step(equations: MultirotorEquations) -> Callee:
+    """Return the function of one step; its C code calls the shorter function if all effects are off."""
+    inputs = sum(len(variable.scalar_names) for variable in variables_of(variables(equations.airframe), "input"))
+    names = [name for name, (rows, columns) in equations.constants.shapes.items() for _ in range(rows * columns)]
+    sizes = {"state": len(states(equations.airframe)), "inputs": inputs, "constants": len(names), "step": 1}
+    arguments = [ca.SX.sym(name, size) for name, size in sizes.items()]
     plain = ca.Function("plain_step", arguments, [equations.step_without_effects(*arguments)])
-    full = ca.Function("step_with_effects", arguments, [equations.step_with_effects(state, inputs, parameters, step)])
+    full = ca.Function("step_with_effects", arguments, [equations.step_with_effects(*arguments)])
     either = ca.Function("free_step", arguments, [full(*arguments)], {"never_inline": True})
-    return Callee(either, _FREE_STEP_C % {"first": EFFECTS_SLICE.start, "end": EFFECTS_SLICE.stop}, [plain, full])
+    effects = [k for k, name in enumerate(names) if name.partition(".")[0] in _EFFECTS]
+    return Callee(either, _FREE_STEP_C % {"first": effects[0], "end": effects[-1] + 1}, [plain, full])
 
 
 _FREE_STEP_C = """{
@@ -249,8 +201,9 @@ _FREE_STEP_C = """{
 
 
 def multirotor_block(airframe: Airframe, description: str) -> Block:
-    """A multirotor in free flight as FMU, and in the world."""
-    equations, step = MultirotorEquations(airframe), free_step(airframe)
+    """Return a multirotor for export: its FMU in free flight and the contact functions of the world."""
+    equations = MultirotorEquations(airframe)
+    step = free_step(equations)
     model = Multirotor(
         airframe.name,
         description,
@@ -258,9 +211,10 @@ def multirotor_block(airframe: Airframe, description: str) -> Block:
         states(airframe),
         equations.initial_state,
         equations.rate,
-        lambda state, inputs, parameters: ca.vertcat(motion_of_state(state), ca.SX.zeros(3)),
-        derived_parameters=derive_constants,
+        lambda state, _inputs, _constants: ca.vertcat(motion_of_state(state), ca.SX.zeros(3)),
+        derived_parameters=equations.constants.vector,
         callees=[step],
         free_step=step.function,
     )
-    return as_block(model, contact_maps.FreeContactMaps(model, rigid_body, motion_of_state).functions())
+    maps = contact_maps.FreeContactMaps(model, lambda c: rigid_body(equations.constants.by_name(c)), motion_of_state)
+    return as_block(model, maps.functions())

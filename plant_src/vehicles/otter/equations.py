@@ -1,6 +1,8 @@
-"""Equations of motion of the Otter in six degrees of freedom: README.md has them in our notation."""
+"""Equations of motion of the Otter in six degrees of freedom; README.md has the loads, `vehicles/README.md` the rest."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import casadi as ca
 import numpy as np
@@ -11,9 +13,10 @@ from cosim.export.fmu.block import Block
 
 from ..common import kinematics
 from ..common.interface import VESSEL_STATES
+from ..common.named_values import NamedValues, values_by_name, variables_of
 from ..vessel import floating_maps, vessel_equations
 from ..vessel import hull as vessel
-from ..vessel.hull import Frame, Hull, LoadArguments, ValuesByName, load_of_force_at, transformation_matrix
+from ..vessel.hull import Frame, Hull, LoadArguments, load_of_force_at, transformation_matrix
 from ..vessel.wave_loads import Footprint
 from . import hydrostatics
 from . import parameters as p
@@ -23,66 +26,66 @@ from .interface import PROPELLER_STATES, VARIABLES
 _CENTRE_OF_FLOTATION = ca.SX(p.CENTRE_OF_FLOTATION)
 
 
-def derive_constants(parameters: ValuesByName) -> ValuesByName:
-    """What the equations need of the parameters."""
-    payload, place, hull_centre = parameters["payload_mass"], parameters["payload_position"], ca.SX(p.HULL_CENTRE)
+def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
+    """Return the constants of the equations."""
+    payload, position, hull_centre = parameters["payload_mass"], parameters["payload_position"], ca.SX(p.HULL_CENTRE)
     mass = p.HULL_MASS + payload
-    centre = (p.HULL_MASS * hull_centre + payload * place) / mass
+    centre = (p.HULL_MASS * hull_centre + payload * position) / mass
     inertia = p.HULL_MASS * ca.diag(ca.SX(p.RADII_OF_GYRATION) ** 2)
-    for share, point in ((p.HULL_MASS, hull_centre), (payload, place)):
+    for part, point in ((p.HULL_MASS, hull_centre), (payload, position)):
         lever = ca.skew(point - centre)
-        inertia -= share * lever @ lever
+        inertia -= part * lever @ lever
     added = added_mass(inertia)
-    whole = vessel.rigid_body_mass_matrix(mass, centre, inertia) + ca.diag(added)
-    water = hydrostatics.hydrostatics(mass, centre)
-    load = ca.vertcat(0, 0, -payload * p.GRAVITY)
+    mass_matrix = vessel.rigid_body_mass_matrix(mass, centre, inertia) + ca.diag(added)
+    floating = hydrostatics.hydrostatics(mass, centre)
     constants = {
         **vessel_equations.initial_parameters(parameters),
         "mass": mass,
-        "centre": centre,
+        "centre_of_mass": centre,
         "inertia": inertia,
         "added_mass": added,
-        "inverse": ca.inv(whole),
-        "draught": water.draught,
-        "stiffness": water.stiffness,
-        "settling": water.compliance,
-        "footprint": water.footprint,
-        "damping": hydrostatics.linear_damping(ca.diag(whole), water.stiffness),
-        "drag": hydrostatics.cross_flow_drag(water.draught),
-        "payload": load[2],
-        "payload_position": place,
+        "inverse_mass_matrix": ca.inv(mass_matrix),
+        "draught": floating.draught,
+        "stiffness": floating.stiffness,
+        "compliance": floating.compliance,
+        "footprint": floating.footprint,
+        "damping": hydrostatics.linear_damping(ca.diag(mass_matrix), floating.stiffness),
+        "drag": hydrostatics.cross_flow_drag(floating.draught),
+        "payload_force": -payload * p.GRAVITY,
+        "payload_position": position,
         "propeller_time_constant": parameters["propeller_time_constant"],
         "wave.count": parameters["wave.count"],
-        "sea": vessel_equations.wave_table_of(parameters, _unpack_footprint(water.footprint)),
+        "wave_table": vessel_equations.wave_table_of(parameters, _unpack_footprint(floating.footprint)),
     }
-    return constants | {"rest": _equilibrium(constants)}
+    return constants | {"equilibrium": _equilibrium(constants)}
 
 
 def added_mass(inertia: ca.SX) -> ca.SX:
-    """The diagonal (6) of the added mass."""
-    masses = [p.SURGE_ADDED_MASS, *(share * p.HULL_MASS for share in p.ADDED_MASS_SHARES)]
+    """Return the diagonal of M_A, shape (6,), for an inertia about the centre of mass (kg m2)."""
+    masses = [p.SURGE_ADDED_MASS, *(ratio * p.HULL_MASS for ratio in p.ADDED_MASS_SHARES)]
     return ca.vertcat(ca.SX(masses), ca.SX(p.ADDED_INERTIA_SHARES) * ca.diag(inertia))
 
 
-def trim(constants: ValuesByName, attitude: ca.SX) -> ca.SX:
-    """Height of O, roll and pitch to which the payload presses the hull in this attitude."""
-    force = attitude.T @ ca.vertcat(0, 0, constants["payload"])
+def trim(constants: Mapping[str, ca.SX], attitude: ca.SX) -> ca.SX:
+    """Return height of O (m), roll and pitch (rad) due to the payload for a rotation matrix body to world, shape (3,)."""
+    force = attitude.T @ ca.vertcat(0, 0, constants["payload_force"])
     load = load_of_force_at(constants["payload_position"], force)
-    return constants["settling"] @ load[2:5]
+    return constants["compliance"] @ load[2:5]
 
 
-def _equilibrium(constants: ValuesByName) -> ca.SX:
-    """The trim that is that of its own attitude, by iteration: each step leaves less than a tenth of the error."""
-    rest = ca.SX.zeros(3)
+def _equilibrium(constants: Mapping[str, ca.SX]) -> ca.SX:
+    """Return the trim at rest by fixed-point iteration, which reduces the error to less than a tenth in each step."""
+    equilibrium = ca.SX.zeros(3)
     for _ in range(20):
-        rest = trim(constants, kinematics.rotation_matrix(kinematics.quaternion_from_euler(rest[1], rest[2], ca.SX(0))))
-    return rest
+        orientation = kinematics.quaternion_from_euler(equilibrium[1], equilibrium[2], ca.SX(0))
+        equilibrium = trim(constants, kinematics.rotation_matrix(orientation))
+    return equilibrium
 
 
-def frame(constants: ValuesByName, orientation: ca.SX) -> Frame:
-    """Velocities are counted in the hull's level frame, which is that of its Euler angles less those of the trim.
+def frame(constants: NamedValues, orientation: ca.SX) -> Frame:
+    """Return the rotations: as in MSS, velocities are expressed in the frame with the Euler angles of the hull minus the trim.
 
-    The current is turned by the yaw angle alone.
+    The current is rotated by the yaw angle only, as in MSS.
     """
     attitude = kinematics.rotation_matrix(orientation)
     roll, pitch, yaw = ca.vertsplit(kinematics.euler_angles(orientation))
@@ -93,22 +96,22 @@ def frame(constants: ValuesByName, orientation: ca.SX) -> Frame:
     return Frame(attitude, to_world, spin, kinematics.rotation_matrix(kinematics.quaternion_about_z(yaw)).T)
 
 
-def hull(constants: ValuesByName) -> Hull:
-    """The vessel with these constants."""
+def hull(constants: NamedValues) -> Hull:
+    """Return the vessel with these constants."""
     added = ca.diag(constants["added_mass"])
     return Hull(
         mass=constants["mass"],
-        centre_of_mass=constants["centre"],
+        centre_of_mass=constants["centre_of_mass"],
         inertia=constants["inertia"],
         added_mass=added,
         coriolis_added_mass=added,
-        inverse_mass_matrix=constants["inverse"],
+        inverse_mass_matrix=constants["inverse_mass_matrix"],
         centre_of_flotation=_CENTRE_OF_FLOTATION,
         deck_centre=ca.SX(p.DECK_CENTRE),
-        equilibrium=constants["rest"],
+        equilibrium=constants["equilibrium"],
         footprint=_unpack_footprint(constants["footprint"]),
         wave_count=constants["wave.count"],
-        wave_table=constants["sea"],
+        wave_table=constants["wave_table"],
         loads=lambda now: propulsion(constants, now) + damping(constants, now) + restoring(constants, now) + wind(now),
         frame=lambda orientation: frame(constants, orientation),
     )
@@ -118,18 +121,18 @@ def _unpack_footprint(values: ca.SX) -> Footprint:
     return Footprint(*ca.vertsplit(values))
 
 
-def restoring(constants: ValuesByName, now: LoadArguments) -> ca.SX:
-    """Linear in height, roll and pitch, relative to the trim and the surface of the water at the centre of flotation."""
+def restoring(constants: NamedValues, now: LoadArguments) -> ca.SX:
+    """Return the restoring load tau, linear in heave, roll and pitch relative to the trim and to the water surface."""
     angles = kinematics.euler_angles(now.orientation)[0:2]
     displacement = ca.vertcat(now.height, angles) - trim(constants, now.frame.attitude)
-    move = transformation_matrix(_CENTRE_OF_FLOTATION)[2:5, 2:5]
+    to_flotation = transformation_matrix(_CENTRE_OF_FLOTATION)[2:5, 2:5]
     surface = ca.vertcat(now.elevation, now.slopes[1], -now.slopes[0])
-    load = -move.T @ (constants["stiffness"] * (move @ displacement - surface))
+    load = -to_flotation.T @ (constants["stiffness"] * (to_flotation @ displacement - surface))
     return ca.vertcat(0, 0, load, 0)
 
 
-def damping(constants: ValuesByName, now: LoadArguments) -> ca.SX:
-    """Linear damping, in yaw growing with the rate, and drag of the cross-flow along the hull."""
+def damping(constants: NamedValues, now: LoadArguments) -> ca.SX:
+    """Return tau of the linear damping, which grows with the yaw rate in yaw, and of the cross-flow drag along the hull."""
     growth = ca.vertcat(ca.SX.ones(5), 1 + p.YAW_DAMPING_GROWTH * ca.fabs(now.relative_velocity[5]))
     load = -constants["damping"] * growth * now.relative_velocity
     _, v, w, _, q, r = ca.vertsplit(now.relative_velocity)
@@ -140,8 +143,8 @@ def damping(constants: ValuesByName, now: LoadArguments) -> ca.SX:
     return load
 
 
-def propulsion(constants: ValuesByName, now: LoadArguments) -> ca.SX:
-    """Thrust of both propellers."""
+def propulsion(constants: NamedValues, now: LoadArguments) -> ca.SX:
+    """Return the load tau of both propellers."""
     lag = constants["propeller_time_constant"]
     speed = ca.if_else(lag > 0, now.actuators, now.inputs["propeller_speed"])
     speed = ca.fmin(ca.fmax(speed, p.MIN_PROPELLER_SPEED), p.MAX_PROPELLER_SPEED)
@@ -151,7 +154,7 @@ def propulsion(constants: ValuesByName, now: LoadArguments) -> ca.SX:
 
 
 def wind(now: LoadArguments) -> ca.SX:
-    """Drag of the wind beyond that of still air."""
+    """Return the load tau of the wind relative to still air, whose drag is part of the surge damping."""
     coefficients = ca.SX([p.AIR_DENSITY / 2 * a * c for a, c in zip(p.PROJECTED_AREAS, p.WIND_COEFFICIENTS, strict=True)])
     still, air = now.velocity[0:2], now.air_relative_velocity[0:2]
     force = coefficients * (ca.fabs(still) * still - ca.fabs(air) * air)
@@ -159,13 +162,15 @@ def wind(now: LoadArguments) -> ca.SX:
 
 
 class OtterModel(ContinuousModel):
-    """The shafts follow their commands after each step, in which their speed is held, as in MSS's simulations (Euler)."""
+    """Model whose shaft speeds are constant during a step and follow their commands after it (Euler), as in MSS."""
 
     def integrate(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1) -> ca.SX:
-        """The state after one step of the Runge-Kutta method, whatever `sub_steps`, and of the shafts."""
+        """Return the state after `step` (s): one Runge-Kutta step of the vessel and one Euler step of the shafts."""
+        del sub_steps  # always one, as in MSS
         end = super().integrate(state, inputs, parameters, step)
         first = len(VESSEL_STATES)
-        lag, shafts, commands = VESSEL.constants_by_name(parameters)["propeller_time_constant"], end[first:], inputs[0:2]
+        lag, shafts = VESSEL.constants.by_name(parameters)["propeller_time_constant"], end[first:]
+        commands = values_by_name(inputs, variables_of(VARIABLES, "input"))["propeller_speed"]
         return ca.vertcat(end[:first], shafts + ca.fmin(1, ca.if_else(lag > 0, step / lag, 1)) * (commands - shafts))
 
 
@@ -175,6 +180,6 @@ VESSEL = vessel_equations.VesselModel(
 
 
 def block() -> Block:
-    """The Otter on open water."""
+    """Return the Otter for export."""
     model = VESSEL.create_continuous_model(OtterModel, max_sub_step=0.01)
     return as_block(model, floating_maps.FloatingContactMaps(model, VESSEL, BODY).functions())

@@ -1,4 +1,4 @@
-"""What Bullet knows of the Otter, in its body frame."""
+"""Rigid body of the Otter in its body frame."""
 
 from __future__ import annotations
 

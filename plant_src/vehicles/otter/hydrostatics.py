@@ -1,4 +1,4 @@
-"""Buoyancy and damping of the Otter with a given load, by the formulas of MSS."""
+"""Hydrostatics and damping of the Otter with its payload, by the formulas of MSS (`parameters.py`)."""
 
 from __future__ import annotations
 
@@ -12,8 +12,14 @@ from . import parameters as p
 
 @dataclass(frozen=True)
 class Hydrostatics:
-    """`draught` (m); `stiffness` of heave (N/m), roll and pitch (N m/rad) at the centre of flotation; `settling` (3, 3): heave,
-    roll and pitch at O per load there; `footprint`: squares of the waterplane's radii of gyration (m2) and the draught."""
+    """Hydrostatics for one mass and centre of mass.
+
+    Attributes:
+        draught: Draught (m).
+        stiffness: Restoring stiffness of heave (N/m), roll and pitch (N m/rad) at the centre of flotation, shape (3,).
+        compliance: Heave (m), roll and pitch (rad) over heave force (N), roll and pitch moment (N m) at O, shape (3, 3).
+        footprint: Values of `wave_loads.Footprint`, shape (3,).
+    """
 
     draught: ca.SX
     stiffness: ca.SX
@@ -22,7 +28,7 @@ class Hydrostatics:
 
 
 def hydrostatics(mass: ca.SX, centre: ca.SX) -> Hydrostatics:
-    """Of a vessel with this mass and centre of mass."""
+    """Return the hydrostatics for a mass (kg) and a centre of mass (m, body frame)."""
     volume = mass / p.WATER_DENSITY
     draught = volume / (2 * p.BLOCK_COEFFICIENT * p.PONTOON_BEAM * p.LENGTH)
     area = 2 * p.WATERLINE_COEFFICIENT * p.LENGTH * p.PONTOON_BEAM
@@ -33,13 +39,13 @@ def hydrostatics(mass: ca.SX, centre: ca.SX) -> Hydrostatics:
     metacentric_heights = buoyancy_height + moments / volume - (draught + centre[2])
     weight = p.WATER_DENSITY * p.GRAVITY
     stiffness = ca.vertcat(weight * area, weight * volume * metacentric_heights)
-    move = transformation_matrix(ca.SX(p.CENTRE_OF_FLOTATION))[2:5, 2:5]
-    settling = ca.inv(move.T @ ca.diag(stiffness) @ move)
-    return Hydrostatics(draught, stiffness, settling, ca.vertcat(moments[1] / area, moments[0] / area, draught))
+    to_flotation = transformation_matrix(ca.SX(p.CENTRE_OF_FLOTATION))[2:5, 2:5]
+    compliance = ca.inv(to_flotation.T @ ca.diag(stiffness) @ to_flotation)
+    return Hydrostatics(draught, stiffness, compliance, ca.vertcat(moments[1] / area, moments[0] / area, draught))
 
 
 def linear_damping(mass: ca.SX, stiffness: ca.SX) -> ca.SX:
-    """The diagonal (6) of the linear damping for the diagonal of the mass matrix."""
+    """Return the diagonal of the linear damping D, shape (6,), for the diagonal of M and `Hydrostatics.stiffness`."""
     frequencies = ca.sqrt(stiffness / mass[2:5])
     oscillating = 2 * ca.SX(p.DAMPING_RATIOS) * frequencies * mass[2:5]
     sway, yaw = p.DAMPING_TIME_CONSTANTS
@@ -47,7 +53,7 @@ def linear_damping(mass: ca.SX, stiffness: ca.SX) -> ca.SX:
 
 
 def cross_flow_drag(draught: ca.SX) -> ca.SX:
-    """N s2/m2 of one of the stations."""
+    """Return the cross-flow drag of one station over its squared velocity (N s2/m2) for a draught (m)."""
     slenderness, coefficients = zip(*p.CROSS_FLOW_DRAG_CURVE, strict=True)
     inside = ca.fmin(ca.fmax(p.PONTOON_BEAM / (2 * draught), slenderness[0]), slenderness[-1])
     coefficient = ca.pw_lin(inside, ca.DM(slenderness), ca.DM(coefficients))

@@ -1,4 +1,4 @@
-"""The variables of the Otter, in the order of its equations' vectors."""
+"""Variables of the Otter, in the order of the equations."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PROPELLER_SPEED = Variable(
     start=(0.0, 0.0),
     unit=parse_unit("rad/s"),
     shape=(2,),
-    description="commanded speed of the propellers port, starboard; limited to what the motors reach",
+    description="commanded propeller speeds (port, starboard), limited to -101.7 ... 103.9 rad/s",
 )
 
 
@@ -35,11 +35,13 @@ def _parameter(name: str, unit: str, start: float, description: str, minimum: fl
 
 PAYLOAD_PARAMETERS = (
     _parameter("payload_mass", "kg", 25.0, "mass of the payload", 0.0, 45.0),
-    _parameter("payload_position.x", "m", 0.05, "payload ahead of the middle of the hull", -1.0, 1.0),
+    _parameter("payload_position.x", "m", 0.05, "payload ahead of midships", -1.0, 1.0),
     _parameter("payload_position.y", "m", 0.0, "payload to port of the centre line", -0.5, 0.5),
     _parameter("payload_position.z", "m", 0.35, "payload above the waterline", -0.2, 1.0),
 )
-PROPELLER_TIME_CONSTANT = _parameter("propeller_time_constant", "s", 0.1, "lag of the propellers' speed; 0: none", 0.0, None)
+PROPELLER_TIME_CONSTANT = _parameter(
+    "propeller_time_constant", "s", 0.1, "time constant of the propeller speeds; 0: no lag", 0.0, None
+)
 
 PARAMETERS = (
     *initial_variables("xy", "uvw", "pqr"),
@@ -51,8 +53,8 @@ PARAMETERS = (
 INPUTS = (PROPELLER_SPEED, *EXTERNAL_LOADS, *WIND_INPUTS, *CURRENT_INPUTS, *WAVE_GAIN_INPUT)
 VARIABLES = (*PARAMETERS, *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *CONTACT_OUTPUTS)
 
-#: the states beside those of every vessel
+#: actuator states
 PROPELLER_STATES = ("propeller_speed[1]", "propeller_speed[2]")
 
-#: how many numbers the equations make of the parameters
-CONSTANT_COUNT = 492
+#: number of constants that the equations derive from the parameters
+CONSTANT_COUNT = 484

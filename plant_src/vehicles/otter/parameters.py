@@ -1,25 +1,27 @@
-"""Numbers of the Otter, SI units, body frame x forward, y left, z up, origin O midships on the centre line at the waterline.
+"""Parameters of the Otter with their sources, in SI units.
+
+Body frame: x forward, y left, z up, origin O midships on the centre line at the waterline.
 
 Source: the model `otter` of the Marine Systems Simulator (github.com/cybergalactic/MSS, MIT licence, revision of 2026-06-27) by
-T. I. Fossen; Fossen 2021, Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd edition. Converted from its frame x
-forward, y right, z down: y and z of vectors change their sign. What is not from there is marked [assumed].
+T. I. Fossen; Fossen 2021, Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd edition. The values are converted
+from the frame x forward, y right, z down: y and z of vectors change their sign. Values from elsewhere are marked [assumed].
 """
 
 from __future__ import annotations
 
 import math
 
-GRAVITY = 9.81
-WATER_DENSITY = 1025.0
+GRAVITY = 9.81  # m/s2
+WATER_DENSITY = 1025.0  # kg/m3
 
-LENGTH, BEAM = 2.0, 1.08
+LENGTH, BEAM = 2.0, 1.08  # m
 
-#: hull without payload (kg), its centre of mass (m), its radii of gyration about x, y, z (m)
+#: hull without payload: mass (kg), centre of mass (m), radii of gyration about x, y, z (m)
 HULL_MASS = 55.0
 HULL_CENTRE = (0.2, 0.0, 0.2)
 RADII_OF_GYRATION = (0.4 * BEAM, 0.25 * LENGTH, 0.25 * LENGTH)
 
-#: pontoons: beam and lateral position (m), coefficients of waterline and block
+#: pontoons: beam and lateral position (m), waterplane and block coefficient
 PONTOON_BEAM = 0.25
 PONTOON_OFFSET = 0.395
 WATERLINE_COEFFICIENT = 0.75
@@ -28,25 +30,25 @@ BLOCK_COEFFICIENT = 0.4
 #: centre of the waterplane (m)
 CENTRE_OF_FLOTATION = (-0.2, 0.0, 0.0)
 
-#: added mass in surge as a share of this (Soeding 1982), sway and heave as shares of the hull's mass, roll, pitch and yaw as
-#: shares of the moments of inertia
+#: added mass in surge (kg, Soeding 1982), of sway and heave over the mass of the hull, of roll, pitch and yaw over the moments
+#: of inertia
 SURGE_ADDED_MASS = 2.7 * WATER_DENSITY * (HULL_MASS / WATER_DENSITY) ** (5 / 3) / LENGTH**2
 ADDED_MASS_SHARES = (1.5, 1.0)
 ADDED_INERTIA_SHARES = (0.2, 0.8, 1.7)
 
-#: surge damping: the propellers' thrust at this speed (m/s)
+#: maximum speed of 6 knots (m/s) and the thrust (N) that the surge damping balances at this speed
 MAX_SPEED = 6 * 0.5144
 MAX_THRUST = 24.4 * GRAVITY
 
-#: time constants of sway and yaw (s), damping ratios of heave, roll and pitch, growth of yaw damping with the rate (s)
+#: damping: time constants of sway and yaw (s), damping ratios of heave, roll and pitch, growth in yaw with |r| (s/rad)
 DAMPING_TIME_CONSTANTS = (1.0, 1.0)
 DAMPING_RATIOS = (0.3, 0.2, 0.4)
 YAW_DAMPING_GROWTH = 10.0
 
-#: stations along the hull for the drag of the cross-flow
+#: number of stations along the hull for the cross-flow drag
 STATION_COUNT = 21
 
-#: drag coefficient of a section over half of beam per draught (Hoerner's curve)
+#: (beam / (2 draught), cross-flow drag coefficient of a section), Hoerner's curve
 CROSS_FLOW_DRAG_CURVE = (
     (0.0109, 1.966),
     (0.1766, 1.9657),
@@ -70,21 +72,21 @@ CROSS_FLOW_DRAG_CURVE = (
     (4.0031, 0.5593),
 )
 
-#: thrust of a propeller = coefficient * speed * |speed|, ahead and astern (N s2/rad2), and limits of its speed (rad/s)
+#: propeller: thrust over speed |speed| ahead and astern (N s2/rad2), limits of the speed (rad/s)
 THRUST_AHEAD, THRUST_ASTERN = 0.02216 / 2, 0.01289 / 2
 MAX_PROPELLER_SPEED = math.sqrt(0.5 * MAX_THRUST / THRUST_AHEAD)
 MIN_PROPELLER_SPEED = -math.sqrt(0.5 * 13.6 * GRAVITY / THRUST_ASTERN)
 
-#: windage [assumed]: areas seen from ahead and from the side (m2) and drag coefficients, of the order of Fossen 2021, chapter
-#: 10.1; the drag of still air is part of the surge damping
+#: wind load [assumed]: density (kg/m3), frontal and lateral projected area (m2), drag coefficients of the order of Fossen (2021),
+#: section 10.1, height of the load above O (m); the drag of still air is part of the surge damping
 AIR_DENSITY = 1.225
 PROJECTED_AREAS = (0.35, 0.55)
 WIND_COEFFICIENTS = (0.7, 0.9)
 WIND_HEIGHT = 0.25
 
-#: landing deck [assumed]: a plate over both pontoons in place of mast and antennas; centre of its top, its edges (m)
+#: landing deck [assumed], a plate over both pontoons instead of mast and antennas: centre of its top and edges (m)
 DECK_CENTRE = (0.0, 0.0, 0.4)
 DECK_SIZE = (1.2, 1.0, 0.02)
 
-#: pontoons above and below O [assumed] (m); the bottom is that of the draught with 25 kg of payload
+#: top and bottom of the pontoons above O [assumed] (m); the bottom is at the draught with 25 kg of payload
 PONTOON_TOP, PONTOON_BOTTOM = 0.15, -0.195

@@ -1,6 +1,7 @@
 """Equations of motion of the catamaran in the horizontal plane: surge, sway and yaw.
 
-Equations 9, 12 and 13 of the paper; README.md has them in our notation.
+They are eqs. 9, 12 and 13 of the paper (`parameters.py`); README.md has them in the project's notation. Loads (X, Y, N) are surge
+and sway force (N) and yaw moment (N m), body frame forward-left-up.
 """
 
 from __future__ import annotations
@@ -11,58 +12,66 @@ from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import ContinuousModel
 from cosim.export.fmu.block import Block
 
-from ..common import contact_maps, kinematics
+from ..common import kinematics
 from ..common.elementary_functions import arctangent, sine_and_cosine, sine_of_right_angle_share
+from ..common.named_values import NamedValues, values_by_name
+from ..vessel import planar_maps
 from . import parameters as p
 from .geometry import DECK_CENTRE
-from .interface import STATES, VARIABLES
+from .interface import INPUTS, STATES, VARIABLES
 
 
-def rate(state: ca.SX, inputs: ca.SX) -> ca.SX:
-    """Time derivative of (x, y, yaw, surge, sway, yaw rate)."""
+def rate(state: ca.SX, inputs: NamedValues) -> ca.SX:
+    """Return the time derivative of the state (x, y, yaw, u, v, r); u, v and r are surge, sway and yaw rate."""
     yaw, u, v, r = ca.vertsplit(state[2:6])
-    thrust, rudder_angle = inputs[0], inputs[1]
-    external_force, external_torque, wind, current = inputs[2:5], inputs[5:8], inputs[8:11], inputs[11:13]
+    external_force, wind, current = inputs["external_force"], inputs["wind"], inputs["current"]
     sin, cos = sine_and_cosine(yaw)
     u_water, v_water = u - (cos * current[0] + sin * current[1]), v - (cos * current[1] - sin * current[0])
     u_air, v_air = u - (cos * wind[0] + sin * wind[1]), v - (cos * wind[1] - sin * wind[0])
-    loads = hull_loads(v_water, r) + air_drag(u_air, v_air) + rudder_loads(u_water, v_water, r, rudder_angle)
-    surge_force = loads[0] + thrust + cos * external_force[0] + sin * external_force[1]
+    loads = hull_loads(v_water, r) + air_drag(u_air, v_air) + rudder_loads(u_water, v_water, r, inputs["rudder_angle"])
+    surge_force = loads[0] + inputs["thrust"] + cos * external_force[0] + sin * external_force[1]
     side_force = loads[1] - sin * external_force[0] + cos * external_force[1]
-    moment = loads[2] + external_torque[2]
+    moment = loads[2] + inputs["external_torque.z"]
     kinematic = (cos * u - sin * v, sin * u + cos * v, r)
     dynamic = (surge_force / p.MASS + v * r, side_force / p.MASS - u * r, moment / p.INERTIA[2])
     return ca.vertcat(*kinematic, *dynamic)
 
 
 def hull_loads(v: ca.SX, r: ca.SX) -> ca.SX:
-    """X, Y (N) and N (N m) of the water on the hulls, which move through it at v and r."""
+    """Return (X, Y, N) of the hulls for a sway velocity (m/s) and yaw rate (rad/s) relative to the water."""
     return p.HULL_COUNT * ca.vertcat(0, p.Y_V * v + p.Y_R * r, p.N_V * v + p.N_R * r)
 
 
 def air_drag(u: ca.SX, v: ca.SX) -> ca.SX:
-    """X, Y (N) and N (N m) of the air, through which the vessel moves at u and v."""
+    """Return (X, Y, N) of the air for a surge and sway velocity (m/s) relative to the air."""
     return -p.AIR_DRAG * ca.vertcat(ca.fabs(u) * u, ca.fabs(v) * v, 0)
 
 
 def rudder_loads(u: ca.SX, v: ca.SX, r: ca.SX, rudder_angle: ca.SX) -> ca.SX:
-    """X, Y (N) and N (N m) of the rudder; lift grows as a sine up to the stall angle. Going astern the lift changes its sign."""
+    """Return (X, Y, N) of the rudder; the lift is a sine of the angle of attack up to the stall angle.
+
+    Args:
+        u: Surge velocity relative to the water (m/s); the lift changes its sign when going astern.
+        v: Sway velocity relative to the water (m/s).
+        r: Yaw rate (rad/s).
+        rudder_angle: Rudder angle (rad).
+    """
     ahead = ca.sign(u)
     inflow_angle = arctangent(ahead * (v - p.RUDDER_ARM * r), ca.fabs(u))
     attack = ca.fmin(1, ca.fmax(-1, (rudder_angle - inflow_angle) / p.STALL_ANGLE))
-    largest = p.WATER_DENSITY / 2 * p.RUDDER_MAX_LIFT_COEFFICIENT * p.RUDDER_AREA * ahead * u**2
-    lift = largest * sine_of_right_angle_share(attack)
+    max_lift = p.WATER_DENSITY / 2 * p.RUDDER_MAX_LIFT_COEFFICIENT * p.RUDDER_AREA * ahead * u**2
+    lift = max_lift * sine_of_right_angle_share(attack)
     side_force = lift * ca.cos(rudder_angle)
     return ca.vertcat(-lift * ca.sin(rudder_angle), side_force, -p.RUDDER_ARM * side_force)
 
 
 def initial_state(parameters: ca.SX) -> ca.SX:
-    """The state from initial position, yaw, body velocity and yaw rate: they are the state."""
+    """Return the state: the parameters are initial position, yaw angle, velocity and yaw rate in the order of the state."""
     return parameters
 
 
 def observe(state: ca.SX) -> ca.SX:
-    """The published motion of the vessel and of its landing deck."""
+    """Return the motion outputs of the vessel and of its landing deck."""
     position = ca.vertcat(state[0:2], p.CENTRE_OF_MASS_HEIGHT)
     orientation = kinematics.quaternion_about_z(state[2])
     to_world = kinematics.rotation_matrix(orientation)
@@ -74,15 +83,15 @@ def observe(state: ca.SX) -> ca.SX:
 
 
 def block() -> Block:
-    """The catamaran on open water."""
+    """Return the catamaran for export."""
     model = ContinuousModel(
         "strider",
         "Strider V1.0 catamaran on calm water",
         VARIABLES,
         STATES,
         initial_state,
-        lambda state, inputs, parameters: rate(state, inputs),
-        lambda state, inputs, parameters: ca.vertcat(observe(state), ca.SX.zeros(3)),
+        lambda state, inputs, _parameters: rate(state, values_by_name(inputs, INPUTS)),
+        lambda state, _inputs, _parameters: ca.vertcat(observe(state), ca.SX.zeros(3)),
     )
-    shadow = contact_maps.PlanarContactMaps(model, p.MASS, p.INERTIA[2], p.CENTRE_OF_MASS_HEIGHT, observe)
-    return as_block(model, shadow.functions())
+    maps = planar_maps.PlanarContactMaps(model, p.MASS, p.INERTIA[2], p.CENTRE_OF_MASS_HEIGHT, observe)
+    return as_block(model, maps.functions())

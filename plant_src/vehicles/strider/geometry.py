@@ -1,4 +1,4 @@
-"""What Bullet knows of the catamaran, in its body frame."""
+"""Rigid body of the catamaran in its body frame."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from .parameters import CENTRE_OF_MASS_HEIGHT, DECK_TOP, DECK_X, DECK_Y, INERTIA
 #: centre of the top of the landing deck (m)
 DECK_CENTRE = (sum(DECK_X) / 2, sum(DECK_Y) / 2, DECK_TOP)
 
-#: from the public simulation model (m)
+#: dimensions from the published simulation model (m)
 PLATE_THICKNESS = 0.023
 HOUSING_SIZE = (0.30, 0.30, 0.05)  # edges of the box under the deck plate
 HULL_LENGTH, HULL_BEAM, HULL_OFFSET = 0.979, 0.126, 0.533  # distance of each hull's centre line from the middle

@@ -1,4 +1,4 @@
-"""The variables of the catamaran, in the order of its equations' vectors."""
+"""Variables of the catamaran, in the order of the equations."""
 
 from __future__ import annotations
 
@@ -16,9 +16,7 @@ from ..common.interface import (
 THRUST = scalar_variable(
     "thrust", "N", "thrust along the body's x axis, at the height and lateral position of the centre of mass"
 )
-RUDDER_ANGLE = scalar_variable(
-    "rudder_angle", "rad", "rudder deflection; positive: trailing edge and bow to starboard, yaw decreases"
-)
+RUDDER_ANGLE = scalar_variable("rudder_angle", "rad", "rudder angle; positive: trailing edge and bow to starboard, yaw decreases")
 
 INPUTS = (THRUST, RUDDER_ANGLE, *EXTERNAL_LOADS, *WIND_INPUTS, *CURRENT_INPUTS)
 VARIABLES = (*initial_variables("xy", "uv", "r"), *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *CONTACT_OUTPUTS)

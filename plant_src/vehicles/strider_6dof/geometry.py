@@ -1,4 +1,4 @@
-"""What Bullet knows of the catamaran: as in the plane, but that its height is part of its motion."""
+"""Rigid body of the catamaran in six degrees of freedom, whose height is part of the state."""
 
 from __future__ import annotations
 

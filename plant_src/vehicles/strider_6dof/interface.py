@@ -1,4 +1,4 @@
-"""The variables of the catamaran in six degrees of freedom, in the order of its equations' vectors."""
+"""Variables of the catamaran in six degrees of freedom, in the order of the equations."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ HYDRODYNAMICS_PARAMETER = Variable(
     1.0,
     parse_unit("1"),
     (),
-    "0 takes away the loads of water and air together with the weight: the vessel is a free rigid body",
+    "1: loads of water, air and weight act; 0: the vessel is a free rigid body",
     0.0,
     1.0,
 )
@@ -36,5 +36,5 @@ PARAMETERS = (*initial_variables("xy", "uvw", "pqr"), *FLOATING_INITIAL_PARAMETE
 INPUTS = (THRUST, RUDDER_ANGLE, *EXTERNAL_LOADS, *WIND_INPUTS, *CURRENT_INPUTS, *WAVE_GAIN_INPUT)
 VARIABLES = (*PARAMETERS, *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *CONTACT_OUTPUTS)
 
-#: how many numbers the equations make of the parameters
-CONSTANT_COUNT = 443
+#: number of constants that the equations derive from the parameters
+CONSTANT_COUNT = 435

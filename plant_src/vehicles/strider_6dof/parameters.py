@@ -1,8 +1,8 @@
-"""Numbers that the catamaran has beyond those of the model in the plane (`strider/parameters.py`), SI units.
+"""Parameters of the catamaran beyond those of the planar model (`strider/parameters.py`), in SI units.
 
-The original moves in the plane, so nothing is published about heave, roll and pitch: everything here is computed from mass and
-main dimensions of the model, or assumed and marked [assumed]. Draught from displacement: the bottom of the hulls lies 0.144 m
-below the centre of mass, which floats 0.1245 m above the water.
+The original moves in the plane, so nothing is published about heave, roll and pitch. All values here are computed from the mass
+and the main dimensions of the model, or marked [assumed]. The draught follows from the geometry: the bottom of the hulls is
+0.144 m below the centre of mass, which floats 0.1245 m above the water.
 """
 
 from __future__ import annotations
@@ -14,41 +14,43 @@ import numpy as np
 from ..strider.geometry import HULL_BEAM, HULL_BOTTOM, HULL_LENGTH, HULL_OFFSET
 from ..strider.parameters import CENTRE_OF_MASS_HEIGHT, HULL_COUNT, INERTIA, MASS, RUDDER_AREA, WATER_DENSITY
 
-GRAVITY = 9.81
+GRAVITY = 9.81  # m/s2
 
-DRAUGHT = -HULL_BOTTOM - CENTRE_OF_MASS_HEIGHT
-VOLUME = MASS / WATER_DENSITY
+DRAUGHT = -HULL_BOTTOM - CENTRE_OF_MASS_HEIGHT  # m
+VOLUME = MASS / WATER_DENSITY  # displaced, m3
 
-#: 0.86: the hulls are nearly boxes
+#: block coefficient C_B = 0.86: the hulls are nearly boxes
 BLOCK_COEFFICIENT = VOLUME / (HULL_COUNT * HULL_LENGTH * HULL_BEAM * DRAUGHT)
 
-#: U-shaped sections: (1 + 2 C_B) / 3 (Schneekluth and Bertram 1998, Ship Design for Efficiency and Economy, section 1.6)
+#: waterplane coefficient of U-shaped sections, (1 + 2 C_B) / 3
+#: (Schneekluth and Bertram 1998, Ship Design for Efficiency and Economy, section 1.6)
 WATERPLANE_COEFFICIENT = (1 + 2 * BLOCK_COEFFICIENT) / 3
 
 WATERPLANE_AREA = HULL_COUNT * WATERPLANE_COEFFICIENT * HULL_LENGTH * HULL_BEAM  # m2
 
-#: second moments of the waterplane (m4), of both hulls; lengthwise reduced by the square of its coefficient
+#: second moments of the waterplane of both hulls (m4); the longitudinal one is reduced by the square of the coefficient
 TRANSVERSE_MOMENT = WATERPLANE_AREA * (HULL_OFFSET**2 + HULL_BEAM**2 / 12)
 LONGITUDINAL_MOMENT = WATERPLANE_COEFFICIENT * WATERPLANE_AREA * HULL_LENGTH**2 / 12
 
-#: metacentric heights (m); the centre of buoyancy lies in the middle of the draught
+#: transverse and longitudinal metacentric height (m); the centre of buoyancy is at half of the draught
 _BUOYANCY_BELOW_CENTRE = CENTRE_OF_MASS_HEIGHT + DRAUGHT / 2
 METACENTRIC_HEIGHTS = tuple(moment / VOLUME - _BUOYANCY_BELOW_CENTRE for moment in (TRANSVERSE_MOMENT, LONGITUDINAL_MOMENT))
 
-#: heave (N/m), roll and pitch (N m/rad)
+#: restoring stiffness of heave (N/m), roll and pitch (N m/rad)
 STIFFNESS = (
     WATER_DENSITY * GRAVITY * WATERPLANE_AREA,
     *(WATER_DENSITY * GRAVITY * VOLUME * height for height in METACENTRIC_HEIGHTS),
 )
 
-#: added mass of the sections (kg/m) by strip theory: a half circle of the draught sideways, a flat plate at the surface
-#: vertically (Newman 1977, Marine Hydrodynamics, table 4.3)
+#: added mass of both hulls per length (kg/m) by strip theory: sections are half circles with the radius of the draught in sway,
+#: flat plates at the surface in heave (Newman 1977, Marine Hydrodynamics, table 4.3)
 _SWAY_ADDED_MASS = HULL_COUNT * WATER_DENSITY * math.pi / 2 * DRAUGHT**2
 _HEAVE_ADDED_MASS = HULL_COUNT * WATER_DENSITY * math.pi / 8 * HULL_BEAM**2
 
-#: of the mass, along the hulls [assumed]: slender bodies have 3 to 8 %
+#: added mass in surge over the mass [assumed]; slender bodies have 3 to 8 %
 SURGE_ADDED_MASS_SHARE = 0.05
 
+#: M_A, shape (6, 6) (kg, kg m2)
 ADDED_MASS = np.diag(
     [
         SURGE_ADDED_MASS_SHARE * MASS,
@@ -60,29 +62,29 @@ ADDED_MASS = np.diag(
     ]
 )
 
-#: the derivatives of side force and yaw moment hold at speed: they contain what the added mass does in the plane
+#: part of M_A in the Coriolis loads; the hydrodynamic derivatives, measured at speed, contain those of surge, sway and yaw
 CORIOLIS_ADDED_MASS = ADDED_MASS * np.diag([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
 
-#: of critical damping, in heave, roll and pitch [assumed], as Fossen's model of the Otter has them
+#: damping ratios of heave, roll and pitch [assumed], equal to those of Fossen's model of the Otter
 DAMPING_RATIOS = (0.3, 0.2, 0.4)
 
 _OSCILLATING_INERTIA = np.array([MASS, *INERTIA[:2]]) + np.diag(ADDED_MASS)[2:5]
 
-#: rad/s
+#: natural frequencies of heave, roll and pitch (rad/s)
 NATURAL_FREQUENCIES = np.sqrt(np.array(STIFFNESS) / _OSCILLATING_INERTIA)
 
 #: linear damping of heave (kg/s), roll and pitch (kg m2/s)
 DAMPING = tuple((2 * np.array(DAMPING_RATIOS) * NATURAL_FREQUENCIES * _OSCILLATING_INERTIA).tolist())
 
-#: of a plate across the flow, for vertical motion [assumed] (Hoerner 1965, Fluid-Dynamic Drag, chapter 3)
+#: drag coefficient of a plate normal to the flow, for vertical motion [assumed] (Hoerner 1965, Fluid-Dynamic Drag, chapter 3)
 PLATE_DRAG_COEFFICIENT = 1.2
 
-#: the vertical drag acts at two points of each hull that give its mean square distance from the middle (m)
+#: points of the vertical drag (m), two on each hull, with the mean squared distance of the hull from midships
 DRAG_POINTS = tuple((x, y) for x in (-HULL_LENGTH / 12**0.5, HULL_LENGTH / 12**0.5) for y in (-HULL_OFFSET, HULL_OFFSET))
 
-#: N s2/m2 at each point
+#: drag over squared velocity at each point (N s2/m2)
 POINT_DRAG = WATER_DENSITY / 2 * PLATE_DRAG_COEFFICIENT * WATERPLANE_AREA / len(DRAG_POINTS)
 
-#: heights of the points where hulls and rudder take side forces, from the centre of mass (m); the rudder is square [assumed]
+#: heights of the side forces on hulls and rudder above the centre of mass (m); the rudder is square [assumed]
 HULL_FORCE_HEIGHT = HULL_BOTTOM + DRAUGHT / 2
 RUDDER_HEIGHT = -CENTRE_OF_MASS_HEIGHT - RUDDER_AREA**0.5 / 2

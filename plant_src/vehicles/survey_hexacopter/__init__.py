@@ -1,1 +1,1 @@
-"""A hexacopter for survey flights, of the class of the Tarot FY680."""
+"""A survey hexacopter of the Tarot FY680 class."""

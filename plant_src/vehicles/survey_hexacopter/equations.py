@@ -1,4 +1,4 @@
-"""The equations of motion of the survey hexacopter: those of `multirotor.py` for its airframe."""
+"""Equations of motion of the survey hexacopter: those of `multirotor_equations.py` for its airframe."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from .parameters import AIRFRAME
 
 
 def block() -> Block:
-    """The survey hexacopter in free flight."""
+    """Return the survey hexacopter for export."""
     return multirotor_equations.multirotor_block(AIRFRAME, "Survey hexacopter of the class of the Tarot FY680 in free flight")

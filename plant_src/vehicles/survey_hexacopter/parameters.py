@@ -1,11 +1,13 @@
-"""Numbers of the survey hexacopter, SI units, body frame x forward, y left, z up, origin at the centre of mass.
+"""Parameters of the survey hexacopter with their sources, in SI units.
 
-A vehicle of the class of the Tarot FY680 (folding frame of carbon fibre, 0.68 m between opposite motors, propellers of 16 inch)
-with a survey camera. Sources: [eagle] multicopter parameters of the Hexarotor 680 of the eagle-mpc project of the Institut de
-Robòtica i Informàtica Industrial, Barcelona (Martí-Saumell et al., "Full-body torque-level nonlinear model predictive control
-for aerial manipulation", 2021): frame, propeller coefficients, largest thrust of Tarot 4008 motors with 1660 propellers;
-[mrs] uavs/f550.yaml of ctu-mrs/mrs_multirotor_simulator; [rotors] component constants of ethz-asl/rotors_simulator. What has
-none of these names is an assumption, made by adding up components of this class.
+Body frame: x forward, y left, z up, origin at the centre of mass. The vehicle is of the Tarot FY680 class (folding carbon fibre
+frame, 0.68 m between opposite motors, 16 inch propellers) and carries a survey camera.
+
+Sources: [eagle] multicopter parameters of the Hexarotor 680 of the eagle-mpc project of the Institut de Robòtica i Informàtica
+Industrial, Barcelona (Martí-Saumell et al., "Full-body torque-level nonlinear model predictive control for aerial
+manipulation", 2021): frame, propeller coefficients, largest thrust of Tarot 4008 motors with 1660 propellers; [mrs]
+uavs/f550.yaml of ctu-mrs/mrs_multirotor_simulator; [rotors] component constants of ethz-asl/rotors_simulator. Values without a
+source are assumptions, made by adding up components of this class.
 """
 
 from __future__ import annotations
@@ -16,10 +18,10 @@ import numpy as np
 
 from ..multirotor.airframe import Airframe, Rotor, RotorEffects
 
-#: of the motors from the middle [eagle] (m)
+#: distance of the motors from the middle of the frame [eagle] (m)
 ARM = 0.68 / 2
 
-#: of the rotors above the centre of mass: assumed, the batteries and the camera hang below the frame (m)
+#: height of the rotors above the centre of mass, assumed: batteries and camera hang below the frame (m)
 ROTOR_HEIGHT = 0.10
 
 ROTOR_RADIUS = 0.4064 / 2  # [eagle] (m)
@@ -28,13 +30,13 @@ _AIR_DENSITY = 1.22  # [eagle] (kg/m3)
 _C_T, _C_P = 0.062, 0.02  # thrust = C_T rho (n / 2 pi)^2 D^4, power = C_P rho (n / 2 pi)^3 D^5 [eagle]
 _DIAMETER = 2 * ROTOR_RADIUS
 
-#: 5.23e-5 [eagle] (N s2/rad2)
+#: thrust over squared speed, 5.23e-5 [eagle] (N s2/rad2)
 THRUST_COEFFICIENT = _C_T * _AIR_DENSITY * _DIAMETER**4 / (2 * math.pi) ** 2
 
-#: power by speed: 1.09e-6 [eagle] (N m s2/rad2)
+#: torque over squared speed, from power over speed, 1.09e-6 [eagle] (N m s2/rad2)
 TORQUE_COEFFICIENT = _C_P * _AIR_DENSITY * _DIAMETER**5 / (2 * math.pi) ** 3
 
-#: at which a rotor pulls with 2.53 kg [eagle]: 689 rad/s (rad/s)
+#: speed at which the thrust of a rotor is the weight of 2.53 kg [eagle], 689 (rad/s)
 MAX_ROTOR_SPEED = math.sqrt(2.53 * 9.81 / THRUST_COEFFICIENT)
 
 #: masses assumed (kg): middle of the frame with electronics, batteries, camera on its gimbal; each arm; each motor with propeller
@@ -47,7 +49,7 @@ _HEIGHTS = {"hub": 0.0, "battery": -0.06, "camera": -0.14, "arms": 0.0, "motors"
 
 
 def _inertia() -> np.ndarray:
-    """Tensor (kg m2): a disc, a box, a ball, six rods and six points, each about the centre of mass of all."""
+    """Return the inertia tensor (kg m2) of a disc, a box, a sphere, six rods and six points about their common centre of mass."""
     masses = {"hub": HUB_MASS, "battery": BATTERY_MASS, "camera": CAMERA_MASS, "arms": 6 * ARM_MASS, "motors": 6 * MOTOR_MASS}
     centre = sum(masses[part] * _HEIGHTS[part] for part in masses) / MASS
     own = np.array(
@@ -59,9 +61,9 @@ def _inertia() -> np.ndarray:
             6 * MOTOR_MASS * ARM**2 * np.array([1 / 2, 1 / 2, 1.0]),
         ]
     )
-    level = sum(masses[part] * (_HEIGHTS[part] - centre) ** 2 for part in masses)
+    steiner = sum(masses[part] * (_HEIGHTS[part] - centre) ** 2 for part in masses)
     x, y, z = own.sum(axis=0)
-    return np.diag([x + level, y + level, z])
+    return np.diag([x + steiner, y + steiner, z])
 
 
 INERTIA = _inertia()
@@ -73,13 +75,13 @@ EFFECTS = RotorEffects(
     body_drag=(0.031, 0.031, 0.049),  # assumed: areas of 0.05 m2 from the side and 0.08 m2 from above, drag coefficient 1 (kg/m)
     ground_effect=1.0,
 )
-_PLACES = ("front left", "left", "rear left", "rear right", "right", "front right")
+_LABELS = ("front left", "left", "rear left", "rear right", "right", "front right")
 
 
 def _rotor(number: int) -> Rotor:
-    """Counter-clockwise from 30 degrees left of the nose, senses alternating [eagle]."""
+    """Return a rotor; they follow counter-clockwise from 30 degrees left of the nose with alternating torque signs [eagle]."""
     angle = math.radians(30 + 60 * number)
-    return Rotor(_PLACES[number], (ARM * math.cos(angle), ARM * math.sin(angle), ROTOR_HEIGHT), (-1.0) ** number)
+    return Rotor(_LABELS[number], (ARM * math.cos(angle), ARM * math.sin(angle), ROTOR_HEIGHT), (-1.0) ** number)
 
 
 AIRFRAME = Airframe(

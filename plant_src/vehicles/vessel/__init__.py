@@ -1,1 +1,1 @@
-"""Parts of floating vessels: hull, wave loads, equations."""
+"""Modules of vessels: hull, wave loads, equations, contact functions."""

@@ -1,31 +1,38 @@
-"""Equations of motion of a floating vessel in six degrees of freedom; README.md has them with their sources.
+"""Equations of motion of a floating vessel in six degrees of freedom; `vehicles/README.md` has them with their sources.
 
-Fossen 2021, Handbook of Marine Craft Hydrodynamics and Motion Control, chapters 3, 6 and 10, in the project's frames: world x, y
-horizontal, z up; body x forward, y left, z up. The body's origin O is fixed in the hull and need not be the centre of mass.
-State: position of O (world), orientation, velocity of O and rates (body, together nu), time, and states of actuators.
+Fossen (2021), Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd edition, chapters 3, 6 and 10, converted to world
+frame ENU and body frame forward-left-up. The origin O of the body frame is fixed in the hull and need not be the centre of mass.
+nu = (u, v, w, p, q, r) holds surge, sway and heave velocity of O (m/s) and roll, pitch and yaw rate (rad/s), body frame. Loads
+tau = (X, Y, Z, K, M, N) are forces (N) and moments about O (N m), body frame.
+
+State: position of O (m, world frame), unit quaternion, nu, time (s), and the states of the actuators.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
 
 from ..common import kinematics
 from ..common.interface import VESSEL_STATES
+from ..common.named_values import NamedValues
 from .wave_loads import Footprint, WaveKinematics, wave_kinematics
-
-ValuesByName = Mapping[str, ca.SX]
 
 
 @dataclass(frozen=True)
 class Frame:
-    """How the body's frame stands in the world.
+    """Rotations between body, velocity and world frame.
 
-    `attitude` (3, 3) turns points of the hull into the world, `to_world` (3, 3) the velocity of O; they differ only if the
-    velocity is counted in a frame that is level at rest. `spin` (3, 3) makes the angular velocity (body) of the rates, and
-    `from_stream` (3, 3) turns the current into the body's frame.
+    The velocity frame, in which nu is expressed, is the body frame for most vessels. The Otter's velocity frame is level when the
+    trimmed vessel is at rest.
+
+    Attributes:
+        attitude: Rotation matrix body to world frame, shape (3, 3).
+        to_world: Rotation matrix velocity frame to world frame, shape (3, 3).
+        rates_to_angular_velocity: Matrix from (p, q, r) to the angular velocity in the body frame, shape (3, 3).
+        world_to_current_axes: Matrix from the current in the world frame to that in the velocity frame, shape (3, 3).
     """
 
     attitude: ca.SX
@@ -41,16 +48,25 @@ class Frame:
         return x / length, y / length
 
     def generalised_force(self, force: ca.SX, torque: ca.SX) -> ca.SX:
-        """A force at O and a torque about it, both in the world frame, as a load in the equations of motion."""
+        """Return the load tau, shape (6,), of a force at O (N) and a torque about O (N m), both in the world frame."""
         return ca.vertcat(self.to_world.T @ force, self.rates_to_angular_velocity.T @ (self.attitude.T @ torque))
 
 
 @dataclass(frozen=True)
 class LoadArguments:
-    """What a hull is exposed to.
+    """Arguments of the loads on a hull.
 
-    `relative` is nu relative to the water with its waves, `air` the velocity of O relative to the air (3, body), `still_air`
-    relative to air at rest; `slopes` are those of the water along the body's x and y; `rise` is the height of O.
+    Attributes:
+        frame: Rotations.
+        orientation: Unit quaternion body to world frame, shape (4,).
+        relative_velocity: nu_r, nu relative to the water with current and waves, shape (6,).
+        air_relative_velocity: Velocity of O relative to the air (m/s, velocity frame), shape (3,).
+        velocity: Velocity of O (m/s, velocity frame), shape (3,).
+        height: Height of O above the still water (m).
+        elevation: Elevation of the water at the centre of flotation (m).
+        slopes: Slopes of the water along the heading and to port (1), shape (2,).
+        inputs: Inputs of the model.
+        actuators: States of the actuators.
     """
 
     frame: Frame
@@ -61,25 +77,35 @@ class LoadArguments:
     height: ca.SX
     elevation: ca.SX
     slopes: ca.SX
-    inputs: ValuesByName
+    inputs: NamedValues
     actuators: ca.SX
 
 
 def level_frame(orientation: ca.SX) -> Frame:
-    """The frame of a hull that is level at rest."""
+    """Return the frame of a hull whose velocity frame is the body frame."""
     attitude = kinematics.rotation_matrix(orientation)
     return Frame(attitude, attitude, ca.SX.eye(3), attitude.T)
 
 
 @dataclass(frozen=True)
 class Hull:
-    """One vessel with given constants: rigid body, added mass and loads, in the body's frame about O.
+    """Rigid body, added mass and loads of one vessel with given constants; positions are in the body frame from O.
 
-    `centre` of mass (3, m), `inertia` about it (3, 3, kg m2); `added_mass` (6, 6); `inverse` (6, 6) of the whole mass matrix;
-    `flow_mass` (6, 6): the part of the added mass whose Coriolis and centripetal loads are not contained in the `loads`.
-    `flotation` is the centre of the waterplane (3, m), `deck` that of the landing deck's top; `rest` has height of O (m), roll
-    and pitch of the vessel afloat at rest. `loads` gives the loads (6) of water, air and propulsion without those of
-    acceleration, `frame` the frame of an orientation.
+    Attributes:
+        mass: Mass (kg).
+        centre_of_mass: Centre of mass r_g (m), shape (3,).
+        inertia: Inertia about the centre of mass I_g (kg m2), shape (3, 3).
+        added_mass: M_A, shape (6, 6).
+        coriolis_added_mass: Part of M_A whose Coriolis and centripetal loads C_A are not contained in `loads`, shape (6, 6).
+        inverse_mass_matrix: Inverse of M_RB + M_A, shape (6, 6).
+        centre_of_flotation: Centre of the waterplane (m), shape (3,).
+        deck_centre: Centre of the top of the landing deck (m), shape (3,).
+        equilibrium: Height of O (m), roll and pitch (rad) of the vessel afloat at rest, shape (3,).
+        footprint: Waterplane for the wave loads.
+        wave_count: Number of wave components.
+        wave_table: Wave components, see `wave_loads.wave_table`.
+        loads: Function for the load tau (6) of water, air and propulsion, without added mass.
+        frame: Function from the orientation to the rotations.
     """
 
     mass: ca.SX
@@ -97,8 +123,8 @@ class Hull:
     loads: Callable[[LoadArguments], ca.SX]
     frame: Callable[[ca.SX], Frame] = level_frame
 
-    def initial_state(self, initial: ValuesByName, actuators: int = 0) -> ca.SX:
-        """The state from the parameters `initial.*`."""
+    def initial_state(self, initial: NamedValues, actuators: int = 0) -> ca.SX:
+        """Return the state from the parameters `initial.*`, with `actuators` further states of 0."""
         displacement = (initial[f"initial.{name}"] for name in ("heave", "roll", "pitch"))
         height, roll, pitch = ca.vertsplit(self.equilibrium + ca.vertcat(*displacement))
         orientation = kinematics.quaternion_from_euler(roll, pitch, initial["initial.yaw"])
@@ -107,92 +133,100 @@ class Hull:
         velocity = initial["initial.velocity_body"] - ca.cross(rates, self.centre_of_mass)
         return ca.vertcat(origin, height, orientation, velocity, rates, initial["initial.time"], ca.SX.zeros(actuators))
 
-    def rate(self, state: ca.SX, inputs: ValuesByName) -> ca.SX:
-        """Time derivative of position, orientation, nu and time."""
+    def rate(self, state: ca.SX, inputs: NamedValues) -> ca.SX:
+        """Return the time derivative of position, quaternion, nu and time (`vehicles/README.md`)."""
         orientation, nu = state[3:7], state[7:13]
         frame = self.frame(orientation)
-        spin = nu[3:6]
-        sea = self._wave_kinematics(state, frame, inputs["wave_gain"])
+        rates = nu[3:6]
+        waves = self._wave_kinematics(state, frame, inputs["wave_gain"])
         current = frame.world_to_current_axes @ ca.vertcat(inputs["current"], 0)
-        orbital, flow = frame.to_world.T @ sea.velocity, frame.to_world.T @ sea.acceleration
-        drift = ca.vertcat(nu[0:3] - current, spin)
-        relative = ca.vertcat(drift[0:3] - orbital, spin)
-        now = self._load_arguments(state, frame, relative, sea, inputs)
-        pull = frame.to_world.T @ ca.vertcat(sea.acceleration[0:2], 0)
-        force = self.loads(now) + self._external_load(frame, inputs)
-        force += self.inertial_load(pull) + self.added_mass[:, 0:3] @ (flow - ca.cross(spin, orbital))
-        force -= self._rigid_body_coriolis(drift) + coriolis_load(self.coriolis_added_mass, relative)
-        acceleration = self.inverse_mass_matrix @ force - ca.vertcat(ca.cross(spin, current), ca.SX.zeros(3))
-        turning = kinematics.quaternion_rate(orientation, frame.rates_to_angular_velocity @ spin)
-        return ca.vertcat(frame.to_world @ nu[0:3], turning, acceleration, 1)
+        wave_velocity, wave_acceleration = frame.to_world.T @ waves.velocity, frame.to_world.T @ waves.acceleration
+        nu_without_current = ca.vertcat(nu[0:3] - current, rates)
+        nu_r = ca.vertcat(nu_without_current[0:3] - wave_velocity, rates)
+        now = self._load_arguments(state, frame, nu_r, waves, inputs)
+        horizontal_acceleration = frame.to_world.T @ ca.vertcat(waves.acceleration[0:2], 0)
+        tau = self.loads(now) + self._external_load(frame, inputs)
+        added = self.added_mass[:, 0:3] @ (wave_acceleration - ca.cross(rates, wave_velocity))
+        tau += self.inertial_load(horizontal_acceleration) + added
+        tau -= self._rigid_body_coriolis(nu_without_current) + coriolis_load(self.coriolis_added_mass, nu_r)
+        acceleration = self.inverse_mass_matrix @ tau - ca.vertcat(ca.cross(rates, current), ca.SX.zeros(3))
+        quaternion_rate = kinematics.quaternion_rate(orientation, frame.rates_to_angular_velocity @ rates)
+        return ca.vertcat(frame.to_world @ nu[0:3], quaternion_rate, acceleration, 1)
 
     def inertial_load(self, acceleration: ca.SX) -> ca.SX:
-        """The load that accelerates the rigid body like this without turning it."""
+        """Return the load tau that gives the rigid body a linear acceleration (m/s2, velocity frame) without rotation."""
         force = self.mass * acceleration
         return ca.vertcat(force, ca.cross(self.centre_of_mass, force))
 
     def _rigid_body_coriolis(self, nu: ca.SX) -> ca.SX:
-        velocity, spin = nu[0:3], nu[3:6]
-        force = self.mass * ca.cross(spin, velocity + ca.cross(spin, self.centre_of_mass))
-        return ca.vertcat(force, ca.cross(spin, self.inertia @ spin) + ca.cross(self.centre_of_mass, force))
+        """Return C_RB(nu) nu in terms of the angular velocity (Fossen 2021, section 3.3)."""
+        velocity, rates = nu[0:3], nu[3:6]
+        force = self.mass * ca.cross(rates, velocity + ca.cross(rates, self.centre_of_mass))
+        return ca.vertcat(force, ca.cross(rates, self.inertia @ rates) + ca.cross(self.centre_of_mass, force))
 
     def _wave_kinematics(self, state: ca.SX, frame: Frame, gain: ca.SX) -> WaveKinematics:
-        place = state[0:2] + (frame.attitude @ self.centre_of_flotation)[0:2]
-        felt = wave_kinematics(place, frame.heading, state[13], self.footprint, self.wave_count, self.wave_table)
-        return WaveKinematics(gain * felt.elevation, gain * felt.slopes, gain * felt.velocity, gain * felt.acceleration)
+        position = state[0:2] + (frame.attitude @ self.centre_of_flotation)[0:2]
+        unit = wave_kinematics(position, frame.heading, state[13], self.footprint, self.wave_count, self.wave_table)
+        return WaveKinematics(gain * unit.elevation, gain * unit.slopes, gain * unit.velocity, gain * unit.acceleration)
 
     def _load_arguments(
-        self, state: ca.SX, frame: Frame, relative: ca.SX, sea: WaveKinematics, inputs: ValuesByName
+        self, state: ca.SX, frame: Frame, nu_r: ca.SX, waves: WaveKinematics, inputs: NamedValues
     ) -> LoadArguments:
         cos, sin = frame.heading
-        slopes = ca.vertcat(cos * sea.slopes[0] + sin * sea.slopes[1], cos * sea.slopes[1] - sin * sea.slopes[0])
-        still_air = state[7:10]
-        air = still_air - frame.to_world.T @ inputs["wind"]
+        slopes = ca.vertcat(cos * waves.slopes[0] + sin * waves.slopes[1], cos * waves.slopes[1] - sin * waves.slopes[0])
+        velocity = state[7:10]
+        air = velocity - frame.to_world.T @ inputs["wind"]
         return LoadArguments(
-            frame, state[3:7], relative, air, still_air, state[2], sea.elevation, slopes, inputs, state[len(VESSEL_STATES) :]
+            frame, state[3:7], nu_r, air, velocity, state[2], waves.elevation, slopes, inputs, state[len(VESSEL_STATES) :]
         )
 
-    def _external_load(self, frame: Frame, inputs: ValuesByName) -> ca.SX:
+    def _external_load(self, frame: Frame, inputs: NamedValues) -> ca.SX:
         force, torque = inputs["external_force"], inputs["external_torque"]
         return frame.generalised_force(force, torque + ca.cross(frame.attitude @ self.centre_of_mass, force))
 
     def observe(self, state: ca.SX) -> ca.SX:
-        """The published motion of the centre of mass (`interface.MOTION`) and of the deck (`interface.DECK`)."""
+        """Return the motion of the centre of mass (`interface.MOTION_OUTPUTS`) and the deck (`interface.DECK_OUTPUTS`)."""
         orientation, nu = state[3:7], state[7:13]
         frame = self.frame(orientation)
         to_centre, to_deck = frame.attitude @ self.centre_of_mass, frame.attitude @ self.deck_centre
-        angular = frame.attitude @ (frame.rates_to_angular_velocity @ nu[3:6])
-        origin = frame.to_world @ nu[0:3]
+        angular_velocity = frame.attitude @ (frame.rates_to_angular_velocity @ nu[3:6])
+        origin_velocity = frame.to_world @ nu[0:3]
         return ca.vertcat(
             state[0:3] + to_centre,
             orientation,
             kinematics.euler_angles(orientation),
-            origin + ca.cross(angular, to_centre),
+            origin_velocity + ca.cross(angular_velocity, to_centre),
             nu[0:3] + ca.cross(nu[3:6], self.centre_of_mass),
             nu[3:6],
             state[0:3] + to_deck,
-            origin + ca.cross(angular, to_deck),
+            origin_velocity + ca.cross(angular_velocity, to_deck),
         )
 
 
 def coriolis_load(mass: ca.SX, nu: ca.SX) -> ca.SX:
-    """Coriolis and centripetal load of a mass matrix (6, 6) (Fossen 2021, equation 6.48 for added mass)."""
+    """Return C(nu) nu of a mass matrix (6, 6), for added mass Fossen (2021), eq. 6.48."""
     momentum = mass @ nu
     force = ca.cross(nu[3:6], momentum[0:3])
     return ca.vertcat(force, ca.cross(nu[0:3], momentum[0:3]) + ca.cross(nu[3:6], momentum[3:6]))
 
 
 def load_of_force_at(point: ca.SX, force: ca.SX) -> ca.SX:
-    """The load of a force (3) that acts at a point of the hull."""
+    """Return the load tau of a force (N) at a point (m), both in the body frame."""
     return ca.vertcat(force, ca.cross(point, force))
 
 
 def transformation_matrix(point: ca.SX) -> ca.SX:
-    """The matrix (6, 6) that makes the generalised velocity at a point of that at O (Fossen 2021, appendix C)."""
+    """Return the matrix (6, 6) from nu of O to nu of a point (m) of the hull (Fossen 2021, appendix C)."""
     return ca.blockcat([[ca.SX.eye(3), -ca.skew(point)], [ca.SX.zeros(3, 3), ca.SX.eye(3)]])
 
 
 def rigid_body_mass_matrix(mass: ca.SX, centre: ca.SX, inertia: ca.SX) -> ca.SX:
-    """The mass matrix (6, 6) about O of a body with its inertia (3, 3) about the centre of mass."""
-    move = transformation_matrix(centre)
-    return move.T @ ca.diagcat(mass * ca.SX.eye(3), inertia) @ move
+    """Return M_RB about O (Fossen 2021, eq. 3.60).
+
+    Args:
+        mass: Mass (kg).
+        centre: Centre of mass r_g (m), shape (3,).
+        inertia: Inertia about the centre of mass I_g (kg m2), shape (3, 3).
+    """
+    to_centre = transformation_matrix(centre)
+    return to_centre.T @ ca.diagcat(mass * ca.SX.eye(3), inertia) @ to_centre

@@ -1,10 +1,10 @@
-"""A vessel's equations with their parameters as what is exported: the model of its FMU."""
+"""Equations of a vessel in six degrees of freedom as a model for export."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -14,90 +14,73 @@ from cosim.export.equations.model import ContinuousModel
 
 from ..common import kinematics
 from ..common.interface import VESSEL_STATES
-from .hull import Hull, ValuesByName
+from ..common.named_values import ConstantsMap, NamedValues, values_by_name, variables_of
+from .hull import Hull
 from .wave_loads import SURFACE_SUM, WAVE_SUM, Footprint, wave_table
 
 
-def values_by_name(vector: ca.SX, variables: Sequence[Variable]) -> dict[str, ca.SX]:
-    """The values of each variable in a vector that holds them in order; `group.x`, `group.y` also together as `group`."""
-    places: dict[str, list[int]] = {}
-    first = 0
-    for variable in variables:
-        slots = list(range(first, first + len(variable.scalar_names)))
-        first += len(slots)
-        places[variable.name] = slots
-        group = variable.name.rpartition(".")[0]
-        if group and not variable.shape:
-            places.setdefault(group, []).extend(slots)
-    return {name: vector[slots] for name, slots in places.items()}
-
-
-def wave_table_of(parameters: ValuesByName, footprint: Footprint) -> ca.SX:
-    """The table of waves."""
+def wave_table_of(parameters: NamedValues, footprint: Footprint) -> ca.SX:
+    """Return the table of wave components (`wave_loads.wave_table`) from the parameters `wave.*`."""
     return wave_table(footprint, *(parameters[f"wave.{name}"] for name in ("amplitude", "frequency", "direction", "phase")))
 
 
 @dataclass(frozen=True)
 class VesselModel:
-    """The equations of one vessel: `prepare` makes constants of its parameters, `hull` the vessel of its constants.
+    """Equations of one vessel.
 
-    Only what depends on parameters is among the constants. `actuators` are the names of further states, which `drive` moves
-    after each step: state, inputs, constants, step -> state.
+    Attributes:
+        identifier: Name of the FMU.
+        description: Description of the FMU.
+        variables: Parameters, inputs and outputs.
+        derive_constants: Function from the parameters to the constants, which holds everything that depends on parameters only.
+        hull: Function from the constants to the vessel.
+        actuators: Names of the actuator states. Their rates are 0; the kind of the exported model moves them after each step.
     """
 
     identifier: str
     description: str
     variables: Sequence[Variable]
-    derive_constants: Callable[[ValuesByName], ValuesByName]
-    hull: Callable[[ValuesByName], Hull]
+    derive_constants: Callable[[NamedValues], Mapping[str, ca.SX]]
+    hull: Callable[[NamedValues], Hull]
     actuators: Sequence[str] = ()
 
-    def constants(self, parameters: ca.SX) -> ca.SX:
-        """The constants one after the other."""
-        values = self.derive_constants(values_by_name(parameters, self._variables_of("parameter")))
-        return ca.vertcat(*(ca.vec(value) for value in values.values()))
-
-    def constants_by_name(self, constants: ca.SX) -> ValuesByName:
-        """The constants by name."""
-        symbols = ca.SX.sym("parameters", sum(len(variable.scalar_names) for variable in self._variables_of("parameter")))
-        shapes = {
-            name: value.shape
-            for name, value in self.derive_constants(values_by_name(symbols, self._variables_of("parameter"))).items()
-        }
-        parts = ca.vertsplit(constants, [0, *accumulate(rows * columns for rows, columns in shapes.values())])
-        return {name: ca.reshape(part, shape) for (name, shape), part in zip(shapes.items(), parts, strict=True)}
+    @cached_property
+    def constants(self) -> ConstantsMap:
+        """Map from the parameters to the constants of the equations."""
+        return ConstantsMap(self.variables, self.derive_constants)
 
     def hull_with(self, constants: ca.SX) -> Hull:
-        """The vessel with these constants."""
-        return self.hull(self.constants_by_name(constants))
+        """Return the vessel for a vector of constants."""
+        return self.hull(self.constants.by_name(constants))
 
-    def create_continuous_model(self, kind: type[ContinuousModel] = ContinuousModel, **more: Any) -> ContinuousModel:
-        """What is exported: the vessel with its waves; contact reads 0."""
+    def create_continuous_model(self, kind: type[ContinuousModel] = ContinuousModel, **options: Any) -> ContinuousModel:
+        """Return the model to export; its contact outputs are 0.
+
+        Args:
+            kind: Class of the model.
+            **options: Further arguments of the class.
+        """
+        inputs, actuators = variables_of(self.variables, "input"), len(self.actuators)
         return kind(
             self.identifier,
             self.description,
             self.variables,
             (*VESSEL_STATES, *self.actuators),
-            lambda c: self.hull_with(c).initial_state(self.constants_by_name(c), len(self.actuators)),
-            lambda x, u, c: ca.vertcat(
-                self.hull_with(c).rate(x, values_by_name(u, self._variables_of("input"))), ca.SX.zeros(len(self.actuators))
-            ),
-            lambda x, u, c: ca.vertcat(self.hull_with(c).observe(x), ca.SX.zeros(3)),
+            lambda c: self.hull_with(c).initial_state(self.constants.by_name(c), actuators),
+            lambda x, u, c: ca.vertcat(self.hull_with(c).rate(x, values_by_name(u, inputs)), ca.SX.zeros(actuators)),
+            lambda x, _u, c: ca.vertcat(self.hull_with(c).observe(x), ca.SX.zeros(3)),
             normalised_state,
-            derived_parameters=self.constants,
+            derived_parameters=self.constants.vector,
             callees=[WAVE_SUM, SURFACE_SUM],
-            **more,
+            **options,
         )
-
-    def _variables_of(self, causality: str) -> list[Variable]:
-        return [variable for variable in self.variables if variable.causality == causality]
 
 
 def normalised_state(state: ca.SX) -> ca.SX:
-    """The state with a unit quaternion."""
+    """Return the state with a unit quaternion."""
     return ca.vertcat(state[0:3], kinematics.normalised_quaternion(state[3:7]), state[7:])
 
 
-def initial_parameters(parameters: ValuesByName) -> ValuesByName:
-    """Those parameters that say how the vessel starts."""
+def initial_parameters(parameters: NamedValues) -> dict[str, ca.SX]:
+    """Return the parameters `initial.*`."""
     return {name: value for name, value in parameters.items() if name.startswith("initial.")}

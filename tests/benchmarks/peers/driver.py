@@ -1,10 +1,10 @@
-"""What the drivers of the peers have in common: the ring, the clock and the answer.
+"""Common part of the peers' drivers: the ring, the clock and the output.
 
     python ring_PEER.py FMU SIZE STEPS
 
-steps a ring of SIZE instances of a lag (output y1 of each feeds input u1 of the next, step 0.01 s, one value recorded) and prints
-one line of JSON: CPU and wall microseconds per step, and the last value, which is 1 when the importer is right: with
-outputs not propagated before the first step it is 0.98.
+steps a ring of SIZE instances of a lag: output y1 of each feeds input u1 of the next, the step size is 0.01 s, one value is
+recorded. It prints one line of JSON: CPU and wall time (us) per step, and the last value. A correct importer ends at 1; without
+propagation of the initial outputs the value is 0.98.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ STEP = 0.01
 
 @dataclass(frozen=True)
 class Ring:
+    """A ring of `size` instances of `fmu`."""
+
     fmu: str
     size: int
     steps: int
@@ -36,7 +38,7 @@ class Ring:
 
 
 class Clock:
-    """CPU time of the process, all threads together, and wall time, of what happens inside (s)."""
+    """CPU time of the process (all threads) and wall time of a `with` block (s)."""
 
     def __enter__(self) -> Clock:
         self._wall, self._cpu = time.perf_counter(), time.process_time()
@@ -47,14 +49,14 @@ class Clock:
         self.wall = time.perf_counter() - self._wall
 
 
-#: seconds of CPU, seconds of wall time, last value
+#: CPU time (s), wall time (s), last value
 Outcome = tuple[float, float, float]
 
 
 def time_whole_runs(simulate: Callable[[int], float], steps: int) -> Outcome:
-    """For importers that only run as a whole: what all steps but the first two cost, so that the start cancels.
+    """Measure an importer that only offers whole runs: the difference of a long and a short run, so that the start cancels.
 
-    They are made twice over, since the start of a large ring takes longer than its steps and scatters.
+    The long run has twice the steps, since the start of a large ring takes longer than its steps, and its duration varies.
     """
     simulate(2)  # imports and caches
     with Clock() as short:

@@ -1,4 +1,4 @@
-"""FMU Manipulation Toolbox: `fmucontainer` packs the ring into one FMU, which the C limit's program steps.
+"""FMU Manipulation Toolbox: `fmucontainer` packs the ring into one FMU, which the program of the C limit steps.
 
 python pack_fmt.py FMU SIZE CONTAINER
 """
@@ -14,7 +14,7 @@ from driver import STEP, Ring
 
 def pack(ring: Ring, container: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        for name in ring.names:  # one file per instance is wanted
+        for name in ring.names:  # fmucontainer needs one file per instance
             shutil.copy(ring.fmu, Path(folder, f"{name}.fmu"))
         rows = ["rule;from_fmu;from_port;to_fmu;to_port"]
         rows += [f"FMU;{name}.fmu;;;" for name in ring.names]

@@ -1,4 +1,4 @@
-"""cosim. Its fourth argument is the executor. Runs in the environment of the benchmarks."""
+"""cosim; the fourth argument is the executor. Runs in the environment of the benchmarks."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Ecos: one batch step, a CSV writer of one variable. Its library needs libtbb, here that of the package tbb beside it."""
+"""Ecos: one batch step, a CSV writer of one variable. The library needs libtbb, which the package tbb provides."""
 
 import ctypes
 import sys

@@ -1,4 +1,4 @@
-"""FMPy: the methods of its FMU2Slave in a loop written by hand."""
+"""FMPy: the methods of FMU2Slave in a hand-written loop."""
 
 import shutil
 
@@ -11,7 +11,7 @@ def run(ring: Ring) -> Outcome:
     folder = fmpy.extract(ring.fmu)
     description = fmpy.read_model_description(folder)
     reference = {variable.name: [variable.valueReference] for variable in description.modelVariables}
-    instances = [_initialized(description, folder, name) for name in ring.names]
+    instances = [_initialize_fmu(description, folder, name) for name in ring.names]
     record = []
     with Clock() as clock:
         for k in range(ring.steps):
@@ -28,7 +28,7 @@ def run(ring: Ring) -> Outcome:
     return clock.cpu, clock.wall, record[-1]
 
 
-def _initialized(description, folder, name):
+def _initialize_fmu(description, folder, name):
     identifier = description.coSimulation.modelIdentifier
     fmu = FMU2Slave(guid=description.guid, modelIdentifier=identifier, unzipDirectory=folder, instanceName=name)
     fmu.instantiate()

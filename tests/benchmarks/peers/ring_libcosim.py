@@ -1,6 +1,6 @@
 """libcosim: an OSP system structure, one batch step, a time series observer.
 
-CosimExecution.add_local_slave of 0.0.6 crashes the process, so the system comes from a file.
+CosimExecution.add_local_slave of version 0.0.6 crashes the process, so the system is read from a file.
 """
 
 import shutil

@@ -10,7 +10,7 @@ def run(ring: Ring) -> Outcome:
         for source, target in ring.pairs
     }
 
-    def work(steps: int) -> float:
+    def simulate_steps(steps: int) -> float:
         result = simulate(
             stop_time=steps * STEP,
             step_size=STEP,
@@ -20,7 +20,7 @@ def run(ring: Ring) -> Outcome:
         )
         return float(result["s0.y1"].iloc[-1])
 
-    return time_whole_runs(work, ring.steps)
+    return time_whole_runs(simulate_steps, ring.steps)
 
 
 if __name__ == "__main__":

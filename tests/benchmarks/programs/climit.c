@@ -1,11 +1,12 @@
-/* The limit of what an importer can reach: a plain loop that calls the FMUs and does nothing else.
+/* The lower bound of an importer's cost: a plain loop that only calls the FMUs.
 
    climit LIBRARY TOKEN RESOURCES RING INSTANCES WIDTH INPUT OUTPUT RECORDED STEPS
 
    RING 1: instances of a lag of WIDTH in a ring, Jacobi: get all outputs, set all inputs, step all instances.
    RING 0: one instance without inputs: step, then get its outputs.
-   INPUT and OUTPUT are the value references of the first input and output; the others follow. In every step the first RECORDED outputs are recorded. Prints microseconds of CPU time per step and the last value.
-   CALLS, defined when this is compiled, is the header with the calls of an FMI version. */
+   INPUT and OUTPUT are the value references of the first input and output; the others are consecutive. The first RECORDED
+   outputs are recorded in every step. Prints the CPU time (us) per step and the last value.
+   The macro CALLS names the header with the calls of an FMI version. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <stdio.h>
@@ -24,9 +25,9 @@ static double cpu_seconds(void)
 static Reference *references(const char *text, size_t n)
 {
     const size_t first = (size_t)atol(text);
-    Reference *made = malloc(n * sizeof *made);
-    for (size_t i = 0; i < n; i++) made[i] = (Reference)(first + i);
-    return made;
+    Reference *consecutive = malloc(n * sizeof *consecutive);
+    for (size_t i = 0; i < n; i++) consecutive[i] = (Reference)(first + i);
+    return consecutive;
 }
 
 static int fail(const char *reason)
@@ -51,7 +52,7 @@ int main(int argc, char **argv)
     for (int i = 0; i < n; i++)
         if ((instances[i] = start(library, argv[2], argv[3])) == NULL) return fail("no instance");
 
-    const double began = cpu_seconds();
+    const double begin = cpu_seconds();
     for (long k = 0; k < steps; k++) {
         if (ring) {
             for (int i = 0; i < n; i++) get(&calls, instances[i], outputs, width, y + (size_t)i * width);
@@ -63,6 +64,6 @@ int main(int argc, char **argv)
         for (size_t i = 0; i < recorded; i++) row[i] = y[i];
         row += recorded;
     }
-    printf("%.6f %.17g\n", (cpu_seconds() - began) / (double)steps * 1e6, row[-1]);
+    printf("%.6f %.17g\n", (cpu_seconds() - begin) / (double)steps * 1e6, row[-1]);
     return 0;
 }

@@ -1,9 +1,9 @@
-/* A near-empty model, so that what is measured is the importer: WIDTH lags side by side, y' = (u - y) / 0.5 s, y(0) = 1,
-   one explicit Euler step per doStep. */
+/* A near-empty model: WIDTH independent first-order lags y' = (u - y) / 0.5 s with y(0) = 1.
+   Each doStep makes one explicit Euler step. */
 #include <stdlib.h>
 #include <string.h>
 
-/* Where values lie; FMI 3.0 value references are these places, FMI 2.0 has no time and begins with the inputs. */
+/* Indices of the values. They are the FMI 3.0 value references; FMI 2.0 value references begin with 0 at the inputs. */
 enum { TIME, U, Y = U + WIDTH, VALUES = Y + WIDTH };
 
 typedef struct {

@@ -1,4 +1,4 @@
-/* The lag as FMI 2.0 Co-Simulation. Importers look up every function of the standard, so every function is there. */
+/* The lag as an FMI 2.0 Co-Simulation FMU. Importers look up every function of the standard, so all are defined. */
 #include "fmi2Functions.h"
 #include "lag.h"
 
@@ -36,14 +36,14 @@ fmi2Status fmi2Reset(fmi2Component c)
 
 /* ---- values ---------------------------------------------------------------------------------------------------------- */
 
-fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference references[], size_t n, fmi2Real given[])
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference references[], size_t n, fmi2Real values[])
 {
-    for (size_t i = 0; i < n; i++) given[i] = ((Lag *)c)->values[U + references[i]];
+    for (size_t i = 0; i < n; i++) values[i] = ((Lag *)c)->values[U + references[i]];
     return fmi2OK;
 }
-fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], size_t n, const fmi2Real given[])
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], size_t n, const fmi2Real values[])
 {
-    for (size_t i = 0; i < n; i++) ((Lag *)c)->values[U + references[i]] = given[i];
+    for (size_t i = 0; i < n; i++) ((Lag *)c)->values[U + references[i]] = values[i];
     return fmi2OK;
 }
 
@@ -84,17 +84,17 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
     return size >= sizeof(Lag) && (*state = copy(*state, bytes)) ? fmi2OK : fmi2Error;
 }
 
-/* ---- what this FMU does not offer ------------------------------------------------------------------------------------ */
+/* ---- unsupported functions ------------------------------------------------------------------------------------------- */
 
-#define REFUSED(NAME, ...)                                                                                                  \
+#define UNSUPPORTED(NAME, ...)                                                                                              \
     fmi2Status fmi2##NAME(fmi2Component c, __VA_ARGS__) { return fmi2Error; }
-REFUSED(GetDirectionalDerivative, const fmi2ValueReference z[], size_t nz, const fmi2ValueReference v[], size_t nv,
+UNSUPPORTED(GetDirectionalDerivative, const fmi2ValueReference z[], size_t nz, const fmi2ValueReference v[], size_t nv,
         const fmi2Real dv[], fmi2Real dz[])
-REFUSED(SetRealInputDerivatives, const fmi2ValueReference r[], size_t n, const fmi2Integer order[], const fmi2Real v[])
-REFUSED(GetRealOutputDerivatives, const fmi2ValueReference r[], size_t n, const fmi2Integer order[], fmi2Real v[])
-REFUSED(GetStatus, const fmi2StatusKind kind, fmi2Status *status)
-REFUSED(GetRealStatus, const fmi2StatusKind kind, fmi2Real *value)
-REFUSED(GetIntegerStatus, const fmi2StatusKind kind, fmi2Integer *value)
-REFUSED(GetBooleanStatus, const fmi2StatusKind kind, fmi2Boolean *value)
-REFUSED(GetStringStatus, const fmi2StatusKind kind, fmi2String *value)
+UNSUPPORTED(SetRealInputDerivatives, const fmi2ValueReference r[], size_t n, const fmi2Integer order[], const fmi2Real v[])
+UNSUPPORTED(GetRealOutputDerivatives, const fmi2ValueReference r[], size_t n, const fmi2Integer order[], fmi2Real v[])
+UNSUPPORTED(GetStatus, const fmi2StatusKind kind, fmi2Status *status)
+UNSUPPORTED(GetRealStatus, const fmi2StatusKind kind, fmi2Real *value)
+UNSUPPORTED(GetIntegerStatus, const fmi2StatusKind kind, fmi2Integer *value)
+UNSUPPORTED(GetBooleanStatus, const fmi2StatusKind kind, fmi2Boolean *value)
+UNSUPPORTED(GetStringStatus, const fmi2StatusKind kind, fmi2String *value)
 fmi2Status fmi2CancelStep(fmi2Component c) { return fmi2Error; }

@@ -1,4 +1,4 @@
-/* The lag as FMI 3.0 Co-Simulation. */
+/* The lag as an FMI 3.0 Co-Simulation FMU. */
 #include "fmi3FunctionTypes.h"
 #include "lag.h"
 
@@ -41,15 +41,15 @@ fmi3Status fmi3Reset(fmi3Instance c)
 
 /* ---- values and states ----------------------------------------------------------------------------------------------- */
 
-fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference references[], size_t n, fmi3Float64 given[], size_t size)
+fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference references[], size_t n, fmi3Float64 values[], size_t size)
 {
-    for (size_t i = 0; i < n; i++) given[i] = ((Lag *)c)->values[references[i]];
+    for (size_t i = 0; i < n; i++) values[i] = ((Lag *)c)->values[references[i]];
     return fmi3OK;
 }
-fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference references[], size_t n, const fmi3Float64 given[],
+fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference references[], size_t n, const fmi3Float64 values[],
                           size_t size)
 {
-    for (size_t i = 0; i < n; i++) ((Lag *)c)->values[references[i]] = given[i];
+    for (size_t i = 0; i < n; i++) ((Lag *)c)->values[references[i]] = values[i];
     return fmi3OK;
 }
 fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) { return (*state = copy(*state, c)) ? fmi3OK : fmi3Error; }
@@ -74,23 +74,23 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_
     return size >= sizeof(Lag) && (*state = copy(*state, bytes)) ? fmi3OK : fmi3Error;
 }
 
-/* ---- what this FMU does not offer: importers look it up, but do not call it -------------------------------------------- */
+/* ---- unsupported functions: importers look them up, but do not call them ---------------------------------------------- */
 
-#define REFUSED(NAME)                                                                                                       \
+#define UNSUPPORTED(NAME)                                                                                                   \
     fmi3Status fmi3##NAME(void) { return fmi3Error; }
 #define NO_INSTANCE(NAME)                                                                                                   \
     fmi3Instance fmi3##NAME(void) { return NULL; }
-#define NO_VARIABLES(TYPE) REFUSED(Get##TYPE) REFUSED(Set##TYPE)
+#define NO_VARIABLES(TYPE) UNSUPPORTED(Get##TYPE) UNSUPPORTED(Set##TYPE)
 /* clang-format off */
-NO_INSTANCE(InstantiateModelExchange) NO_INSTANCE(InstantiateScheduledExecution)
-NO_VARIABLES(Float32) NO_VARIABLES(Int8) NO_VARIABLES(UInt8) NO_VARIABLES(Int16) NO_VARIABLES(UInt16) NO_VARIABLES(Int32)
-NO_VARIABLES(UInt32) NO_VARIABLES(Int64) NO_VARIABLES(UInt64) NO_VARIABLES(Boolean) NO_VARIABLES(String)
-NO_VARIABLES(Binary) NO_VARIABLES(Clock)
-REFUSED(GetNumberOfVariableDependencies) REFUSED(GetVariableDependencies) REFUSED(GetDirectionalDerivative)
-REFUSED(GetAdjointDerivative) REFUSED(GetOutputDerivatives) REFUSED(EnterConfigurationMode) REFUSED(ExitConfigurationMode)
-REFUSED(GetIntervalDecimal) REFUSED(GetIntervalFraction) REFUSED(SetIntervalDecimal) REFUSED(SetIntervalFraction)
-REFUSED(GetShiftDecimal) REFUSED(GetShiftFraction) REFUSED(SetShiftDecimal) REFUSED(SetShiftFraction)
-REFUSED(EnterEventMode) REFUSED(EvaluateDiscreteStates) REFUSED(UpdateDiscreteStates) REFUSED(EnterContinuousTimeMode)
-REFUSED(CompletedIntegratorStep) REFUSED(SetTime) REFUSED(SetContinuousStates) REFUSED(GetContinuousStates)
-REFUSED(GetContinuousStateDerivatives) REFUSED(GetNominalsOfContinuousStates) REFUSED(GetNumberOfContinuousStates)
-REFUSED(GetEventIndicators) REFUSED(GetNumberOfEventIndicators) REFUSED(EnterStepMode) REFUSED(ActivateModelPartition)
+NO_INSTANCE(InstantiateModelExchange) NO_INSTANCE(InstantiateScheduledExecution) NO_VARIABLES(Float32) NO_VARIABLES(Int8)
+NO_VARIABLES(UInt8) NO_VARIABLES(Int16) NO_VARIABLES(UInt16) NO_VARIABLES(Int32) NO_VARIABLES(UInt32) NO_VARIABLES(Int64)
+NO_VARIABLES(UInt64) NO_VARIABLES(Boolean) NO_VARIABLES(String) NO_VARIABLES(Binary) NO_VARIABLES(Clock)
+UNSUPPORTED(GetNumberOfVariableDependencies) UNSUPPORTED(GetVariableDependencies) UNSUPPORTED(GetDirectionalDerivative)
+UNSUPPORTED(GetAdjointDerivative) UNSUPPORTED(GetOutputDerivatives) UNSUPPORTED(EnterConfigurationMode)
+UNSUPPORTED(ExitConfigurationMode) UNSUPPORTED(GetIntervalDecimal) UNSUPPORTED(GetIntervalFraction)
+UNSUPPORTED(SetIntervalDecimal) UNSUPPORTED(SetIntervalFraction) UNSUPPORTED(GetShiftDecimal) UNSUPPORTED(GetShiftFraction)
+UNSUPPORTED(SetShiftDecimal) UNSUPPORTED(SetShiftFraction) UNSUPPORTED(EnterEventMode) UNSUPPORTED(EvaluateDiscreteStates)
+UNSUPPORTED(UpdateDiscreteStates) UNSUPPORTED(EnterContinuousTimeMode) UNSUPPORTED(CompletedIntegratorStep) UNSUPPORTED(SetTime)
+UNSUPPORTED(SetContinuousStates) UNSUPPORTED(GetContinuousStates) UNSUPPORTED(GetContinuousStateDerivatives)
+UNSUPPORTED(GetNominalsOfContinuousStates) UNSUPPORTED(GetNumberOfContinuousStates) UNSUPPORTED(GetEventIndicators)
+UNSUPPORTED(GetNumberOfEventIndicators) UNSUPPORTED(EnterStepMode) UNSUPPORTED(ActivateModelPartition)

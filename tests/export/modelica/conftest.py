@@ -1,4 +1,4 @@
-"""Runs Modelica text three ways: emitted C behind ctypes, the interpreter, and (in the tests) references by hand."""
+"""Execution of Modelica models by the generated C code (ctypes) and by the interpreter, with bitwise comparison."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ GCC = ["gcc", "-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werr
 
 
 class CompiledBlock:
-    """One instance of a Block, as the FMI shells see it: the struct through offsets, and the four functions."""
+    """An instance of a compiled block, which is accessed like by the FMI shells: struct offsets and four functions."""
 
     def __init__(self, block: Block, folder: Path):
         self.block = block
         self.variables: Mapping[str, BlockVariable] = {v.name: v for v in block.variables}
         for name, text in block.files.items():
             (folder / name).write_text(text)
-        offsets = ", ".join(["sizeof(Model)", *(f"offsetof(Model, {v.member})" for v in block.variables)])
-        (folder / "layout.c").write_text(f'#include <stddef.h>\n#include "model.h"\nsize_t layout[] = {{{offsets}}};\n')
+        layout = ", ".join(["sizeof(Model)", *(f"offsetof(Model, {v.member})" for v in block.variables)])
+        (folder / "layout.c").write_text(f'#include <stddef.h>\n#include "model.h"\nsize_t layout[] = {{{layout}}};\n')
         library = folder / "block.so"
         subprocess.run([*GCC, "-o", str(library), str(folder / "model.c"), str(folder / "layout.c"), "-lm"], check=True)
         self._library = ctypes.CDLL(str(library))
-        size, *places = (ctypes.c_size_t * (1 + len(block.variables))).in_dll(self._library, "layout")
-        self._offsets = dict(zip(self.variables, places, strict=True))
+        size, *offsets = (ctypes.c_size_t * (1 + len(block.variables))).in_dll(self._library, "layout")
+        self._offsets = dict(zip(self.variables, offsets, strict=True))
         self._memory = ctypes.create_string_buffer(size)
         for function in (self._library.model_initialize, self._library.model_step):
             function.restype = ctypes.c_char_p
@@ -60,7 +60,7 @@ class CompiledBlock:
         return self._reason(self._library.model_initialize(self._memory, ctypes.c_double(time)))
 
     def step(self, time: float, step_size: float) -> str | None:
-        """None, or the reason of the failure."""
+        """Step the block; return None or the reason for its failure."""
         return self._reason(self._library.model_step(self._memory, ctypes.c_double(time), ctypes.c_double(step_size)))
 
     @staticmethod
@@ -69,7 +69,7 @@ class CompiledBlock:
 
 
 class CompiledAndInterpreted:
-    """The emitted C and the interpreter of one model, driven alike and compared bit for bit."""
+    """The compiled block and the interpreter of one model, stepped together and compared bit for bit."""
 
     def __init__(self, c: CompiledBlock, python: Interpreter):
         self.c, self.python = c, python
@@ -77,7 +77,7 @@ class CompiledAndInterpreted:
         self.inputs = [v for v in c.block.variables if v.causality == "input"]
 
     def set(self, **values: Any) -> None:
-        """Set variables; `__` in a name stands for a dot."""
+        """Set variables; `__` in a name is replaced by a dot."""
         for name, value in values.items():
             self.c.set(name.replace("__", "."), value)
             self.python.set(name.replace("__", "."), value)
@@ -100,7 +100,7 @@ class CompiledAndInterpreted:
         return self.c.get(name)
 
     def randomize(self, seed: int, variables: list[BlockVariable] | None = None, scale: float = 3.0) -> dict[str, Any]:
-        """Random values for all inputs (or the given variables), set in both; returns them."""
+        """Set all inputs (or the given variables) to random values and return these."""
         rng = np.random.default_rng(seed)
         values = {v.name: _random(rng, v, scale) for v in variables or self.inputs}
         for name, value in values.items():
@@ -109,7 +109,7 @@ class CompiledAndInterpreted:
         return values
 
     def run(self, ticks: int, seed: int = 0, period: float = 0.01) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Steps with random inputs; yields the number of the tick and its inputs after each step."""
+        """Step with random inputs; yield the number of the tick and its inputs after each step."""
         for k in range(ticks):
             values = self.randomize(seed * 100_000 + k)
             self.step(k * period, period)
@@ -133,7 +133,7 @@ def _random(rng: np.random.Generator, variable: BlockVariable, scale: float) -> 
 
 @pytest.fixture
 def write_model(tmp_path: Path) -> Callable[[str], Path]:
-    """Writes Modelica text to a file that is named as its last class."""
+    """Return a function that writes Modelica text to a file with the name of its last class."""
 
     def write_file(text: str) -> Path:
         path = tmp_path / f"{text.rsplit('end ', 1)[1].split(';')[0]}.mo"
@@ -145,7 +145,7 @@ def write_model(tmp_path: Path) -> Callable[[str], Path]:
 
 @pytest.fixture
 def compile_both(tmp_path: Path, write_model: Callable[[str], Path]) -> Callable[..., CompiledAndInterpreted]:
-    """Both forms of a model from its text, or from a file."""
+    """Return a function that compiles and interprets a model, given as text or as a file."""
 
     if shutil.which("gcc") is None:
         pytest.skip("needs gcc")

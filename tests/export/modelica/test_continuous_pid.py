@@ -1,4 +1,4 @@
-"""The exported continuous PID controller drives the vessel's plant FMU, beside the same loop in scipy."""
+"""Closed loop of the exported continuous PID controller and the FMU of a vessel, compared with the same loop in SciPy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ STEP, MASS, DRAG = 0.01, 4.11, 0.1  # s, kg, kg/m: surge of the vessel by the fa
 
 
 def fly(folder: Path, controller: str, **changes: float) -> cosim.Result:
-    """Speed steps of the vessel: 1.5 m/s, after 10 s back to 0.5 m/s."""
+    """Return the speed setpoint: 1.5 m/s, and 0.5 m/s after 10 s."""
     scenario = {
         "name": "speed_loop",
         "stop_time": 20.0,
@@ -38,7 +38,7 @@ def fly(folder: Path, controller: str, **changes: float) -> cosim.Result:
 
 
 def limited(reference: float, speed: float, integral: float, filtered: float) -> tuple[float, float]:
-    """The controller's output and how much the limits take from it."""
+    """Return the controller output and the amount by which the limits reduce it."""
     error, g = reference - speed, GAINS
     unlimited = g["P"] * error + integral + g["D"] * g["N"] * (error - filtered)
     u = min(g["u_max"], max(g["u_min"], unlimited))
@@ -56,7 +56,7 @@ def vessel_rate(_t: float, state: np.ndarray, thrust: float) -> list[float]:
 
 
 def expected(duration: float) -> np.ndarray:
-    """Speed and thrust at every communication point: the controller steps first, then the vessel."""
+    """Return speed and thrust at every communication point; the controller steps before the vessel."""
 
     def over_a_step(rate, state, *held):
         return solve_ivp(rate, (0, STEP), state, "DOP853", args=held, rtol=1e-11, atol=1e-12).y[:, -1]
@@ -77,14 +77,14 @@ def flight(tmp_path_factory: pytest.TempPathFactory) -> cosim.Result:
     return fly(tmp_path_factory.mktemp("flight"), "continuous_pid.fmu")
 
 
-def test_the_loop_is_that_of_scipy(flight):
+def test_the_closed_loop_agrees_with_scipy(flight):
     reference = expected(12.0)
     rows = len(reference)
     assert flight["vessel.velocity_body.u"][:rows] == pytest.approx(reference[:, 0], abs=1e-5)
     assert flight["pid.u"][:rows] == pytest.approx(reference[:, 1], abs=1e-4)  # most where the limits begin to act inside a step
 
 
-def test_both_fmi_versions_fly_the_same(flight, tmp_path):
+def test_both_fmi_versions_give_the_same_results(flight, tmp_path):
     other = fly(tmp_path, "fmi3/continuous_pid.fmu")
     assert np.array_equal(flight["vessel.velocity_body.u"], other["vessel.velocity_body.u"])
 

@@ -1,6 +1,6 @@
-"""Whole controllers: the shipped ones in C and in the interpreter, and a cascade against a reference in numpy.
+"""Complete controllers: generated C code compared with the interpreter, and a cascade compared with a NumPy reference.
 
-Random inputs and random, non-default parameters; every output equal to the last bit.
+Inputs are random, parameters are random or default, and all outputs must be bit-identical.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ TICKS = 500
 
 @pytest.mark.parametrize("path", CONTROLLERS, ids=lambda path: path.stem)
 def test_shipped_controllers_agree_with_the_interpreter(compile_both, path):
-    """100 ticks with default parameters, then 500 with other ones."""
+    """Run 100 ticks with default parameters, then 500 ticks with random ones."""
     model = compile_both(path)
     model.initialize()
     assert len(list(model.run(100))) == 100
@@ -109,7 +109,7 @@ end Cascade;"""
 
 
 class Pid:
-    """The controller of PID, written from its description."""
+    """Reference implementation of the PID controller in the cascade."""
 
     def __init__(self, kp=1.0, ki=0.5, kd=0.1, nd=50.0, limit=2.0):
         self.kp, self.ki, self.kd, self.nd, self.limit = kp, ki, kd, nd, limit
@@ -118,10 +118,10 @@ class Pid:
 
     def __call__(self, error: float, reset: bool) -> float:
         self.filtered = error if reset else self.filtered + self.alpha * (error - self.filtered)
-        wanted = self.kp * error + self.integral + self.kd * self.nd * (error - self.filtered)
-        saturated = abs(wanted) > self.limit and wanted * error > 0
+        unlimited = self.kp * error + self.integral + self.kd * self.nd * (error - self.filtered)
+        saturated = abs(unlimited) > self.limit and unlimited * error > 0
         self.integral = 0.0 if reset else self.integral if saturated else self.integral + self.ki * 0.01 * error
-        return min(self.limit, max(-self.limit, wanted))
+        return min(self.limit, max(-self.limit, unlimited))
 
 
 def test_a_cascade_of_pid_controllers_against_numpy(compile_both):

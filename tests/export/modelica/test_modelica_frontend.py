@@ -1,4 +1,4 @@
-"""Files in, flat model out: how names resolve, and what the front end's failures look like."""
+"""Modelica front end: name lookup, source locations and errors."""
 
 from __future__ import annotations
 
@@ -59,12 +59,12 @@ def test_files_beside_the_model_are_not_read(folder):
     assert load_block(folder / "Top.mo").files == expected
 
 
-def test_a_member_of_a_package_is_loaded_as_such(folder):
+def test_a_file_with_within_is_loaded_as_a_member_of_its_package(folder):
     block = load_block(folder / "Lib" / "Double.mo")
     assert (block.identifier, sorted(block.resources)) == ("Double", ["Lib/Double.mo", "Lib/package.mo"])
 
 
-def test_one_of_several_models_of_a_file(write_model):
+def test_a_model_of_a_file_is_selected_by_name(write_model):
     path = write_model(
         "model A\n  output Real y;\nequation\n  y = 1;\nend A;\nmodel B\n  output Real z;\nequation\n  z = 2;\nend B;"
     )
@@ -107,7 +107,7 @@ end M;""")
         load_block(path)
 
 
-def test_a_missing_model_and_a_missing_file(folder, write_model):
+def test_a_missing_model_and_a_missing_file(folder):
     with pytest.raises(InputError, match="no such Modelica file"):
         load_block(folder / "Nothing.mo")
     with pytest.raises(InputError, match=r"Top.mo: .*Other"):
@@ -116,11 +116,11 @@ def test_a_missing_model_and_a_missing_file(folder, write_model):
 
 def test_another_version_of_the_front_end_is_refused(folder, monkeypatch):
     monkeypatch.setattr(rumoca_frontend, "RUMOCA_VERSION", "0.9.0")
-    with pytest.raises(InputError, match=r"rumoca 0.10.2 is installed, but only 0.9.0 is known to work"):
+    with pytest.raises(InputError, match=r"found rumoca 0.10.2, but only 0.9.0 is supported"):
         load_block(folder / "Top.mo")
 
 
-def test_a_place_that_the_front_end_knows_is_kept(write_model):
+def test_a_location_in_a_message_of_the_front_end_is_preserved(write_model):
     path = write_model("""package P
   constant Integer n = 3;
 end P;

@@ -1,4 +1,4 @@
-"""Ordinary Modelica that rumoca's own code generator gets wrong without a word; here it must be right, tick by tick."""
+"""Valid Modelica models that rumoca's own code generator silently miscompiles; cosim must translate or refuse them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ end M;""")
         assert model.get("k") == count
 
 
-def test_b_a_parameter_in_the_condition_of_an_if_expression_is_not_folded(compile_both):
+def test_a_parameter_in_the_condition_of_an_if_expression_is_not_folded(compile_both):
     model = compile_both("""model M
   parameter Boolean hold = false;
   parameter Real level = 1;
@@ -76,8 +76,10 @@ end M;"""
         'y = x; if hold then assert(x < 1, "large"); end if;',
     ],
 )
-def test_b_an_if_equation_that_the_front_end_decides_by_a_default_is_refused(write_model, equations):
-    with pytest.raises(InputError, match=r"M.mo:7: the front end would decide this if-equation by the default of hold"):
+def test_an_if_equation_that_the_front_end_folds_with_a_default_value_is_refused(write_model, equations):
+    with pytest.raises(
+        InputError, match=r"M.mo:7: the front end evaluates the condition of this if-equation with the default value of hold"
+    ):
         load_block(write_model(FOLDED.format(equations)))
 
 
@@ -88,11 +90,11 @@ def test_b_an_if_equation_that_the_front_end_decides_by_a_default_is_refused(wri
         "if x > (if x > 2 then 1 else 0) then y = if hold then 1 else 2; else y = x; end if; // if hold then",
     ],
 )
-def test_b_other_if_equations_on_parameters_are_not_refused(write_model, equations):
+def test_other_if_equations_on_parameters_are_accepted(write_model, equations):
     assert load_block(write_model(FOLDED.format(equations))).identifier == "M"
 
 
-def test_b_an_if_equation_on_a_constant_may_be_decided(compile_both):
+def test_an_if_equation_on_a_constant_may_be_folded(compile_both):
     text = FOLDED.replace("parameter Boolean hold = false", "constant Boolean hold = true")
     model = compile_both(text.format("if hold then y = 2*x; else y = x; end if;"))
     model.set(x=3.0)
@@ -101,7 +103,7 @@ def test_b_an_if_equation_on_a_constant_may_be_decided(compile_both):
     assert model.get("y") == 6.0
 
 
-def test_c_the_last_of_two_assignments_counts(compile_both):
+def test_the_last_of_two_assignments_determines_the_value(compile_both):
     model = compile_both("""model M
   input Real x;
   output Integer k(start = 0, fixed = true);

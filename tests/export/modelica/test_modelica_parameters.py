@@ -1,4 +1,4 @@
-"""Which variables the Block shows, what it says of them, and who owns a parameter."""
+"""Variables of a block: FMI attributes and roles of parameters."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ equation
 end M;"""
 
 
-def test_only_owned_parameters_can_be_set(write_model):
+def test_only_independent_unprotected_parameters_can_be_set(write_model):
     shown = {v.name: v.causality for v in load_block(write_model(OWNERS)).variables}
     parameters = {name for name, causality in shown.items() if causality == "parameter"}
     assert parameters == {"base", "n", "A", "b.k", "c.k", "many[2].k"}
@@ -55,7 +55,7 @@ def test_only_owned_parameters_can_be_set(write_model):
     assert not [name for name in shown if "hidden" in name or "table" in name]
 
 
-def test_dependent_parameters_follow_their_owner(compile_both):
+def test_dependent_parameters_are_updated_when_a_parameter_is_set(compile_both):
     model = compile_both(OWNERS)
     model.set(base=10.0, b__k=0.5)
     model.compare(0)
@@ -83,7 +83,7 @@ def test_parameters_take_effect_between_steps(compile_both):
     assert model.get("y") == before + 2 * (3 * 1.0) + 2.0
 
 
-def test_descriptions_units_limits_and_starts(write_model):
+def test_variables_have_description_unit_limits_and_start(write_model):
     block = load_block(write_model(OWNERS))
     variables = {v.name: v for v in block.variables}
     assert (block.identifier, block.description, block.step_size) == ("M", "a model of owners", 0.01)
@@ -115,7 +115,7 @@ end M;""")
     assert (model.get("x"), list(model.get("q"))) == (16.0, [6.0, 2.0])
 
 
-def test_large_parameter_lists(compile_both):
+def test_a_large_parameter_array_is_initialized(compile_both):
     model = compile_both("""model M
   constant Integer capacity = 32;
   parameter Integer count(min = 1) = 3;
@@ -139,7 +139,7 @@ end M;""")
         assert model.get("y") == expected
 
 
-def test_constants_may_size_arrays_slices_and_loops(compile_both):
+def test_constants_can_determine_the_sizes_of_arrays_slices_and_loops(compile_both):
     model = compile_both("""model M
   constant Integer half = 2;
   constant Integer full = 2*half;
@@ -161,7 +161,7 @@ end M;""")
         assert model.get("s") == inputs["u"] + 2 * inputs["u"] + (inputs["u"] + inputs["u"] + inputs["u"] + inputs["u"])
 
 
-def test_members_are_unique_and_no_words_of_c(compile_both):
+def test_struct_members_are_unique_and_not_reserved_in_c(compile_both):
     model = compile_both("""model M
   block B
     input Real int;

@@ -1,4 +1,4 @@
-"""The meaning of the language, one construct at a time, against references by hand; C and interpreter agree bit for bit."""
+"""Semantics of each language construct, compared with hand-written references; C and interpreter are bit-identical."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ end M;""")
         assert model.get("y") == 3 * inputs["i"] + inputs["j"] - 3
 
 
-def test_a_subscript_out_of_range_is_a_failure_that_names_variable_and_line(compile_both):
+def test_a_subscript_out_of_range_fails_with_variable_and_line(compile_both):
     model = compile_both("""model M
   input Integer k;
   parameter Real wx[3] = {1, 2, 3};
@@ -364,7 +364,7 @@ end M;""")
         assert list(model.get("y")) == [u, u * u, u * u * u, u * u * u + 1]
 
 
-def test_algorithms_keep_order_and_hold_what_they_do_not_assign(compile_both):
+def test_algorithms_keep_their_order_and_unassigned_variables_their_value(compile_both):
     model = compile_both(
         """model M
   input Real u;
@@ -435,7 +435,7 @@ end M;""")
         before, was = 2 * inputs["u"], armed
 
 
-def test_when_on_a_condition_acts_once_as_it_becomes_true(compile_both):
+def test_when_with_a_condition_is_active_once_when_it_becomes_true(compile_both):
     model = compile_both("""model M
   input Real u;
   output Integer rises(start = 0, fixed = true);
@@ -459,7 +459,7 @@ end M;""")
         assert (model.get("rises"), model.get("high")) == (rises, high)
 
 
-def test_elsewhen_acts_where_no_earlier_branch_does(compile_both):
+def test_elsewhen_is_active_if_no_earlier_branch_is(compile_both):
     model = compile_both("""model M
   input Real u;
   output Real y(start = 0, fixed = true);
@@ -489,7 +489,7 @@ end M;""")
         assert (model.get("y"), model.get("z")) == (y, z)
 
 
-def test_a_when_clause_may_name_a_clock_and_a_condition(compile_both):
+def test_a_when_clause_can_have_a_clock_and_a_condition(compile_both):
     text = """model M
   input Real u;
   output Integer n(start = 0, fixed = true);
@@ -516,7 +516,7 @@ end M;"""
         assert (double.get("n"), double.get("k")) == (n, tick + 1)
 
 
-def test_a_clause_for_the_initialization_only(compile_both):
+def test_a_when_clause_with_initial_is_active_at_the_initialization_only(compile_both):
     model = compile_both("""model M
   parameter Integer n0 = 3;
   output Integer n(start = 0, fixed = true);
@@ -736,7 +736,7 @@ end M;""")
         pytest.param({"k": 2**31 - 1, "x": -1.0}, "Integer overflow", id="the first failure counts"),
     ],
 )
-def test_arithmetic_that_has_no_result_is_a_failure(compile_both, inputs, reason):
+def test_an_undefined_arithmetic_result_is_a_failure(compile_both, inputs, reason):
     model = compile_both("""model M
   input Integer k;
   parameter Integer d = 1;

@@ -1,4 +1,4 @@
-"""Continuous states: order and exactness, held inputs, ticks between communication points, start values."""
+"""Continuous states: order and accuracy of the integration, constant inputs, ticks inside a step, start values."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ equation
 end Plant;"""
 
 
-def pendulum(t, x, torque, w=20.0, damping=0.3):
+def pendulum(_t, x, torque, w=20.0, damping=0.3):
     return [x[1], -(w**2) * math.sin(x[0]) - damping * x[1] + torque]
 
 
@@ -87,7 +87,7 @@ def state(model):
     return np.array([model.get("angle"), model.get("rate")])
 
 
-def test_exponential_decay_is_exact_to_its_last_digits(compile_both):
+def test_exponential_decay_agrees_with_the_exact_solution(compile_both):
     model = compile_both("""model Decay
   output Real x(start = 1, fixed = true);
 equation
@@ -125,7 +125,7 @@ def test_steps_are_split_into_equal_parts_of_at_most_five_milliseconds(compile_b
     assert state(model) == pytest.approx(x, rel=1e-14)
 
 
-def test_inputs_are_held_over_a_step_and_outputs_belong_to_its_end(compile_both):
+def test_inputs_are_constant_during_a_step_and_outputs_belong_to_its_end(compile_both):
     model = compile_both(PENDULUM)
     model.initialize()
     x = np.array([2.0, 0.0])
@@ -136,7 +136,7 @@ def test_inputs_are_held_over_a_step_and_outputs_belong_to_its_end(compile_both)
     assert model.get("energy") == pytest.approx(rate**2 / 2 + 400 * (1 - math.cos(angle)), rel=1e-14)
 
 
-def test_time_is_that_of_each_stage(compile_both):
+def test_time_is_that_of_each_runge_kutta_stage(compile_both):
     model = compile_both("""model M
   output Real x(start = 0, fixed = true);
 equation
@@ -147,7 +147,7 @@ end M;""")
     assert model.get("x") == pytest.approx(2**4 - 1, rel=1e-14)  # Simpson's rule is exact for cubics
 
 
-def test_c_and_python_agree_to_the_bit_in_a_mixed_model(compile_both):
+def test_c_and_interpreter_are_bit_identical_for_a_mixed_model(compile_both):
     model = compile_both(PLANT)
     parameters = [v for v in model.c.block.variables if v.causality == "parameter"]
     for seed in range(4):
@@ -159,7 +159,7 @@ def test_c_and_python_agree_to_the_bit_in_a_mixed_model(compile_both):
     assert (model.get("ticks"), model.get("crossings")) > (30, 0)
 
 
-def test_components_and_arrays_of_states_follow_their_closed_form(compile_both):
+def test_states_in_components_and_arrays_agree_with_the_exact_solution(compile_both):
     model = compile_both(PLANT)
     model.initialize()
     model.set(u=1.0)
@@ -170,7 +170,7 @@ def test_components_and_arrays_of_states_follow_their_closed_form(compile_both):
     assert model.get("last") == pytest.approx(expected, abs=1e-9)
 
 
-def test_derivatives_may_stand_where_textbooks_write_them(compile_both):
+def test_der_is_accepted_on_either_side_and_inside_expressions(compile_both):
     model = compile_both("""model Forms
   type Angle = Real(unit = "rad");
   record Motion
@@ -258,7 +258,7 @@ def test_an_initial_equation_sets_a_state_from_a_parameter(compile_both):
 
 
 @pytest.mark.parametrize("ticks_per_step", [1, 2, 5])
-def test_ticks_act_where_they_lie_inside_a_step(compile_both, ticks_per_step):
+def test_ticks_inside_a_step_are_executed_at_their_time(compile_both, ticks_per_step):
     model = compile_both(SAMPLED_LOOP)
     model.initialize()
     decay, speed, force = math.exp(-0.5 * 0.01), 0.0, 0.0
@@ -270,7 +270,7 @@ def test_ticks_act_where_they_lie_inside_a_step(compile_both, ticks_per_step):
         assert (model.get("speed"), model.get("force")) == pytest.approx((speed, force), abs=1e-11)
 
 
-def test_two_rates_beside_a_state(compile_both):
+def test_two_sample_rates_in_a_model_with_a_state(compile_both):
     model = compile_both("""model M
   output Real x(start = 0, fixed = true);
   output Real fast(start = 0, fixed = true);
@@ -295,7 +295,7 @@ end M;""")
             assert (model.get("x"), model.get("fast"), model.get("slow")) == pytest.approx((x, fast, slow), rel=1e-12)
 
 
-def test_a_clock_that_drives_nothing_does_not_disturb(compile_both):
+def test_an_unused_clock_has_no_effect(compile_both):
     model = compile_both("""model M
   output Real x(start = 1, fixed = true);
 equation
@@ -309,7 +309,7 @@ end M;""")
     assert model.get("x") == pytest.approx(math.exp(-1), abs=1e-10)
 
 
-def test_steps_shorter_than_the_period_meet_the_same_ticks(compile_both):
+def test_shorter_steps_execute_the_same_ticks(compile_both):
     model = compile_both(SAMPLED_LOOP)
     results = []
     for h in (0.0025, 0.01):
@@ -349,7 +349,7 @@ def test_outputs_of_a_model_with_states_are_continuous(compile_both):
     assert not any(name.startswith("der(") for name in variables)
 
 
-def test_only_models_with_states_carry_the_integrator(write_model):
+def test_only_models_with_states_contain_the_integrator(write_model):
     sampled = write_model("""model M
   output Real y;
 equation
@@ -359,7 +359,7 @@ end M;""")
     assert "runge_kutta.h" in load_block(write_model(PENDULUM)).files
 
 
-def test_a_state_that_escapes_is_a_failure(compile_both):
+def test_a_state_that_becomes_infinite_is_a_failure(compile_both):
     model = compile_both("""model M
   input Real u;
   Real x(start = 1, fixed = true);
@@ -374,7 +374,7 @@ end M;""")
         model.python.step(0.0, 0.1)
 
 
-def test_a_failure_in_a_stage_names_its_reason(compile_both):
+def test_a_failure_in_a_runge_kutta_stage_is_reported_with_its_reason(compile_both):
     model = compile_both("""model M
   parameter Integer n = 0;
   output Real x(start = 0, fixed = true);

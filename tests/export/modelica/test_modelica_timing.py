@@ -1,4 +1,4 @@
-"""When things are computed: ticks in [t, t + h), start times, several rates, models without a clock."""
+"""Timing of sampled models: ticks in [t, t + h), start times, several rates, models without a clock."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_one_tick_per_step_and_no_drift_over_100_seconds(compile_both):
         assert (model.get("n"), model.get("t")) == (k + 1, k * 0.01)
 
 
-def test_a_long_step_runs_all_its_ticks_with_held_inputs(compile_both):
+def test_a_long_step_runs_all_its_ticks_with_constant_inputs(compile_both):
     model = compile_both(COUNTER)
     model.initialize()
     model.set(u=2.0)
@@ -39,7 +39,7 @@ def test_a_long_step_runs_all_its_ticks_with_held_inputs(compile_both):
     assert (model.get("n"), model.get("t")) == (10, 0.09)
 
 
-def test_steps_shorter_than_the_period_run_a_tick_where_it_lies(compile_both):
+def test_a_step_shorter_than_the_period_runs_a_tick_only_if_it_contains_one(compile_both):
     model = compile_both(COUNTER)
     model.initialize()
     counts = []
@@ -60,7 +60,7 @@ def test_the_first_tick_is_the_first_one_not_before_the_start_time(compile_both,
     assert model.get("t") == pytest.approx(first, abs=1e-12)
 
 
-def test_a_period_that_is_a_parameter_counts_from_the_initialization_on(compile_both):
+def test_a_period_parameter_takes_effect_at_the_initialization(compile_both):
     model = compile_both(COUNTER)
     assert model.c.variables["Ts"].variability == "fixed"
     model.set(Ts=0.02)
@@ -145,7 +145,7 @@ end M;""")
     assert model.get("y") == 17.5
 
 
-def test_a_failure_is_over_with_the_next_step(compile_both):
+def test_a_step_after_a_failed_step_can_succeed(compile_both):
     model = compile_both(COUNTER.replace("    t = time;", '    t = time;\n    assert(u < 1, "too large");'))
     model.initialize()
     model.set(u=5.0)

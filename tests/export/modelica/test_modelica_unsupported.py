@@ -1,4 +1,4 @@
-"""What is not supported is refused with file, line and reason, never left out."""
+"""Unsupported features are refused with file, line and reason; they are never ignored."""
 
 from __future__ import annotations
 
@@ -23,7 +23,11 @@ CASES = {
     "der of an input": ("", "y = der(u);", r"M.mo:8: der\(...\) must name a coordinate classified as a continuous state"),
     "der of an Integer": ("Integer n;", "n = 1;\n  y = der(n);", "M.mo:9: .*n"),
     "index reduction": ("Real x;", "x = sin(time);\n  y = der(x);", "M.mo:8: this equation defines no variable"),
-    "parameter of a variable": ("parameter Real p = u;", "y = p;", "M.mo:6: the parameter p depends on u, which is no parameter"),
+    "parameter of a variable": (
+        "parameter Real p = u;",
+        "y = p;",
+        "M.mo:6: the parameter p depends on u, which is not a parameter",
+    ),
     "a state in an algorithm": (
         "Real x;",
         "der(x) = 1;\nalgorithm\n  x := u;\n  y := x;\nequation",
@@ -32,7 +36,7 @@ CASES = {
     "steady start": (
         "Real x;",
         "der(x) = u - x;\n  y = x;\ninitial equation\n  der(x) = 0;\nequation",
-        "M.mo:11: an initial equation must have a continuous state, or a variable",
+        "M.mo:11: one side of an initial equation must be a continuous state, or a variable",
     ),
     "loop": (
         "Real a;\n  Real b;",
@@ -47,7 +51,7 @@ CASES = {
     "implicit": (
         "Real a;",
         "a + u = 2*a;\n  y = a;",
-        "M.mo:8: this equation defines no variable: write it with a variable",
+        "M.mo:8: this equation defines no variable: one side must be a variable",
     ),
     "structural if": (
         "parameter Integer n = 2;",
@@ -57,19 +61,23 @@ CASES = {
     "structural size": (
         "parameter Integer n = 2;\n  parameter Integer m = n + 1;\n  Real v[m];",
         "for i in 1:m loop\n    v[i] = u;\n  end for;\n  y = v[1];",
-        "M.mo:8: the parameter n cannot be settable: it decides the size of an array",
+        "M.mo:8: the parameter n cannot be settable: it determines the size of an array",
     ),
     "slice": (
         "parameter Integer n = 2;\n  Real v[3];",
         "v = {u, u, u};\n  y = sum(v[1:n]);",
-        "M.mo:10: the bounds of a slice must be",
+        "M.mo:10: the bounds of a range must be",
     ),
     "pre outside when": (
         "Boolean a;\n  Boolean b;",
         "a = u > 0;\n  b = pre(a);\n  y = if b then 1 else 0;",
         r"pre\(a\) outside a when",
     ),
-    "warning": ("", 'y = u;\n  assert(u > 0, "low", AssertionLevel.warning);', "M.mo:9: assert.. with a level below error"),
+    "warning": (
+        "",
+        'y = u;\n  assert(u > 0, "low", AssertionLevel.warning);',
+        "M.mo:9: assert.. with a level other than AssertionLevel.error",
+    ),
     "text": ('parameter String name = "x";', "y = u;", "M.mo:6: name: variables of type String are not supported"),
     "message": ('parameter String name = "x";', "y = u;\n  assert(u > 0, name);", "M.mo:9: the message of an assert.. must be a"),
     "text of a number": (
@@ -90,7 +98,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_refused(write_model, case):
+def test_an_unsupported_feature_is_refused_with_file_and_line(write_model, case):
     declarations, equations, message = CASES[case]
     path = write_model(f"""model M
   input Real u;
@@ -112,11 +120,11 @@ end M;""")
     ("when", "message"),
     [
         ("sample(0, u)", "sample interval is not parameter-evaluable"),
-        ("sample(0, 0.1) and u > 1", r"sample\(\) must stand alone in a when-condition"),
+        ("sample(0, 0.1) and u > 1", r"sample\(\) cannot be combined with other conditions"),
         ("edge(b)", "in a when-condition are not supported"),
     ],
 )
-def test_refused_when_conditions(write_model, when, message):
+def test_an_unsupported_when_condition_is_refused(write_model, when, message):
     path = write_model(f"""model M
   input Real u;
   output Real y;
@@ -166,7 +174,7 @@ end M;""")
         ModelReader(json, sources).read_model("M")
 
 
-def test_unknown_json_is_refused_not_dropped():
+def test_unknown_elements_of_the_front_ends_json_are_refused():
     from cosim.export.modelica.frontend.reader import ModelReader
     from cosim.export.modelica.frontend.rumoca_frontend import ModelicaSources
 

@@ -1,4 +1,4 @@
-"""What is asked of OpenModelica, and what is said when it is missing or fails. OpenModelica itself is not tested here."""
+"""Export by OpenModelica: the script for omc, and errors. A shell script replaces omc; OpenModelica itself is not tested."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MODEL = "model M\n  output Real x;\nequation\n  der(x) = 1;\nend M;\n"
 
 @pytest.fixture
 def omc(tmp_path, monkeypatch):
-    """Puts a shell script called omc on PATH, alone with the commands of the system; it is told what to do."""
+    """Return a function that puts a shell script with the given commands on PATH under the name omc."""
 
     def install(commands: str) -> Path:
         script = tmp_path / "bin" / "omc"
@@ -22,7 +22,7 @@ def omc(tmp_path, monkeypatch):
         script.write_text(f"#!/bin/sh\n{commands}\n")
         script.chmod(0o755)
         monkeypatch.setenv("PATH", str(script.parent), prepend=":")
-        return tmp_path / "asked.mos"
+        return tmp_path / "script.mos"
 
     return install
 
@@ -31,9 +31,9 @@ def test_the_command_loads_packages_and_file_and_builds_a_co_simulation_fmu(omc,
     path = write_model(MODEL)
     (tmp_path / "Library").mkdir()
     (tmp_path / "Library" / "package.mo").write_text("package Library\nend Library;\n")
-    asked = omc(f'cp "$1" "{tmp_path}/asked.mos"; echo archive > M.fmu')
+    script = omc(f'cp "$1" "{tmp_path}/script.mos"; echo archive > M.fmu')
     export_with_omc(path, tmp_path / "fmus" / "m.fmu")
-    assert asked.read_text().splitlines() == [
+    assert script.read_text().splitlines() == [
         f'loadFile("{tmp_path}/Library/package.mo");',
         f'loadFile("{path}");',
         'buildModelFMU(M, version="2.0", fmuType="cs", platforms={"static"});',
@@ -47,14 +47,14 @@ def test_a_member_of_a_package_is_loaded_with_its_package(omc, tmp_path):
     (tmp_path / "Library" / "package.mo").write_text("package Library\nend Library;\n")
     member = tmp_path / "Library" / "M.mo"
     member.write_text(f"within Library;\n{MODEL}")
-    asked = omc(f'cp "$1" "{tmp_path}/asked.mos"; echo archive > Library.M.fmu')
+    script = omc(f'cp "$1" "{tmp_path}/script.mos"; echo archive > Library.M.fmu')
     export_with_omc(member, tmp_path / "m.fmu")
-    lines = asked.read_text().splitlines()
+    lines = script.read_text().splitlines()
     assert lines[0] == f'loadFile("{tmp_path}/Library/package.mo");'
     assert lines[1].startswith("buildModelFMU(Library.M, ")
 
 
-def test_errors_are_told_with_file_and_line(omc, write_model, tmp_path):
+def test_errors_are_reported_with_file_and_line(omc, write_model, tmp_path):
     path = write_model(MODEL)
     omc(f'echo "true"; echo "[{path}:4:3-4:13:writable] Error: Variable y not found in scope M."; echo "Error: no code"; exit 1')
     with pytest.raises(InputError) as refused:
@@ -63,10 +63,10 @@ def test_errors_are_told_with_file_and_line(omc, write_model, tmp_path):
     assert not (tmp_path / "m.fmu").exists()
 
 
-def test_silence_is_an_error_too(omc, write_model, tmp_path):
+def test_it_is_an_error_if_omc_creates_no_fmu_and_prints_nothing(omc, write_model, tmp_path):
     path = write_model(MODEL)
     omc("exit 0")
-    with pytest.raises(InputError, match="OpenModelica has made no FMU: it printed nothing"):
+    with pytest.raises(InputError, match="OpenModelica has created no FMU: it printed nothing"):
         export_with_omc(path, tmp_path / "m.fmu")
 
 

@@ -1,4 +1,4 @@
-"""Coloured noise and Dryden turbulence against the theory of the filters that they are."""
+"""Coloured noise and Dryden turbulence against the theory of their filters."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_second_order_noise_is_discretised_exactly(second_order, lag, measured: 
     measured("Wind and current", "correlation of transverse gusts", found, expected, "1", "(1 - t/2T) exp(-t/T)", within=0.01)
 
 
-def test_noise_goes_on_where_blocks_meet(first_order):
+def test_noise_is_continuous_across_blocks(first_order):
     """The pairs of last and first value of the blocks of 256 are correlated as all others."""
     last, first = first_order[0][255:-1:256], first_order[0][256::256]
     assert np.mean(last * first) / 4.0 == pytest.approx(math.exp(-GRID_STEP / FAST), abs=0.1)
@@ -68,14 +68,14 @@ def test_channels_do_not_depend_on_each_other(first_order):
     assert abs(np.corrcoef(first_order)[0, 1]) < 0.02
 
 
-def test_noise_is_a_function_of_its_place():
+def test_noise_is_a_function_of_its_index():
     noise, other = (ColouredNoise(3, "uav", [Channel(1.0, 0.3, 1.7)]) for _ in range(2))
     expected = [noise[k] for k in range(3000)]
     for k in (2999, 0, 511, 512, 2047, 1, 2999):
         assert other[k] == expected[k]
 
 
-def test_names_and_seeds_make_noises_of_their_own():
+def test_other_names_and_seeds_give_independent_noise():
     noises = [ColouredNoise(seed, name, [Channel(1.0, 0.3)]) for seed, name in ((1, "uav"), (1, "usv"), (2, "uav"))]
     assert len({noise[100] for noise in noises}) == 3
 

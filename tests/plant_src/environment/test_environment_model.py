@@ -1,4 +1,4 @@
-"""A world with wind, current and surfaces below: what vehicles meet, what is published, and how it is returned to."""
+"""Worlds with wind, waves, current and ground effect: inputs of the vehicles, outputs and saved states."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_a_calm_world_has_no_environment() -> None:
     assert not [name for name in names if "environment" in name or "wind" in name or "wave" in name]
 
 
-def test_who_drifts_with_air_and_water_moves_as_in_a_calm(measured: MeasurementCheck) -> None:
+def test_a_vessel_drifting_with_air_and_water_moves_as_in_calm_conditions(measured: MeasurementCheck) -> None:
     """Galilean invariance: water, air and vessel with the same velocity on top."""
     drift = np.array([0.4, -0.3])
     start = np.array([0.5, 0.1])  # through the water, world frame at yaw 0
@@ -58,7 +58,7 @@ def test_who_drifts_with_air_and_water_moves_as_in_a_calm(measured: MeasurementC
     assert moving["usv.attitude.yaw"] == pytest.approx(calm["usv.attitude.yaw"], abs=1e-9)
 
 
-def test_who_drifts_with_the_air_flies_as_in_a_calm(measured: MeasurementCheck) -> None:
+def test_a_multirotor_drifting_with_the_air_flies_as_in_calm_air(measured: MeasurementCheck) -> None:
     drift = np.array([3.0, -2.0, 0.5])
     calm = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, 50.0], parameters=DRAG, velocity_body=[4.0, 1.0, 0.0])})
     moving = WorldHarness(
@@ -80,7 +80,7 @@ def test_the_wind_at_a_vehicle_is_published() -> None:
     assert trial.vector("uav.wind") == pytest.approx([3.0, 0.0, 0.0])
 
 
-def test_vehicles_meet_gusts_of_their_own() -> None:
+def test_gusts_of_different_vehicles_are_independent() -> None:
     wind = {"speed": 5.0, "turbulence": {}}
     trial = WorldHarness(
         {"a": quadcopter_settings([0, 0, 20]), "b": quadcopter_settings([0, 9, 20])}, environment={"wind": wind}
@@ -90,7 +90,7 @@ def test_vehicles_meet_gusts_of_their_own() -> None:
     assert alone["b.wind.y"] == trial["b.wind.y"]
 
 
-def test_wind_and_current_can_be_told_at_any_time() -> None:
+def test_wind_and_current_can_be_changed_at_any_time() -> None:
     trial = WorldHarness(
         {"usv": vessel_settings([0.0, 0.0], yaw=math.pi / 2)}, environment={"wind": {"speed": 0}, "current": {"speed": 0}}
     )
@@ -102,7 +102,7 @@ def test_wind_and_current_can_be_told_at_any_time() -> None:
     assert trial.step()["usv.wind.x"] == 2.0
 
 
-def test_what_is_not_finite_is_named() -> None:
+def test_an_input_that_is_not_finite_is_named() -> None:
     trial = WorldHarness({"usv": vessel_settings([0.0, 0.0])}, environment={"current": {"speed": 0}})
     trial["environment.current.y"] = math.nan
     with pytest.raises(ComponentError, match=r"usv.current.y is nan, expected a finite number"):
@@ -120,13 +120,13 @@ def landing(environment: dict[str, Any], motion: str = "planar") -> WorldHarness
 
 
 @pytest.mark.parametrize("steps", [0, 5, 18, 22, 30, 120, 255, 256, 300])
-def test_a_state_is_returned_to_bit_for_bit_in_gusts(steps: int, measured: MeasurementCheck) -> None:
+def test_a_state_is_restored_bit_for_bit_in_gusts(steps: int, measured: MeasurementCheck) -> None:
     differing = returned_to(landing(GUSTY).step(steps))
     measured("Determinism and saved states", "steps that differ after a return, in gusts", differing, 0, "1", AGAIN)
 
 
 def returned_to(trial: WorldHarness) -> int:
-    """How many of 60 steps differ when they are made again, twice."""
+    """Return how many of 60 steps differ when they are repeated twice from a saved state."""
     state, before, begun = trial.world.get_state(), trial.bytes, trial.steps
     expected, differing = [trial.step().bytes for _ in range(60)], 0
     for _ in range(2):
@@ -139,13 +139,13 @@ def returned_to(trial: WorldHarness) -> int:
     return differing
 
 
-def test_the_landing_of_these_tests_lands() -> None:
+def test_the_vehicle_of_these_tests_lands() -> None:
     trial = landing(GUSTY)
     assert not trial.step(15)["uav.contact.vessel"]
     assert trial.step(285)["uav.contact.vessel"]
 
 
-def test_a_state_includes_what_the_environment_was_told() -> None:
+def test_a_state_includes_the_inputs_of_the_environment() -> None:
     trial = landing(GUSTY)
     state = trial.world.get_state()
     trial["environment.wind.x"] = 9.0
@@ -160,7 +160,7 @@ def test_time_counts_from_the_start_of_the_run() -> None:
     assert early.step(50).bytes == late.step(50).bytes
 
 
-def test_the_ground_is_where_rotors_feel_it() -> None:
+def test_the_ground_distance_counts_from_the_rotor_centre() -> None:
     """Above a platform and a deck: from the centre of the rotors, 6 mm below the centre of mass, to the top."""
     on = {"parameters": {"ground_effect": 1.0}}
     vehicles = {
@@ -169,17 +169,17 @@ def test_the_ground_is_where_rotors_feel_it() -> None:
         "c": quadcopter_settings([20, 0, 1.0], **on),
     }
     trial = WorldHarness(vehicles | {"usv": vessel_settings([9.0, 0.0])}, {"start": PLATFORM}, {"wind": {"speed": 0}})
-    distances = [shadow.environment_inputs[-1] for shadow in trial.world._fleet.bodies[:3]]
+    distances = [body.environment_inputs[-1] for body in trial.world._fleet.bodies[:3]]
     assert distances == pytest.approx([1.0 - PLATFORM_TOP, 1.0 - DECK_TOP, 1.0], abs=0.007)
     assert np.ptp(np.array(distances) - [1.0 - PLATFORM_TOP, 1.0 - DECK_TOP, 1.0]) < 1e-12
 
 
-def test_who_is_not_in_ground_effect_is_not_asked_for() -> None:
+def test_without_ground_effect_no_distance_is_computed() -> None:
     trial = WorldHarness({"a": quadcopter_settings([0, 0, 1.0])}, {"start": PLATFORM}, {"wind": {"speed": 0}}).step()
     assert trial.world._fleet.bodies[0].environment_inputs[-1] == 1e3
 
 
-def test_a_planar_vessel_in_waves_is_said(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_planar_vessel_in_waves_gives_a_warning(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING, "cosim.component"):
         WorldHarness({"usv": vessel_settings([0.0, 0.0])}, environment={"sea_state": 3})
     assert "the planar vessel usv does not move with the waves" in caplog.text
@@ -235,12 +235,12 @@ def test_the_elevation_at_a_vessel_is_that_of_the_sea() -> None:
 
 
 @pytest.mark.parametrize("steps", [0, 10, 22, 60, 300])
-def test_a_state_is_returned_to_bit_for_bit_in_waves(steps: int, measured: MeasurementCheck) -> None:
+def test_a_state_is_restored_bit_for_bit_in_waves(steps: int, measured: MeasurementCheck) -> None:
     differing = returned_to(landing(GUSTY | {"sea_state": 1}, "6dof").step(steps))
     measured("Determinism and saved states", "steps that differ after a return, gusts and waves", differing, 0, "1", AGAIN)
 
 
-def test_a_vessel_rides_the_waves_that_are_seen() -> None:
+def test_a_vessel_follows_the_waves_of_the_scenario() -> None:
     """Waves much longer than the vessel carry it up and down; half the gain, half the height."""
     trial = WorldHarness({"usv": vessel_settings([0.0, 0.0], motion="6dof")}, environment={"sea_state": 3})
     trial["environment.wave_gain"] = 0.5

@@ -1,4 +1,4 @@
-"""What a scenario may say about the environment, and how the rest is refused."""
+"""Settings of the environment: valid ones are read, invalid ones are refused."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from plant_src.json_reader import JsonReader
 WIND = {"speed": 5.0, "direction": 1.0}
 
 
-def understood(**environment: Any) -> EnvironmentSettings:
+def read_valid(**environment: Any) -> EnvironmentSettings:
     reader = JsonReader()
     found = read_environment(reader, environment)
     assert reader.problems == []
@@ -37,7 +37,7 @@ def understood(**environment: Any) -> EnvironmentSettings:
         ({"waves": {"significant_height": -0.1}}, "significant_height: found -0.1, expected a number from 0 to 30"),
         ({"waves": {"significant_height": 1, "peak_period": 0}}, "peak_period: found 0, expected a number greater than 0"),
         ({"sea_state": 3, "waves": {"spectrum": "jonswop"}}, r"""spectrum: found 'jonswop'; did you mean "jonswap"\?"""),
-        ({"sea_state": 3, "waves": {"gamma": 3}}, "waves.gamma: found a peak enhancement"),
+        ({"sea_state": 3, "waves": {"gamma": 3}}, 'waves.gamma: a "pierson_moskowitz" spectrum has no peak enhancement'),
         ({"sea_state": 3, "waves": {"spectrum": "jonswap", "gamma": 8}}, "gamma: found 8, expected a number from 1 to 7"),
         ({"sea_state": 3, "waves": {"spreading": -1}}, "spreading: found -1, expected a number from 0 to 1000"),
         ({"sea_state": 3, "waves": {"components": 65}}, "components: found 65, expected an integer from 1 to 64"),
@@ -79,28 +79,31 @@ def test_all_problems_are_reported_together() -> None:
     ]
 
 
-def test_without_a_word_all_is_calm() -> None:
-    assert understood() == EnvironmentSettings(0, None, None, None)
+def test_an_empty_environment_is_calm() -> None:
+    assert read_valid() == EnvironmentSettings(0, None, None, None)
 
 
-def test_a_direction_is_that_towards_which_it_goes() -> None:
-    found = understood(wind={"speed": 5.0, "direction": math.pi / 2}, current={"speed": 0.5, "direction": math.pi})
-    assert found.wind and found.current
+def test_a_direction_is_that_of_the_flow() -> None:
+    found = read_valid(wind={"speed": 5.0, "direction": math.pi / 2}, current={"speed": 0.5, "direction": math.pi})
+    assert found.wind
+    assert found.current
     assert found.wind.velocity == pytest.approx((0.0, 5.0, 0.0))
     assert found.current.velocity == pytest.approx((-0.5, 0.0))
 
 
-def test_the_mean_wind_says_how_strong_the_turbulence_is() -> None:
-    found = understood(wind={**WIND, "turbulence": {}}).wind
-    assert found and found.turbulence
+def test_the_turbulence_intensity_defaults_to_that_of_the_mean_wind() -> None:
+    found = read_valid(wind={**WIND, "turbulence": {}}).wind
+    assert found
+    assert found.turbulence
     assert found.turbulence.airspeed == pytest.approx(5.0)
     assert found.turbulence.intensities == pytest.approx(turbulence_intensities(5.0, 6.096))
 
 
-def test_turbulence_may_be_said_itself() -> None:
+def test_turbulence_can_be_set_explicitly() -> None:
     turbulence = {"intensity": [0.5, 0.4, 0.3], "airspeed": 2.0, "height": 20.0}
-    found = understood(wind={"speed": 0.0, "turbulence": turbulence}).wind
-    assert found and found.turbulence
+    found = read_valid(wind={"speed": 0.0, "turbulence": turbulence}).wind
+    assert found
+    assert found.turbulence
     assert found.turbulence.intensities == (0.5, 0.4, 0.3)
     assert (found.turbulence.airspeed, found.turbulence.height) == (2.0, 20.0)
 
@@ -117,6 +120,7 @@ def test_turbulence_may_be_said_itself() -> None:
     ],
 )
 def test_wind_grows_with_height(profile: dict[str, float], height: float, share: float) -> None:
-    found = understood(wind={**WIND, "profile": profile}).wind
-    assert found and found.profile
+    found = read_valid(wind={**WIND, "profile": profile}).wind
+    assert found
+    assert found.profile
     assert found.profile(height) == pytest.approx(share)

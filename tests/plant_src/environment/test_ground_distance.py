@@ -1,4 +1,4 @@
-"""What lies below a multirotor, against rays and planes in numpy."""
+"""Ground distance of multirotors against rays and planes in NumPy."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PLATFORM = Platform("start", (2.0, 1.0, 0.5), (5.0, 0.0, 1.0))
 
 
 def vessel(centre: Any, attitude: Rotation) -> Any:
-    """A vessel that publishes this deck centre and attitude, as the world's shadows do."""
+    """A vessel that publishes this deck centre and attitude, as the contact bodies of a world do."""
     slots = STRIDER.slots("output")
     outputs = np.zeros(len(slots))
     x, y, z, w = attitude.as_quat()

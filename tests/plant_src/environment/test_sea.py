@@ -74,7 +74,7 @@ def test_half_an_hour_at_a_point_has_the_significant_height(waves, seed, measure
     measured("Waves", "4 standard deviations of 30 min, 3 seas, 3 seeds", found, expected, "m", "Hs", relative=0.05)
 
 
-def test_the_energy_lies_where_the_spectrum_has_it():
+def test_the_energy_is_distributed_as_in_the_spectrum():
     """Below any frequency the components hold what the spectrum does, up to one component."""
     waves = realisation(3, **CHOP)
     one = waves.amplitude[0] ** 2 / 2
@@ -109,7 +109,7 @@ def test_long_crests_run_one_way():
 
 @pytest.mark.parametrize("power", [1, 2, 10])
 def test_short_crests_spread_as_the_power_of_the_cosine(power, measured: MeasurementCheck):
-    """E[cos^2 d] = (n + 1) / (n + 2) for the density cos^n d; bins of equal energy leave little to chance."""
+    """E[cos^2 d] = (n + 1) / (n + 2) for the density cos^n d; bins of equal energy keep the sampling error small."""
     spread = realisation(**SWELL, direction=0.4, spreading=power).direction - 0.4
     found, expected, case = np.mean(np.cos(spread) ** 2), (power + 1) / (power + 2), f"n = {power}"
     measured("Waves", "mean squared cosine of the spreading", found, expected, "1", "integral of cos^n", within=0.01, case=case)
@@ -126,15 +126,15 @@ def test_a_sea_does_not_repeat_itself_within_an_hour(waves):
     assert np.abs(correlation).max() < 0.6
 
 
-def test_seeds_make_seas():
+def test_other_seeds_give_other_seas():
     first, again, other = (realisation(seed, **CHOP, spreading=2) for seed in (1, 1, 2))
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
     assert not np.array_equal(first.frequency, other.frequency)
     assert not np.array_equal(first.phase, other.phase)
 
 
-def test_the_sea_of_a_seed_stays_what_it_is():
-    """Results of earlier runs can be had again: these numbers may change with a note in the change log only."""
+def test_the_sea_of_a_seed_is_reproducible():
+    """Earlier runs remain reproducible: these numbers may change only with a note in the change log."""
     waves = realisation(1, **CHOP)
     assert waves.frequency[:2] == pytest.approx([2.199540, 2.404438], abs=1e-6)
 

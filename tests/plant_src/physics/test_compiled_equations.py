@@ -27,7 +27,8 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache" / "cosim" / "plant"
 
 
-def test_a_missing_fmu_is_named(root: Path) -> None:
+@pytest.mark.usefixtures("root")
+def test_a_missing_fmu_is_named() -> None:
     with pytest.raises(InputError, match=r'vehicle model "ar_drone" cannot be read from ".*ar_drone.fmu": .*No such file'):
         compiled_equations.load_library("ar_drone")
 

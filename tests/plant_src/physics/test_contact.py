@@ -1,4 +1,4 @@
-"""What happens when vehicles touch each other or a platform."""
+"""Contact between vehicles, and with platforms."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ def test_at_rest_the_height_is_that_of_the_feet(parked: WorldHarness, measured: 
 
 
 def test_at_rest_velocities_read_zero(parked: WorldHarness, measured: MeasurementCheck) -> None:
-    """The velocity at the end of a free step would be 0.05 m/s: what gravity does in half of it."""
+    """The predicted velocity at the end of the step is not zero: gravity gives 0.05 m/s in half a step."""
     measured("Contact", "its velocity", parked.vector("uav.velocity"), 0.0, "m/s", "rest", within=1e-5)
     assert np.abs(parked.vector("uav.rates", "pqr")).max() < 1e-4
 
 
-def test_touching_a_vessel_is_told_from_touching_a_platform(parked: WorldHarness) -> None:
+def test_contact_with_a_vessel_is_distinguished_from_a_platform(parked: WorldHarness) -> None:
     on_platform = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT])}, {"start": PLATFORM}).step(20)
     assert (parked["uav.contact.touching"], parked["uav.contact.vessel"]) == (True, True)
     assert (on_platform["uav.contact.touching"], on_platform["uav.contact.vessel"]) == (True, False)
@@ -86,7 +86,7 @@ def test_contact_force_is_the_mean_over_a_long_step() -> None:
 
 
 def test_contact_conserves_momentum(measured: MeasurementCheck) -> None:
-    """A quadcopter slides onto a vessel at rest; in a few steps the air has hardly begun to act."""
+    """A quadcopter slides onto a vessel at rest; the air drag of a few steps is negligible."""
     trial = on_deck(velocity_body=[1.0, 0.0, 0.0])
     trial["uav.rotor_speed"] = rotor_speed(0.3)
     trial.step(6)
@@ -97,7 +97,7 @@ def test_contact_conserves_momentum(measured: MeasurementCheck) -> None:
 
 
 def test_friction_drags_the_vessel_along() -> None:
-    """Both end at the common velocity of an inelastic impact, but for the drag of air, which is small."""
+    """Both reach the common velocity of an inelastic impact, up to the small air drag."""
     trial = on_deck(velocity_body=[1.0, 0.0, 0.0]).step(60)
     common = reference.QUADCOPTER_MASS / (reference.QUADCOPTER_MASS + reference.VESSEL_MASS)
     assert trial["uav.velocity.x"] == pytest.approx(trial["usv.velocity.x"], abs=1e-4)
@@ -137,8 +137,8 @@ def test_take_off_from_the_deck() -> None:
     assert trial["uav.position.z"] - start == pytest.approx(height, abs=0.01)
 
 
-def test_two_pairs_do_not_notice_each_other(measured: MeasurementCheck) -> None:
-    """Nothing but rounding: when one of them touches down, Bullet's step is made again for all."""
+def test_two_pairs_do_not_affect_each_other(measured: MeasurementCheck) -> None:
+    """They differ by rounding only: when one touches down, Bullet's step is repeated for all."""
     pair = {"uav": quadcopter_settings([0.0, 0.0, 0.4]), "usv": vessel_settings([0.0, 0.0])}
     distant = {"uav2": quadcopter_settings([50.0, 0.0, 0.5]), "usv2": vessel_settings([50.0, 0.0])}
     alone, together = WorldHarness(pair).step(100), WorldHarness(pair | distant).step(100)
@@ -152,7 +152,8 @@ def test_vessels_push_each_other() -> None:
     trial = WorldHarness({"a": vessel_settings([0.0, 0.0], velocity_body=[1.0, 0.0, 0.0]), "b": vessel_settings([1.2, 0.0])})
     while not trial["b.contact.touching"]:
         trial.step()
-    assert trial["a.contact.vessel"] and trial["b.contact.vessel"]
+    assert trial["a.contact.vessel"]
+    assert trial["b.contact.vessel"]
     assert trial["b.velocity.x"] > 0.1
     assert trial["a.velocity.x"] + trial["b.velocity.x"] == pytest.approx(1.0, abs=0.02)
 

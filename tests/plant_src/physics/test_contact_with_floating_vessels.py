@@ -23,7 +23,7 @@ def landing(offset: tuple[float, float] = (0.15, 0.1), height: float = 0.02, **m
 
 
 def test_the_weight_on_the_deck_sinks_and_heels_the_vessel(measured: MeasurementCheck) -> None:
-    """Hydrostatics: weight over stiffness, lever arms from where the quadcopter stands."""
+    """Expected values: weight over stiffness, lever arms from the position of the quadcopter."""
     trial = landing().step(500)
     x, y, _ = trial.vector("uav.position") - trial.vector("usv.position")
     heave, roll, pitch = p.STIFFNESS
@@ -89,7 +89,7 @@ def test_the_otter_carries_a_quadcopter_on_its_deck(measured: MeasurementCheck) 
 
 
 @pytest.mark.parametrize("steps", [0, 5, 7, 8, 9, 60, 200])
-def test_a_saved_state_is_returned_to_bit_for_bit_in_waves(steps: int, measured: MeasurementCheck) -> None:
+def test_a_saved_state_is_restored_bit_for_bit_in_waves(steps: int, measured: MeasurementCheck) -> None:
     """In flight, at touchdown, at rest."""
     trial = landing(environment=WAVES).step(steps)
     trial["usv.thrust"] = 1.0

@@ -1,4 +1,4 @@
-"""Without contact vehicles move as their equations say: in the world and as plant FMUs, against an independent integration."""
+"""Motion without contact, in a world and as plant FMUs, against independent equations and integration."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def voyage() -> np.ndarray:
     return reference.integrate(reference.vessel_rate, start, rudder_schedule())
 
 
-def test_quadcopter_flies_as_its_equations_say(flight: np.ndarray, measured: MeasurementCheck) -> None:
+def test_quadcopter_in_a_world_follows_its_equations(flight: np.ndarray, measured: MeasurementCheck) -> None:
     trial = WorldHarness({"uav": {"model": "ar_drone", **QUADCOPTER_START}})
     positions, rates = [], []
     for duration, inputs in rotor_schedule():
@@ -77,7 +77,7 @@ def test_quadcopter_flies_as_its_equations_say(flight: np.ndarray, measured: Mea
     measured("AR.Drone 2.0", "rates in it, world", turning, 0.0, "rad/s", "DOP853", within=1e-6)
 
 
-def test_vessel_sails_as_its_equations_say(voyage: np.ndarray, measured: MeasurementCheck) -> None:
+def test_vessel_in_a_world_follows_its_equations(voyage: np.ndarray, measured: MeasurementCheck) -> None:
     trial = WorldHarness({"usv": {"model": "strider", **VESSEL_START}})
     positions = []
     for duration, inputs in rudder_schedule():
@@ -108,14 +108,14 @@ def initial(start: dict[str, object], skip: str = "") -> dict[str, float]:
     return {f"initial.{name}": value for name, value in (named | {"yaw": start["yaw"]}).items() if name not in skip}
 
 
-def test_quadcopter_fmu_flies_as_its_equations_say(flight: np.ndarray, measured: MeasurementCheck) -> None:
+def test_quadcopter_fmu_follows_its_equations(flight: np.ndarray, measured: MeasurementCheck) -> None:
     fmu = PlantFmu("ar_drone", initial(QUADCOPTER_START))
     names = [*(f"rotor_speed[{k}]" for k in (1, 2, 3, 4)), *LOADS]
     error = deviation(list(positions(fmu, names, "xyz", rotor_schedule())), flight[:, :3])
     measured("AR.Drone 2.0", "place in 10 s of tilting flight, FMU", error, 0.0, "m", "DOP853", within=1e-6)
 
 
-def test_vessel_fmu_sails_as_its_equations_say(voyage: np.ndarray, measured: MeasurementCheck) -> None:
+def test_vessel_fmu_follows_its_equations(voyage: np.ndarray, measured: MeasurementCheck) -> None:
     fmu = PlantFmu("strider", initial(VESSEL_START, skip="velocity_body.w rates.p rates.q"))
     error = deviation(list(positions(fmu, ["thrust", "rudder_angle", *LOADS], "xy", rudder_schedule())), voyage[:, :2])
     measured("Strider, planar", "place in 60 s of rudder steps and a gust, FMU", error, 0.0, "m", "DOP853", within=1e-6)

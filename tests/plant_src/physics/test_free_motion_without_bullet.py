@@ -1,4 +1,4 @@
-"""Free motion without Bullet: it has to be what Bullet would have made of it."""
+"""Free motion without Bullet is the same as with Bullet in every step."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from world_harness import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, WorldHa
 import cosim
 from cosim.results import Result
 from plant_src.physics import clearance
-from plant_src.physics.body import MAX_HEAVE
+from plant_src.physics.vessel_bodies import MAX_HEAVE
 
-EVERYWHERE = 1e9  # m: whatever is closer than this is near
+EVERYWHERE = 1e9  # m; with this near distance all vehicles are near each other
 
 
 def landing() -> WorldHarness:
@@ -31,7 +31,7 @@ def landing() -> WorldHarness:
 
 
 def rows(trial: WorldHarness, steps: int) -> np.ndarray:
-    """What is published after each step."""
+    """Return the outputs after each step."""
     return np.array([np.concatenate([a.astype(float) for a in trial.step().outputs.arrays.values()]) for _ in range(steps)])
 
 
@@ -42,10 +42,10 @@ def always_bullet(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def no_bullet(monkeypatch: pytest.MonkeyPatch) -> None:
-    def asked(*_: object) -> None:
-        raise AssertionError("Bullet was asked")
+    def step(*_: object) -> None:
+        raise AssertionError("Bullet was stepped")
 
-    monkeypatch.setattr(pybullet, "stepSimulation", asked)
+    monkeypatch.setattr(pybullet, "stepSimulation", step)
 
 
 def test_flight_is_the_same_bit_for_bit_and_landing_within_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -58,16 +58,19 @@ def test_flight_is_the_same_bit_for_bit_and_landing_within_rounding(monkeypatch:
 
 
 def error_of_bullet(trial: WorldHarness) -> float:
-    """How far Bullet's bodies are from where the vehicles say (m, rad)."""
-    bodies = [shadow.body_id for shadow in trial.world._fleet.bodies]
+    """Return the largest difference between the poses in Bullet and the published ones (m, rad)."""
+    bodies = [body.body_id for body in trial.world._fleet.bodies]
     (uav, _), (usv, q) = (pybullet.getBasePositionAndOrientation(body, trial.world._client) for body in bodies)
-    found = [*uav, *usv, *pybullet.getEulerFromQuaternion(q)]
-    says = np.concatenate([trial.vector("uav.position"), trial.vector("usv.position"), [0.0, 0.0, trial["usv.attitude.yaw"]]])
-    return float(np.abs(found - says).max())
+    in_bullet = [*uav, *usv, *pybullet.getEulerFromQuaternion(q)]
+    published = np.concatenate(
+        [trial.vector("uav.position"), trial.vector("usv.position"), [0.0, 0.0, trial["usv.attitude.yaw"]]]
+    )
+    return float(np.abs(in_bullet - published).max())
 
 
-def test_bullet_agrees_in_free_flight(always_bullet: None) -> None:
-    """Bullet has carried the bodies all the way."""
+@pytest.mark.usefixtures("always_bullet")
+def test_bullet_agrees_in_free_flight() -> None:
+    """Bullet integrates the bodies in all steps."""
     assert error_of_bullet(landing().step(60)) < 1e-12
 
 
@@ -77,21 +80,21 @@ def test_bullet_agrees_in_contact() -> None:
     assert error_of_bullet(trial) < 2 * MAX_HEAVE
 
 
-def test_bullet_is_not_asked_where_nothing_is_near(request: pytest.FixtureRequest) -> None:
+def test_bullet_is_not_stepped_when_nothing_is_near(request: pytest.FixtureRequest) -> None:
     trial = landing()
     request.getfixturevalue("no_bullet")
     trial.step(30)
 
 
-def test_bullet_is_asked_before_anything_touches(request: pytest.FixtureRequest) -> None:
+def test_bullet_is_stepped_before_anything_touches(request: pytest.FixtureRequest) -> None:
     trial = landing()
     request.getfixturevalue("no_bullet")
-    with pytest.raises(AssertionError, match="Bullet was asked"):
+    with pytest.raises(AssertionError, match="Bullet was stepped"):
         trial.step(100)
     assert 0.0 < trial["uav.position.z"] - DECK_TOP - REST_HEIGHT < 0.3
 
 
-def test_after_take_off_bullet_is_not_asked_any_more(request: pytest.FixtureRequest) -> None:
+def test_after_take_off_bullet_is_no_longer_stepped(request: pytest.FixtureRequest) -> None:
     trial = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT])}, {"start": PLATFORM}).step(20)
     assert trial["uav.contact.touching"]
     trial["uav.rotor_speed"] = [reference.HOVER_SPEED * 1.05] * 4
@@ -101,8 +104,8 @@ def test_after_take_off_bullet_is_not_asked_any_more(request: pytest.FixtureRequ
     assert not trial["uav.contact.touching"]
 
 
-def test_a_body_that_takes_no_part_is_in_nobodys_way() -> None:
-    """The first vehicle leaves the platform; the second lands where Bullet saw the first one last."""
+def test_an_inactive_body_is_no_obstacle() -> None:
+    """The first vehicle leaves the platform; the second lands at the last active pose of the first one in Bullet."""
     place = [0.0, 0.0, PLATFORM_TOP + REST_HEIGHT]
     first, second = quadcopter_settings(place, velocity_body=[0.0, 0.0, 4.0]), quadcopter_settings([0.0, 0.0, 3.0])
     trial = WorldHarness({"first": first, "second": second}, {"start": PLATFORM})
@@ -114,7 +117,7 @@ def test_a_body_that_takes_no_part_is_in_nobodys_way() -> None:
 
 
 def flown(near: float | None, monkeypatch: pytest.MonkeyPatch) -> Result:
-    """Demo 1 with another threshold for taking part."""
+    """Run Demo 1 with another near distance (m)."""
     assembly = cosim.load("demo1_box")
     if near is not None:
         world = assembly.system.components["plant"]
@@ -122,7 +125,9 @@ def flown(near: float | None, monkeypatch: pytest.MonkeyPatch) -> Result:
     return cosim.api.execute(assembly)
 
 
-def test_demo1_lands_at_the_same_place_without_the_shortcut(monkeypatch: pytest.MonkeyPatch, measured: MeasurementCheck) -> None:
+def test_demo1_lands_at_the_same_place_with_bullet_in_every_step(
+    monkeypatch: pytest.MonkeyPatch, measured: MeasurementCheck
+) -> None:
     shortcut, bullet = flown(None, monkeypatch), flown(EVERYWHERE, monkeypatch)
     assert np.array_equal(shortcut["uav.vtol.mode"], bullet["uav.vtol.mode"])
     for axis in "xyz":

@@ -1,4 +1,4 @@
-"""Multirotors of all sizes stand on what is below them."""
+"""Contact of multirotors of all sizes with platforms and decks."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def test_the_platform_carries_its_weight(model: str) -> None:
     assert dropped(model)["uav.contact.force"] == pytest.approx(MASS[model] * 9.81, rel=1e-3)
 
 
-def test_a_planar_deck_does_not_give_way_to_what_is_heavier_than_its_vessel() -> None:
-    """Bullet's vessel of 4.11 kg could; after the blow the feet rise out of the deck by 8 % a step, as they do on a platform."""
+def test_a_planar_deck_carries_a_vehicle_heavier_than_its_vessel() -> None:
+    """The deck behaves as a platform, although Bullet's vessel has 4.11 kg: the feet rise out of it by 8 % per step."""
     vehicles = {"usv": vessel_settings([0.0, 0.0]), "uav": {"model": "survey_hexacopter", "velocity_body": [0.0, 0.0, -0.3]}}
     heights, decks = {"deck": DECK_TOP, "platform": PLATFORM_TOP}, {}
     for deck, height in heights.items():

@@ -1,4 +1,4 @@
-"""Determinism and return to saved states, bit for bit."""
+"""Determinism and restoring of saved states, bit for bit."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def mission() -> WorldHarness:
 
 
 def visit() -> WorldHarness:
-    """Drop from 0.6 m onto the deck, take-off: Bullet takes part from the 34th step to the 81st."""
+    """Drop from 0.6 m onto the deck, take-off: Bullet is active from the 34th step to the 81st."""
     trial = WorldHarness(
         {"uav": quadcopter_settings([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.6]), "usv": vessel_settings([0.0, 0.0])}
     )
@@ -36,7 +36,7 @@ def visit() -> WorldHarness:
 
 
 @pytest.mark.parametrize("steps", [0, 20, 30, 45, 60])
-def test_a_state_is_returned_to_from_where_bullet_takes_part_or_not(steps: int) -> None:
+def test_a_state_is_restored_whether_bullet_is_active_or_not(steps: int) -> None:
     trial = visit().step(steps)
     state, before = trial.world.get_state(), trial.bytes
 
@@ -55,7 +55,7 @@ def test_a_state_is_returned_to_from_where_bullet_takes_part_or_not(steps: int) 
 
 
 @pytest.mark.parametrize("steps", [0, 5, 17, 18, 19, 20, 60, 200])
-def test_a_saved_state_is_returned_to_bit_for_bit(steps: int, measured: MeasurementCheck) -> None:
+def test_a_saved_state_is_restored_bit_for_bit(steps: int, measured: MeasurementCheck) -> None:
     trial = mission().step(steps)
     state, before = trial.world.get_state(), trial.bytes
     expected = [trial.step().bytes for _ in range(40)]

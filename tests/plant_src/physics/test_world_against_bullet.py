@@ -1,4 +1,4 @@
-"""The world against Bullet alone: forces from the reference equations, integrated and resolved by Bullet itself."""
+"""The world against plain Bullet, which integrates the forces of the reference equations itself."""
 
 from __future__ import annotations
 

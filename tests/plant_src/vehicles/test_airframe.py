@@ -1,4 +1,4 @@
-"""The data of multirotors: what is impossible is refused where it is written down, all of it at once."""
+"""Airframes: physically impossible data are refused, all problems together."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ FAULTS = [
         {"inertia": np.diag([1.0, 1.0, 3.0])},
         r"inertia: found the principal moments \[1.0, 1.0, 3.0\], expected none greater than the sum",
     ),
-    ({"inertia": np.diag([1.0, -1.0, 1.0])}, "expected them greater than 0"),
+    ({"inertia": np.diag([1.0, -1.0, 1.0])}, "expected all greater than 0"),
     ({"inertia": np.array([[1, 0.5, 0], [0, 1, 0], [0, 0, 1]])}, "expected a symmetric tensor"),
     ({"inertia": np.eye(2)}, "expected 3 rows of 3 finite numbers"),
     ({"rotors": ()}, "rotors: found none"),
-    ({"rotors": (Rotor("nose", (0.1, 0.0, 0.0), 0.5),)}, r"rotors\[1\].sense: found 0.5, expected 1 or -1"),
+    ({"rotors": (Rotor("nose", (0.1, 0.0, 0.0), 0.5),)}, r"rotors\[1\].torque_sign: found 0.5, expected 1 or -1"),
     ({"rotors": (Rotor("nose", (0.1, 0.0, 0.0), 1.0, (0.0, 0.0, 2.0)),)}, r"rotors\[1\].axis: .* expected a unit vector"),
     ({"effects": RotorEffects(body_drag=(0.0, -0.1, 0.0))}, "effects.body_drag: found .* expected finite numbers of at least 0"),
 ]
@@ -53,7 +53,7 @@ def test_principal_axes_make_the_inertia_diagonal(seed: int) -> None:
     moments, axes = with_inertia(tensor).principal_axes()
     assert axes @ np.diag(moments) @ axes.T == pytest.approx(tensor, abs=1e-12)
     assert np.linalg.det(axes) == pytest.approx(1.0)
-    assert np.trace(axes) > 0  # turned by less than 120 degrees: `shapes.quaternion` can have it
+    assert np.trace(axes) > 0  # angle less than 120 degrees, as `shapes.quaternion_from_matrix` requires
 
 
 @pytest.mark.parametrize("name", ["ar_drone", "crazyflie", "survey_hexacopter"])

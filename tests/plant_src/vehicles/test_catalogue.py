@@ -1,4 +1,4 @@
-"""The catalogue says of each model what its equations say."""
+"""The catalogue agrees with the equations of each model."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fmpy import read_model_description
 from cosim.core import resources
 from plant_src.catalogue import MODELS, VEHICLE_MODELS
 from plant_src.vehicles.common.interface import ENVIRONMENT_INPUTS
-from plant_src.vehicles.multirotor import multirotor_equations
+from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations
 
 ALL = pytest.mark.parametrize("name", MODELS)
 
@@ -29,7 +29,7 @@ def test_the_fmu_has_the_variables_of_the_catalogue(name: str) -> None:
 
 
 @ALL
-def test_surroundings_come_last_among_the_inputs(name: str) -> None:
+def test_environment_inputs_come_last_among_the_inputs(name: str) -> None:
     inputs = [variable.name in ENVIRONMENT_INPUTS for variable in MODELS[name].interface if variable.causality == "input"]
     assert inputs == sorted(inputs)
 
@@ -37,11 +37,11 @@ def test_surroundings_come_last_among_the_inputs(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.constant_count is not None])
 def test_the_number_of_constants_is_that_of_the_equations(name: str) -> None:
     model, module = MODELS[name], equations(name)
-    constants = multirotor_equations.derive_constants if model.airframe else module.VESSEL.constants
-    assert constants(ca.SX.sym("parameters", len(model.slots("parameter")))).numel() == model.constant_count
+    constants = MultirotorEquations(model.airframe).constants if model.airframe else module.VESSEL.constants
+    assert constants.vector(ca.SX.sym("parameters", len(model.slots("parameter")))).numel() == model.constant_count
 
 
-def test_strider_moves_in_the_plane_unless_told_otherwise() -> None:
+def test_strider_moves_in_the_plane_by_default() -> None:
     assert [model.name for model in VEHICLE_MODELS["strider"].values()] == ["strider", "strider_6dof"]
     assert next(iter(VEHICLE_MODELS["strider"])) == "planar"
     assert list(VEHICLE_MODELS["otter"]) == ["6dof"]

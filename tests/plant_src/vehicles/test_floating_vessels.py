@@ -33,7 +33,7 @@ def afloat(**more: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("duration", [2.0, pytest.param(60.0, marks=pytest.mark.long)])
-def test_catamaran_in_waves_and_current_moves_as_its_equations_say(duration: float, measured: MeasurementCheck) -> None:
+def test_catamaran_in_waves_and_current_follows_its_equations(duration: float, measured: MeasurementCheck) -> None:
     """Turning by the rudder, against an eighth-order method."""
     times = np.arange(1.0, duration + 1)
     reference = Catamaran(sea(WATERS), thrust=1.0, rudder=0.15, current=(0.2, -0.1), wind=(-3.0, 1.0, 0.0))
@@ -118,7 +118,7 @@ def test_water_carries_a_vessel_along_sideways(model: dict[str, str], measured: 
 
 @pytest.mark.parametrize("motion", ["planar", "6dof"])
 def test_wind_pushes_as_hard_as_the_same_speed_through_still_air(motion: str, measured: MeasurementCheck) -> None:
-    """At rest in a wind of 4 m/s the thrust has to hold against the drag at 4 m/s, 0.1 kg/m times its square."""
+    """At rest in a wind of 4 m/s the thrust balances the drag at 4 m/s, 0.1 kg/m times its square."""
     trial = WorldHarness({"usv": vessel_settings([0.0, 0.0], motion=motion)}, environment={"wind": {"velocity": [4.0, 0.0, 0.0]}})
     trial["usv.thrust"] = -0.1 * 4.0**2
     trial.step(200)

@@ -1,4 +1,4 @@
-"""Each effect on a multirotor by itself, against its closed form."""
+"""Each effect on a multirotor separately, against its closed form."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from plant_fmu import PlantFmu
 from plant_validation import MeasurementCheck
 
 from plant_src.vehicles.crazyflie.parameters import AIRFRAME
-from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations, derive_constants
+from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations
 
 CRAZYFLIE, HEXACOPTER = VEHICLES["crazyflie"], VEHICLES["survey_hexacopter"]
 IMAGES = "Sanchez-Cuevas et al. 2017"
@@ -90,7 +90,7 @@ def test_rotors_follow_a_step_of_their_command_with_a_first_order_lag(measured: 
 
 
 @pytest.mark.parametrize("lag", [1e-9, 1e-5])
-def test_a_lag_much_shorter_than_a_step_is_stable_and_like_none(lag: float) -> None:
+def test_a_lag_much_shorter_than_a_step_is_stable_and_has_no_effect(lag: float) -> None:
     found = []
     for time_constant in (lag, 0.0):
         fmu = PlantFmu("crazyflie", {**STILL, "rotor_time_constant": time_constant, "initial_rotor_speed": CRAZYFLIE.hover_speed})
@@ -186,7 +186,7 @@ def test_spinning_rotors_turn_a_pitching_body_about_its_roll_axis(measured: Meas
     )
 
 
-def test_rotors_that_spin_up_turn_the_body_the_other_way() -> None:
+def test_accelerating_rotors_turn_the_body_in_the_opposite_direction() -> None:
     inertia, lag, speed, moment = 3.5e-4, 0.05, 400.0, 1e-6
     speeds = {f"rotor_speed[{number}]": speed for number in (2, 4, 6)}
     without, with_rotors = (
@@ -197,7 +197,7 @@ def test_rotors_that_spin_up_turn_the_body_the_other_way() -> None:
 
 
 def test_without_effects_shorter_code_gives_the_same_flight() -> None:
-    """An effect too small to matter has the long code run."""
+    """A negligible effect selects the longer function."""
     found = []
     for drag in (0.0, 1e-200):
         fmu = PlantFmu("ar_drone", {**HIGH, "initial.rates.p": 1.0, "body_drag.x": drag})
@@ -214,8 +214,9 @@ def test_the_rate_of_the_state_is_the_derivative_of_a_step() -> None:
     inputs = np.concatenate([1600 + random.standard_normal(4), 0.01 * random.standard_normal(6), [1, 2, 3], [0.05]])
     body = [AIRFRAME.mass, *np.diag(AIRFRAME.inertia), 0.0, 0.0, 0.0]
     effects = [0.07, 5e-8, 1e-6, 2e-6, 1e-6, 0.01, 0.02, 0.03, 1.0]
-    parameters = derive_constants(ca.DM([*np.zeros(10), *body, 0.0, *effects])).full().ravel()
-    equations, symbols = MultirotorEquations(AIRFRAME), [ca.SX.sym("", len(vector)) for vector in (state, inputs, parameters)]
-    rate = ca.Function("rate", symbols, [equations.rate(*symbols)])(state, inputs, parameters)
-    after = ca.Function("after", symbols, [equations.step_with_effects(*symbols, ca.SX(moment))])(state, inputs, parameters)
+    equations = MultirotorEquations(AIRFRAME)
+    constants = ca.DM(equations.constants.vector(ca.SX([*np.zeros(10), *body, 0.0, *effects]))).full().ravel()
+    symbols = [ca.SX.sym("", len(vector)) for vector in (state, inputs, constants)]
+    rate = ca.Function("rate", symbols, [equations.rate(*symbols)])(state, inputs, constants)
+    after = ca.Function("after", symbols, [equations.step_with_effects(*symbols, ca.SX(moment))])(state, inputs, constants)
     assert ((after - state) / moment).full().ravel() == pytest.approx(rate.full().ravel(), rel=1e-3, abs=1e-3)

@@ -1,4 +1,4 @@
-"""Multirotors with rotor lag, drag, wind and ground effect fly as an independent integration of their data sheets says."""
+"""Multirotors with rotor lag, drag, wind and ground effect against an independent implementation of their data sheets."""
 
 from __future__ import annotations
 

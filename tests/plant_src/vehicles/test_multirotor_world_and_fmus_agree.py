@@ -1,4 +1,4 @@
-"""A multirotor is the same in the world and as plant FMU of either version, in wind and with all effects."""
+"""Multirotors in a world and as plant FMUs of both FMI versions agree, with wind and all effects."""
 
 from __future__ import annotations
 

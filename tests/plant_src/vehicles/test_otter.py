@@ -1,4 +1,4 @@
-"""The Otter against the values of Fossen's Marine Systems Simulator, and against an implementation of its own."""
+"""The Otter against values of Fossen's Marine Systems Simulator and an independent implementation."""
 
 from __future__ import annotations
 
@@ -72,8 +72,8 @@ def test_mass_matrix(measured: MeasurementCheck) -> None:
     model = equations.VESSEL.create_continuous_model(equations.OtterModel)
     parameters = np.concatenate([np.ravel(v.start) for v in model.variables if v.causality == "parameter"])
     assert model.derived_parameters is not None
-    inverse = casadi.DM(equations.VESSEL.constants_by_name(model.derived_parameters(casadi.SX(parameters)))["inverse"])
-    diagonal = np.diag(np.linalg.inv(inverse.full()))
+    constants = equations.VESSEL.constants.by_name(model.derived_parameters(casadi.SX(parameters)))
+    diagonal = np.diag(np.linalg.inv(casadi.DM(constants["inverse_mass_matrix"]).full()))
     golden = [85.282, 162.500, 135.000, 17.657, 32.894, 40.045]
     measured("Otter", "diagonal of the mass matrix", diagonal, golden, "kg, kg.m2", GOLDEN, within=5e-4)
 
@@ -124,7 +124,7 @@ def test_current_carries_it_like_the_independent_implementation(measured: Measur
 
 
 @pytest.mark.parametrize(("speed", "force"), [(200.0, 24.4 * 9.81), (-200.0, -13.6 * 9.81)])
-def test_motors_reach_no_more_than_their_bollard_pull(speed: float, force: float) -> None:
+def test_thrust_is_limited_to_the_bollard_pull(speed: float, force: float) -> None:
     """The first step from rest without lag: force over mass."""
     trial = run(otter(parameters={"propeller_time_constant": 0.0}), speed, speed, 1)
     slow = run(otter(parameters={"propeller_time_constant": 0.0}), np.sign(speed) * 10.0, np.sign(speed) * 10.0, 1)

@@ -1,4 +1,4 @@
-"""The Otter's turning circle and zig-zag as scenarios, their measures against the independent implementation in numpy."""
+"""Turning circle and zig-zag scenarios of the Otter against the independent implementation in NumPy."""
 
 import math
 
@@ -38,7 +38,7 @@ def passing(values, level):
 
 @pytest.fixture(scope="module")
 def circle():
-    x, y, psi = rows(lambda psi: (100.0, 60.0)).T
+    x, y, psi = rows(lambda _psi: (100.0, 60.0)).T
     quarter, half, t = passing(psi, math.pi / 2), passing(psi, math.pi), np.arange(len(psi)) * STEP
     x, y = x - x[0], y - y[0]
     return {

@@ -1,4 +1,4 @@
-"""A vessel is the same in the world and as plant FMU of either version, in waves, wind and current."""
+"""Vessels in a world and as plant FMUs of both FMI versions agree, in waves, wind and current."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WATERS = {
     "wind": {"velocity": [3.0, -2.0, 0.0]},
     "current": {"velocity": [0.2, 0.1]},
 }
-SURROUNDINGS = {"wind.x": 3.0, "wind.y": -2.0, "wind.z": 0.0, "current.x": 0.2, "current.y": 0.1}
+ENVIRONMENT_VALUES = {"wind.x": 3.0, "wind.y": -2.0, "wind.z": 0.0, "current.x": 0.2, "current.y": 0.1}
 START = {"initial.position.x": 1.0, "initial.position.y": 2.0, "initial.yaw": 0.5, "initial.velocity_body.u": 0.4}
 VESSELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "strider": ({"model": "strider"}, {"thrust": 1.0, "rudder_angle": 0.1}),
@@ -43,18 +43,18 @@ MOTION = [
 
 
 def scalars(values: dict[str, Any]) -> dict[str, float]:
-    """With "name[1]", "name[2]" in place of lists."""
+    """Replace lists by scalars "name[1]", "name[2]"."""
     lists = {f"{name}[{k}]": x for name, xs in values.items() if isinstance(xs, list) for k, x in enumerate(xs, 1)}
     return {name: x for name, x in values.items() if not isinstance(x, list)} | lists
 
 
 def parameters(model: str) -> dict[str, Any]:
-    """What the environment makes of a model's surroundings, and the start."""
+    """Return the environment inputs that the world's environment gives, and the initial state."""
     vehicle, inputs = VESSELS[model]
     waves = sea(WATERS)
     arrays = {name: getattr(waves, name).tolist() for name in ("amplitude", "frequency", "direction", "phase")}
     table = {"wave.count": float(len(waves.amplitude)), **{f"wave.{name}": values for name, values in arrays.items()}}
-    return {**START, **SURROUNDINGS, **inputs, **vehicle.get("parameters", {}), **(table if model != "strider" else {})}
+    return {**START, **ENVIRONMENT_VALUES, **inputs, **vehicle.get("parameters", {}), **(table if model != "strider" else {})}
 
 
 def scenario(model: str) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What hulls feel of waves: limits of long and short waves, and the arithmetic behind."""
+"""Wave loads: limits of long and short waves, and the elementary functions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def swell(height: float, period: float, direction: float = 0.0) -> dict[str, Any
 @pytest.mark.parametrize("vehicle", VESSELS)
 @pytest.mark.parametrize("direction", [0.0, 1.2])
 def test_long_waves_carry_the_hull(vehicle: dict[str, Any], direction: float, measured: MeasurementCheck) -> None:
-    """It rises with the water and lies on its slopes: waves of 150 m and more."""
+    """It follows elevation and slopes of waves of 150 m and more."""
     trial = WorldHarness({"usv": {**vehicle, "position": [0.0, 0.0]}}, environment=swell(0.5, 10.0, direction))
     calm = WorldHarness({"usv": {**vehicle, "position": [0.0, 0.0]}})
     rise, water, heel = [], [], []
@@ -52,7 +52,7 @@ def test_long_waves_carry_the_hull(vehicle: dict[str, Any], direction: float, me
 
 
 def test_short_waves_pass_under_the_hull() -> None:
-    """Waves of 0.4 m length, half that of the hull, leave it within a fiftieth of their height."""
+    """Waves of 0.4 m length, half that of the hull, move it by less than a fiftieth of their height."""
     trial = WorldHarness({"usv": vessel_settings([0.0, 0.0], motion="6dof")}, environment=swell(0.1, 0.5))
     heights = [trial.step()["usv.position.z"] for _ in range(500)]
     assert np.ptp(heights) < 0.002
@@ -65,7 +65,7 @@ def test_gain_scales_the_waves() -> None:
     assert half == pytest.approx(full / 2, abs=0.01 * np.abs(full).max())
 
 
-def test_the_hull_feels_what_linear_theory_says(measured: MeasurementCheck) -> None:
+def test_wave_kinematics_agree_with_linear_theory(measured: MeasurementCheck) -> None:
     """Against the functions of numpy: elevation, slopes, velocity, acceleration."""
     random, count = np.random.default_rng(1), 5
     frequency = random.uniform(1.0, 7.0, count)

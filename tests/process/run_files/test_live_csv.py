@@ -1,4 +1,4 @@
-"""The file that grows while a run goes on has the same bytes as the final one."""
+"""CSV file of a run in progress: same bytes as the final file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ TEXTS = {0: {"first": "a"}, 7: {"last": 'quoted, "x"'}, 600: {"first": "", "last
 
 @pytest.fixture
 def table() -> np.ndarray:
-    """Random bits in all types, with room between some fields, not finite numbers among them."""
+    """Random bits in all types, with gaps between some fields and non-finite numbers."""
     offsets = [0, 8, 12, 13, 24, 32]
     dtype = np.dtype({"names": list(KINDS), "formats": list(KINDS.values()), "offsets": offsets, "itemsize": 48})
     rows = np.random.default_rng(5).integers(0, 256, ROWS_COUNT * 48, dtype=np.uint8).view(dtype)
@@ -36,7 +36,7 @@ def table() -> np.ndarray:
 
 
 def header(table: np.ndarray) -> RowsHeader:
-    """As the run describes its rows; one signal is recorded under two names."""
+    """Header of the rows; one signal is recorded under two names."""
     fields = {name: table.dtype.fields[name] for name in table.dtype.names}
     columns = [Column(name, kind.str, offset, kind.kind == "b", "") for name, (kind, offset) in fields.items()]
     twin = Column("twin", "<i8", fields["whole"][1], False, "")
@@ -65,7 +65,7 @@ def write_texts(run: Path) -> None:
 
 
 def running(table: np.ndarray, folder: Path) -> Journal:
-    """The journal of a run in its loop, whose rows all lie in its file already."""
+    """Journal of a run in the stepping loop whose rows are all in the file."""
     run = folder / "run"
     run.mkdir()
     (run / HEADER_FILE).write_text(json.dumps(asdict(header(table))))
@@ -87,7 +87,7 @@ def test_lines_have_the_format_of_results(table, tmp_path):
     assert text == expected(table, tmp_path, ROWS_COUNT)
 
 
-def test_the_file_is_whole_at_every_moment_even_when_an_update_is_interrupted(table, tmp_path, monkeypatch):
+def test_the_file_is_complete_even_if_an_update_is_interrupted(table, tmp_path, monkeypatch):
     monkeypatch.setattr("cosim.process.run_files.live_csv_writer.FIRST_UPDATE_DELAY", 0.0)
     monkeypatch.setattr("cosim.process.run_files.live_csv_writer.UPDATE_INTERVAL", 0.0)
     journal = running(table, tmp_path)
@@ -108,8 +108,8 @@ def interrupt() -> bytes:
     raise KeyboardInterrupt
 
 
-def test_texts_are_followed_as_they_are_written(table, tmp_path):
-    """The last line is not whole yet; later it is, and an earlier row is asked for again."""
+def test_strings_are_read_while_they_are_written(table, tmp_path):
+    """The last line is incomplete at first; afterwards an earlier row is read again."""
     write_texts(tmp_path)
     file = tmp_path / TEXTS_FILE
     whole = file.read_bytes()
@@ -123,7 +123,7 @@ def test_texts_are_followed_as_they_are_written(table, tmp_path):
 
 
 def test_the_final_file_is_not_replaced(table, tmp_path):
-    """An update that comes too late, when the run has left its loop."""
+    """The update comes after the run has left the stepping loop."""
     journal, final = running(table, tmp_path), tmp_path / "result.csv"
     journal[ROW_COUNT] = 10
     csv = LiveCsvWriter(journal)

@@ -1,4 +1,4 @@
-"""Where rows lie: in memory, in the file that was asked for, or in one that nobody sees."""
+"""Row stores in memory, in a given file and in a temporary file."""
 
 from fractions import Fraction
 
@@ -7,7 +7,8 @@ import pytest
 from fakes import counter
 from systems import endpoint, make_system
 
-from cosim.engine.run_loop import Settings, simulate
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Settings
 from cosim.process.run_files.row_store import read_rows
 from cosim.results.csv_files import read_csv, write_csv
 
@@ -37,13 +38,13 @@ def test_many_rows_are_kept_in_a_file_and_are_the_same(small_chunks):
     assert recording.columns["a.n"].tolist() == list(range(STEPS + 1))
 
 
-def test_sparse_rows_of_many_have_their_times(small_chunks):
+def test_rows_of_every_nth_step_have_the_right_times(small_chunks):
     recording = recorded(every=3)
     assert recording.time.tolist() == [n / 100 for n in range(0, STEPS + 1, 3)]
     assert recording.columns["a.y"].tolist() == list(range(0, STEPS + 1, 3))
 
 
-def test_rows_lie_in_the_file_that_was_asked_for(tmp_path):
+def test_rows_are_stored_in_the_given_file(tmp_path):
     recording = recorded(rows_file=tmp_path / "rows")
     dtype = np.dtype([("y", np.float64), ("n", np.int32), ("gap", np.int32)])
     assert read_rows(tmp_path / "rows", dtype, STEPS + 1)["n"].tolist() == recording.columns["a.n"].tolist()
@@ -57,7 +58,7 @@ def test_csv_is_written_from_a_file_of_rows(small_chunks, tmp_path):
     assert again.columns["a.y"].tolist() == recording.columns["a.y"].tolist()
 
 
-def test_no_signals_make_rows_without_bytes(tmp_path):
+def test_rows_without_signals_have_no_bytes(tmp_path):
     settings = Settings(Fraction(0), Fraction(1), Fraction(1, 100), rows_file=tmp_path / "rows")
     recording = simulate(make_system({"a": counter()}), settings).recording
     assert len(recording.time) == 101

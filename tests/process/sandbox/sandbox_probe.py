@@ -1,4 +1,4 @@
-"""A component that tries what it may not do, and prints what came of it."""
+"""Component that tries forbidden operations and prints their outcome."""
 
 import json
 import os
@@ -16,7 +16,7 @@ def attempt(act):
 
 
 class SandboxProbe(Fmi2Slave):
-    """`private`, `own` (files), `port` and `process` are what it goes for."""
+    """Targets of the forbidden operations: files `private` and `own`, `port`, `process`."""
 
     def __init__(self, private, own, port, process, **arguments):
         super().__init__(**arguments)

@@ -1,4 +1,4 @@
-"""Worker processes under a sandbox try what they may not do; each test runs real processes."""
+"""Forbidden operations of worker processes in a sandbox; each test runs real processes."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ print(json.dumps(outcome, default=str))
 
 
 def worker(expression: str, **settings: object) -> object:
-    """What the expression came to in a process under a sandbox: its value or the name of its exception."""
+    """Evaluate an expression in a sandboxed process; return its value or the name of its exception."""
     words = [sys.executable, "-c", WORKER, json.dumps(settings, default=str), expression]
     done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 0, done.stderr
@@ -130,7 +130,7 @@ class TestNetwork:
         assert worker("socket.create_server(('127.0.0.1', 0))") == "PermissionError"
 
     def test_udp_is_not_blocked_by_landlock(self):
-        """A documented limit: who needs more takes the strict mode."""
+        """A documented limit of Landlock; the strict mode has no such limit."""
         with listener(socket.SOCK_DGRAM) as server:
             assert worker(SEND.format(port=server.getsockname()[1])) == 3
 
@@ -162,7 +162,7 @@ class TestLimits:
         assert json.loads(done.stdout) == ""
 
     def test_the_process_says_what_holds(self):
-        """What is said was tried out: a confined process cannot list the root folder."""
+        """A confined process cannot list the root folder."""
         said = worker("__import__('dataclasses').asdict(probe_restrictions())", memory=2 << 30, open_files=99, confine="available")
         assert said["files_confined"] is (AVAILABLE.landlock > 0)
         assert said["tcp_closed"] is (AVAILABLE.landlock >= landlock.NETWORK_ABI)
@@ -204,7 +204,7 @@ def test_a_worker_does_not_outlive_its_parent():
 
 
 @needs_landlock
-def test_a_folder_that_is_not_there_is_refused(tmp_path):
+def test_a_missing_folder_is_refused(tmp_path):
     with pytest.raises(InputError, match="nowhere does not exist"):
         enter_sandbox(SandboxSettings(readable=(tmp_path / "nowhere",)))
     assert not probe_restrictions().files_confined
@@ -226,7 +226,7 @@ def test_a_network_that_the_kernel_cannot_close_is_refused(monkeypatch):
 
 
 def strict(code: str, **folders: list[Path]) -> subprocess.CompletedProcess[str]:
-    """A Python program in strict mode."""
+    """Run a Python program in strict mode."""
     readable = [*interpreter_folders(), *folders.get("readable", [])]
     words = bubblewrap_command([sys.executable, "-c", code], readable, folders.get("writable", []))
     return subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
@@ -251,7 +251,7 @@ class TestStrict:
         assert strict(f"open({str(tmp_path / 'file')!r}, 'w')", readable=[tmp_path]).returncode == 1
 
     def test_orphans_end_with_the_worker(self, tmp_path):
-        """A grandchild in a session of its own would write a file after half a second."""
+        """A grandchild in another session would write a file after half a second."""
         late = tmp_path / "late"
         child = f"import time; time.sleep(0.5); open({str(late)!r}, 'w')"
         done = strict(

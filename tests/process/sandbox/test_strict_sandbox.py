@@ -1,4 +1,4 @@
-"""`--sandbox strict`: not only FMUs, the whole command sees and reaches nothing but what it needs."""
+"""`--sandbox strict`: the whole command is confined, not only FMUs."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def cosim(folder: Path, *arguments: object, **variables: str) -> subprocess.Comp
 
 @pytest.fixture
 def server():
-    """Listens at one port to TCP and UDP; what came by UDP is read at once or not at all."""
+    """Server at one TCP and UDP port; reads UDP without waiting."""
     with socket.socket() as stream, socket.socket(type=socket.SOCK_DGRAM) as datagrams:
         stream.bind(("127.0.0.1", 0))
         stream.listen()
@@ -50,7 +50,7 @@ def server():
 
 @pytest.fixture
 def home(tmp_path):
-    """A folder with a scenario in a folder of its own, and a private file beside it."""
+    """Folder with a scenario in a subfolder and a private file beside it."""
     (tmp_path / "project").mkdir()
     (tmp_path / "private.txt").write_text("secret")
     shutil.copy(Path(__file__).with_name("sandbox_probe.py"), tmp_path / "project")
@@ -97,8 +97,8 @@ def test_the_run_writes_its_results_and_reaches_nothing_else(home, server):
     assert list((home / "tmp").iterdir()) == []
 
 
-def test_without_it_the_same_run_reaches_everything(home, server):
-    """Or the test above would prove nothing."""
+def test_without_sandbox_the_same_run_reaches_everything(home, server):
+    """Control experiment for the test above."""
     done = cosim(home, "run", prowling(home, server.getsockname()[1]), "--output-dir", "out", "--no-report")
     found = report(done)
     assert (found["read a private file"], found["connect"], found["send"], found["signal"]) == ("secret", "connected", 3, None)
@@ -122,14 +122,14 @@ def test_a_refused_scenario_leaves_no_folder(home):
     assert not (home / "new").exists()
 
 
-def test_without_bubblewrap_it_is_refused_before_anything_runs(home, tmp_path):
+def test_strict_sandbox_without_bubblewrap_is_refused_before_the_run(home, tmp_path):
     done = cosim(home, "run", prowling(home), "--sandbox", "strict", PATH=str(tmp_path))
     assert done.returncode == 2
     assert done.stderr.startswith("the strict sandbox needs bubblewrap")
     assert not (home / "runs").exists()
 
 
-def test_a_bubblewrap_that_starts_nothing_is_no_success(home):
+def test_a_bubblewrap_that_does_not_start_the_command_is_a_failure(home):
     (home / "bwrap").write_text("#!/bin/sh\nexit 0\n")
     (home / "bwrap").chmod(0o755)
     done = cosim(home, "run", prowling(home), "--sandbox", "strict", PATH=f"{home}:/bin")
@@ -137,7 +137,7 @@ def test_a_bubblewrap_that_starts_nothing_is_no_success(home):
     assert not (home / "runs").exists()
 
 
-def test_one_fmu_alone(home, probe):
+def test_strict_sandbox_of_a_single_fmu(home, probe):
     done = cosim(home, "simulate", probe, "--output-file", "out/x.csv", "--sandbox", "strict")
     assert done.returncode == 0, done.stderr
     free = cosim(home, "simulate", probe, "--output-file", "free.csv")
@@ -146,7 +146,7 @@ def test_one_fmu_alone(home, probe):
 
 
 def slow(home: Path) -> subprocess.Popen[str]:
-    """A run that keeps pace with the clock, so that it lasts, and has written rows."""
+    """Long real-time run that has written rows."""
     order = ("run", prowling(home, stop_time=1000), "--output-dir", "out", "--no-report", "--sandbox", "strict", "--real-time")
     (home / "tmp").mkdir()
     environment = {**os.environ, "TMPDIR": str(home / "tmp"), "MARK": str(home)}
@@ -158,7 +158,7 @@ def slow(home: Path) -> subprocess.Popen[str]:
 
 
 def marked(home: Path) -> list[str]:
-    """Processes of the run, by their environment."""
+    """Return the processes of the run, found by their environment."""
     found = []
     for entry in Path("/proc").iterdir():
         try:

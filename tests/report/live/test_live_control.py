@@ -13,7 +13,8 @@ import cosim.report.live.feed
 from cosim.core.component import Variable
 from cosim.core.errors import ComponentError
 from cosim.core.time_grid import TimeGrid
-from cosim.engine.run_loop import Event, Settings, simulate
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Event, Settings
 from cosim.process.run_files.folder import Column, RowsHeader
 from cosim.report.live.control import LiveControl
 from cosim.report.live.feed import RowFeed

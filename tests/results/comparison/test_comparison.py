@@ -1,4 +1,4 @@
-"""What a comparison says: which signals fail, why, which of them first."""
+"""Comparison with a reference: failing signals, reasons, order."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_a_run_is_equal_to_itself():
     assert str(comparison) == "all 3 signals stay in their tubes"
 
 
-def test_the_message_says_which_left_first_when_and_by_how_much():
+def test_message_names_first_signal_time_and_distance():
     late, early = np.where(TIME >= 7, 0.5, 0), np.where(TIME >= 3, 0.25, 0) + np.where(TIME == 4, 0.5, 0)
     result = recorded(units={"a.y": "m"}, a__x=-late, a__y=TIME + early)
     reference = recorded(a__x=np.zeros(101), a__y=TIME)
@@ -51,7 +51,7 @@ def test_a_missing_signal_fails():
     assert failures(less) == ['a.y is missing; did you mean "a.x"?']
 
 
-def test_a_signal_that_the_reference_does_not_know_is_no_failure():
+def test_additional_signals_of_the_result_are_ignored():
     assert compare(changed(c=TIME), REFERENCE, EXACT).passed
 
 
@@ -69,20 +69,20 @@ def test_a_longer_result_is_compared_where_the_reference_is():
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_what_is_not_finite_fails_however_wide_the_tube(value):
+def test_non_finite_values_fail_in_any_tube(value):
     spoilt = np.where(TIME == 4.2, value, TIME)
     wide = {"*": Tolerance(1e300, 1, 100)}
     assert failures(changed(a__y=spoilt), wide) == [f"a.y is {value} at t = 4.2 s in the result"]
     assert failures(REFERENCE, wide, changed(a__y=spoilt)) == [f"a.y is {value} at t = 4.2 s in the reference"]
 
 
-def test_what_is_not_finite_before_the_reference_begins_does_not_matter():
+def test_non_finite_values_before_the_reference_are_ignored():
     longer = np.arange(-50, 101) / 10
     assert compare(recorded(longer, a__y=np.where(longer < 0, np.nan, longer)), REFERENCE, {"a.y": Tolerance(1e-9)}).passed
 
 
-def test_what_is_not_finite_is_found_between_rows_too():
-    """The reference begins between a row that is NaN and one that is not."""
+def test_non_finite_interpolated_values_fail():
+    """The reference begins between a row with NaN and a finite one."""
     result = recorded([-0.05, 0.05, 10], a__y=[np.nan, 0.05, 10])
     assert failures(result, {"a.y": Tolerance(9, 9, 9)}) == ["a.y is nan at t = 0 s in the result"]
 
@@ -103,20 +103,20 @@ def test_a_pattern_without_a_signal_fails():
     ]
 
 
-def test_a_time_tolerance_forgives_a_late_switch():
+def test_time_tolerance_permits_a_late_switch():
     late = changed(b__x=TIME > 5.3)
     assert compare(late, REFERENCE, {"*": Tolerance(time=0.3)}).passed
     assert failures(late, {"*": Tolerance(time=0.1)})[0].startswith("b.x leaves its tube at t = 5.2 s: 0 is 1 below 1;")
 
 
-def test_a_coarse_result_misses_nothing():
+def test_a_coarse_result_is_compared_at_rows_of_the_reference():
     peak = recorded(x=np.where(TIME == 5.5, 1.0, 0.0))
     coarse = recorded(TIME[::10], x=np.zeros(11))
     (failure,) = failures(coarse, {"x": Tolerance(0.5)}, peak)
     assert failure.startswith("x leaves its tube at t = 5.5 s: 0 is 0.5 below 0.5")
 
 
-def test_texts_have_to_be_equal():
+def test_strings_must_be_equal():
     phases = np.array(["climb"] * 50 + ["land"] * 51, dtype=object)
     reference = recorded(phase=phases)
     assert compare(recorded(phase=phases), reference, EXACT).passed
@@ -126,14 +126,14 @@ def test_texts_have_to_be_equal():
     assert failures(recorded(phase=TIME), EXACT, reference) == ["phase holds text in the reference, and numbers in the other"]
 
 
-def test_texts_count_between_the_rows_of_the_reference_too():
+def test_strings_are_compared_between_rows_of_the_reference():
     phases = np.array(["climb"] * 50 + ["hover"] * 3 + ["climb"] * 48, dtype=object)
     ends = recorded(TIME[[0, -1]], phase=np.array(["climb", "climb"], dtype=object))
     assert failures(recorded(phase=phases), EXACT, ends) == ['phase is "hover" at t = 5 s, expected "climb"']
     assert failures(ends, EXACT, recorded(phase=phases)) == ['phase is "climb" at t = 5 s, expected "hover"']
 
 
-def test_nothing_to_compare_does_not_pass():
+def test_an_empty_comparison_fails():
     empty = recorded([], a__x=[], a__y=[], b__x=[])
     assert failures(empty) == ["the result has no rows"]
     assert failures(REFERENCE, EXACT, empty) == ["the reference has no rows"]
@@ -142,7 +142,7 @@ def test_nothing_to_compare_does_not_pass():
     assert not compare(REFERENCE, REFERENCE, {}).passed
 
 
-def test_the_worst_signal_is_the_one_farthest_out_of_its_own_tube():
+def test_worst_signals_are_sorted_by_relative_excess():
     result = changed(a__x=np.sin(TIME) + 0.3, a__y=TIME + 0.5)
     comparison = compare(result, REFERENCE, {"a.x": Tolerance(0.1), "a.y": Tolerance(0.4), "b.x": Tolerance(1)})
     assert [verdict.signal for verdict in comparison.worst] == ["a.x", "a.y", "b.x"]

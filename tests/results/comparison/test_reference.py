@@ -1,4 +1,4 @@
-"""References: few rows of a run that describe it all, and what made it."""
+"""References: selection of rows, and provenance."""
 
 import json
 
@@ -32,7 +32,7 @@ def test_few_rows_describe_the_run_closely():
     assert compare(swing(), reference, {name: part.scaled(0.25) for name, part in TOLERANCES.items()}).passed
 
 
-def test_rows_are_close_where_something_happens():
+def test_rows_are_dense_where_the_signal_changes():
     time = decimate(swing(), TOLERANCES).time
     before, after = time[time < 7.77][-1], time[time >= 7.77][0]
     assert after - before <= 0.05
@@ -43,7 +43,7 @@ def test_without_a_tolerance_every_row_that_matters_is_kept():
     assert len(decimate(swing(), {"b": Tolerance()}).time) == 2001
 
 
-def test_texts_are_kept_where_they_change():
+def test_rows_with_changed_strings_are_selected():
     phases = np.where(SWITCH, "land", "climb").astype(object)
     reference = decimate(swing(phase=phases), {"phase": Tolerance()})
     assert next(iter(reference.time[reference["phase"] == "land"])) == 7.77
@@ -62,7 +62,7 @@ def test_the_same_run_writes_the_same_bytes(tmp_path):
     }
 
 
-def test_what_is_written_is_what_was_recorded(tmp_path):
+def test_written_rows_equal_the_recorded_ones(tmp_path):
     run = swing()
     write_reference(run, tmp_path / "r.csv", TOLERANCES)
     read = Result.from_csv(tmp_path / "r.csv")
@@ -77,7 +77,7 @@ def test_what_is_written_is_what_was_recorded(tmp_path):
         (swing(), {"a.x": Tolerance(1), "a.z": Tolerance(1)}, '"a.z" matches no signal'),
     ],
 )
-def test_what_cannot_be_met_becomes_no_reference(run, tolerances, reason, tmp_path):
+def test_a_run_that_fails_its_own_comparison_is_refused(run, tolerances, reason, tmp_path):
     with pytest.raises(CheckError, match=reason):
         write_reference(run, tmp_path / "r.csv", tolerances)
     assert list(tmp_path.iterdir()) == []

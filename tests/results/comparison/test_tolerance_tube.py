@@ -1,4 +1,4 @@
-"""The tube against its definition: a brute-force search, cases drawn by hand, and pyfunnel where it is installed."""
+"""Tube compared with a brute-force search, hand-made cases and pyfunnel."""
 
 import csv
 
@@ -18,7 +18,7 @@ def recorded(time, **columns):
 
 
 def bounds(moments, time, values, *tolerance):
-    """(lower, upper) at the rows of a result with these times."""
+    """Return lower and upper bound at the rows of a result with these times."""
     comparer = Comparer(recorded(moments, x=moments), recorded(time, x=values))
     rows = np.flatnonzero(np.isin(comparer.points.time, moments))
     assert list(comparer.points.time[rows]) == list(moments)
@@ -26,7 +26,7 @@ def bounds(moments, time, values, *tolerance):
 
 
 def searched(moments, time, values, reach):
-    """Extremes of a polyline within `reach` of each moment, by looking at every corner and at both ends of each window."""
+    """Return the extremes of a polyline within `reach` of each moment, from all corners and both ends of each window."""
     lower, upper = [], []
     for moment in moments:
         begin, end = max(moment - reach, time[0]), min(moment + reach, time[-1])
@@ -37,7 +37,7 @@ def searched(moments, time, values, reach):
     return np.array(lower), np.array(upper)
 
 
-def test_a_step_may_be_early_or_late():
+def test_time_tolerance_permits_early_and_late_steps():
     lower, upper = bounds([0, 0.5, 0.9, 1.5, 2.1, 2.5, 3], [0, 1, 2, 3], [0, 0, 1, 1], 0, 0, 0.5)
     assert upper == pytest.approx([0, 0, 0.4, 1, 1, 1, 1])
     assert lower == pytest.approx([0, 0, 0, 0, 0.6, 1, 1])
@@ -60,14 +60,14 @@ def test_the_larger_of_absolute_and_relative_counts():
     assert bounds([0], [0, 1, 2], [7.0, 1.0, 11.0], 0.5, 0.2, 0)[1] == pytest.approx([9.0])
 
 
-def test_sums_of_decimal_fractions_do_not_decide():
-    """0.05 - 0.02 is a little more than 0.03, where the reference jumps: still within 0.02 s."""
+def test_rounding_of_decimal_fractions_is_tolerated():
+    """The reference jumps at 0.03, and 0.05 - 0.02 is slightly more than 0.03 in float64."""
     time = np.array([0, 0.03, 0.03, 0.06])
     assert list(bounds([0.05], time, [0.0, 0, 5, 5], 0, 0, 0.02)[0]) == [0.0]
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_windows_find_what_a_search_finds(seed):
+def test_windows_match_a_brute_force_search(seed):
     rng = np.random.default_rng(seed)
     time = np.sort(rng.integers(0, 60, rng.integers(1, 80)) / 8)  # some times twice
     values = rng.normal(size=len(time))
@@ -80,7 +80,7 @@ def test_windows_find_what_a_search_finds(seed):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_even_rows_are_searched_faster_and_as_well(seed):
+def test_uniform_windows_match_general_windows(seed):
     rng = np.random.default_rng(seed)
     time = rng.uniform(-5, 5) + np.arange(rng.integers(2, 90)) * 0.01
     values = rng.normal(size=len(time))
@@ -93,14 +93,14 @@ def test_even_rows_are_searched_faster_and_as_well(seed):
     assert tube.upper == pytest.approx(upper, abs=1e-9)
 
 
-def test_uneven_rows_are_not_taken_for_even_ones():
+def test_uneven_rows_have_no_uniform_spacing():
     assert uniform_spacing(np.array([0, 0.01, 0.02, 0.031])) == 0
     assert uniform_spacing(np.array([0.0, 0.0])) == uniform_spacing(np.array([1.0])) == 0
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_result_passes_where_every_point_is_inside(seed):
-    """The quick look at values near the reference changes nothing."""
+    """The shortcut for values near the reference does not change the verdict."""
     rng = np.random.default_rng(seed)
     time = np.arange(200) / 10
     values = np.cumsum(rng.normal(size=200))

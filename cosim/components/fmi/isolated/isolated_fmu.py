@@ -1,61 +1,68 @@
-"""A component whose FMU lives in a process of its own."""
+"""Importer side of an isolated FMU: a component that forwards all calls to a worker process."""
 
 from __future__ import annotations
 
 import ctypes
-import math
 import os
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
-from ....core import component_log
 from ....core.component import Component, Ports, PreparedCall, StepResult
-from ....core.errors import ComponentError, InputError
-from ....process.journal import CALL_NUMBER, Phase
+from ....core.errors import InputError
 from ....process.temporary_folders import WORKER_PREFIX, LockedFolder
 from ..file import FmuFile
-from ..instance import DISCARD, OK, FmuInstance
+from ..function_calls import DISCARD, OK
+from ..instance import FmuInstance
 from .isolation import Isolation
-from .pipes import STEP_COMMAND, STEP_DONE, decode_line, encode_line
+from .pipes import STEP_COMMAND, STEP_DONE
 from .shared_memory import SharedMemoryBlock, matching_buffers, string_array
 from .worker import Worker
-from .worker_process import WorkerLost, WorkerProcess
+from .worker_client import WorkerClient
+from .worker_process import WorkerProcess
 
 
-class WorkerEnded(ComponentError):
-    """The worker ended or had to be ended."""
+class IsolatedFmu(WorkerClient, Component):
+    """Component whose FMU instance runs in a worker process.
 
-
-class IsolatedFmu(Component):
-    """An FMU as `FmuInstance` is one, with the same results; a crash, exit or hang of it is a ComponentError."""
+    Results are identical to those of `FmuInstance`. A crash, exit or hang of the FMU raises a ComponentError.
+    """
 
     binds_everything = False
 
     def __init__(
         self, instance_class: type[FmuInstance], file: FmuFile, instance_name: str, logging_on: bool, isolation: Isolation
     ):
+        """Create the component; see `create_component`. The worker process is started by `instantiate`.
+
+        Args:
+            instance_class: Class of the instance in the worker process.
+            file: The FMU.
+            instance_name: Name of the FMU instance.
+            logging_on: Value of `loggingOn`.
+            isolation: Deadlines and sandbox of the worker process.
+
+        Raises:
+            InputError: The operating system has no fork, or the FMU has no usable binary for this platform.
+        """
         if not hasattr(os, "fork"):
-            raise InputError("FMUs in processes of their own need an operating system with fork (Linux, macOS)")
+            raise InputError("isolated FMUs need an operating system with fork (Linux, macOS)")
         file.check_binary()
-        self.name, self._file, self._instance_class, self.isolation = instance_name, file, instance_class, isolation
+        super().__init__(file, instance_name, isolation.deadlines.load)
+        self._instance_class, self.isolation = instance_class, isolation
         self.description = file.description
         self.variables, self.has_state = self.description.variables, self.description.has_state
         self._logging_on = logging_on
-        self._process: WorkerProcess | None = None
         self._temporary_folder: LockedFolder | None = None
-        #: the deadline that holds now
-        self._deadline = isolation.deadlines.load
-        #: the command that is being carried out, and the names of the calls of a turn
-        self._command, self._call_names = "instantiate", [""]
         self._result: StepResult | None = None
 
     # -- life cycle ----------------------------------------------------------------------------------------------------
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
+        """Allocate the shared memory that mirrors the bound arrays."""
         self._shared_memory = SharedMemoryBlock(inputs, outputs)
-        self._clock = self._shared_memory.clock
+        self._current_time = self._shared_memory.current_time
         self._input_buffers, self._output_buffers = (
             matching_buffers(self._shared_memory.inputs, inputs),
             matching_buffers(outputs, self._shared_memory.outputs),
@@ -64,7 +71,12 @@ class IsolatedFmu(Component):
         self._has_strings = len(self._input_strings) + len(self._output_strings) > 0
 
     def instantiate(self) -> None:
-        """Start the worker process and instantiate the FMU in it."""
+        """Start the worker process and instantiate the FMU in it.
+
+        Raises:
+            InputError: The FMU cannot be extracted or loaded, or the sandbox is not supported.
+            ComponentError: The FMU returned no instance, or the worker process ended.
+        """
         folder = self._file.acquire()
         self._temporary_folder = LockedFolder(WORKER_PREFIX)
         self._start_worker(folder, Path(self._temporary_folder.name))
@@ -72,31 +84,35 @@ class IsolatedFmu(Component):
         self._deadline = self.isolation.deadlines.initialization
 
     def _start_worker(self, folder: Path, temporary: Path) -> None:
-        import_module(f"fmpy.fmi{self.description.major}")  # once here and not once in every worker
-        enter = self.isolation.worker_setup(folder, temporary, os.getpid())
+        import_module(f"fmpy.fmi{self.description.major}")  # imported before the fork, so that workers need not
+        setup = self.isolation.worker_setup(folder, temporary, os.getpid())
 
         def serve(commands: int, answers: int) -> None:
             instance = self._instance_class(self._file.share(), self.name, self._logging_on)
-            Worker(instance, self._shared_memory, enter).serve(commands, answers, temporary)
+            Worker(instance, self._shared_memory, setup).serve(commands, answers, temporary)
 
         self._process = WorkerProcess(self.name, self._shared_memory.journal, serve)
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
+        """Call `FmuInstance.enter_initialization_mode` in the worker process."""
         self._execute("enter_initialization_mode", start_time, stop_time)
 
     def exit_initialization_mode(self) -> None:
+        """Call `FmuInstance.exit_initialization_mode` in the worker process."""
         self._execute("exit_initialization_mode")
         self._deadline = self.isolation.deadlines.step
 
     def terminate(self) -> None:
+        """Call `FmuInstance.terminate` in the worker process, unless the FMU has returned fatal."""
         self._deadline = self.isolation.deadlines.end
         if not self._file.has_fatal_error:
-            self._request_final("terminate")
+            self._execute_or_warn("terminate")
 
     def free(self) -> None:
+        """Call `FmuInstance.free` in the worker process, stop it and remove its temporary folder."""
         self._deadline = self.isolation.deadlines.end
         if self._process and not self._file.has_fatal_error:
-            self._request_final("free")
+            self._execute_or_warn("free")
         if self._process:
             self._stop_worker()
         if self._temporary_folder:
@@ -104,81 +120,79 @@ class IsolatedFmu(Component):
             self._temporary_folder = None
             self._file.release()
 
-    def _request_final(self, command: str) -> None:
-        """Whatever becomes of the worker now, the results are complete."""
-        try:
-            if self._process:
-                self._execute(command)
-        except WorkerEnded as ended:
-            component_log.log_message(self.name, component_log.WARNING, f"{ended.function} failed: {ended.reason}")
-
-    def _stop_worker(self) -> None:
-        assert self._process is not None
-        self._process.stop()
-        self._process = None
-
-    # -- access off the hot path ---------------------------------------------------------------------------------------
+    # -- access outside the stepping loop ---------------------------------------------------------------------------------------
 
     def set(self, name: str, value: Any) -> None:
+        """Set a variable of the FMU in the worker process."""
         self._execute("set", name, value)
 
     def get(self, name: str) -> Any:
+        """Return the value of a variable of the FMU in the worker process."""
         return self._execute("get", name)
 
     def get_state(self) -> Any:
+        """Save the FMU state in the worker process and return its number."""
         return self._execute("get_state")
 
     def set_state(self, state: Any) -> None:
+        """Restore the FMU state with a number."""
         self._execute("set_state", state)
 
     def free_state(self, state: Any) -> None:
+        """Free the FMU state with a number."""
         self._execute("free_state", state)
 
     # -- steps ---------------------------------------------------------------------------------------------------------
 
     def set_inputs(self) -> None:
+        """Copy the bound inputs to the worker process and set them in the FMU."""
         self._copy_inputs()
         self._execute("set_inputs", self._input_strings.tolist())
 
     def do_step(self, time: float, step_size: float) -> StepResult | None:
+        """Call `FmuInstance.do_step` in the worker process."""
         result = self._execute("do_step", time, step_size)
         return result and StepResult(*result)
 
     def get_outputs(self) -> None:
-        found = self._execute("get_outputs")
+        """Get the outputs of the FMU in the worker process and copy them to the bound arrays."""
+        strings = self._execute("get_outputs")
         self._copy_outputs()
-        if found:
-            self._output_strings[:] = found
+        if strings:
+            self._output_strings[:] = strings
 
-    def prepare_step_calls(self, clock: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
-        self._call_names = self._execute("prepare", step_size)
-        turn = self._step_with_strings if self._has_strings else self._step
-        return [PreparedCall(turn, (clock,), "a step in its own process")]
+    def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
+        """Prepare one call that makes a whole step (set inputs, doStep, get outputs) in the worker process."""
+        self._call_names = self._execute("prepare_step", step_size)
+        step = self._step_with_strings if self._has_strings else self._step
+        return [PreparedCall(step, (current_time,), "step in the worker process")]
 
-    def _step(self, clock: ctypes.c_double) -> int:
-        self._clock.value = clock.value
+    def _step(self, current_time: ctypes.c_double) -> int:
+        self._current_time.value = current_time.value
         for target, source in self._input_buffers:
             target[:] = source
-        self._command = "turn"
+        self._command = "step"
         answer = self._request(STEP_COMMAND)
         result = None if answer == STEP_DONE else self._parse_answer(answer)
         for target, source in self._output_buffers:
             target[:] = source
         return OK if result is None else self._store_early_return(result)
 
-    def _step_with_strings(self, clock: ctypes.c_double) -> int:
-        self._clock.value = clock.value
+    def _step_with_strings(self, current_time: ctypes.c_double) -> int:
+        self._current_time.value = current_time.value
         self._copy_inputs()
-        result, found = self._execute("turn", self._input_strings.tolist())
+        result, strings = self._execute("step", self._input_strings.tolist())
         self._copy_outputs()
-        self._output_strings[:] = found
+        self._output_strings[:] = strings
         return self._store_early_return(result) if result else OK
 
     def _store_early_return(self, result: Sequence[Any]) -> int:
+        """Keep the result of a step for `interpret_status`, which discard makes the executor call."""
         self._result = StepResult(*result)
         return DISCARD
 
-    def interpret_status(self, name: str, status: int) -> StepResult:
+    def interpret_status(self, _function: str, _status: int) -> StepResult:
+        """Return the result of the step that returned discard."""
         assert self._result is not None
         return self._result
 
@@ -189,54 +203,3 @@ class IsolatedFmu(Component):
     def _copy_outputs(self) -> None:
         for target, source in self._output_buffers:
             target[:] = source
-
-    # -- commands and answers ------------------------------------------------------------------------------------------
-
-    def _execute(self, command: str, *arguments: Any) -> Any:
-        self._command = command
-        return self._parse_answer(self._request(encode_line([command, *arguments])))
-
-    def _request(self, line: bytes) -> bytes:
-        process = self._process
-        if process is None:
-            raise WorkerEnded(self.name, self._command, "its process has ended before")
-        try:
-            return process.request(line, self._deadline)
-        except WorkerLost as lost:
-            self._stop_worker()
-            self._raise_worker_ended(str(lost))
-        except BaseException:  # interrupted: the answer would come to a question that nobody asks any more
-            self._stop_worker()
-            raise
-
-    def _parse_answer(self, answer: bytes) -> Any:
-        if answer == STEP_DONE:
-            return None
-        message = self._decode_answer(answer)
-        self._file.has_fatal_error = self._file.has_fatal_error or bool(message.get("corrupt"))
-        if "failed" in message:
-            raise ComponentError(*message["failed"])
-        if "refused" in message:
-            raise InputError(message["refused"])
-        return message["value"]
-
-    def _decode_answer(self, answer: bytes) -> dict[str, Any]:
-        try:
-            message = decode_line(answer)
-        except ValueError:
-            message = None
-        if not isinstance(message, dict) or not {"value", "failed", "refused"} & message.keys():
-            self._stop_worker()
-            raise WorkerEnded(self.name, self._command, "its process answered with something that is no answer")
-        return message
-
-    def _raise_worker_ended(self, reason: str) -> NoReturn:
-        """Raise the error for what the worker was doing when it ended, as its journal says."""
-        journal = self._shared_memory.journal
-        if journal.phase == Phase.CALLING:
-            activity = journal.activity()
-            time = None if math.isnan(activity.time) else activity.time
-            raise WorkerEnded(self.name, activity.function, reason, time)
-        if self._command == "turn" and 0 <= journal[CALL_NUMBER] < len(self._call_names):
-            raise WorkerEnded(self.name, self._call_names[journal[CALL_NUMBER]], reason, self._clock.value)
-        raise WorkerEnded(self.name, self._command, reason)

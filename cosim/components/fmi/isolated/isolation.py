@@ -1,4 +1,4 @@
-"""How an FMU is kept apart."""
+"""Settings of the worker process of an isolated FMU."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal
 
 from ....process.journal import Deadlines
 
@@ -15,28 +16,42 @@ _CLONE_NEWUSER, _CLONE_NEWNET = 0x10000000, 0x40000000
 
 @dataclass(frozen=True)
 class Isolation:
-    """How long calls into the FMU may take; with `sandbox` it reads only its own files and libraries, writes only to its
-    temporary folder, and has no network (where user namespaces are forbidden: no TCP)."""
+    """Settings of a worker process.
+
+    Attributes:
+        deadlines: Largest wall times of calls into the FMU (s).
+        sandbox: Restrict the worker process: it reads only its own files and libraries, writes only to its temporary folder and
+            has no network. Where user namespaces are not permitted, only TCP is blocked.
+    """
 
     deadlines: Deadlines = field(default_factory=Deadlines)
     sandbox: bool = False
 
     def worker_setup(self, fmu: Path, temporary: Path, importer: int) -> Callable[[], None]:
-        """What a worker of the process `importer` does before it loads foreign code; raises InputError where it cannot."""
+        """Create the function that a worker process calls before it loads foreign code.
+
+        Args:
+            fmu: Folder of the extracted FMU.
+            temporary: Folder for temporary files of the FMU.
+            importer: Process id of the importer; the worker process ends with it.
+
+        Returns:
+            A function that enters the sandbox. It raises InputError if this system does not support the required restrictions.
+        """
         from ....process.sandbox import SandboxSettings, enter_sandbox, interpreter_folders, landlock
 
         readable = (fmu, *interpreter_folders()) if self.sandbox else ()
-        confine = "required" if self.sandbox else "never"
-        settings = SandboxSettings(readable=readable, writable=(temporary,), confine=confine, parent=importer)  # type: ignore[arg-type]
+        confine: Literal["required", "never"] = "required" if self.sandbox else "never"
+        settings = SandboxSettings(readable=readable, writable=(temporary,), confine=confine, parent=importer)
 
-        def entrance() -> None:
-            left = self.sandbox and _unshare_network()
-            # no kernel is refused for rules about a network that is not there
-            enter_sandbox(replace(settings, network=left and landlock.abi_version() < landlock.NETWORK_ABI))
+        def enter() -> None:
+            has_no_network = self.sandbox and _unshare_network()
+            # without any network, older kernels that lack Landlock's network rules are sufficient
+            enter_sandbox(replace(settings, network=has_no_network and landlock.abi_version() < landlock.NETWORK_ABI))
 
-        return entrance
+        return enter
 
 
 def _unshare_network() -> bool:
-    """From now on this process has a network of its own, without any device; where that is forbidden, nothing changes."""
-    return sys.platform == "linux" and ctypes.CDLL(None).unshare(_CLONE_NEWUSER | _CLONE_NEWNET) == 0
+    """Move this process into a network namespace without devices; return False if that is not permitted."""
+    return sys.platform == "linux" and bool(ctypes.CDLL(None).unshare(_CLONE_NEWUSER | _CLONE_NEWNET) == 0)

@@ -1,4 +1,7 @@
-"""Messages between importer and worker: one line of JSON each, for neither may run code that the other sends."""
+"""Messages between the importer process and a worker process: lines of JSON through pipes.
+
+JSON, unlike pickle, cannot make the receiver execute code of the sender.
+"""
 
 from __future__ import annotations
 
@@ -8,40 +11,39 @@ import select
 from collections.abc import Iterable
 from typing import Any
 
-#: the command to take a turn, and the answer that all is well, are the same empty line
+from ....core.json_values import decode_object, encode_value
+
+#: the command to execute a prepared step, and the answer that it succeeded without a result: the same empty line
 STEP_COMMAND = STEP_DONE = b"\n"
 
 #: bytes of one read
 READ_SIZE = 1 << 16
 
-#: so often a descriptor is looked at before sleep (0.3 us each)
+#: polls without sleeping before a blocking wait (0.3 us each)
 SPIN_COUNT = 40
-#: so often at most sleep comes at once after looking was in vain
+#: largest number of waits without spinning after spinning was unsuccessful
 MAX_SPIN_BACKOFF = 512
 
 
 def encode_line(message: Any) -> bytes:
-    return json.dumps(message, default=_encode_value).encode() + b"\n"
+    """Return a message as one line of JSON; bytes and NumPy arrays are allowed in it."""
+    return json.dumps(message, default=encode_value).encode() + b"\n"
 
 
 def decode_line(line: bytes) -> Any:
-    """Raises ValueError for anything but JSON."""
-    return json.loads(line, object_hook=_decode_bytes)
+    """Return the message in a line.
 
-
-def _encode_value(value: Any) -> Any:
-    return {"bytes": value.hex()} if isinstance(value, bytes) else value.tolist()
-
-
-def _decode_bytes(value: dict[str, Any]) -> Any:
-    return bytes.fromhex(value["bytes"]) if value.keys() == {"bytes"} else value
+    Raises:
+        ValueError: The line is not JSON.
+    """
+    return json.loads(line, object_hook=decode_object)
 
 
 class SpinningPoller:
-    """Waits for descriptors that will soon be ready, awake for a moment: falling asleep and being woken costs more.
+    """Poller that spins briefly before it sleeps, because sleeping and waking up take longer than most answers.
 
-    Where that was in vain, because the other process has more to do or no processor of its own, it sleeps at once the next time,
-    and twice as often after each further time.
+    If spinning was unsuccessful, as when the other process computes longer or has no processor of its own, the next waits sleep
+    at once. Their number doubles with each further unsuccessful spin.
     """
 
     def __init__(self, descriptors: Iterable[int]):
@@ -52,11 +54,15 @@ class SpinningPoller:
         self._spins_to_skip, self._next_backoff = 0, 1
 
     def wait(self, milliseconds: float) -> list[tuple[int, int]]:
-        """What is ready, at the latest after this time."""
+        """Wait until a descriptor is ready or the time has passed.
+
+        Returns:
+            Pairs (descriptor, event) as from `select.poll`.
+        """
         return self._spin() or self._poll.poll(milliseconds)
 
     def read(self, reader: int) -> bytes:
-        """What can be read, sooner or later."""
+        """Read the available bytes of a pipe, waiting for at least one."""
         self._spin()
         return os.read(reader, READ_SIZE)
 
@@ -73,15 +79,15 @@ class SpinningPoller:
         return []
 
 
-def read_line(reader: int, vigil: SpinningPoller) -> bytes:
-    """The next command; empty when there is nobody any more who could send one."""
-    line = vigil.read(reader)
+def read_line(reader: int, poller: SpinningPoller) -> bytes:
+    """Read the next line; empty if the other end of the pipe is closed."""
+    line = poller.read(reader)
     while line[-1:] != b"\n" and line:
         line += os.read(reader, READ_SIZE)
     return line
 
 
 def write_line(writer: int, line: bytes) -> None:
-    """Write the whole line."""
+    """Write a whole line."""
     while (written := os.write(writer, line)) < len(line):
         line = line[written:]

@@ -1,4 +1,4 @@
-"""The memory that the importer and one worker share."""
+"""Memory shared by the importer process and one worker process."""
 
 from __future__ import annotations
 
@@ -14,24 +14,32 @@ from ....core.component import Ports
 from ....process import journal as journals
 from ....process.journal import Journal
 
-_CLOCK_OFFSET, _VALUES_OFFSET = journals.JOURNAL_SIZE, journals.JOURNAL_SIZE + 64
+_TIME_OFFSET, _VALUES_OFFSET = journals.JOURNAL_SIZE, journals.JOURNAL_SIZE + 64
 _OBJECT_DTYPE = np.dtype(object)
 _PROT_READ_WRITE, _MAP_PRIVATE, _MAP_FIXED, _MAP_ANONYMOUS = 3, 0x02, 0x10, 0x20
 
 
 class SharedMemoryBlock:
-    """The worker's journal, the time of the step, and mirrors of the arrays that inputs and outputs are bound to.
+    """Shared memory block: the worker's journal, the current time, and mirrors of the bound arrays.
 
-    The importer copies values between its arrays and the mirrors, so that a worker can spoil nothing but its own values.
-    Texts are in no shared memory; their mirrors belong to the worker.
+    The importer copies values between its own arrays and the mirrors, so that a worker process can change only its own values.
+    Strings are sent through the pipes; their arrays here are private to each process.
+
+    Attributes:
+        memory: The shared memory.
+        journal: Journal of the worker process.
+        marker: Integers of the journal, which the worker process writes in every step.
+        current_time: Communication point at which the step starts (s).
+        inputs: Mirrors of the input arrays.
+        outputs: Mirrors of the output arrays.
     """
 
     def __init__(self, inputs: Ports, outputs: Ports):
+        """Allocate the block for the bound arrays of a component."""
         self.memory = mmap.mmap(-1, _VALUES_OFFSET + _mirror_size(inputs) + _mirror_size(outputs))
         self.journal = Journal(self.memory)
-        #: the integers of the journal, which the worker writes in every step
         self.marker = memoryview(self.memory)[:64].cast("q")
-        self.clock = ctypes.c_double.from_buffer(self.memory, _CLOCK_OFFSET)
+        self.current_time = ctypes.c_double.from_buffer(self.memory, _TIME_OFFSET)
         self.inputs = self._mirror(inputs, _VALUES_OFFSET)
         self.outputs = self._mirror(outputs, _VALUES_OFFSET + _mirror_size(inputs))
 
@@ -46,21 +54,28 @@ class SharedMemoryBlock:
         return Ports(ports.variables, arrays)
 
     def unshare_other_memory(self) -> None:
-        """In the worker: what the importer shares with anybody is no longer shared with this process, except this block."""
-        own = ctypes.addressof(self.clock)
+        """Replace all other shared mappings of this process by private ones; called in the worker process.
+
+        A forked worker process inherits the importer's mappings, such as the blocks of other workers (Linux only).
+        """
+        own_address = ctypes.addressof(self.current_time)
         library = ctypes.CDLL(None, use_errno=True)
         library.mmap.restype = ctypes.c_void_p
         for begin, end in _shared_regions():
-            if not begin <= own < end:
+            if not begin <= own_address < end:
                 flags = _MAP_PRIVATE | _MAP_FIXED | _MAP_ANONYMOUS
                 address, size = ctypes.c_void_p(begin), ctypes.c_size_t(end - begin)
                 library.mmap(address, size, _PROT_READ_WRITE, flags, -1, ctypes.c_long(0))
 
 
 def matching_buffers(targets: Ports, sources: Ports) -> list[tuple[memoryview, memoryview]]:
-    """The numbers of both as bytes: `target[:] = source` copies an array."""
-    both = [(targets.arrays[dtype], source) for dtype, source in sources.arrays.items() if not dtype.hasobject and len(source)]
-    return [(_byte_view(target), _byte_view(source)) for target, source in both]
+    """Pair the numeric arrays of two ports.
+
+    Returns:
+        Pairs (target, source) of byte views; `target[:] = source` copies an array.
+    """
+    pairs = [(targets.arrays[dtype], source) for dtype, source in sources.arrays.items() if not dtype.hasobject and len(source)]
+    return [(_byte_view(target), _byte_view(source)) for target, source in pairs]
 
 
 def _byte_view(array: np.ndarray) -> memoryview:
@@ -68,7 +83,7 @@ def _byte_view(array: np.ndarray) -> memoryview:
 
 
 def string_array(ports: Ports) -> np.ndarray:
-    """The array of texts; empty where there are none."""
+    """Return the array of String and Binary values, which is empty if there are none."""
     return ports.arrays.get(_OBJECT_DTYPE, np.empty(0, object))
 
 
@@ -81,10 +96,10 @@ def _aligned_size(array: np.ndarray) -> int:
 
 
 def _shared_regions() -> Sequence[tuple[int, int]]:
-    """Where memory lies that is writable and shared, as far as the system tells (Linux)."""
+    """Return (begin, end) addresses of writable shared mappings; empty where /proc/self/maps does not exist."""
     try:
         lines = [line.split(maxsplit=2) for line in Path("/proc/self/maps").read_text().splitlines()]
     except OSError:
         return []
-    bounds = [place.split("-") for place, rights, _ in lines if rights[1] == "w" and rights[3] == "s"]
+    bounds = [addresses.split("-") for addresses, permissions, _ in lines if permissions[1] == "w" and permissions[3] == "s"]
     return [(int(begin, 16), int(end, 16)) for begin, end in bounds]

@@ -1,4 +1,4 @@
-"""What a worker process does: it serves one instance of an FMU until that is freed or the importer is gone."""
+"""Worker side of an isolated FMU: executes the importer's commands on one FMU instance."""
 
 from __future__ import annotations
 
@@ -23,14 +23,25 @@ from ..instance import FmuInstance
 from .pipes import STEP_COMMAND, STEP_DONE, SpinningPoller, decode_line, encode_line, read_line, write_line
 from .shared_memory import SharedMemoryBlock, string_array
 
+#: characters of a log message; the importer shortens messages to its own limit
 _MAX_MESSAGE_LENGTH = 1 << 20
 
 
 class Worker:
-    """Answers each command of the importer with one line; messages of the FMU go before it."""
+    """Command server in the worker process.
 
-    def __init__(self, instance: FmuInstance, block: SharedMemoryBlock, enter: Callable[[], None]):
-        self._instance, self._block, self._setup = instance, block, enter
+    It answers each command with one line. Log messages of the FMU are lines that precede the answer.
+    """
+
+    def __init__(self, instance: FmuInstance, block: SharedMemoryBlock, setup: Callable[[], None]):
+        """Create the server.
+
+        Args:
+            instance: The FMU instance, not yet bound and instantiated.
+            block: Memory shared with the importer process.
+            setup: Function that enters the sandbox, called before foreign code is loaded.
+        """
+        self._instance, self._block, self._setup = instance, block, setup
         self._input_strings, self._output_strings = string_array(block.inputs), string_array(block.outputs)
         self._calls: Sequence[tuple[int, Callable[..., int], tuple[Any, ...], bool, PreparedCall]] = ()
         self._states: dict[int, Any] = {}
@@ -44,8 +55,8 @@ class Worker:
             "set_inputs": self._set_inputs,
             "do_step": instance.do_step,
             "get_outputs": self._get_outputs,
-            "prepare": self._prepare_step,
-            "turn": self._step_with_strings,
+            "prepare_step": self._prepare_step,
+            "step": self._step_with_strings,
             "get_state": self._get_state,
             "set_state": lambda number: instance.set_state(self._states[number]),
             "free_state": lambda number: instance.free_state(self._states.pop(number)),
@@ -54,21 +65,25 @@ class Worker:
         }
 
     def serve(self, commands: int, answers: int, temporary: Path) -> None:
-        """Until there is nobody any more who commands; `temporary` is where the FMU may put temporary files."""
+        """Execute commands until the importer closes the pipe.
+
+        Args:
+            commands: Descriptor of the pipe with commands.
+            answers: Descriptor of the pipe for answers.
+            temporary: Folder for temporary files of the FMU.
+        """
         gc.freeze()
         self._block.unshare_other_memory()
         journals.set_current_journal(self._block.journal)
         tempfile.tempdir = os.environ["TMPDIR"] = str(temporary)
-        component_log.MAX_MESSAGES_PER_SECOND, component_log.MAX_MESSAGE_LENGTH = (
-            sys.maxsize,
-            _MAX_MESSAGE_LENGTH,
-        )  # the importer cuts and counts
-        voice = _LogForwarder(answers)
-        speaker = logging.getLogger("cosim.component")
-        speaker.handlers, speaker.propagate, speaker.level = [voice], False, logging.INFO
-        vigil = SpinningPoller([commands])
-        while line := read_line(commands, vigil):
-            voice.send(self._execute(line))
+        # the importer limits number and length of the messages
+        component_log.MAX_MESSAGES_PER_SECOND, component_log.MAX_MESSAGE_LENGTH = sys.maxsize, _MAX_MESSAGE_LENGTH
+        sender = _LineSender(answers)
+        logger = logging.getLogger("cosim.component")
+        logger.handlers, logger.propagate, logger.level = [sender], False, logging.INFO
+        poller = SpinningPoller([commands])
+        while line := read_line(commands, poller):
+            sender.send(self._execute(line))
 
     def _execute(self, line: bytes) -> bytes:
         try:
@@ -79,57 +94,60 @@ class Worker:
                 result = self._commands[command](*arguments)
             return STEP_DONE if result is None else encode_line({"value": result})
         except ComponentError as error:
-            failed = error.component, error.function, error.reason, error.time
-            return encode_line({"failed": failed, "corrupt": self._instance.has_fatal_error})
+            fields = error.component, error.function, error.reason, error.time
+            return encode_line({"component_error": fields, "fatal": self._instance.has_fatal_error})
         except InputError as error:
-            return encode_line({"refused": [str(problem) for problem in error.problems]})
+            return encode_line({"input_error": [str(problem) for problem in error.problems]})
         except Exception as error:
-            return encode_line({"failed": (self._instance.name, "its own process", f"{type(error).__name__}: {error}", None)})
+            fields = self._instance.name, "the worker process", f"{type(error).__name__}: {error}", None
+            return encode_line({"component_error": fields})
 
     def _instantiate(self) -> None:
+        """Enter the sandbox, bind the instance to the shared memory and instantiate the FMU."""
         self._setup()
         self._instance.bind(self._block.inputs, self._block.outputs)
         self._instance.instantiate()
 
-    # -- texts do not lie in shared memory -----------------------------------------------------------------------------
+    # -- commands that carry strings, which are not in shared memory ---------------------------------------------------
 
-    def _set_inputs(self, given: list[Any]) -> None:
-        self._input_strings[:] = given
+    def _set_inputs(self, strings: list[Any]) -> None:
+        self._input_strings[:] = strings
         self._instance.set_inputs()
 
     def _get_outputs(self) -> list[Any] | None:
         self._instance.get_outputs()
         return self._output_strings.tolist() or None
 
-    def _step_with_strings(self, given: list[Any]) -> tuple[StepResult | None, list[Any]]:
-        self._input_strings[:] = given
+    def _step_with_strings(self, strings: list[Any]) -> tuple[StepResult | None, list[Any]]:
+        self._input_strings[:] = strings
         return self._step(), self._output_strings.tolist()
 
-    # -- the hot path --------------------------------------------------------------------------------------------------
+    # -- the stepping loop ---------------------------------------------------------------------------------------------
 
     def _prepare_step(self, step_size: float) -> list[str]:
-        """Names of the calls of a turn, by the number that stands in the journal."""
-        calls = self._instance.prepare_step_calls(self._block.clock, step_size)
+        """Prepare the calls of a step and return their names; the journal records the index of the present call."""
+        calls = self._instance.prepare_step_calls(self._block.current_time, step_size)
         self._calls = [
-            (n, call.function, call.arguments, isinstance(call.native, NativeDoStep), call) for n, call in enumerate(calls)
+            (index, call.function, call.arguments, isinstance(call.native, NativeDoStep), call)
+            for index, call in enumerate(calls)
         ]
         self._block.journal.enter_phase(Phase.STEPPING)
         return [call.name for call in calls]
 
     def _step(self) -> StepResult | None:
         marker, traps = self._block.marker, float_mode.enabled_traps
-        one, little, least = float_mode.PROBE_VALUES
+        one, tiny, subnormal = float_mode.PROBE_VALUES
         result = None
-        for number, function, arguments, steps, call in self._calls:
-            marker[CALL_NUMBER] = number
+        for index, function, arguments, is_do_step, call in self._calls:
+            marker[CALL_NUMBER] = index
             status = function(*arguments)
             if status and status not in SUCCESS_STATUSES:
                 result = self._instance.interpret_status(call.name, status)
-            if one + little != one - little or not least + least or (steps and traps()):
-                raise ComponentError(self._instance.name, call.name, float_mode.CHANGE_REASON, self._block.clock.value)
+            if one + tiny != one - tiny or not subnormal + subnormal or (is_do_step and traps()):
+                raise ComponentError(self._instance.name, call.name, float_mode.CHANGE_REASON, self._block.current_time.value)
         return result
 
-    # -- states stay here ----------------------------------------------------------------------------------------------
+    # -- FMU states, which stay in the worker process ------------------------------------------------------------------
 
     def _get_state(self) -> int:
         number = next(self._state_numbers)
@@ -137,18 +155,20 @@ class Worker:
         return number
 
 
-class _LogForwarder(logging.Handler):
-    """Messages of the FMU, from whatever thread, as lines to the importer."""
+class _LineSender(logging.Handler):
+    """Sender of answers and log messages to the importer, callable from any thread."""
 
     def __init__(self, writer: int):
         super().__init__()
         self._writer, self._lock = writer, Lock()
 
     def emit(self, record: logging.LogRecord) -> None:
+        """Send a log message of the FMU, without the name of the component, which the importer adds."""
         arguments = record.args if isinstance(record.args, tuple) else ()
         text = arguments[1] if len(arguments) == 2 else record.getMessage()
         self.send(encode_line({"log": (record.levelno, text)}))
 
     def send(self, line: bytes) -> None:
+        """Send a line."""
         with self._lock:
             write_line(self._writer, line)

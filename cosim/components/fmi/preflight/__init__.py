@@ -1,4 +1,4 @@
-"""What is examined of an FMU before any of its code runs or any of its files is written."""
+"""Preflight check of an FMU, made before any of its code runs and any of its files is extracted."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ....core.errors import InputError
 from . import rules_model, rules_structure, rules_values, rules_variables
 from .archive import Archive, open_regular_file
 from .binary import check_binary
-from .findings import DESCRIPTION_FILE, FatalFinding, Finding, Rule, raise_errors
+from .findings import DESCRIPTION_FILE, FatalFindingError, Finding, Rule, raise_errors
 from .fmu_platform import current_platform
 from .limits import DEFAULT_LIMITS, PreflightLimits
 from .model_description import ModelDescription
@@ -21,8 +21,8 @@ from .xml import parse_xml
 from .xml_reader import check_repeated_elements, read_model
 
 __all__ = [
-    "DESCRIPTION_FILE",
     "DEFAULT_LIMITS",
+    "DESCRIPTION_FILE",
     "Examination",
     "Finding",
     "PreflightLimits",
@@ -34,7 +34,6 @@ __all__ = [
 
 MISSING = Rule("archive.description", "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5")
 CHANGED = Rule("archive.changed", "limits")
-#: of one check; who has that many will look at the first ones first
 _MAX_FINDINGS_PER_CHECK = 100
 _CHECKS: Sequence[Callable[[ModelDescription], Iterator[Finding]]] = (
     *rules_model.CHECKS,
@@ -46,9 +45,14 @@ _CHECKS: Sequence[Callable[[ModelDescription], Iterator[Finding]]] = (
 
 @dataclass
 class Examination:
-    """What was found. `model` is None when its description cannot be read; `binary` are findings about this machine.
+    """Result of the preflight check.
 
-    `stamp` tells whether the file is still the one that was examined.
+    Attributes:
+        file_identity: Device, inode, size and modification time, to detect that the file is changed later.
+        members: Names of the members of the archive.
+        model: Model description, None if it cannot be read.
+        findings: Findings that do not depend on the platform.
+        binary_findings: Findings about the binary for this platform.
     """
 
     file_identity: tuple[int, ...] = ()
@@ -59,30 +63,38 @@ class Examination:
 
 
 def examine(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> Examination:
-    """Examine archive, model description and binary of an FMU; nothing is written, and nothing of it is executed.
+    """Check archive, model description and binary of an FMU, without extracting or executing anything.
 
-    Raises InputError when there is no such file. What is wrong with the FMU itself is in the findings.
+    Args:
+        path: The FMU.
+        limits: Limits of the check.
+
+    Returns:
+        The result; problems of the FMU itself are findings, not exceptions.
+
+    Raises:
+        InputError: The file does not exist, is not a regular file or cannot be read.
     """
     result = Examination()
     with open_regular_file(path) as file:
         result.file_identity = _file_identity(file)
         try:
             _examine_archive(Archive(file, limits), limits, result)
-        except FatalFinding as flaw:
-            result.findings.append(flaw.finding)
+        except FatalFindingError as error:
+            result.findings.append(error.finding)
         except OSError as error:
             raise InputError(f'FMU "{path}" cannot be read: {error.strerror}') from None
     return result
 
 
 def _examine_archive(archive: Archive, limits: PreflightLimits, result: Examination) -> None:
-    """In order of need: what is wrong with the archive is told before anything in it is read."""
+    """Check the archive first: if it has errors, nothing in it is read."""
     result.findings += archive.findings
     if _has_errors(archive.findings):
         return
     result.members = list(archive.members)
     if DESCRIPTION_FILE not in archive.members:
-        raise FatalFinding(MISSING(f"There is no item named '{DESCRIPTION_FILE}' in the archive"))
+        raise FatalFindingError(MISSING(f"there is no member '{DESCRIPTION_FILE}' in the archive"))
     root = parse_xml(archive.read(DESCRIPTION_FILE), DESCRIPTION_FILE, limits)
     model = result.model = read_model(root)
     result.findings += check_repeated_elements(root)
@@ -96,8 +108,8 @@ def _examine_archive(archive: Archive, limits: PreflightLimits, result: Examinat
 def _binary_findings(archive: Archive, model: ModelDescription, limits: PreflightLimits) -> Iterator[Finding]:
     try:
         yield from check_binary(archive, model, current_platform(), limits)
-    except FatalFinding as flaw:
-        yield flaw.finding
+    except FatalFindingError as error:
+        yield error.finding
 
 
 def _has_errors(findings: Sequence[Finding]) -> bool:
@@ -105,19 +117,26 @@ def _has_errors(findings: Sequence[Finding]) -> bool:
 
 
 def extract(path: Path, examination: Examination, folder: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> None:
-    """Write the members of an examined FMU below `folder`.
+    """Extract an examined FMU.
 
-    Raises InputError when the file is no longer the one that was examined, is not safe, or holds damaged data.
+    Args:
+        path: The FMU.
+        examination: Result of the preflight check.
+        folder: Folder that receives the files.
+        limits: Limits of the check.
+
+    Raises:
+        InputError: The file was changed after the check, or contains damaged data.
     """
     with open_regular_file(path) as file:
         try:
             if _file_identity(file) != examination.file_identity:
-                raise FatalFinding(CHANGED("the file was changed after it had been examined"))
+                raise FatalFindingError(CHANGED("the file was changed after it had been examined"))
             archive = Archive(file, limits)
             raise_errors(path, archive.findings)
             archive.extract(folder)
-        except FatalFinding as flaw:
-            raise_errors(path, [flaw.finding])
+        except FatalFindingError as error:
+            raise_errors(path, [error.finding])
 
 
 def _file_identity(file: BufferedReader) -> tuple[int, ...]:

@@ -1,4 +1,4 @@
-"""The library of an FMU for this machine, examined without loading it."""
+"""Check of an FMU's library for a platform, without loading it."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
+from ....core.errors import abbreviate_names
 from . import elf, macho, pe
 from .archive import Archive
 from .findings import Finding, Rule
 from .fmu_platform import FmuPlatform
-from .library import InvalidLibrary, SharedLibrary
+from .library import InvalidLibraryError, SharedLibrary
 from .limits import PreflightLimits
 from .model_description import ModelDescription
 
@@ -50,7 +51,7 @@ _FMI3_FUNCTIONS = (
     *("SetShiftDecimal", "SetShiftFraction", "SetTime", "UpdateDiscreteStates"),
 )
 _FMI3_TYPES = ("Binary", "Clock", "Float32", "Float64", *(f"{s}Int{bits}" for s in ("", "U") for bits in (8, 16, 32, 64)))
-#: the functions that a Co-Simulation FMU exports, by FMI version
+#: functions that a Co-Simulation FMU must export, by FMI major version
 REQUIRED_FUNCTIONS = {
     2: frozenset(
         f"fmi2{name}"
@@ -69,7 +70,14 @@ REQUIRED_FUNCTIONS = {
 
 
 def list_platforms(names: Iterable[str]) -> list[str]:
-    """The platforms that an FMU has binaries for, as it calls them, and "c-code" if it brings sources."""
+    """List the platforms of an FMU.
+
+    Args:
+        names: Names of the members of the archive.
+
+    Returns:
+        Names of the folders with libraries, and "c-code" if the FMU contains sources.
+    """
     parts = [name.split("/") for name in names]
     folders = {part[1] for part in parts if len(part) == 3 and part[0] == "binaries" and part[2].endswith(_LIBRARY_SUFFIXES)}
     sources = any(part[0] == "sources" and part[-1].endswith((".c", ".cpp")) for part in parts if len(part) > 1)
@@ -77,18 +85,28 @@ def list_platforms(names: Iterable[str]) -> list[str]:
 
 
 def check_binary(archive: Archive, model: ModelDescription, machine: FmuPlatform, limits: PreflightLimits) -> Iterator[Finding]:
-    """Whether the library for this machine is there, whole, and exports what FMI demands. Raises Flaw for damaged data."""
+    """Check that the library for a platform exists, is complete, and exports the functions that FMI requires.
+
+    Args:
+        archive: The FMU.
+        model: Its model description.
+        machine: The platform.
+        limits: Limits of the preflight check.
+
+    Raises:
+        FatalFindingError: The data of the library are damaged.
+    """
     folder = machine.binary_folder(model.major)
-    present = list_platforms(archive.members)
-    if folder not in present:
+    platforms = list_platforms(archive.members)
+    if folder not in platforms:
         names = folder if folder == machine.platform_tuple else f"{machine.platform_tuple} ({folder})"
-        yield PLATFORM(f"has no binary for {names}; it has: {', '.join(present) or 'no binaries'}")
+        yield PLATFORM(f"has no binary for {names}; it has: {', '.join(platforms) or 'no binaries'}")
         return
     identifier = (model.co_simulation or {}).get("modelIdentifier", "")
     member = f"binaries/{folder}/{identifier}{machine.suffix}"
     if member not in archive.members:
-        there = ", ".join(name for name in archive.members if name.startswith(f"binaries/{folder}/"))
-        yield PRESENT(f"the library cannot be loaded: {member} does not exist; there is: {there}")
+        found = ", ".join(name for name in archive.members if name.startswith(f"binaries/{folder}/"))
+        yield PRESENT(f"the library cannot be loaded: {member} does not exist; found: {found}")
     elif archive.members[member].size > limits.max_library_size:
         yield SIZE(f"the library has {archive.members[member].size} bytes, expected at most {limits.max_library_size}", member)
     else:
@@ -98,28 +116,27 @@ def check_binary(archive: Archive, model: ModelDescription, machine: FmuPlatform
 def _check_library(archive: Archive, member: str, major: int, machine: FmuPlatform) -> Iterator[Finding]:
     try:
         library = _READERS[machine.suffix](archive.read(member), machine.architecture)
-    except InvalidLibrary as damage:
-        yield FORMAT(f"the library cannot be loaded: it {damage}", member)
+    except InvalidLibraryError as error:
+        yield FORMAT(f"the library cannot be loaded: it {error}", member)
         return
     if missing := sorted(REQUIRED_FUNCTIONS[major] - library.exports):
-        shown = ", ".join(missing[:5]) + (f" and {len(missing) - 5} more" if len(missing) > 5 else "")
-        yield FUNCTIONS(f"the library does not export {shown}", member)
+        yield FUNCTIONS(f"the library does not export {abbreviate_names(missing, limit=5)}", member)
     for name in library.needed_libraries:
         if not _is_library_found(name, library, archive, member):
-            yield NEEDED(f"needs the library {name}, which this machine does not seem to have", member)
+            yield NEEDED(f"needs the library {name}, which was not found on this machine", member)
 
 
 def _is_library_found(name: str, library: SharedLibrary, archive: Archive, member: str) -> bool:
-    """Whether the loader will probably find a library: beside the FMU's own, in its search path, or known to the system."""
+    """Return whether the loader will probably find a needed library: in the FMU, in a search path or in the loader's cache."""
     if f"{member.rpartition('/')[0]}/{name}" in archive.members and any("ORIGIN" in folder for folder in library.search_folders):
         return True
-    own = [Path(folder) for folder in library.search_folders if folder.startswith("/")]
-    environment = [Path(folder) for folder in os.environ.get("LD_LIBRARY_PATH", "").split(":") if folder]
-    return any((folder / name).is_file() for folder in (*own, *environment)) or _is_in_loader_cache(name)
+    folders = [folder for folder in library.search_folders if folder.startswith("/")]
+    folders += [folder for folder in os.environ.get("LD_LIBRARY_PATH", "").split(":") if folder]
+    return any((Path(folder) / name).is_file() for folder in folders) or _is_in_loader_cache(name)
 
 
 def _is_in_loader_cache(name: str) -> bool:
-    """Whether the loader's own list names a library; where there is no list, nothing is known against it."""
+    """Return whether the loader's cache contains a library; True on systems without such a cache."""
     try:
         return name.encode() + b"\0" in Path("/etc/ld.so.cache").read_bytes()
     except OSError:

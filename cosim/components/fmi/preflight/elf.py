@@ -1,156 +1,186 @@
-"""What an ELF shared library says about itself, read without loading it (System V gABI 4.1, chapters 4 and 5)."""
+"""Reader of ELF shared libraries that does not load them.
+
+Format and field names: System V ABI 4.1, chapters 4 and 5. The reader follows the same tables as the dynamic loader: program
+headers, dynamic section, symbol table and symbol hash table.
+"""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
-from .library import InvalidLibrary, SharedLibrary
+from .library import InvalidLibraryError, SharedLibrary
 
 MAGIC = b"\x7fELF"
-#: (class, machine) of the architectures
+#: (EI_CLASS, e_machine) of the supported architectures
 MACHINES = {"x86_64": (2, 62), "aarch64": (2, 183), "x86": (1, 3)}
 _MACHINE_NAMES = {3: "x86", 8: "MIPS", 21: "PowerPC64", 40: "ARM", 62: "x86_64", 183: "aarch64", 243: "RISC-V"}
+_ELFDATA2LSB = 1
 _ET_DYN = 3
-_LOAD, _DYNAMIC = 1, 2
-_NEEDED, _HASH, _STRTAB, _SYMTAB, _STRSZ, _RPATH, _RUNPATH, _GNU_HASH = 1, 4, 5, 6, 10, 15, 29, 0x6FFFFEF5
+_PT_LOAD, _PT_DYNAMIC = 1, 2
+_DT_NEEDED, _DT_HASH, _DT_STRTAB, _DT_SYMTAB, _DT_STRSZ, _DT_RPATH, _DT_RUNPATH = 1, 4, 5, 6, 10, 15, 29
+_DT_GNU_HASH = 0x6FFFFEF5
+_STB_LOCAL = 0
+_STV_DEFAULT, _STV_PROTECTED = 0, 3
+_SHN_UNDEF = 0
 _MAX_SYMBOLS = 1 << 22
 
 
+class _ProgramHeader(NamedTuple):
+    p_type: int
+    p_offset: int
+    p_vaddr: int
+    p_filesz: int
+
+
 def read_library(content: bytes, architecture: str) -> SharedLibrary:
-    """Raises Damaged for anything that the loader of an `architecture` would refuse, or die of."""
-    bits, order = _check_header(content, architecture)
-    return _ElfReader(content, bits, order).library()
+    """Read the dynamic linking information of an ELF shared library.
+
+    Args:
+        content: The file.
+        architecture: Architecture that the library must be built for.
+
+    Raises:
+        InvalidLibraryError: The loader of the architecture would reject the file, or crash on it.
+    """
+    bits, byte_order = _check_header(content, architecture)
+    return _ElfReader(content, bits, byte_order).library()
 
 
 def _check_header(content: bytes, architecture: str) -> tuple[int, str]:
+    """Check the ELF header; return the word size (bits) and the byte order as in `struct`."""
     if not content.startswith(MAGIC):
-        raise InvalidLibrary("is no ELF file")
+        raise InvalidLibraryError("is not an ELF file")
     if len(content) < 64:
-        raise InvalidLibrary("is cut: its header is incomplete")
-    kind, endian = content[4], content[5]
-    if kind not in (1, 2) or endian not in (1, 2):
-        raise InvalidLibrary("has a damaged ELF header")
-    order = "<" if endian == 1 else ">"
-    file_type, machine = struct.unpack_from(f"{order}2H", content, 16)
-    wanted = MACHINES.get(architecture)
-    if wanted is not None and ((kind, machine) != wanted or endian != 1):
-        found = (
-            f"{_MACHINE_NAMES.get(machine, f'machine {machine}')}, {32 * kind} bit, {'little' if endian == 1 else 'big'}-endian"
+        raise InvalidLibraryError("is truncated: its header is incomplete")
+    ei_class, ei_data = content[4], content[5]
+    if ei_class not in (1, 2) or ei_data not in (1, 2):
+        raise InvalidLibraryError("has a damaged ELF header")
+    byte_order = "<" if ei_data == _ELFDATA2LSB else ">"
+    e_type, e_machine = struct.unpack_from(f"{byte_order}2H", content, 16)
+    expected = MACHINES.get(architecture)
+    if expected is not None and ((ei_class, e_machine) != expected or ei_data != _ELFDATA2LSB):
+        machine = _MACHINE_NAMES.get(e_machine, f"machine {e_machine}")
+        endianness = "little" if ei_data == _ELFDATA2LSB else "big"
+        raise InvalidLibraryError(
+            f"is built for {machine}, {32 * ei_class} bit, {endianness}-endian; this machine is {architecture}, little-endian"
         )
-        raise InvalidLibrary(f"is made for {found}; this machine is {architecture}, little-endian")
-    if file_type != _ET_DYN:
-        raise InvalidLibrary(f"is an ELF file of type {file_type}, expected a shared library")
-    return 32 * kind, order
+    if e_type != _ET_DYN:
+        raise InvalidLibraryError(f"is an ELF file of type {e_type}, expected a shared library")
+    return 32 * ei_class, byte_order
 
 
 class _ElfReader:
-    """Follows what the dynamic loader follows: segments, the dynamic table, symbols."""
+    """Reader of the tables of one ELF file."""
 
-    def __init__(self, content: bytes, bits: int, order: str):
-        self.content, self.bits, self.order = content, bits, order
+    def __init__(self, content: bytes, bits: int, byte_order: str):
+        self.content, self.bits, self.byte_order = content, bits, byte_order
         self.word_format = "Q" if bits == 64 else "L"
-        self.segments = list(self._segments())
-        self.load_segments = [segment[1:] for segment in self.segments if segment[0] == _LOAD]
+        self.program_headers = list(self._program_headers())
+        self.load_segments = [header for header in self.program_headers if header.p_type == _PT_LOAD]
 
     def unpack(self, form: str, offset: int) -> tuple[int, ...]:
-        form = self.order + form
+        """Unpack numbers at an offset in the file, in the format of `struct` without byte order."""
+        form = self.byte_order + form
         if offset < 0 or offset + struct.calcsize(form) > len(self.content):
-            raise InvalidLibrary(f"is cut: it refers to byte {offset}, but has {len(self.content)}")
+            raise InvalidLibraryError(f"is truncated: it refers to byte {offset}, but has {len(self.content)}")
         return struct.unpack_from(form, self.content, offset)
 
-    def _segments(self) -> Iterator[tuple[int, int, int, int]]:
-        """(type, offset, address, size in the file) of each program header."""
-        wide = self.bits == 64
-        (table,) = self.unpack(self.word_format, 32 if wide else 28)
-        size, count = self.unpack("2H", 54 if wide else 42)
-        if count == 0 or size < (56 if wide else 32):
-            raise InvalidLibrary("has no segments to load")
-        for i in range(count):
-            kind, offset, address, length = self._segment(table + i * size)
-            if kind in (_LOAD, _DYNAMIC) and offset + length > len(self.content):
-                raise InvalidLibrary(f"is cut: a segment ends at byte {offset + length}, the file at {len(self.content)}")
-            yield kind, offset, address, length
+    def _program_headers(self) -> Iterator[_ProgramHeader]:
+        is_64_bit = self.bits == 64
+        (e_phoff,) = self.unpack(self.word_format, 32 if is_64_bit else 28)
+        e_phentsize, e_phnum = self.unpack("2H", 54 if is_64_bit else 42)
+        if e_phnum == 0 or e_phentsize < (56 if is_64_bit else 32):
+            raise InvalidLibraryError("has no segments to load")
+        for i in range(e_phnum):
+            header = self._program_header(e_phoff + i * e_phentsize)
+            end = header.p_offset + header.p_filesz
+            if header.p_type in (_PT_LOAD, _PT_DYNAMIC) and end > len(self.content):
+                raise InvalidLibraryError(f"is truncated: a segment ends at byte {end}, the file at {len(self.content)}")
+            yield header
 
-    def _segment(self, place: int) -> tuple[int, int, int, int]:
+    def _program_header(self, offset: int) -> _ProgramHeader:
         if self.bits == 64:
-            kind, _, offset, address, _, length = self.unpack("2L4Q", place)
+            p_type, _, p_offset, p_vaddr, _, p_filesz = self.unpack("2L4Q", offset)
         else:
-            kind, offset, address, _, length = self.unpack("5L", place)
-        return kind, offset, address, length
+            p_type, p_offset, p_vaddr, _, p_filesz = self.unpack("5L", offset)
+        return _ProgramHeader(p_type, p_offset, p_vaddr, p_filesz)
 
     def library(self) -> SharedLibrary:
+        """Read the dynamic section and the tables it refers to."""
         dynamic = list(self._dynamic_entries())
-        first = dict(reversed(dynamic))
-        if not {_STRTAB, _SYMTAB, _STRSZ} <= first.keys():
-            raise InvalidLibrary("has no table of symbols")
-        strings = self._read_address(first[_STRTAB], first[_STRSZ])
-        search = ":".join(_string_at(strings, value) for tag, value in dynamic if tag in (_RPATH, _RUNPATH))
+        first_values = dict(reversed(dynamic))
+        if not {_DT_STRTAB, _DT_SYMTAB, _DT_STRSZ} <= first_values.keys():
+            raise InvalidLibraryError("has no symbol table")
+        strings = self._read_address(first_values[_DT_STRTAB], first_values[_DT_STRSZ])
+        search_path = ":".join(_string_at(strings, value) for tag, value in dynamic if tag in (_DT_RPATH, _DT_RUNPATH))
         return SharedLibrary(
-            frozenset(self._exported_symbols(first, strings)),
-            [_string_at(strings, value) for tag, value in dynamic if tag == _NEEDED],
-            [folder for folder in search.split(":") if folder],
+            frozenset(self._exported_symbols(first_values, strings)),
+            [_string_at(strings, value) for tag, value in dynamic if tag == _DT_NEEDED],
+            [folder for folder in search_path.split(":") if folder],
         )
 
     def _dynamic_entries(self) -> Iterator[tuple[int, int]]:
-        """The rows (tag, value) of the dynamic table."""
-        place = next((offset for kind, offset, _, _ in self.segments if kind == _DYNAMIC), None)
-        if place is None:
-            raise InvalidLibrary("is not linked dynamically")
-        step = struct.calcsize(f"{self.order}2{self.word_format}")
-        while (row := self.unpack(f"2{self.word_format}", place))[0]:
-            yield row[0], row[1]
-            place += step
+        """Yield (d_tag, d_val) of the dynamic section."""
+        offset = next((header.p_offset for header in self.program_headers if header.p_type == _PT_DYNAMIC), None)
+        if offset is None:
+            raise InvalidLibraryError("is not linked dynamically")
+        size = struct.calcsize(f"{self.byte_order}2{self.word_format}")
+        while (entry := self.unpack(f"2{self.word_format}", offset))[0]:
+            yield entry[0], entry[1]
+            offset += size
 
     def _file_offset(self, address: int) -> int:
-        """Where in the file the byte lies that is loaded to an address."""
-        for offset, begin, length in self.load_segments:
-            if begin <= address < begin + length:
-                return offset + address - begin
-        raise InvalidLibrary(f"is damaged: address {address:#x} lies in no segment")
+        """Return the offset in the file of the byte that is loaded to an address."""
+        for _, p_offset, p_vaddr, p_filesz in self.load_segments:
+            if p_vaddr <= address < p_vaddr + p_filesz:
+                return p_offset + address - p_vaddr
+        raise InvalidLibraryError(f"is damaged: address {address:#x} is in no segment")
 
-    def _read_address(self, address: int, length: int) -> bytes:
+    def _read_address(self, address: int, size: int) -> bytes:
         begin = self._file_offset(address)
-        if begin + length > len(self.content):
-            raise InvalidLibrary(f"is cut: a table ends at byte {begin + length}, the file at {len(self.content)}")
-        return self.content[begin : begin + length]
+        if begin + size > len(self.content):
+            raise InvalidLibraryError(f"is truncated: a table ends at byte {begin + size}, the file at {len(self.content)}")
+        return self.content[begin : begin + size]
 
-    def _exported_symbols(self, table: Mapping[int, int], strings: bytes) -> Iterator[str]:
-        """Names of the symbols that are defined and visible from outside."""
-        row = struct.Struct(self.order + ("L2BH16x" if self.bits == 64 else "L8x2BH"))
-        symbols = self._read_address(table[_SYMTAB], self._symbol_count(table) * row.size)
-        for name, info, other, section in row.iter_unpack(symbols):
-            if section and info >> 4 and other & 3 in (0, 3):
-                yield _string_at(strings, name)
+    def _exported_symbols(self, dynamic: Mapping[int, int], strings: bytes) -> Iterator[str]:
+        """Yield the names of the symbols that are defined and visible to other libraries."""
+        symbol = struct.Struct(self.byte_order + ("L2BH16x" if self.bits == 64 else "L8x2BH"))
+        table = self._read_address(dynamic[_DT_SYMTAB], self._symbol_count(dynamic) * symbol.size)
+        for st_name, st_info, st_other, st_shndx in symbol.iter_unpack(table):
+            is_visible = st_other & 3 in (_STV_DEFAULT, _STV_PROTECTED)
+            if st_shndx != _SHN_UNDEF and st_info >> 4 != _STB_LOCAL and is_visible:
+                yield _string_at(strings, st_name)
 
-    def _symbol_count(self, table: Mapping[int, int]) -> int:
-        if _HASH in table:
-            count = self.unpack("2L", self._file_offset(table[_HASH]))[1]
-        elif _GNU_HASH in table:
-            count = self._gnu_symbol_count(self._file_offset(table[_GNU_HASH]))
+    def _symbol_count(self, dynamic: Mapping[int, int]) -> int:
+        if _DT_HASH in dynamic:
+            count = self.unpack("2L", self._file_offset(dynamic[_DT_HASH]))[1]
+        elif _DT_GNU_HASH in dynamic:
+            count = self._gnu_symbol_count(self._file_offset(dynamic[_DT_GNU_HASH]))
         else:
-            raise InvalidLibrary("has no hash table of symbols")
+            raise InvalidLibraryError("has no symbol hash table")
         if count > _MAX_SYMBOLS:
-            raise InvalidLibrary(f"is damaged: it claims {count} symbols")
+            raise InvalidLibraryError(f"is damaged: it claims {count} symbols")
         return count
 
-    def _gnu_symbol_count(self, place: int) -> int:
-        """One more than the last symbol of the longest-reaching chain."""
-        buckets, first, bloom, _ = self.unpack("4L", place)
-        if buckets > _MAX_SYMBOLS or bloom > _MAX_SYMBOLS:
-            raise InvalidLibrary(f"is damaged: it claims {buckets} hash buckets")
-        table = place + 16 + bloom * (self.bits // 8)
-        last = max(self.unpack(f"{buckets}L", table), default=0)
-        if last < first:
-            return first
-        chain = table + 4 * buckets
-        while not self.unpack("L", chain + 4 * (last - first))[0] & 1:
+    def _gnu_symbol_count(self, offset: int) -> int:
+        """Return one more than the largest symbol index in the chains of a GNU hash table."""
+        nbuckets, symoffset, bloom_size, _ = self.unpack("4L", offset)
+        if nbuckets > _MAX_SYMBOLS or bloom_size > _MAX_SYMBOLS:
+            raise InvalidLibraryError(f"is damaged: it claims {nbuckets} hash buckets")
+        buckets = offset + 16 + bloom_size * (self.bits // 8)
+        last = max(self.unpack(f"{nbuckets}L", buckets), default=0)
+        if last < symoffset:
+            return symoffset
+        chains = buckets + 4 * nbuckets
+        while not self.unpack("L", chains + 4 * (last - symoffset))[0] & 1:
             last += 1
         return last + 1
 
 
-def _string_at(strings: bytes, place: int) -> str:
-    end = strings.find(b"\0", place)
-    if place >= len(strings) or end < 0:
-        raise InvalidLibrary("is damaged: a name lies outside the table of names")
-    return strings[place:end].decode("utf-8", "replace")
+def _string_at(strings: bytes, index: int) -> str:
+    end = strings.find(b"\0", index)
+    if index >= len(strings) or end < 0:
+        raise InvalidLibraryError("is damaged: a name is outside the string table")
+    return strings[index:end].decode("utf-8", "replace")

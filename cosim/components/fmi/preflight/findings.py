@@ -1,4 +1,4 @@
-"""What an examination of an FMU finds, and which rule says so."""
+"""Rules of the preflight check and findings of violations."""
 
 from __future__ import annotations
 
@@ -11,25 +11,38 @@ from ....core.errors import InputError
 
 Severity = Literal["error", "warning"]
 DESCRIPTION_FILE = "modelDescription.xml"
+#: errors that one message lists
 _MAX_SHOWN = 100
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A rule of the standard or of caution. An FMU that breaks an error is not run; a warning is only reported by `validate`."""
+    """Rule of the FMI standard, of a file format or for safety.
+
+    Attributes:
+        name: Rule id, such as "archive.name".
+        source: Section of the standard, or another reason.
+        severity: "error" for an FMU that is not run, "warning" for one that `cosim validate` only reports.
+    """
 
     name: str
     source: str
     severity: Severity = "error"
 
     def __call__(self, message: str, member: str = "", line: int = 0) -> Finding:
-        """The finding that an FMU breaks this rule, in `member` of the archive, at `line` of it (0: nowhere special)."""
+        """Create a finding that an FMU violates this rule.
+
+        Args:
+            message: What was found and what was expected.
+            member: Member of the archive, if the finding belongs to one.
+            line: Line in the member, or 0.
+        """
         return Finding(self, message, member, line)
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One broken rule: what was found and expected, and where."""
+    """Violation of a rule, with its place in the FMU; see `Rule.__call__`."""
 
     rule: Rule
     message: str
@@ -38,16 +51,16 @@ class Finding:
 
     @property
     def location(self) -> str:
-        """ "modelDescription.xml:12", or less where less is known."""
+        """Member and line, such as "modelDescription.xml:12", or less if they are unknown."""
         return escape_unprintable(self.member) + (f":{self.line}" if self.line else "")
 
     def __str__(self) -> str:
-        place = f"{self.location}: " if self.location else ""
-        return f"{place}{escape_unprintable(self.message)} [{self.rule.name}, {self.rule.source}]"
+        prefix = f"{self.location}: " if self.location else ""
+        return f"{prefix}{escape_unprintable(self.message)} [{self.rule.name}, {self.rule.source}]"
 
 
-class FatalFinding(Exception):
-    """A finding after which nothing more can be examined."""
+class FatalFindingError(Exception):
+    """Finding that ends the check, because nothing after it can be read."""
 
     def __init__(self, finding: Finding):
         super().__init__(str(finding))
@@ -55,17 +68,25 @@ class FatalFinding(Exception):
 
 
 def raise_errors(path: Path, findings: Iterable[Finding]) -> None:
-    """Raises InputError with all errors among the findings; of very many, with the first ones and their number."""
+    """Raise the errors among some findings, if there are any.
+
+    Args:
+        path: The FMU, for messages.
+        findings: Errors and warnings.
+
+    Raises:
+        InputError: There are errors; it lists at most the first 100 and the number of the others.
+    """
     errors = [finding for finding in findings if finding.rule.severity == "error"]
     lines = [f'"{path}": {finding}' for finding in dict.fromkeys(errors[:_MAX_SHOWN])]
-    if len(errors) > _MAX_SHOWN:
-        lines.append(f'"{path}": and {len(errors) - _MAX_SHOWN} more errors')
+    if (hidden := len(errors) - _MAX_SHOWN) > 0:
+        lines.append(f'"{path}": and {hidden} more error{"s" if hidden > 1 else ""}')
     if lines:
         raise InputError(lines)
 
 
 def escape_unprintable(text: str, length: int = 300) -> str:
-    """Text of an FMU on one line: control characters are made visible, what is very long is shortened."""
+    """Return text of an FMU as one line of at most `length` characters, with control characters escaped."""
     text = text[: length + 1]
-    shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
-    return shown if len(shown) <= length else shown[: length - 3] + "..."
+    escaped = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+    return escaped if len(escaped) <= length else escaped[: length - 3] + "..."

@@ -1,4 +1,4 @@
-"""What this machine is called in FMUs, and what a library for it looks like."""
+"""Names of platforms in FMUs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,13 @@ _ARCHITECTURES = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "
 
 @dataclass(frozen=True, slots=True)
 class FmuPlatform:
-    """A platform: `tuple_name` is its folder in FMI 3.0 ("x86_64-linux"), `name` the one in FMI 2.0 ("linux64")."""
+    """Platform of an FMU binary.
+
+    Attributes:
+        system: Operating system, such as "linux".
+        architecture: Processor architecture, such as "x86_64".
+        suffix: File name suffix of shared libraries, such as ".so".
+    """
 
     system: str
     architecture: str
@@ -20,19 +26,22 @@ class FmuPlatform:
 
     @property
     def fmi2_platform(self) -> str:
+        """Folder name in FMI 2.0, such as "linux64"."""
         system = "win" if self.system == "windows" else self.system
         return f"{system}{32 if self.architecture == 'x86' else 64}"
 
     @property
     def platform_tuple(self) -> str:
+        """Platform tuple of FMI 3.0, such as "x86_64-linux"."""
         return f"{self.architecture}-{self.system}"
 
     def binary_folder(self, major: int) -> str:
+        """Return the name of the folder below `binaries` for an FMI major version."""
         return self.fmi2_platform if major == 2 else self.platform_tuple
 
 
 def current_platform() -> FmuPlatform:
-    """The machine that this program runs on."""
+    """Return the platform of this process."""
     system, suffix = _SYSTEMS.get(sys.platform, (sys.platform, ".so"))
     machine = platform.machine().lower()
     architecture = _ARCHITECTURES.get(machine, machine)

@@ -1,4 +1,4 @@
-"""What examining and extracting an FMU may cost."""
+"""Limits of the resources that checking and extracting an FMU may use."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class PreflightLimits:
-    """An FMU beyond one of these is refused."""
+    """Limits of the preflight check; an FMU that exceeds one of them is refused."""
 
-    #: files and folders in the archive
+    #: number of files and folders in the archive
     max_members: int = 10_000
-    #: bytes of all members together, extracted
+    #: total extracted size (bytes)
     max_expanded_size: int = 1 << 30
-    #: extracted size over compressed size, of members that extract to more than `ratio_from` bytes
+    #: largest ratio of extracted to compressed size, for members larger than `ratio_threshold` (bytes)
     max_ratio: int = 200
     ratio_threshold: int = 1 << 24
-    #: bytes of the library that is to be loaded: it is examined in memory
+    #: size of the library for this platform (bytes), which is read into memory
     max_library_size: int = 1 << 28
-    #: bytes of one XML file, and tags in it: each costs memory
+    #: size of an XML file (bytes) and number of its tags
     max_xml_size: int = 1 << 25
     max_xml_tags: int = 500_000
-    #: scalars of one array variable
+    #: number of elements of one array variable
     max_array_size: int = 1_000_000
 
 

@@ -1,145 +1,159 @@
-"""What a macOS library says about itself, read without loading it (Apple's mach-o/loader.h, fat.h and nlist.h)."""
+"""Reader of macOS libraries (Mach-O) that does not load them.
+
+Format and field names: Apple's mach-o/loader.h, fat.h and nlist.h.
+"""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
 
-from .library import InvalidLibrary, SharedLibrary
+from .library import InvalidLibraryError, SharedLibrary
 
+#: values of cputype by architecture
 MACHINES = {"x86_64": 0x01000007, "aarch64": 0x0100000C, "x86": 7}
 _MACHINE_NAMES = {number: name for name, number in MACHINES.items()}
-_MAGIC, _MAGIC_32 = b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe"
-#: several libraries in one file: magic -> form of an entry, place of offset and size in it
+_MH_MAGIC_64, _MH_MAGIC = b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe"
+#: universal files: magic -> format of fat_arch and fat_arch_64
 _FAT_FORMATS = {b"\xca\xfe\xba\xbe": ">5L", b"\xca\xfe\xba\xbf": ">2L2Q2L"}
-_DYLIB, _BUNDLE = 6, 8
+_FAT_HEADER_SIZE, _MACH_HEADER_64_SIZE = 8, 32
+_MH_DYLIB, _MH_BUNDLE = 6, 8
 _LC_SEGMENT_64, _LC_SYMTAB = 0x19, 2
-#: commands with a tree of exports -> where its offset and size stand
+#: LC_DYLD_EXPORTS_TRIE, LC_DYLD_INFO, LC_DYLD_INFO_ONLY -> position of the export trie's offset and size in the command
 _EXPORT_TRIE_COMMANDS = {0x80000033: 8, 0x22: 40, 0x80000022: 40}
 _MAX_ENTRIES = 1 << 20
-#: of a symbol: seen by others, a debugger's, undefined unless one of these
-_EXTERNAL, _DEBUG, _DEFINED = 0x01, 0xE0, 0x0E
+#: bits of n_type
+_N_EXT, _N_STAB, _N_TYPE = 0x01, 0xE0, 0x0E
+_NLIST_64_SIZE = 16
 
 
 def read_library(content: bytes, architecture: str) -> SharedLibrary:
-    """The exports of a dynamic library, of a universal one those for the architecture (its dependencies are left to the loader).
+    """Read the exports of a dynamic library; its dependencies are not read.
 
-    Raises Damaged for what the loader would refuse.
+    Args:
+        content: The file; of a universal file the part for the architecture is read.
+        architecture: Architecture that the library must be built for.
+
+    Raises:
+        InvalidLibraryError: The loader would reject the file.
     """
     content = _select_architecture(content, architecture)
-    if content.startswith(_MAGIC_32):
-        raise InvalidLibrary(f"is made for 32 bit; this machine is {architecture}")
-    if not content.startswith(_MAGIC):
-        raise InvalidLibrary("is no macOS library")
-    machine, _, kind, count, size = _unpack(content, "<5L", 4)
-    if machine != MACHINES.get(architecture, machine):
-        raise InvalidLibrary(f"is made for {_architecture_name(machine)}; this machine is {architecture}")
-    if kind not in (_DYLIB, _BUNDLE):
-        raise InvalidLibrary(f"is of type {kind}, expected a dynamic library")
-    return SharedLibrary(frozenset(_exports(content, count, 32 + size)))
+    if content.startswith(_MH_MAGIC):
+        raise InvalidLibraryError(f"is built for 32 bit; this machine is {architecture}")
+    if not content.startswith(_MH_MAGIC_64):
+        raise InvalidLibraryError("is not a macOS library")
+    cputype, _, filetype, ncmds, sizeofcmds = _unpack(content, "<5L", 4)
+    if cputype != MACHINES.get(architecture, cputype):
+        raise InvalidLibraryError(f"is built for {_architecture_name(cputype)}; this machine is {architecture}")
+    if filetype not in (_MH_DYLIB, _MH_BUNDLE):
+        raise InvalidLibraryError(f"is of type {filetype}, expected a dynamic library")
+    return SharedLibrary(frozenset(_exports(content, ncmds, _MACH_HEADER_64_SIZE + sizeofcmds)))
 
 
-def _architecture_name(machine: int) -> str:
-    return _MACHINE_NAMES.get(machine, f"machine {machine:#x}")
+def _architecture_name(cputype: int) -> str:
+    return _MACHINE_NAMES.get(cputype, f"machine {cputype:#x}")
 
 
 def _select_architecture(content: bytes, architecture: str) -> bytes:
-    """The part of a universal file for the architecture; of others the whole."""
+    """Return the part of a universal file for the architecture, or the whole of any other file."""
     form = _FAT_FORMATS.get(content[:4])
     if form is None:
         return content
-    (count,) = _unpack(content, ">L", 4)
-    if count > _MAX_ENTRIES:
-        raise InvalidLibrary(f"is damaged: it claims {count} architectures")
-    found = []
-    for i in range(count):
-        machine, _, offset, size, *_ = _unpack(content, form, 8 + i * struct.calcsize(form))
-        if machine == MACHINES.get(architecture):
+    (nfat_arch,) = _unpack(content, ">L", 4)
+    if nfat_arch > _MAX_ENTRIES:
+        raise InvalidLibraryError(f"is damaged: it claims {nfat_arch} architectures")
+    names = []
+    for i in range(nfat_arch):
+        cputype, _, offset, size, *_ = _unpack(content, form, _FAT_HEADER_SIZE + i * struct.calcsize(form))
+        if cputype == MACHINES.get(architecture):
             if offset + size > len(content):
-                raise InvalidLibrary(
-                    f"is cut: the part for {architecture} ends at byte {offset + size}, the file at {len(content)}"
+                raise InvalidLibraryError(
+                    f"is truncated: the part for {architecture} ends at byte {offset + size}, the file at {len(content)}"
                 )
             return content[offset : offset + size]
-        found.append(_architecture_name(machine))
-    raise InvalidLibrary(f"is made for {', '.join(found[:9]) or 'nothing'}; this machine is {architecture}")
+        names.append(_architecture_name(cputype))
+    raise InvalidLibraryError(f"is built for {', '.join(names[:9]) or 'no architecture'}; this machine is {architecture}")
 
 
 def _unpack(content: bytes, form: str, offset: int) -> tuple[int, ...]:
     if offset + struct.calcsize(form) > len(content):
-        raise InvalidLibrary(f"is cut: it refers to byte {offset}, but has {len(content)}")
+        raise InvalidLibraryError(f"is truncated: it refers to byte {offset}, but has {len(content)}")
     return struct.unpack_from(form, content, offset)
 
 
-def _exports(content: bytes, count: int, end: int) -> Iterator[str]:
-    """Names from the tables that the commands for the loader point to."""
-    place = 32
-    for _ in range(min(count, _MAX_ENTRIES)):
-        command, size = _unpack(content, "<2L", place)
-        if size < 8 or place + size > end:
-            raise InvalidLibrary("has damaged commands for the loader")
-        if command == _LC_SEGMENT_64:
-            _check_segment(content, place)
-        elif command == _LC_SYMTAB:
-            yield from _symbol_table_exports(content, *_unpack(content, "<4L", place + 8))
-        elif command in _EXPORT_TRIE_COMMANDS:
-            yield from _trie_exports(content, *_unpack(content, "<2L", place + _EXPORT_TRIE_COMMANDS[command]))
-        place += size
+def _exports(content: bytes, ncmds: int, end: int) -> Iterator[str]:
+    """Yield the names in the tables that the load commands refer to."""
+    offset = _MACH_HEADER_64_SIZE
+    for _ in range(min(ncmds, _MAX_ENTRIES)):
+        cmd, cmdsize = _unpack(content, "<2L", offset)
+        if cmdsize < 8 or offset + cmdsize > end:
+            raise InvalidLibraryError("has damaged load commands")
+        if cmd == _LC_SEGMENT_64:
+            _check_segment(content, offset)
+        elif cmd == _LC_SYMTAB:
+            yield from _symbol_table_exports(content, *_unpack(content, "<4L", offset + 8))
+        elif cmd in _EXPORT_TRIE_COMMANDS:
+            yield from _trie_exports(content, *_unpack(content, "<2L", offset + _EXPORT_TRIE_COMMANDS[cmd]))
+        offset += cmdsize
 
 
 def _trie_exports(content: bytes, offset: int, size: int) -> Iterator[str]:
-    """Names that the paths of a tree spell: a node is the size of what is exported, that, and its branches."""
-    tree = content[offset : offset + size]
-    if len(tree) < size:
-        raise InvalidLibrary(f"is cut: its tree of exports ends at byte {offset + size}, the file at {len(content)}")
-    nodes, seen = [(0, b"")] if tree else [], set[int]()
+    """Yield the names of an export trie; a node is the size of its export information, that information, and its edges."""
+    trie = content[offset : offset + size]
+    if len(trie) < size:
+        raise InvalidLibraryError(f"is truncated: its export trie ends at byte {offset + size}, the file at {len(content)}")
+    nodes, visited = [(0, b"")] if trie else [], set[int]()
     while nodes:
-        place, name = nodes.pop()
-        if place in seen:
-            raise InvalidLibrary("has a tree of exports that runs in circles")
-        seen.add(place)
-        exported, place = _read_uleb128(tree, place)
-        if exported:
+        node, name = nodes.pop()
+        if node in visited:
+            raise InvalidLibraryError("has an export trie with a cycle")
+        visited.add(node)
+        terminal_size, position = _read_uleb128(trie, node)
+        if terminal_size:
             yield name.decode("utf-8", "replace").removeprefix("_")
-        nodes += _trie_children(tree, place + exported, name)
+        nodes += _trie_children(trie, position + terminal_size, name)
 
 
-def _trie_children(tree: bytes, place: int, name: bytes) -> Iterator[tuple[int, bytes]]:
-    (count,) = _unpack(tree, "<B", place)
-    place += 1
+def _trie_children(trie: bytes, position: int, name: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield (offset, name) of the child nodes, from the edges at a position."""
+    (count,) = _unpack(trie, "<B", position)
+    position += 1
     for _ in range(count):
-        end = tree.find(b"\0", place)
+        end = trie.find(b"\0", position)
         if end < 0:
-            raise InvalidLibrary("is damaged: the name of an export does not end")
-        branch, following = _read_uleb128(tree, end + 1)
-        yield branch, name + tree[place:end]
-        place = following
+            raise InvalidLibraryError("is damaged: the name of an export is not terminated")
+        child, next_position = _read_uleb128(trie, end + 1)
+        yield child, name + trie[position:end]
+        position = next_position
 
 
-def _read_uleb128(tree: bytes, place: int) -> tuple[int, int]:
-    """A number in groups of 7 bits, the lowest first, and the place behind it."""
+def _read_uleb128(trie: bytes, position: int) -> tuple[int, int]:
+    """Read a ULEB128 number; return it and the position after it."""
     value = 0
     for shift in range(0, 64, 7):
-        (byte,) = _unpack(tree, "<B", place)
-        place += 1
+        (byte,) = _unpack(trie, "<B", position)
+        position += 1
         value |= (byte & 0x7F) << shift
         if byte < 0x80:
-            return value, place
-    raise InvalidLibrary("is damaged: a number of its tree of exports does not end")
+            return value, position
+    raise InvalidLibraryError("is damaged: a number in its export trie is not terminated")
 
 
-def _check_segment(content: bytes, place: int) -> None:
-    offset, size = _unpack(content, "<2Q", place + 40)
-    if offset + size > len(content):
-        raise InvalidLibrary(f"is cut: a segment ends at byte {offset + size}, the file at {len(content)}")
+def _check_segment(content: bytes, command: int) -> None:
+    fileoff, filesize = _unpack(content, "<2Q", command + 40)
+    if fileoff + filesize > len(content):
+        raise InvalidLibraryError(f"is truncated: a segment ends at byte {fileoff + filesize}, the file at {len(content)}")
 
 
-def _symbol_table_exports(content: bytes, table: int, count: int, names: int, length: int) -> Iterator[str]:
-    """Symbols that others see; C names begin with an underscore there."""
-    if count > _MAX_ENTRIES or names + length > len(content):
-        raise InvalidLibrary(f"is cut: its table of {count} symbols ends at byte {names + length}, the file at {len(content)}")
-    for i in range(count):
-        index, kind, _, _, _ = _unpack(content, "<L2BHQ", table + 16 * i)
-        if kind & _EXTERNAL and not kind & _DEBUG and kind & _DEFINED and index < length:
-            end = content.find(b"\0", names + index, names + length)
-            name = content[names + index : end if end >= 0 else names + length]
+def _symbol_table_exports(content: bytes, symoff: int, nsyms: int, stroff: int, strsize: int) -> Iterator[str]:
+    """Yield the names of the defined external symbols, without the leading underscore of C names."""
+    if nsyms > _MAX_ENTRIES or stroff + strsize > len(content):
+        raise InvalidLibraryError(
+            f"is truncated: its table of {nsyms} symbols ends at byte {stroff + strsize}, the file at {len(content)}"
+        )
+    for i in range(nsyms):
+        n_strx, n_type, _, _, _ = _unpack(content, "<L2BHQ", symoff + _NLIST_64_SIZE * i)
+        if n_type & _N_EXT and not n_type & _N_STAB and n_type & _N_TYPE and n_strx < strsize:
+            end = content.find(b"\0", stroff + n_strx, stroff + strsize)
+            name = content[stroff + n_strx : end if end >= 0 else stroff + strsize]
             yield name.decode("utf-8", "replace").removeprefix("_")

@@ -1,12 +1,11 @@
-"""A model description as it is written: texts, nothing checked, FMI 2.0 and 3.0 in the same shape."""
+"""Model description as unchecked text, in the same form for FMI 2.0 and FMI 3.0."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
-#: first the default, then what else `initial` may be (FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.4)
+#: (causality, variability) -> allowed values of `initial`, the default first (FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.4)
 _EXACT, _DERIVED, _ANY = ("exact",), ("calculated", "approx"), ("calculated", "exact", "approx")
 ALLOWED_INITIAL: Mapping[tuple[str, str], Sequence[str]] = {
     ("structuralParameter", "fixed"): _EXACT,
@@ -31,7 +30,15 @@ ALLOWED_INITIAL: Mapping[tuple[str, str], Sequence[str]] = {
 
 @dataclass(frozen=True, slots=True)
 class TypeDefinition:
-    """A declared type; `kind` is an FMI 3.0 type name, `items` are (name, value) of an enumeration."""
+    """Declared type.
+
+    Attributes:
+        name: Name of the type.
+        kind: FMI 3.0 type name, or "" if FMI does not define the type.
+        attributes: XML attributes.
+        items: (name, value) of the items of an enumeration.
+        line: Line in the file.
+    """
 
     name: str
     kind: str
@@ -42,10 +49,19 @@ class TypeDefinition:
 
 @dataclass(frozen=True, slots=True)
 class ModelVariable:
-    """A variable; `kind` is an FMI 3.0 type name, or "" when it has none that FMI knows.
+    """Model variable.
 
-    `attributes` are those of the variable and of its type together, `starts` the words of its start value (None: it has
-    none), `dimensions` the attributes of each of its dimensions, `aliases` those of its FMI 3.0 aliases.
+    Attributes:
+        name: Name of the variable.
+        kind: FMI 3.0 type name, or "" if FMI does not define the type.
+        causality: Causality, "local" by default.
+        variability: Variability, or its default.
+        attributes: XML attributes of the variable and of its type element.
+        start_words: Words of the start value, or None without one.
+        dimensions: XML attributes of each dimension.
+        aliases: XML attributes of each alias (FMI 3.0).
+        line: Line in the file.
+        declared_type: Declared type, if it exists.
     """
 
     name: str
@@ -61,15 +77,16 @@ class ModelVariable:
 
     @property
     def initial(self) -> str:
-        """What is written, else the default of causality and variability; "" where there is none."""
+        """Value of `initial`, or the default for causality and variability, or "" if there is no default."""
         return self.attributes.get("initial") or ALLOWED_INITIAL.get((self.causality, self.variability), ("",))[0]
 
     @property
     def is_float(self) -> bool:
+        """True for Float32 and Float64."""
         return self.kind.startswith("Float")
 
     def attribute(self, name: str) -> str | None:
-        """Its own attribute, else that of its declared type."""
+        """Return an XML attribute of the variable, or else of its declared type."""
         return self.attributes.get(name) or (self.declared_type.attributes.get(name) if self.declared_type else None)
 
     def __str__(self) -> str:
@@ -78,7 +95,15 @@ class ModelVariable:
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """A row of the model structure. `group` is the FMI 3.0 name of the list it stands in."""
+    """Element of the model structure.
+
+    Attributes:
+        element: FMI 3.0 name of the element, such as "Output" or "InitialUnknown".
+        reference: Reference to the variable: index in FMI 2.0, value reference in FMI 3.0.
+        dependencies: References in `dependencies`, or None without that attribute.
+        dependency_kinds: Words in `dependenciesKind`, or None without that attribute.
+        line: Line in the file.
+    """
 
     element: str
     reference: str
@@ -89,7 +114,14 @@ class Unknown:
 
 @dataclass(frozen=True, slots=True)
 class UnitDefinition:
-    """A unit; `base` are the attributes of its BaseUnit, None without one."""
+    """Unit definition.
+
+    Attributes:
+        name: Name of the unit.
+        base_unit: XML attributes of BaseUnit, or None without one.
+        display_units: Names of the display units.
+        line: Line in the file.
+    """
 
     name: str
     base_unit: Mapping[str, str] | None
@@ -99,7 +131,21 @@ class UnitDefinition:
 
 @dataclass(frozen=True)
 class ModelDescription:
-    """A model description. `root` are the attributes of the root, `interface` those of CoSimulation (None: not offered)."""
+    """Model description.
+
+    Attributes:
+        major: FMI major version.
+        root: XML attributes of the root element.
+        co_simulation: XML attributes of the Co-Simulation interface, or None without one.
+        default_experiment: XML attributes of the default experiment.
+        variables: Model variables in order.
+        types: Declared types.
+        units: Unit definitions.
+        model_structure: Elements of the model structure.
+        log_categories: Names of the log categories.
+        lines: Lines of the elements below the root by name; "" for the root.
+        by_reference: Variables by the reference that the model structure uses, see `Unknown`.
+    """
 
     major: int
     root: Mapping[str, str]
@@ -114,8 +160,9 @@ class ModelDescription:
     by_reference: Mapping[str, ModelVariable] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """FMI 2.0 refers to variables by their place, counted from one, FMI 3.0 by their value references."""
-        keys: Any = map(str, range(1, len(self.variables) + 1))
-        if self.major == 3:
-            keys = (variable.attributes.get("valueReference", "").strip() for variable in self.variables)
-        object.__setattr__(self, "by_reference", dict(zip(keys, self.variables, strict=True)))
+        """Index the variables: FMI 2.0 refers to them by their index from 1, FMI 3.0 by value reference."""
+        if self.major == 2:
+            references = [str(index) for index in range(1, len(self.variables) + 1)]
+        else:
+            references = [variable.attributes.get("valueReference", "").strip() for variable in self.variables]
+        object.__setattr__(self, "by_reference", dict(zip(references, self.variables, strict=True)))

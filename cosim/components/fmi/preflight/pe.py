@@ -1,79 +1,99 @@
-"""What a Windows library says about itself, read without loading it (Microsoft PE/COFF specification, sections 3 to 6)."""
+"""Reader of Windows libraries (PE) that does not load them.
+
+Format and field names: Microsoft PE/COFF specification, sections 3 to 6.
+"""
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
-from .library import InvalidLibrary, SharedLibrary
+from .library import InvalidLibraryError, SharedLibrary
 
+#: values of Machine by architecture
 MACHINES = {"x86_64": 0x8664, "aarch64": 0xAA64, "x86": 0x14C}
 _MACHINE_NAMES = {number: name for name, number in MACHINES.items()}
-_FILE_DLL = 0x2000
+_IMAGE_FILE_DLL = 0x2000
+#: Magic of the optional header
 _PE32, _PE32_PLUS = 0x10B, 0x20B
-_MAX_EXPORTS = 1 << 20
+_COFF_HEADER_SIZE, _SECTION_HEADER_SIZE = 24, 40
+_MAX_EXPORTS, _MAX_NAME_LENGTH = 1 << 20, 4096
+
+
+class _Section(NamedTuple):
+    virtual_address: int
+    size_of_raw_data: int
+    pointer_to_raw_data: int
 
 
 def read_library(content: bytes, architecture: str) -> SharedLibrary:
-    """The exports of a DLL (its dependencies are left to the loader). Raises Damaged for what the loader would refuse."""
+    """Read the exports of a DLL; its dependencies are not read.
+
+    Args:
+        content: The file.
+        architecture: Architecture that the library must be built for.
+
+    Raises:
+        InvalidLibraryError: The loader would reject the file.
+    """
     if not content.startswith(b"MZ"):
-        raise InvalidLibrary("is no Windows library")
-    header = _unpack(content, "<L", 0x3C)[0]
-    if content[header : header + 4] != b"PE\0\0":
-        raise InvalidLibrary("has a damaged PE header")
-    machine, sections, _, _, _, size, flags = _unpack(content, "<2H3L2H", header + 4)
+        raise InvalidLibraryError("is not a Windows library")
+    (e_lfanew,) = _unpack(content, "<L", 0x3C)
+    if content[e_lfanew : e_lfanew + 4] != b"PE\0\0":
+        raise InvalidLibraryError("has a damaged PE header")
+    machine, number_of_sections, _, _, _, optional_header_size, characteristics = _unpack(content, "<2H3L2H", e_lfanew + 4)
     if machine != MACHINES.get(architecture, machine):
-        raise InvalidLibrary(
-            f"is made for {_MACHINE_NAMES.get(machine, f'machine {machine:#x}')}; this machine is {architecture}"
-        )
-    if not flags & _FILE_DLL:
-        raise InvalidLibrary("is no library but a program")
-    optional = header + 24
-    table = list(_sections(content, optional + size, sections))
-    return SharedLibrary(frozenset(_exports(content, _export_directory(content, optional), table)))
+        machine_name = _MACHINE_NAMES.get(machine, f"machine {machine:#x}")
+        raise InvalidLibraryError(f"is built for {machine_name}; this machine is {architecture}")
+    if not characteristics & _IMAGE_FILE_DLL:
+        raise InvalidLibraryError("is a program, expected a library")
+    optional_header = e_lfanew + _COFF_HEADER_SIZE
+    sections = list(_sections(content, optional_header + optional_header_size, number_of_sections))
+    return SharedLibrary(frozenset(_exports(content, _export_table_address(content, optional_header), sections)))
 
 
 def _unpack(content: bytes, form: str, offset: int) -> tuple[int, ...]:
     if offset + struct.calcsize(form) > len(content):
-        raise InvalidLibrary(f"is cut: it refers to byte {offset}, but has {len(content)}")
+        raise InvalidLibraryError(f"is truncated: it refers to byte {offset}, but has {len(content)}")
     return struct.unpack_from(form, content, offset)
 
 
-def _sections(content: bytes, place: int, count: int) -> Iterator[tuple[int, int, int]]:
-    """(address, length in the file, offset in the file) of each section."""
+def _sections(content: bytes, section_table: int, count: int) -> Iterator[_Section]:
     for i in range(count):
-        _, address, length, offset = _unpack(content, "<4L", place + 40 * i + 8)
-        if length and offset + length > len(content):
-            raise InvalidLibrary(f"is cut: a section ends at byte {offset + length}, the file at {len(content)}")
-        yield address, length, offset
+        _, address, size, pointer = _unpack(content, "<4L", section_table + _SECTION_HEADER_SIZE * i + 8)
+        if size and pointer + size > len(content):
+            raise InvalidLibraryError(f"is truncated: a section ends at byte {pointer + size}, the file at {len(content)}")
+        yield _Section(address, size, pointer)
 
 
-def _export_directory(content: bytes, optional: int) -> int:
-    """The address of the table of exports, which is the first of the data directories."""
-    (magic,) = _unpack(content, "<H", optional)
+def _export_table_address(content: bytes, optional_header: int) -> int:
+    """Return the address of the export table from the data directories, or 0 if there is none."""
+    (magic,) = _unpack(content, "<H", optional_header)
     if magic not in (_PE32, _PE32_PLUS):
-        raise InvalidLibrary("has a damaged PE header")
-    count, address = _unpack(content, "<2L", optional + (108 if magic == _PE32_PLUS else 92))
-    return address if count else 0
+        raise InvalidLibraryError("has a damaged PE header")
+    directory_count, address = _unpack(content, "<2L", optional_header + (108 if magic == _PE32_PLUS else 92))
+    return address if directory_count else 0
 
 
-def _exports(content: bytes, directory: int, table: list[tuple[int, int, int]]) -> Iterator[str]:
-    if directory == 0:
+def _exports(content: bytes, export_table: int, sections: Sequence[_Section]) -> Iterator[str]:
+    """Yield the names in the export name pointer table."""
+    if export_table == 0:
         return
-    count, _, names = _unpack(content, "<3L", _file_offset(directory, table) + 24)
-    if count > _MAX_EXPORTS:
-        raise InvalidLibrary(f"is damaged: it claims {count} exports")
-    for address in _unpack(content, f"<{count}L", _file_offset(names, table) if count else 0):
-        begin = _file_offset(address, table)
-        end = content.find(b"\0", begin, begin + 4096)
+    name_count, _, name_pointers = _unpack(content, "<3L", _file_offset(export_table, sections) + 24)
+    if name_count > _MAX_EXPORTS:
+        raise InvalidLibraryError(f"is damaged: it claims {name_count} exports")
+    for address in _unpack(content, f"<{name_count}L", _file_offset(name_pointers, sections) if name_count else 0):
+        begin = _file_offset(address, sections)
+        end = content.find(b"\0", begin, begin + _MAX_NAME_LENGTH)
         if end < 0:
-            raise InvalidLibrary("is damaged: the name of an export does not end")
+            raise InvalidLibraryError("is damaged: the name of an export is not terminated")
         yield content[begin:end].decode("utf-8", "replace")
 
 
-def _file_offset(address: int, table: list[tuple[int, int, int]]) -> int:
-    """Where in the file the byte lies that is loaded to an address."""
-    for begin, length, offset in table:
-        if begin <= address < begin + length:
+def _file_offset(address: int, sections: Sequence[_Section]) -> int:
+    """Return the offset in the file of the byte that is loaded to a relative virtual address."""
+    for begin, size, offset in sections:
+        if begin <= address < begin + size:
             return offset + address - begin
-    raise InvalidLibrary(f"is damaged: address {address:#x} lies in no section")
+    raise InvalidLibraryError(f"is damaged: address {address:#x} is in no section")

@@ -1,4 +1,4 @@
-"""Rules about the model as a whole: what it is called, what it offers, its units, types and default experiment."""
+"""Rules about the model as a whole: names, interface, units, types, default experiment and log categories."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 
 from ....core.units import BASE_UNITS
 from .findings import DESCRIPTION_FILE, Finding, Rule
-from .model_description import ModelDescription, UnitDefinition
+from .model_description import ModelDescription, TypeDefinition, UnitDefinition
 from .values import parse_float, parse_value
 
 _ROOT = "FMI 2.0.5 section 2.2.1, FMI 3.0.2 section 2.4.1"
@@ -35,6 +35,7 @@ _C_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 def check_names(model: ModelDescription) -> Iterator[Finding]:
+    """Check the attributes of the root element and of the Co-Simulation interface."""
     line = model.lines[""]
     attribute = "guid" if model.major == 2 else "instantiationToken"
     if not model.root.get(attribute):
@@ -51,44 +52,58 @@ def check_names(model: ModelDescription) -> Iterator[Finding]:
 
 
 def check_units(model: ModelDescription) -> Iterator[Finding]:
-    for name, place in _find_duplicates((unit.name, unit.line) for unit in model.units):
-        yield UNIT_NAME(f'the unit "{name}" is defined twice', DESCRIPTION_FILE, place)
+    """Check that unit names are unique, and that base units have valid exponents, factors and offsets."""
+    for name, line in _find_duplicates((unit.name, unit.line) for unit in model.units):
+        yield UNIT_NAME(f'the unit "{name}" is defined twice', DESCRIPTION_FILE, line)
     for unit in model.units:
         yield from _check_unit_base(unit)
 
 
 def _check_unit_base(unit: UnitDefinition) -> Iterator[Finding]:
     for name, text in (unit.base_unit or {}).items():
-        try:
-            good = int(text) is not None if name in BASE_UNITS else math.isfinite(parse_float(text))
-        except ValueError:
-            good = False
-        if not good or (name == "factor" and parse_float(text) == 0):
-            kind = "an integer" if name in BASE_UNITS else "a finite number, a factor not 0"
-            yield UNIT_BASE(f'unit "{unit.name}": found {name}="{text}", expected {kind}', DESCRIPTION_FILE, unit.line)
+        if not _is_valid_base_unit_value(name, text):
+            expected = "an integer" if name in BASE_UNITS else "a finite number, a factor not 0"
+            yield UNIT_BASE(f'unit "{unit.name}": found {name}="{text}", expected {expected}', DESCRIPTION_FILE, unit.line)
+
+
+def _is_valid_base_unit_value(name: str, text: str) -> bool:
+    try:
+        if name in BASE_UNITS:
+            int(text)
+            return True
+        value = parse_float(text)
+    except ValueError:
+        return False
+    return math.isfinite(value) and not (name == "factor" and value == 0)
 
 
 def check_types(model: ModelDescription) -> Iterator[Finding]:
-    for name, place in _find_duplicates((definition.name, definition.line) for definition in model.types):
-        yield TYPE_NAME(f'the type "{name}" is defined twice', DESCRIPTION_FILE, place)
+    """Check that type names are unique, that types are defined by FMI, and that enumerations have valid items."""
+    for name, line in _find_duplicates((definition.name, definition.line) for definition in model.types):
+        yield TYPE_NAME(f'the type "{name}" is defined twice', DESCRIPTION_FILE, line)
     for definition in model.types:
         if not definition.kind:
-            yield TYPE_KIND(f'the type "{definition.name}" is of no kind that FMI knows', DESCRIPTION_FILE, definition.line)
-        for what, words in (("item", [item[0] for item in definition.items]), ("value", [item[1] for item in definition.items])):
-            for word, _ in _find_duplicates((word, 0) for word in words):
-                text = f'the {what} "{word}" of enumeration "{definition.name}" stands twice'
-                yield ITEMS(text, DESCRIPTION_FILE, definition.line)
-        for name, word in definition.items:
-            try:
-                parse_value(word, "Int64")
-            except ValueError:
-                text = f'the item "{name}" of enumeration "{definition.name}" is "{word}", expected an integer'
-                yield ITEMS(text, DESCRIPTION_FILE, definition.line)
+            yield TYPE_KIND(f'the type "{definition.name}" is not of a type defined by FMI', DESCRIPTION_FILE, definition.line)
+        for message in _item_violations(definition):
+            yield ITEMS(message, DESCRIPTION_FILE, definition.line)
         if definition.kind == "Enumeration" and not definition.items:
             yield TYPE_KIND(f'the enumeration "{definition.name}" has no items', DESCRIPTION_FILE, definition.line)
 
 
+def _item_violations(definition: TypeDefinition) -> Iterator[str]:
+    names, values = [name for name, _ in definition.items], [value for _, value in definition.items]
+    for label, words in (("item", names), ("value", values)):
+        for word, _ in _find_duplicates((word, 0) for word in words):
+            yield f'the {label} "{word}" of enumeration "{definition.name}" occurs twice'
+    for name, value in definition.items:
+        try:
+            parse_value(value, "Int64")
+        except ValueError:
+            yield f'the item "{name}" of enumeration "{definition.name}" is "{value}", expected an integer'
+
+
 def check_experiment(model: ModelDescription) -> Iterator[Finding]:
+    """Check that the values of the default experiment are finite, and that stop time, step size and tolerance are consistent."""
     line = model.lines.get("DefaultExperiment", 0)
     numbers: dict[str, float] = {}
     for name in ("startTime", "stopTime", "stepSize", "tolerance"):
@@ -109,16 +124,17 @@ def check_experiment(model: ModelDescription) -> Iterator[Finding]:
 
 
 def check_categories(model: ModelDescription) -> Iterator[Finding]:
+    """Check that log categories are unique."""
     for name, _ in _find_duplicates((name, 0) for name in model.log_categories):
-        yield CATEGORIES(f'the log category "{name}" stands twice', DESCRIPTION_FILE, model.lines["LogCategories"])
+        yield CATEGORIES(f'the log category "{name}" occurs twice', DESCRIPTION_FILE, model.lines["LogCategories"])
 
 
 def _find_duplicates(names: Iterable[tuple[str, int]]) -> Iterator[tuple[str, int]]:
-    """Those that were there before."""
+    """Yield each (name, line) whose name occurred before."""
     seen: set[str] = set()
-    for name, place in names:
+    for name, line in names:
         if name in seen:
-            yield name, place
+            yield name, line
         seen.add(name)
 
 

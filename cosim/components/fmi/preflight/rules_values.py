@@ -1,4 +1,4 @@
-"""Rules about values: start values, limits and the sizes of arrays."""
+"""Rules about values: start values, min and max, and the sizes of arrays."""
 
 from __future__ import annotations
 
@@ -30,6 +30,7 @@ _NON_NUMERIC_TYPES = ("String", "Binary", "Clock", "")
 
 
 def check_starts(model: ModelDescription) -> Iterator[Finding]:
+    """Check that start values exist where required, are valid, and are between min and max."""
     for variable in model.variables:
         if variable.kind not in ("Clock", ""):
             yield from _check_start_presence(variable)
@@ -40,11 +41,11 @@ def check_starts(model: ModelDescription) -> Iterator[Finding]:
 def _check_start_presence(variable: ModelVariable) -> Iterator[Finding]:
     initial, causality = variable.initial, variable.causality
     if not variable.start_words and (initial in ("exact", "approx") or causality == "input"):
-        why = "inputs" if causality == "input" else f'initial="{initial}"'
-        yield _variable_finding(MISSING, variable, f"has no start value, which is needed for {why}")
+        reason = "inputs" if causality == "input" else f'initial="{initial}"'
+        yield _variable_finding(MISSING, variable, f"has no start value, which is required for {reason}")
     if variable.start_words is not None and (initial == "calculated" or causality == "independent"):
-        why = "it is independent" if causality == "independent" else 'initial="calculated"'
-        yield _variable_finding(UNEXPECTED, variable, f"has a start value, but {why}")
+        reason = "it is independent" if causality == "independent" else 'initial="calculated"'
+        yield _variable_finding(UNEXPECTED, variable, f"has a start value, but {reason}")
 
 
 def _check_start_values(variable: ModelVariable) -> Iterator[Finding]:
@@ -53,21 +54,20 @@ def _check_start_values(variable: ModelVariable) -> Iterator[Finding]:
         try:
             number = parse_value(word, variable.kind)
         except ValueError:
-            text = f'start value "{" ".join(variable.start_words or ())}" of {variable} is no {variable.kind}'
+            text = f'start value "{" ".join(variable.start_words or ())}" of {variable} is not a valid {variable.kind}'
             yield VALUE(text, DESCRIPTION_FILE, variable.line)
             return
         if not math.isfinite(number):
-            harmless = math.isinf(number) and variable.causality not in ("input", "output")
-            yield _variable_finding(
-                INFINITE if harmless else FINITE, variable, f"found start value {word}, expected a finite number"
-            )
+            is_allowed = math.isinf(number) and variable.causality not in ("input", "output")
+            text = f"found start value {word}, expected a finite number"
+            yield _variable_finding(INFINITE if is_allowed else FINITE, variable, text)
         elif not low <= number <= high:
             yield _variable_finding(_range_rule(variable), variable, f"found start value {word}, expected {low:g} to {high:g}")
     yield from _check_enumeration_start(variable)
 
 
 def _read_limits(variable: ModelVariable) -> Generator[Finding, None, tuple[float, float]]:
-    """Returns (min, max), infinite where there is none that can be read."""
+    """Return (min, max), infinite for a limit that is missing or invalid; yield findings about invalid limits."""
     limits = {"min": -math.inf, "max": math.inf}
     for name in limits:
         if (text := variable.attribute(name)) is None or variable.kind == "Boolean":
@@ -84,7 +84,13 @@ def _read_limits(variable: ModelVariable) -> Generator[Finding, None, tuple[floa
 
 
 def read_limit(text: str) -> float | None:
-    """A limit, also of integers, where tools write more than their range; None when it is none that can be read."""
+    """Parse the value of `min` or `max`.
+
+    Limits of integers are parsed as floating-point numbers too, because exporters write limits beyond the integer range.
+
+    Returns:
+        The limit, or None if the text is not a number.
+    """
     try:
         limit = parse_float(text.strip())
     except ValueError:
@@ -93,7 +99,7 @@ def read_limit(text: str) -> float | None:
 
 
 def _range_rule(variable: ModelVariable) -> Rule:
-    """Only what comes from outside has to keep to the limits; what an FMU sets itself it will know how to use."""
+    """Return the rule for a start value out of range: an error only for values that the importer sets."""
     return RANGE if variable.causality in ("input", "parameter", "structuralParameter") else OWN_RANGE
 
 
@@ -107,6 +113,7 @@ def _check_enumeration_start(variable: ModelVariable) -> Iterator[Finding]:
 
 
 def check_dimensions(model: ModelDescription, limits: PreflightLimits) -> Iterator[Finding]:
+    """Check the dimensions of arrays and the number of their start values."""
     for variable in model.variables:
         if not variable.dimensions:
             shape: Sequence[int] | None = ()
@@ -118,23 +125,34 @@ def check_dimensions(model: ModelDescription, limits: PreflightLimits) -> Iterat
         if size > limits.max_array_size:
             yield _variable_finding(SIZE, variable, f"has {size} elements, expected at most {limits.max_array_size}")
         elif variable.start_words and len(variable.start_words) not in (1, size):
-            yield _variable_finding(COUNT, variable, f"found {len(variable.start_words)} start values, expected {size}")
+            count = len(variable.start_words)
+            text = f"found {count} start value{'s' if count > 1 else ''}, expected {size}"
+            yield _variable_finding(COUNT, variable, text)
 
 
 def _read_shape(model: ModelDescription, variable: ModelVariable) -> Generator[Finding, None, Sequence[int] | None]:
-    """Returns the sizes, or None when one of them is unknown."""
+    """Return the shape, or None if a dimension is invalid; yield findings about invalid dimensions."""
     sizes = [dimension_size(model, dimension) for dimension in variable.dimensions]
     for size, dimension in zip(sizes, variable.dimensions, strict=True):
         if size is None or size < 1:
             found = " ".join(f'{name}="{text}"' for name, text in dimension.items()) or "nothing"
-            text = f"found a dimension with {found}, expected start > 0 or the reference of a structural parameter that is"
+            expected = "start > 0, or the value reference of a structural parameter with start > 0"
+            text = f"found a dimension with {found}, expected {expected}"
             yield _variable_finding(DIMENSION, variable, text)
-    good = [size for size in sizes if size]
-    return good if len(good) == len(sizes) else None
+    valid = [size for size in sizes if size]
+    return valid if len(valid) == len(sizes) else None
 
 
 def dimension_size(model: ModelDescription, dimension: Mapping[str, str]) -> int | None:
-    """The size of a dimension before anything is set; None when it is not said clearly."""
+    """Return the size of a dimension according to the start values.
+
+    Args:
+        model: The model description.
+        dimension: XML attributes of the dimension.
+
+    Returns:
+        The size, or None if the dimension is not defined by exactly one of `start` and a valid `valueReference`.
+    """
     reference, text = dimension.get("valueReference"), dimension.get("start")
     if (reference is None) == (text is None):
         return None

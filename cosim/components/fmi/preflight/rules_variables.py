@@ -1,4 +1,4 @@
-"""Rules about variables: names, references, what they may be, and where they point to."""
+"""Rules about variables: names, causality, variability, value references, and references to other definitions."""
 
 from __future__ import annotations
 
@@ -44,24 +44,25 @@ _NAME_PATTERN = (
     r"(?:[A-Za-z_][A-Za-z0-9_]*|'(?:[A-Za-z0-9_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ]|\\['\"?\\abfnrtv])+')(?:\[[0-9]+(?:,[0-9]+)*\])?"
 )
 _STRUCTURED_NAME = re.compile(rf"{_NAME_PATTERN}(?:\.{_NAME_PATTERN})*|der\({_NAME_PATTERN}(?:\.{_NAME_PATTERN})*(?:,[0-9]+)?\)")
-#: names among which the nearest one is looked for, which is slow
+#: largest number of names that are compared for a spelling hint, which is slow
 _MAX_HINT_CANDIDATES = 200
-#: kinds of FMI 2.0 that are read and written by the same functions
+#: types of FMI 2.0 whose value references share one number range with another type
 _ACCESSOR_TYPES = {"Enumeration": "Int32"}
 
 
 def check_identity(model: ModelDescription) -> Iterator[Finding]:
-    """Names are there, are one line, unique and written as they are said to be."""
-    seen: dict[str, int] = {}
-    structured = model.root.get("variableNamingConvention") == "structured"
+    """Check that variable names are printable, unique and follow the declared naming convention."""
+    first_lines: dict[str, int] = {}
+    is_structured = model.root.get("variableNamingConvention") == "structured"
     for name, line in _all_names(model):
         if not name or not name.isprintable():
             yield NAME(f'found the variable name "{name}", expected one without control characters', DESCRIPTION_FILE, line)
-        elif structured and not _STRUCTURED_NAME.fullmatch(name):
+        elif is_structured and not _STRUCTURED_NAME.fullmatch(name):
             yield CONVENTION(f'the name "{name}" does not follow the structured naming convention', DESCRIPTION_FILE, line)
-        if name in seen:
-            yield UNIQUE(f'the variable name "{name}" stands in line {seen[name]} too, expected once', DESCRIPTION_FILE, line)
-        seen.setdefault(name, line)
+        if name in first_lines:
+            text = f'the variable name "{name}" is already used in line {first_lines[name]}, expected a unique name'
+            yield UNIQUE(text, DESCRIPTION_FILE, line)
+        first_lines.setdefault(name, line)
 
 
 def _all_names(model: ModelDescription) -> Iterator[tuple[str, int]]:
@@ -72,13 +73,13 @@ def _all_names(model: ModelDescription) -> Iterator[tuple[str, int]]:
 
 
 def check_kinds(model: ModelDescription) -> Iterator[Finding]:
-    """Type, causality, variability and initial are words of FMI, and go together."""
+    """Check that type, causality, variability and initial are valid and allowed in combination."""
     for variable in model.variables:
         if not variable.kind:
-            yield _variable_finding(KIND, variable, "has no type that this FMI version knows")
-        wrong = list(_check_attribute_values(variable))
-        yield from wrong
-        if not wrong and variable.kind != "Clock":
+            yield _variable_finding(KIND, variable, "has no type that this FMI version defines")
+        invalid_values = list(_check_attribute_values(variable))
+        yield from invalid_values
+        if not invalid_values and variable.kind != "Clock":
             yield from _check_combination(model, variable)
     count = sum(variable.causality == "independent" for variable in model.variables)
     if count > 1 or (model.major == 3 and count == 0):
@@ -96,33 +97,31 @@ def _check_combination(model: ModelDescription, variable: ModelVariable) -> Iter
     causality, variability = variable.causality, variable.variability
     allowed = ALLOWED_INITIAL.get((causality, variability))
     if allowed is None:
-        yield _variable_finding(COMBINATION, variable, f'causality="{causality}" does not go with variability="{variability}"')
+        text = f'causality="{causality}" is not allowed with variability="{variability}"'
+        yield _variable_finding(COMBINATION, variable, text)
         return
     if variability == "continuous" and variable.kind and not variable.is_float:
-        yield _variable_finding(CONTINUOUS, variable, f'type {variable.kind} does not go with variability="continuous"')
+        yield _variable_finding(CONTINUOUS, variable, f'type {variable.kind} is not allowed with variability="continuous"')
     if model.major == 2 and "variability" not in variable.attributes and variable.kind and not variable.is_float:
-        yield _variable_finding(
-            IMPLIED, variable, f"lacks the variability, which makes it continuous; {variable.kind} is taken as discrete"
-        )
+        text = f"lacks the attribute variability; its default is continuous, but {variable.kind} is treated as discrete"
+        yield _variable_finding(IMPLIED, variable, text)
     initial = variable.attributes.get("initial")
     if initial and (causality == "independent" or (causality == "input" and model.major == 2)):
-        yield _variable_finding(
-            INITIAL_NOT_ALLOWED, variable, f'found initial="{initial}", expected none for causality="{causality}"'
-        )
+        text = f'found initial="{initial}", expected none for causality="{causality}"'
+        yield _variable_finding(INITIAL_NOT_ALLOWED, variable, text)
     elif initial and initial not in allowed:
-        text = f'initial="{initial}" does not go with causality="{causality}" and variability="{variability}"'
+        text = f'initial="{initial}" is not allowed with causality="{causality}" and variability="{variability}"'
         yield _variable_finding(INITIAL_RULE, variable, text)
 
 
 def check_references(model: ModelDescription) -> Iterator[Finding]:
-    """Value references are numbers; FMI 3.0 has one for each variable, in FMI 2.0 those who share one are aliases."""
+    """Check value references: unique in FMI 3.0, shared only by aliases in FMI 2.0."""
     groups: dict[tuple[str, int], list[ModelVariable]] = defaultdict(list)
     for variable in model.variables:
         text = variable.attributes.get("valueReference", "")
         if not re.fullmatch(r"\s*\+?[0-9]{1,10}\s*", text) or int(text) >= 2**32:
-            yield _variable_finding(
-                REFERENCE, variable, f'found valueReference="{text}", expected a whole number from 0 to 4294967295'
-            )
+            message = f'found valueReference="{text}", expected an integer from 0 to 4294967295'
+            yield _variable_finding(REFERENCE, variable, message)
         else:
             kind = _ACCESSOR_TYPES.get(variable.kind, variable.kind) if model.major == 2 else ""
             groups[kind, int(text)].append(variable)
@@ -133,14 +132,14 @@ def check_references(model: ModelDescription) -> Iterator[Finding]:
 
 def _check_shared_references(group: Sequence[ModelVariable]) -> Iterator[Finding]:
     for variable in group[1:]:
-        text = f'has the value reference of "{group[0].name}", expected one of its own'
+        text = f'has the same value reference as "{group[0].name}", expected a unique one'
         yield _variable_finding(SHARED, variable, text)
 
 
 def _check_aliases(group: Sequence[ModelVariable]) -> Iterator[Finding]:
     settable = [variable for variable in group if variable.causality in ("input", "parameter")]
     for variable in settable[1:]:
-        text = f'has the value reference of "{settable[0].name}"; of inputs and parameters each needs its own'
+        text = f'has the same value reference as "{settable[0].name}", expected a unique one for each input and parameter'
         yield _variable_finding(SHARED, variable, text)
     first = group[0]
     for variable in group[1:]:
@@ -151,19 +150,18 @@ def _check_aliases(group: Sequence[ModelVariable]) -> Iterator[Finding]:
 
 
 def check_declarations(model: ModelDescription) -> Iterator[Finding]:
-    """What a variable names exists: declared type, unit, state, clocks."""
+    """Check that the declared types, units, states and clocks that variables refer to exist."""
     units = {unit.name: unit.display_units for unit in model.units}
     for variable in model.variables:
         yield from _check_declared_type(model, variable)
         yield from _check_units(variable, units)
         state = variable.attributes.get("derivative", "").strip()
         if state and (state not in model.by_reference or not model.by_reference[state].is_float):
-            yield _variable_finding(
-                DERIVATIVE, variable, f'found derivative="{state}", expected the reference of a floating-point variable'
-            )
+            text = f'found derivative="{state}", expected a reference to a floating-point variable'
+            yield _variable_finding(DERIVATIVE, variable, text)
         for clock in variable.attributes.get("clocks", "").split():
             if clock not in model.by_reference or model.by_reference[clock].kind != "Clock":
-                yield _variable_finding(CLOCK, variable, f'found "{clock}" among its clocks, expected the reference of a clock')
+                yield _variable_finding(CLOCK, variable, f'found "{clock}" in its clocks, expected a reference to a clock')
 
 
 def _check_declared_type(model: ModelDescription, variable: ModelVariable) -> Iterator[Finding]:
@@ -175,9 +173,8 @@ def _check_declared_type(model: ModelDescription, variable: ModelVariable) -> It
         hint = did_you_mean(name, (definition.name for definition in model.types[:_MAX_HINT_CANDIDATES]))
         yield _variable_finding(DECLARED, variable, f'found declaredType="{name}", which is not defined{hint}')
     elif variable.kind and variable.declared_type.kind not in ("", variable.kind):
-        yield _variable_finding(
-            DECLARED, variable, f'the type "{name}" is {variable.declared_type.kind}, the variable {variable.kind}'
-        )
+        text = f'the type "{name}" is {variable.declared_type.kind}, but the variable is {variable.kind}'
+        yield _variable_finding(DECLARED, variable, text)
 
 
 def _check_units(variable: ModelVariable, units: dict[str, Sequence[str]]) -> Iterator[Finding]:
@@ -185,9 +182,8 @@ def _check_units(variable: ModelVariable, units: dict[str, Sequence[str]]) -> It
         return
     unit, display = variable.attribute("unit"), variable.attributes.get("displayUnit")
     if unit is not None and unit not in units:
-        yield _variable_finding(
-            UNIT, variable, f'the unit "{unit}" is not defined{did_you_mean(unit, islice(units, _MAX_HINT_CANDIDATES))}'
-        )
+        hint = did_you_mean(unit, islice(units, _MAX_HINT_CANDIDATES))
+        yield _variable_finding(UNIT, variable, f'the unit "{unit}" is not defined{hint}')
     elif display is not None and display not in units.get(unit or "", ()):
         yield _variable_finding(UNIT, variable, f'the display unit "{display}" is not defined for unit "{unit or ""}"')
 

@@ -1,4 +1,4 @@
-"""The standard's own XML schemas: they find every misspelt or misplaced element and attribute."""
+"""Check of XML files against the XML schemas of FMI, which find misspelt and misplaced elements and attributes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lxml import etree
 from .findings import DESCRIPTION_FILE, Finding, Rule
 
 SCHEMA = Rule("xml.schema", "XML schemas of FMI 2.0.5 and 3.0.2", "warning")
-#: member of the archive -> its schema, by FMI version; only FMI 3.0 standardizes the others
+#: (FMI major version, member of the archive) -> schema file of FMPy
 SCHEMA_FILES = {
     (2, DESCRIPTION_FILE): "fmi2/fmi2ModelDescription.xsd",
     (3, DESCRIPTION_FILE): "fmi3/fmi3ModelDescription.xsd",
@@ -24,14 +24,21 @@ SCHEMA_FILES = {
 
 @cache
 def _load_schema(name: str) -> Any:
-    """A schema, from the copies that FMPy brings."""
+    """Load a schema from the copies that FMPy contains."""
     fmpy = find_spec("fmpy")
-    assert fmpy is not None and fmpy.origin is not None
+    assert fmpy is not None
+    assert fmpy.origin is not None
     return etree.XMLSchema(file=str(Path(fmpy.origin).parent / "schema" / name))
 
 
 def check_schema(root: Any, member: str, major: int) -> Iterator[Finding]:
-    """What an XML document has that its schema does not allow, and what it lacks."""
+    """Check an XML document against its schema.
+
+    Args:
+        root: Root element.
+        member: Member of the archive, a key of `SCHEMA_FILES`.
+        major: FMI major version.
+    """
     schema = _load_schema(SCHEMA_FILES[major, member])
     if not schema.validate(root):
         for error in schema.error_log:

@@ -1,4 +1,4 @@
-"""What `cosim validate` examines beyond what a run needs: every byte of the archive, every XML file, the XML schemas."""
+"""Complete check of an FMU for `cosim validate`: all data of the archive, and all XML files against their schemas."""
 
 from __future__ import annotations
 
@@ -7,39 +7,50 @@ from pathlib import Path
 
 from . import Examination, examine
 from .archive import Archive, open_regular_file
-from .findings import FatalFinding, Finding
+from .findings import FatalFindingError, Finding
 from .limits import DEFAULT_LIMITS, PreflightLimits
 from .schema import SCHEMA_FILES, check_schema
 from .xml import parse_xml
 
-#: beyond, the XML schemas are left out: they compare each variable with each other one
+#: largest model for the check by schemas, whose uniqueness constraints take quadratic time
 MAX_SCHEMA_VARIABLES = 10_000
 
 
 def validate_fmu(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> Sequence[Finding]:
-    """All findings about an FMU, errors first. Raises InputError when there is no such file."""
+    """Check an FMU completely.
+
+    Args:
+        path: The FMU.
+        limits: Limits of the check.
+
+    Returns:
+        All findings, errors first.
+
+    Raises:
+        InputError: The file does not exist or cannot be read.
+    """
     examination = examine(path, limits)
-    found = [*examination.findings, *examination.binary_findings]
+    findings = [*examination.findings, *examination.binary_findings]
     if examination.members:
         with open_regular_file(path) as file:
             archive = Archive(file, limits)
-            found += archive.verify()
-            if all(finding.rule.severity == "warning" for finding in found):
-                found += _check_xml_files(archive, examination, limits)
-    known = {finding.location for finding in found if finding.line and finding.rule.name != "xml.schema"}
-    # the schemas often say once more, and less clearly, what a rule has said
-    kept = [finding for finding in found if finding.rule.name != "xml.schema" or finding.location not in known]
-    return sorted(dict.fromkeys(kept), key=lambda finding: finding.rule.severity)
+            findings += archive.verify()
+            if all(finding.rule.severity == "warning" for finding in findings):
+                findings += _check_xml_files(archive, examination, limits)
+    # a schema often reports, less clearly, the same problem as a rule
+    locations = {finding.location for finding in findings if finding.line and finding.rule.name != "xml.schema"}
+    unique = [finding for finding in findings if finding.rule.name != "xml.schema" or finding.location not in locations]
+    return sorted(dict.fromkeys(unique), key=lambda finding: finding.rule.severity)
 
 
 def _check_xml_files(archive: Archive, examination: Examination, limits: PreflightLimits) -> Iterator[Finding]:
     model = examination.model
-    assert model is not None  # anything else is an error
+    assert model is not None  # otherwise the examination has found an error
     for version, member in SCHEMA_FILES:
         if version == model.major and member in archive.members:
             try:
                 root = parse_xml(archive.read(member), member, limits)
                 if len(model.variables) <= MAX_SCHEMA_VARIABLES:
                     yield from check_schema(root, member, model.major)
-            except FatalFinding as flaw:
-                yield flaw.finding
+            except FatalFindingError as error:
+                yield error.finding

@@ -1,4 +1,4 @@
-"""Numbers as XML Schema writes them; Python would read more ("1_000", "nan", other digits) than other tools do."""
+"""Numbers in the lexical forms of XML Schema; Python accepts more forms, such as "1_000" and "nan"."""
 
 from __future__ import annotations
 
@@ -10,7 +10,15 @@ _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 
 
 def parse_value(word: str, kind: str) -> float | int | bool:
-    """The value of one word for an FMI type. Raises ValueError when the type has no such value."""
+    """Parse one value of a numeric FMI type.
+
+    Args:
+        word: The text.
+        kind: FMI 3.0 type name: a float or integer type, Boolean or Enumeration.
+
+    Raises:
+        ValueError: The text is not a value of the type.
+    """
     if kind == "Boolean":
         if word not in _BOOLEANS:
             raise ValueError(word)
@@ -19,7 +27,11 @@ def parse_value(word: str, kind: str) -> float | int | bool:
 
 
 def parse_float(word: str) -> float:
-    """A floating-point number, which may be infinite or NaN. Raises ValueError."""
+    """Parse a floating-point number, which may be infinite or NaN.
+
+    Raises:
+        ValueError: The text is not a number.
+    """
     if not _FLOAT.fullmatch(word.strip()):
         raise ValueError(word)
     return float(word)

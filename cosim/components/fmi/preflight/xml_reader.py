@@ -1,4 +1,4 @@
-"""modelDescription.xml -> Model."""
+"""Conversion of the XML elements of modelDescription.xml to a `ModelDescription`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from .findings import DESCRIPTION_FILE, FatalFinding, Finding, Rule
+from .findings import DESCRIPTION_FILE, FatalFindingError, Finding, Rule
 from .model_description import ModelDescription, ModelVariable, TypeDefinition, UnitDefinition, Unknown
 
 _ROOT = "FMI 2.0.5 section 2.2.1, FMI 3.0.2 section 2.4.1"
@@ -15,6 +15,7 @@ ROOT = Rule("model.root", _ROOT)
 VERSION = Rule("model.version", _ROOT)
 REPEATED = Rule("model.repeated", _ROOT)
 
+#: names of type elements -> FMI 3.0 type names, by FMI major version
 TYPE_NAMES = {
     2: {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String", "Enumeration": "Enumeration"},
     3: {
@@ -23,38 +24,45 @@ TYPE_NAMES = {
         **{name: name for name in ("Boolean", "String", "Binary", "Enumeration", "Clock")},
     },
 }
-#: lists of the model structure -> their path in it
-_FMI2_GROUPS = {
+#: FMI 3.0 names of the elements of the model structure -> their path in it
+_FMI2_STRUCTURE = {
     "Output": "Outputs/Unknown",
     "ContinuousStateDerivative": "Derivatives/Unknown",
     "InitialUnknown": "InitialUnknowns/Unknown",
 }
-_FMI3_GROUPS = {
+_FMI3_STRUCTURE = {
     name: name for name in ("Output", "ContinuousStateDerivative", "ClockedState", "InitialUnknown", "EventIndicator")
 }
 _FIXED_CAUSALITIES = ("parameter", "calculatedParameter", "structuralParameter")
-#: no "3.0-beta": the C functions changed until 3.0
+#: without "3.0-beta", because the C functions changed until 3.0
 _SUPPORTED_VERSION = re.compile(r"2\.0(\.[0-9]+)?|3\.[0-9]+(\.[0-9]+)?")
 
 
 def read_model(root: Any) -> ModelDescription:
-    """The model description below a root element. Raises Flaw when it is of no FMI version that cosim knows."""
+    """Read a model description.
+
+    Args:
+        root: Root element of modelDescription.xml.
+
+    Raises:
+        FatalFindingError: The root element is not a model description of a supported FMI version.
+    """
     if root.tag != "fmiModelDescription":
-        raise FatalFinding(ROOT(f"found <{root.tag}>, expected <fmiModelDescription>", DESCRIPTION_FILE, root.sourceline))
-    version = root.get("fmiVersion", "of unknown version")
-    if not _SUPPORTED_VERSION.fullmatch(version):
-        text = f"is an FMI {version} FMU; FMI 2.0 and 3.0 are supported"
-        raise FatalFinding(VERSION(text, DESCRIPTION_FILE, root.sourceline))
+        raise FatalFindingError(ROOT(f"found <{root.tag}>, expected <fmiModelDescription>", DESCRIPTION_FILE, root.sourceline))
+    version = root.get("fmiVersion")
+    if version is None or not _SUPPORTED_VERSION.fullmatch(version):
+        found = "lacks the attribute fmiVersion" if version is None else f"is an FMI {version} FMU"
+        raise FatalFindingError(VERSION(f"{found}; FMI 2.0 and 3.0 are supported", DESCRIPTION_FILE, root.sourceline))
     major = int(version[0])
     interface = root.find("CoSimulation")
     types = [_read_type(element, major) for element in root.iterfind("TypeDefinitions/*")]
-    declared = {definition.name: definition for definition in types}
+    types_by_name = {definition.name: definition for definition in types}
     return ModelDescription(
         major,
         _read_attributes(root),
         None if interface is None else _read_attributes(interface),
         _read_attributes(root.find("DefaultExperiment")),
-        [_read_variable(element, major, declared) for element in root.iterfind("ModelVariables/*")],
+        [_read_variable(element, major, types_by_name) for element in root.iterfind("ModelVariables/*")],
         types,
         [_read_unit(element) for element in root.iterfind("UnitDefinitions/Unit")],
         list(_read_structure(root, major)),
@@ -64,34 +72,38 @@ def read_model(root: Any) -> ModelDescription:
 
 
 def check_repeated_elements(root: Any) -> Iterator[Finding]:
-    """Elements of which a second reader might take the other one."""
+    """Find elements that occur several times, because other tools may read another one of them.
+
+    Args:
+        root: Root element of modelDescription.xml.
+    """
     counts = Counter(element.tag for element in root)
     for tag, count in counts.items():
         if count > 1:
-            yield REPEATED(f"<{tag}> stands {count} times, expected once", DESCRIPTION_FILE, root.find(tag).sourceline)
+            yield REPEATED(f"<{tag}> occurs {count} times, expected once", DESCRIPTION_FILE, root.find(tag).sourceline)
 
 
 def _read_attributes(element: Any) -> dict[str, str]:
     return {} if element is None else dict(element.items())
 
 
+def _type_element(element: Any, major: int) -> Any:
+    """Return the element with the type of a variable or type definition: a child in FMI 2.0, the element itself in FMI 3.0."""
+    return element if major == 3 else next((child for child in element if child.tag in TYPE_NAMES[2]), element)
+
+
 def _read_type(element: Any, major: int) -> TypeDefinition:
-    typed = element
-    if major == 2:
-        typed = next((child for child in element if child.tag in TYPE_NAMES[2]), element)
-    kind = TYPE_NAMES[major].get(typed.tag if major == 2 else typed.tag.removesuffix("Type"), "")
-    items = [(item.get("name", ""), item.get("value", "")) for item in typed.iterfind("Item")]
-    return TypeDefinition(
-        element.get("name", ""), kind, _read_attributes(typed) | _read_attributes(element), items, element.sourceline
-    )
+    type_element = _type_element(element, major)
+    kind = TYPE_NAMES[major].get(type_element.tag if major == 2 else type_element.tag.removesuffix("Type"), "")
+    attributes = _read_attributes(type_element) | _read_attributes(element)
+    items = [(item.get("name", ""), item.get("value", "")) for item in type_element.iterfind("Item")]
+    return TypeDefinition(element.get("name", ""), kind, attributes, items, element.sourceline)
 
 
-def _read_variable(element: Any, major: int, declared: Mapping[str, TypeDefinition]) -> ModelVariable:
-    typed = element
-    if major == 2:
-        typed = next((child for child in element if child.tag in TYPE_NAMES[2]), element)
-    attributes = _read_attributes(typed) | _read_attributes(element)
-    kind = TYPE_NAMES[major].get(typed.tag, "")
+def _read_variable(element: Any, major: int, types_by_name: Mapping[str, TypeDefinition]) -> ModelVariable:
+    type_element = _type_element(element, major)
+    attributes = _read_attributes(type_element) | _read_attributes(element)
+    kind = TYPE_NAMES[major].get(type_element.tag, "")
     causality = attributes.get("causality", "local")
     return ModelVariable(
         attributes.get("name", ""),
@@ -103,7 +115,7 @@ def _read_variable(element: Any, major: int, declared: Mapping[str, TypeDefiniti
         [_read_attributes(child) for child in element.iterfind("Dimension")],
         [_read_attributes(child) for child in element.iterfind("Alias")],
         element.sourceline,
-        declared.get(attributes.get("declaredType", "")),
+        types_by_name.get(attributes.get("declaredType", "")),
     )
 
 
@@ -114,7 +126,7 @@ def _default_variability(kind: str, causality: str, major: int) -> str:
 
 
 def _read_starts(element: Any, kind: str, text: str | None, major: int) -> Sequence[str] | None:
-    """Words of an attribute; FMI 3.0 strings and binaries have elements of their own, one for each value."""
+    """Return the words of a start value; String and Binary variables of FMI 3.0 have one element per value."""
     if kind in ("String", "Binary") and major == 3:
         return [child.get("value", "") for child in element.iterfind("Start")] or None
     if text is None:
@@ -129,11 +141,11 @@ def _read_unit(element: Any) -> UnitDefinition:
 
 
 def _read_structure(root: Any, major: int) -> Iterator[Unknown]:
-    for group, path in (_FMI2_GROUPS if major == 2 else _FMI3_GROUPS).items():
+    for name, path in (_FMI2_STRUCTURE if major == 2 else _FMI3_STRUCTURE).items():
         for element in root.iterfind(f"ModelStructure/{path}"):
-            yield _read_unknown(element, group, "index" if major == 2 else "valueReference")
+            yield _read_unknown(element, name, "index" if major == 2 else "valueReference")
 
 
-def _read_unknown(element: Any, group: str, attribute: str) -> Unknown:
-    words = [None if (text := element.get(name)) is None else text.split() for name in ("dependencies", "dependenciesKind")]
-    return Unknown(group, element.get(attribute, ""), words[0], words[1], element.sourceline)
+def _read_unknown(element: Any, name: str, reference_attribute: str) -> Unknown:
+    words = [None if (text := element.get(key)) is None else text.split() for key in ("dependencies", "dependenciesKind")]
+    return Unknown(name, element.get(reference_attribute, ""), words[0], words[1], element.sourceline)

@@ -1,7 +1,7 @@
-"""ZIP archives read strictly: one table of contents at the very end, and headers that all say the same.
+"""Strict reader of ZIP structures: one central directory at the end of the file, and consistent headers.
 
-Python's zipfile is lenient by design: it accepts members that overlap, trailing data and headers that contradict each
-other, so that two programs can see two different archives in one file. Format: PKWARE APPNOTE 6.3.10, sections 4.3 and 4.5.
+Python's zipfile is lenient by design. It accepts overlapping members, trailing data and contradictory headers, so that two
+programs can see different contents in the same file. Format: PKWARE APPNOTE 6.3.10, sections 4.3 and 4.5.
 """
 
 from __future__ import annotations
@@ -11,30 +11,41 @@ import struct
 from dataclasses import dataclass
 from io import BufferedReader
 
-from .findings import FatalFinding, Rule
+from .findings import FatalFindingError, Rule
 
 NO_ZIP = Rule("archive.zip", "APPNOTE 4.3")
 TRAILING = Rule("archive.trailing-data", "APPNOTE 4.3.16")
 CENTRAL_DIRECTORY = Rule("archive.contents", "APPNOTE 4.3.12")
 HEADER = Rule("archive.header", "APPNOTE 4.3.7")
 
-_END_RECORD, _DIRECTORY_HEADER, _LOCAL_HEADER = (
-    struct.Struct("<4s4H2LH"),
-    struct.Struct("<4s6H3L5H2L"),
-    struct.Struct("<4s5H3L2H"),
-)
-_END_MAGIC, _ENTRY_MAGIC, _LOCAL_MAGIC = b"PK\x05\x06", b"PK\x01\x02", b"PK\x03\x04"
+#: end of central directory record
+_EOCD = struct.Struct("<4s4H2LH")
+_CENTRAL_HEADER, _LOCAL_HEADER = struct.Struct("<4s6H3L5H2L"), struct.Struct("<4s5H3L2H")
+_EOCD_SIGNATURE, _CENTRAL_SIGNATURE, _LOCAL_SIGNATURE = b"PK\x05\x06", b"PK\x01\x02", b"PK\x03\x04"
 _MAX_COMMENT_SIZE = 0xFFFF
-#: on average, in the table of contents
+#: largest accepted mean size of a central directory header (bytes)
 _MAX_HEADER_SIZE = 4096
+#: value of a 32-bit field whose real value is in the ZIP64 extra field
 _ZIP64_MARKER = 0xFFFFFFFF
-#: bits of the flags
+_ZIP64_HEADER_ID = 1
+#: bits of the general purpose bit flag (ENCRYPTED: all bits of the encryption methods)
 ENCRYPTED, HAS_DATA_DESCRIPTOR, UTF8 = 0x2041, 0x8, 0x800
 
 
 @dataclass(frozen=True, slots=True)
 class ZipEntry:
-    """One row of the table of contents; sizes and offset in bytes, `mode` as of Unix (0: unknown)."""
+    """Central directory header of one member.
+
+    Attributes:
+        name: File name as in the archive.
+        flags: General purpose bit flag.
+        method: Compression method.
+        crc: CRC-32 of the content.
+        compressed_size: Size of the compressed data (bytes).
+        size: Size of the content (bytes).
+        mode: Unix file mode from the external attributes, 0 if unknown.
+        offset: Offset of the local file header in the archive (bytes).
+    """
 
     name: bytes
     flags: int
@@ -47,7 +58,7 @@ class ZipEntry:
 
     @property
     def decoded_name(self) -> str:
-        """The name as text; without the flag for UTF-8 it is UTF-8 if it can be, else code page 437."""
+        """Name as text: UTF-8 if it is valid UTF-8, else code page 437."""
         try:
             return self.name.decode()
         except UnicodeDecodeError:
@@ -55,99 +66,125 @@ class ZipEntry:
 
 
 def read_central_directory(file: BufferedReader, max_entries: int) -> tuple[list[ZipEntry], int]:
-    """The table of contents, and where it begins. Raises Flaw when it has more than `most` rows or is none."""
-    count, size, offset = _read_end(file)
+    """Read the central directory.
+
+    Args:
+        file: The archive.
+        max_entries: Largest accepted number of members.
+
+    Returns:
+        The headers of the members, and the offset of the central directory in the file (bytes).
+
+    Raises:
+        FatalFindingError: The file is not an archive, the central directory is damaged or has too many members.
+    """
+    count, size, offset = _read_eocd(file)
     if count > max_entries:
-        raise FatalFinding(CENTRAL_DIRECTORY(f"found {count} members, expected at most {max_entries}"))
+        raise FatalFindingError(CENTRAL_DIRECTORY(f"found {count} members, expected at most {max_entries}"))
     if size > max_entries * _MAX_HEADER_SIZE:
-        raise FatalFinding(
-            CENTRAL_DIRECTORY(f"found a table of contents of {size} bytes, expected at most {max_entries * _MAX_HEADER_SIZE}")
+        raise FatalFindingError(
+            CENTRAL_DIRECTORY(f"found a central directory of {size} bytes, expected at most {max_entries * _MAX_HEADER_SIZE}")
         )
     file.seek(offset)
-    table = file.read(size)
-    entries, place = [], 0
+    directory = file.read(size)
+    entries, position = [], 0
     for _ in range(count):
-        entry, place = _read_entry(table, place)
+        entry, position = _read_entry(directory, position)
         entries.append(entry)
-    if place != size:
-        raise FatalFinding(
-            CENTRAL_DIRECTORY(f"the table of contents has {size - place} bytes more than its {count} members need")
-        )
+    if position != size:
+        text = f"the central directory is {size - position} bytes longer than its {count} header{'s' if count != 1 else ''}"
+        raise FatalFindingError(CENTRAL_DIRECTORY(text))
     return entries, offset
 
 
-def _read_end(file: BufferedReader) -> tuple[int, int, int]:
-    """(members, size, offset) of the table of contents, from the record at the very end of the file."""
+def _read_eocd(file: BufferedReader) -> tuple[int, int, int]:
+    """Read the end of central directory record; return (members, size, offset) of the central directory."""
     length = file.seek(0, os.SEEK_END)
-    file.seek(max(0, length - _END_RECORD.size - _MAX_COMMENT_SIZE))
+    file.seek(max(0, length - _EOCD.size - _MAX_COMMENT_SIZE))
     tail = file.read()
-    place = tail.rfind(_END_MAGIC)
-    if place < 0 or len(tail) - place < _END_RECORD.size:
-        raise FatalFinding(NO_ZIP("is no FMU: File is not a zip file, or its end is missing"))
-    _, disk, contents_disk, here, count, size, offset, comment = _END_RECORD.unpack_from(tail, place)
-    surplus = len(tail) - place - _END_RECORD.size - comment
-    if surplus or _is_in_comment(tail, place):
-        raise FatalFinding(
+    position = tail.rfind(_EOCD_SIGNATURE)
+    if position < 0 or len(tail) - position < _EOCD.size:
+        raise FatalFindingError(NO_ZIP("is not an FMU: it is not a ZIP file, or its end is missing"))
+    _, disk, directory_disk, disk_count, count, size, offset, comment_size = _EOCD.unpack_from(tail, position)
+    surplus = len(tail) - position - _EOCD.size - comment_size
+    if surplus or _is_in_comment(tail, position):
+        raise FatalFindingError(
             TRAILING(f"found {abs(surplus)} bytes behind the end of the archive or a second end, expected neither")
         )
-    if (disk, contents_disk) != (0, 0) or here != count:
-        raise FatalFinding(CENTRAL_DIRECTORY("is one part of an archive in several parts"))
-    end = length - _END_RECORD.size - comment
+    if (disk, directory_disk) != (0, 0) or disk_count != count:
+        raise FatalFindingError(CENTRAL_DIRECTORY("is one part of an archive in several parts"))
+    end = length - _EOCD.size - comment_size
     if offset + size != end:
-        raise FatalFinding(
-            CENTRAL_DIRECTORY(f"the table of contents should end at byte {end}, found {offset + size} (cut, or data in front?)")
-        )
+        text = f"the central directory should end at byte {end}, found {offset + size} (truncated, or data in front?)"
+        raise FatalFindingError(CENTRAL_DIRECTORY(text))
     return count, size, offset
 
 
-def _is_in_comment(tail: bytes, place: int) -> bool:
-    """Whether an earlier end record takes the last one for its comment."""
-    earlier = tail.find(_END_MAGIC)
-    while earlier != place:
-        if len(tail) - earlier >= _END_RECORD.size and earlier + _END_RECORD.size + _END_RECORD.unpack_from(tail, earlier)[
-            -1
-        ] == len(tail):
-            return True
-        earlier = tail.find(_END_MAGIC, earlier + 1)
+def _is_in_comment(tail: bytes, position: int) -> bool:
+    """Return whether the record at a position is part of the comment of an earlier record."""
+    earlier = tail.find(_EOCD_SIGNATURE)
+    while earlier != position:
+        if len(tail) - earlier >= _EOCD.size:
+            comment_size = _EOCD.unpack_from(tail, earlier)[-1]
+            if earlier + _EOCD.size + comment_size == len(tail):
+                return True
+        earlier = tail.find(_EOCD_SIGNATURE, earlier + 1)
     return False
 
 
-def _read_entry(table: bytes, place: int) -> tuple[ZipEntry, int]:
-    if len(table) - place < _DIRECTORY_HEADER.size or not table.startswith(_ENTRY_MAGIC, place):
-        raise FatalFinding(CENTRAL_DIRECTORY(f"the table of contents is damaged at its byte {place}"))
-    _, _, _, flags, method, _, _, crc, compressed, size, n, m, k, _, _, attributes, offset = _DIRECTORY_HEADER.unpack_from(
-        table, place
-    )
-    name_at = place + _DIRECTORY_HEADER.size
-    end = name_at + n + m + k
-    if end > len(table):
-        raise FatalFinding(CENTRAL_DIRECTORY(f"the table of contents is damaged at its byte {place}"))
-    name = table[name_at : name_at + n]
-    size, compressed, offset = _apply_zip64(table[name_at + n : name_at + n + m], size, compressed, offset)
+def _read_entry(directory: bytes, position: int) -> tuple[ZipEntry, int]:
+    """Read the central directory header at a position; return it and the position after it."""
+    if len(directory) - position < _CENTRAL_HEADER.size or not directory.startswith(_CENTRAL_SIGNATURE, position):
+        raise _damaged_directory_error(position)
+    fields = _CENTRAL_HEADER.unpack_from(directory, position)
+    _, _, _, flags, method, _, _, crc, compressed, size, name_size, extra_size, comment_size, _, _, attributes, offset = fields
+    name_begin = position + _CENTRAL_HEADER.size
+    extra_begin = name_begin + name_size
+    end = extra_begin + extra_size + comment_size
+    if end > len(directory):
+        raise _damaged_directory_error(position)
+    name, extra = directory[name_begin:extra_begin], directory[extra_begin : extra_begin + extra_size]
+    size, compressed, offset = _apply_zip64(extra, size, compressed, offset)
     return ZipEntry(name, flags, method, crc, compressed, size, attributes >> 16, offset), end
 
 
+def _damaged_directory_error(position: int) -> FatalFindingError:
+    return FatalFindingError(CENTRAL_DIRECTORY(f"the central directory is damaged at its byte {position}"))
+
+
 def _apply_zip64(extra: bytes, *values: int) -> tuple[int, ...]:
-    """The values, with those that did not fit into 32 bits taken from the ZIP64 field (APPNOTE 4.5.3)."""
-    place = 0
-    while _ZIP64_MARKER in values and place + 4 <= len(extra):
-        kind, length = struct.unpack_from("<2H", extra, place)
-        if kind == 1:
-            count = (len(extra[place + 4 : place + 4 + length])) // 8
-            wide = iter(struct.unpack_from(f"<{count}Q", extra, place + 4))
-            return tuple(next(wide, value) if value == _ZIP64_MARKER else value for value in values)
-        place += 4 + length
+    """Replace the values that did not fit into 32 bits by those of the ZIP64 extra field (APPNOTE 4.5.3)."""
+    position = 0
+    while _ZIP64_MARKER in values and position + 4 <= len(extra):
+        header_id, length = struct.unpack_from("<2H", extra, position)
+        if header_id == _ZIP64_HEADER_ID:
+            count = (len(extra[position + 4 : position + 4 + length])) // 8
+            wide_values = iter(struct.unpack_from(f"<{count}Q", extra, position + 4))
+            return tuple(next(wide_values, value) if value == _ZIP64_MARKER else value for value in values)
+        position += 4 + length
     return values
 
 
 def find_data_offset(file: BufferedReader, entry: ZipEntry, end: int) -> int:
-    """Where the data of a member begin, before `end`. Raises Flaw when its own header contradicts the table of contents."""
+    """Compare the local file header of a member with its central directory header.
+
+    Args:
+        file: The archive.
+        entry: Central directory header of the member.
+        end: Offset of the central directory, at which all members end (bytes).
+
+    Returns:
+        Offset of the member's data in the archive (bytes).
+
+    Raises:
+        FatalFindingError: The local file header is missing or contradicts the central directory.
+    """
     file.seek(min(entry.offset, end))
-    head = file.read(_LOCAL_HEADER.size)
-    if len(head) < _LOCAL_HEADER.size or not head.startswith(_LOCAL_MAGIC):
-        raise FatalFinding(HEADER(f"found no member at byte {entry.offset}", entry.decoded_name))
-    _, _, flags, method, _, _, crc, compressed, size, n, m = _LOCAL_HEADER.unpack(head)
-    name, extra = file.read(n), file.read(m)
+    header = file.read(_LOCAL_HEADER.size)
+    if len(header) < _LOCAL_HEADER.size or not header.startswith(_LOCAL_SIGNATURE):
+        raise FatalFindingError(HEADER(f"found no member at byte {entry.offset}", entry.decoded_name))
+    _, _, flags, method, _, _, crc, compressed, size, name_size, extra_size = _LOCAL_HEADER.unpack(header)
+    name, extra = file.read(name_size), file.read(extra_size)
     size, compressed = _apply_zip64(extra, size, compressed)
     pairs = {
         "name": (name, entry.name),
@@ -157,10 +194,10 @@ def find_data_offset(file: BufferedReader, entry: ZipEntry, end: int) -> int:
         "compressed size": (compressed, entry.compressed_size),
         "size": (size, entry.size),
     }
-    for label, (own, listed) in pairs.items():
-        comes_later = own == 0 and flags & HAS_DATA_DESCRIPTOR and label in ("CRC", "compressed size", "size")
-        if own != listed and not comes_later:
-            raise FatalFinding(
-                HEADER(f"its own header has {label} {own!r}, the table of contents has {listed!r}", entry.decoded_name)
-            )
-    return entry.offset + _LOCAL_HEADER.size + n + m
+    for label, (local, central) in pairs.items():
+        is_in_data_descriptor = local == 0 and flags & HAS_DATA_DESCRIPTOR and label in ("CRC", "compressed size", "size")
+        if local != central and not is_in_data_descriptor:
+            text = f"its local file header has {label} {local!r}, the central directory has {central!r}"
+            raise FatalFindingError(HEADER(text, entry.decoded_name))
+    data_offset: int = entry.offset + _LOCAL_HEADER.size + name_size + extra_size
+    return data_offset

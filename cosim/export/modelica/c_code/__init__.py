@@ -1,1 +1,1 @@
-"""C code of a sorted flat model."""
+"""Code generation: a flat model with its schedule is lowered to C code."""

@@ -1,4 +1,4 @@
-"""model.c: a flat model in C that is meant to be read; together with model.h and runtime.h a complete Block."""
+"""Code generation of model.c: readable C code of a flat model, which forms a block together with model.h and runtime.h."""
 
 from __future__ import annotations
 
@@ -13,16 +13,8 @@ import numpy as np
 from ..causality.interpreter import Interpreter
 from ..causality.matching import is_input
 from ..causality.schedule import finite_variables, pre_variables, start_value
-from ..model.flat_model import (
-    Body,
-    Name,
-    SourceLocation,
-    Statement,
-    Variable,
-    derivative_name,
-    owning_component,
-    referenced_variable,
-)
+from ..model.flat_model import Variable, derivative_name, owning_component
+from ..model.syntax_tree import Body, Name, SourceLocation, Statement, referenced_variable
 from ..model.traversal import assigned_references
 from .c_values import C_TYPES, CExpression, CValue, c_literal, scalar_value
 from .formatting import function_definition, uses_variable
@@ -31,14 +23,22 @@ from .header import HeaderWriter, struct_member, struct_members
 from .model_step import continuous_step_body, sampled_step_body
 from .statements import StatementLowering
 
-#: in the order of the enum in runtime.h, from 1
+#: failure reasons of runtime.h, in the order of its enumeration (from 1)
 _STANDARD_REASONS = ("Integer overflow", "division by zero in div(), mod() or rem()", "the period of sample() must be positive")
 
 
 def generate_c(defaults: Interpreter, sources: Sequence[str]) -> dict[str, str]:
-    """The C files by name; `defaults` holds the model with its default values, `sources` are named in a comment.
+    """Generate the C files of a model.
 
-    Raises InputError for what cannot be translated.
+    Args:
+        defaults: The model with its schedule and default values.
+        sources: Names of the Modelica files, for a comment.
+
+    Returns:
+        File name -> text.
+
+    Raises:
+        InputError: The model uses a feature that is not supported.
     """
     header = HeaderWriter(defaults.model, defaults.schedule, defaults.parameter_roles, sources).text()
     fixed = ("runtime.h", "runge_kutta.h") if defaults.model.states else ("runtime.h",)
@@ -48,30 +48,32 @@ def generate_c(defaults: Interpreter, sources: Sequence[str]) -> dict[str, str]:
 
 @dataclass
 class _Emitter:
+    """Code generator of model.c; collects the failure reasons and the functions of the model while it generates code."""
+
     defaults: Interpreter
     reasons: list[str] = field(default_factory=lambda: list(_STANDARD_REASONS))
 
     def __post_init__(self) -> None:
-        self.model, self.plan, self.roles = self.defaults.model, self.defaults.schedule, self.defaults.parameter_roles
+        self.model, self.schedule, self.roles = self.defaults.model, self.defaults.schedule, self.defaults.parameter_roles
         self.members = struct_members(self.model)
         self.functions = FunctionTranslator(dict(self.model.functions), self._failure_code)
 
     def model_c(self) -> str:
+        """Return the text of model.c."""
         event = self._event()
-        wanted = {"m": "Model *m"} | {
-            k: v for k, v in (("time", "double time"), ("due", "const bool *due")) if uses_variable(k, event)
-        }
-        call = f"event({', '.join(wanted).replace('time', 'now')});"
+        optional = {"time": "double time", "due": "const bool *due"}
+        parameters = {"m": "Model *m"} | {name: code for name, code in optional.items() if uses_variable(name, event)}
+        call = f"event({', '.join(parameters).replace('time', 'now')});"
         step = continuous_step_body if self.model.states else sampled_step_body
         definitions = [
             function_definition("static void start_variables(Model *m)", self._start_variables()),
             function_definition("void model_parameters(Model *m)", self._model_parameters()),
             function_definition("void model_start(Model *m)", self._model_start()),
-            function_definition(f"static void event({', '.join(wanted.values())})", event),
+            function_definition(f"static void event({', '.join(parameters.values())})", event),
             function_definition("const char *model_initialize(Model *m, double time)", self._model_initialize()),
             *self._continuous(),
             function_definition(
-                "const char *model_step(Model *m, double time, double step_size)", step(len(self.plan.clocks), call)
+                "const char *model_step(Model *m, double time, double step_size)", step(len(self.schedule.clocks), call)
             ),
         ]
         includes = f'#include "model.h"\n#include "{"runge_kutta.h" if self.model.states else "runtime.h"}"'
@@ -79,7 +81,7 @@ class _Emitter:
 
     def _reasons(self) -> str:
         texts = ",\n    ".join(["NULL", *(json.dumps(reason, ensure_ascii=False) for reason in self.reasons)])
-        comment = "/* Why a step can fail: m->failure is a place in this list. */"
+        comment = "/* Reasons for failures; m->failure is an index in this array. */"
         return f"{comment}\nstatic const char *const REASONS[] = {{\n    {texts},\n}};"
 
     def _failure_code(self, reason: str, where: SourceLocation | None) -> str:
@@ -89,11 +91,11 @@ class _Emitter:
         return str(self.reasons.index(text) + 1)
 
     def _make_lowering(self, initial: bool = False) -> StatementLowering:
-        """The scope of the model: variables are members of the struct, their values before the event are locals `pre_...`."""
+        """Create a lowering with the scope of the model: struct members, and local variables `pre_...` for pre()."""
         scope = {v.name: struct_member(v, f"m->{self.members[v.name]}") for v in self.model.variables.values()}
-        scope["time"] = scalar_value("Real", CExpression("time"), simple=True)
-        before = {v.name: struct_member(v, f"pre_{self.members[v.name]}") for v in self.model.variables.values()}
-        return StatementLowering(self.functions, scope, before, initial=initial)
+        scope["time"] = scalar_value("Real", CExpression("time"), reusable=True)
+        pre_scope = {v.name: struct_member(v, f"pre_{self.members[v.name]}") for v in self.model.variables.values()}
+        return StatementLowering(self.functions, scope, pre_scope, initial=initial)
 
     # start values and parameters
 
@@ -123,25 +125,25 @@ class _Emitter:
     # events
 
     def _body(self, body: Body, initial: bool) -> list[str]:
-        """The statements with the values that pre() needs in front, and a comment where another component begins."""
+        """Generate statements, preceded by copies of the arguments of pre(); a comment marks the statements of a component."""
         lowering = self._make_lowering(initial)
         for name in pre_variables(self.model, body):
             lowering.lines += _save_pre_value(self.model.variables[name], self.members[name])
-        owner = None
+        previous_component = None
         for statement in body:
-            if (new := _owning_component(statement)) != owner:
-                lowering.lines += [*[""] * bool(lowering.lines), f"/* {new or 'the model itself'} */"]
-                owner = new
+            if (component := _owning_component(statement)) != previous_component:
+                lowering.lines += [*[""] * bool(lowering.lines), f"/* {component or 'the model itself'} */"]
+                previous_component = component
             lowering.statement(statement)
         return lowering.lines
 
     def _event(self) -> list[str]:
-        lines = self._body(self.plan.event, initial=False)
-        lines += [""] * bool(finite_variables(self.model, self.plan))
-        for name in finite_variables(self.model, self.plan):
+        lines = self._body(self.schedule.event, initial=False)
+        lines += [""] * bool(finite_variables(self.model, self.schedule))
+        for name in finite_variables(self.model, self.schedule):
             lines += self._finite_check(self.model.variables[name])
         if uses_variable("risen", lines):
-            lines.insert(0, f"bool risen[{self.plan.edge_detector_count}];")
+            lines.insert(0, f"bool risen[{self.schedule.edge_detector_count}];")
         return lines or ["(void)m;"]
 
     def _finite_check(self, variable: Variable) -> list[str]:
@@ -152,20 +154,20 @@ class _Emitter:
 
     def _model_initialize(self) -> list[str]:
         lowering = self._make_lowering()
-        for k, clock in enumerate(self.plan.clocks):
+        for k, clock in enumerate(self.schedule.clocks):
             start, period = lowering.scalar_of(clock.start).code, lowering.scalar_of(clock.period).code
             lowering.lines.append(f"set_clock(m, &m->clock[{k}], {start}, {period}, time);")
-        lines = [*lowering.lines, *self._body(self.plan.initialization, initial=True)]
+        lines = [*lowering.lines, *self._body(self.schedule.initialization, initial=True)]
         unused = [] if uses_variable("time", lines) else ["(void)time;"]
         return [*unused, "m->failure = 0;", "start_variables(m);", *lines, "return REASONS[m->failure];"]
 
     # continuous states
 
     def _continuous(self) -> list[str]:
-        """The derivatives as a function of the states and the time, and the integration of both."""
+        """Generate the functions `derivatives` and `advance` (integration) of a model with continuous states."""
         if not self.model.states:
             return []
-        lines = self._body(self.plan.derivatives, initial=False)
+        lines = self._body(self.schedule.derivatives, initial=False)
         unused = [] if uses_variable("time", lines) else ["(void)time;"]
         states, rates = self._element_pointers(self.model.states), self._element_pointers(map(derivative_name, self.model.states))
         system = ["const System system = {", f"    {{{states}}},", f"    {{{rates}}},", "    derivatives,", "};"]
@@ -177,30 +179,30 @@ class _Emitter:
         ]
 
     def _element_pointers(self, names: Iterable[str]) -> str:
-        """Pointers to all elements of variables."""
+        """Return C pointers to all elements of variables."""
         values = (struct_member(self.model.variables[name], f"m->{self.members[name]}") for name in names)
         return ", ".join(f"&{value.element(k).code}" for value in values for k in range(value.size))
 
 
 def _owning_component(statement: Statement) -> str:
-    """The component whose variable a statement assigns first."""
+    """Return the component whose variable a statement assigns first."""
     return next((owning_component(referenced_variable(target)) for target in assigned_references(statement)), "")
 
 
 def _save_pre_value(variable: Variable, name: str) -> list[str]:
-    """Copies a variable to a local, from which pre() reads."""
-    kind = C_TYPES[variable.type]
+    """Generate the copy of a variable to a local variable, which pre() reads."""
+    c_type = C_TYPES[variable.type]
     if not variable.shape:
-        return [f"const {kind} pre_{name} = m->{name};"]
-    return [f"{kind} pre_{name}[{struct_member(variable, name).size}];", f"memcpy(pre_{name}, m->{name}, sizeof pre_{name});"]
+        return [f"const {c_type} pre_{name} = m->{name};"]
+    return [f"{c_type} pre_{name}[{struct_member(variable, name).size}];", f"memcpy(pre_{name}, m->{name}, sizeof pre_{name});"]
 
 
 def _assign_constant(target: CValue, value: Any) -> list[str]:
-    """Gives a variable a value that is known now."""
-    numbers = [c_literal(x, target.type).code for x in np.asarray(value).flat]
+    """Generate the assignment of a constant value."""
+    literals = [c_literal(x, target.type).code for x in np.asarray(value).flat]
     if target.size > 4:
-        while len(numbers) > 1 and numbers[-1] in ("0.0", "0", "false"):
-            numbers.pop()  # C fills up with zeros
-        table = f"(const {C_TYPES[target.type]}[{target.size}]){{{', '.join(numbers)}}}"
-        return [f"memcpy({target.pointer}, {table}, sizeof {target.pointer});"]
-    return [f"{target.element(k).code} = {x};" for k, x in enumerate(numbers)]
+        while len(literals) > 1 and literals[-1] in ("0.0", "0", "false"):
+            literals.pop()  # C initializes the other elements to zero
+        array = f"(const {C_TYPES[target.type]}[{target.size}]){{{', '.join(literals)}}}"
+        return [f"memcpy({target.pointer}, {array}, sizeof {target.pointer});"]
+    return [f"{target.element(k).code} = {literal};" for k, literal in enumerate(literals)]

@@ -1,15 +1,15 @@
-"""Modelica expressions in C.
+"""Lowering of Modelica expressions to C.
 
-An expression may need statements in front of it (the result of an array function, for example): they go to `self.out`.
-Statements of a branch that is not always evaluated stay inside that branch.
+An expression may require statements in front of it, for example the call of a function with an array result. They are appended
+to `Lowering.lines`; those of a branch that is not always evaluated remain inside this branch.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..model import flat_model
-from ..model.flat_model import SourceLocation, raise_model_error
+from ..model import syntax_tree
+from ..model.syntax_tree import SourceLocation, raise_model_error
 from .builtin_functions import BUILTINS
 from .c_values import (
     CExpression,
@@ -33,35 +33,35 @@ _COMPARISONS = {"<": "<", "<=": "<=", ">": ">", ">=": ">=", "==": "==", "<>": "!
 
 
 class ExpressionLowering(SubscriptLowering):
-    """Lowers expressions."""
+    """Lowering of expressions."""
 
-    def _literal(self, node: flat_model.Literal) -> CValue:
+    def _literal(self, node: syntax_tree.Literal) -> CValue:
         if node.type == "String":
-            raise_model_error("texts can only stand in assert()", None)
-        if node.type == "Integer" and not -(2**31) <= node.value < 2**31:  # type: ignore[operator]
-            raise_model_error(f"the Integer {node.value} does not fit into 32 bits; write a Real", None)
-        return scalar_value(node.type, c_literal(node.value, node.type), simple=True)  # type: ignore[arg-type]
+            raise_model_error("a String is only supported as the message of assert()", None)
+        if node.type == "Integer" and not -(2**31) <= node.number < 2**31:
+            raise_model_error(f"the Integer {node.value} does not fit into 32 bits; use a Real", None)
+        return scalar_value(node.type, c_literal(node.number, node.type), reusable=True)
 
-    def _name(self, node: flat_model.Name) -> CValue:
+    def _name(self, node: syntax_tree.Name) -> CValue:
         if node.name not in self.scope:
             raise_model_error(f"unknown name {node.name}", node.where)
         return self.scope[node.name]
 
-    def _array(self, node: flat_model.Array) -> CValue:
+    def _array(self, node: syntax_tree.Array) -> CValue:
         parts = [self.lower(element) for element in node.elements]
         if len({part.shape for part in parts}) != 1:
-            raise_model_error("an array with rows of different shapes", None)
-        kind, inner = common_type([part.type for part in parts]), parts[0].size
-        simple = all(part.reusable for part in parts)
+            raise_model_error("the elements of an array constructor have different shapes", None)
+        type_name, inner = common_type([part.type for part in parts]), parts[0].size
+        reusable = all(part.reusable for part in parts)
         return CValue(
-            kind,
+            type_name,
             (len(parts), *parts[0].shape),
             lambda k: parts[int(k) // inner].element(int(k) % inner),
             indexable_in_loop=False,
-            reusable=simple,
+            reusable=reusable,
         )
 
-    def _range(self, node: flat_model.Range) -> CValue:
+    def _range(self, node: syntax_tree.Range) -> CValue:
         numbers = self.static_range(node)
         return CValue(
             "Integer", (len(numbers),), lambda k: c_literal(numbers[int(k)], "Integer"), indexable_in_loop=False, reusable=True
@@ -69,17 +69,17 @@ class ExpressionLowering(SubscriptLowering):
 
     # operators
 
-    def _unary(self, node: flat_model.Unary) -> CValue:
+    def _unary(self, node: syntax_tree.Unary) -> CValue:
         operand = self.lower(node.operand)
         if node.operator == "not":
             return map_elements(operand, "Boolean", lambda text: prefix("!", text))
-        if isinstance(node.operand, flat_model.Literal):
-            return scalar_value(operand.type, c_literal(-node.operand.value, operand.type), simple=True)  # type: ignore[operator]
+        if isinstance(node.operand, syntax_tree.Literal):
+            return scalar_value(operand.type, c_literal(-node.operand.number, operand.type), reusable=True)
         if operand.type == "Integer":
             return map_elements(operand, "Integer", lambda text: c_call("subtract", "m", "0", text))
         return map_elements(operand, "Real", lambda text: prefix("-", text))
 
-    def _binary(self, node: flat_model.Binary) -> CValue:
+    def _binary(self, node: syntax_tree.Binary) -> CValue:
         operator = node.operator
         if operator in ("and", "or"):
             return self._logical(node)
@@ -89,23 +89,23 @@ class ExpressionLowering(SubscriptLowering):
         if operator in _COMPARISONS:
             return self._lower_elementwise(left, right, "Boolean", lambda a, b: infix(_COMPARISONS[operator], a, b), node.where)
         operator = operator.removeprefix(".")
-        kind = "Real" if operator in ("/", "^") else common_type([left.type, right.type])
-        return self._lower_elementwise(left, right, kind, self._arithmetic(operator, kind, left, node), node.where)
+        type_name = "Real" if operator in ("/", "^") else common_type([left.type, right.type])
+        return self._lower_elementwise(left, right, type_name, self._arithmetic(operator, type_name, left, node), node.where)
 
     def _arithmetic(
-        self, operator: str, kind: str, left: CValue, node: flat_model.Binary
+        self, operator: str, type_name: str, left: CValue, node: syntax_tree.Binary
     ) -> Callable[[CExpression, CExpression], CExpression]:
         if operator == "^":
-            if node.right == flat_model.Literal(2, "Integer"):
+            if node.right == syntax_tree.Literal(2, "Integer"):
                 return lambda a, _: c_call("square", a)
             return lambda a, b: c_call("pow", a, b)
-        if kind == "Integer":
+        if type_name == "Integer":
             return lambda a, b: c_call(_ARITHMETIC[operator], "m", a, b)
         if operator == "/" and left.type == "Integer":
             return lambda a, b: infix("/", CExpression(a.code + ".0") if a.code.isdigit() else prefix("(double)", a), b)
         return lambda a, b: infix(operator, a, b)
 
-    def _logical(self, node: flat_model.Binary) -> CValue:
+    def _logical(self, node: syntax_tree.Binary) -> CValue:
         left = self.scalar_of(node.left)
         with self.collect_lines() as lines:
             right = self.scalar_of(node.right)
@@ -121,16 +121,16 @@ class ExpressionLowering(SubscriptLowering):
         self,
         left: CValue,
         right: CValue,
-        kind: str,
+        type_name: str,
         combine: Callable[[CExpression, CExpression], CExpression],
         where: SourceLocation | None,
     ) -> CValue:
         if left.shape and right.shape and left.shape != right.shape:
-            raise_model_error(f"arrays of different sizes {list(left.shape)} and {list(right.shape)}", where)
+            raise_model_error(f"the operands are arrays of different sizes: {list(left.shape)} and {list(right.shape)}", where)
         if bool(left.shape) != bool(right.shape):
             left, right = (self.evaluated_once(left), right) if right.shape else (left, self.evaluated_once(right))
         return CValue(
-            kind,
+            type_name,
             left.shape or right.shape,
             lambda k: combine(left.element(k), right.element(k)),
             indexable_in_loop=left.indexable_in_loop and right.indexable_in_loop,
@@ -139,33 +139,35 @@ class ExpressionLowering(SubscriptLowering):
     def _matrix_product(self, left: CValue, right: CValue, where: SourceLocation | None) -> CValue:
         inner = left.shape[-1]
         if inner != right.shape[0]:
-            raise_model_error(f"product of arrays of sizes {list(left.shape)} and {list(right.shape)}", where)
+            raise_model_error(f"arrays of the sizes {list(left.shape)} and {list(right.shape)} cannot be multiplied", where)
         left, right = self.evaluated_once(left), self.evaluated_once(right)
         columns = right.size // inner
-        kind = common_type([left.type, right.type])
+        type_name = common_type([left.type, right.type])
 
         def element(k: int | str) -> CExpression:
             row, column = (k, 0) if columns == 1 else divmod(int(k), columns)
             pairs = (
                 (left.element(linear_index([(inner, row), (1, j)])), right.element(columns * j + column)) for j in range(inner)
             )
-            return sum_terms(kind, [infix("*", a, b) if kind == "Real" else c_call("multiply", "m", a, b) for a, b in pairs])
+            return sum_terms(
+                type_name, [infix("*", a, b) if type_name == "Real" else c_call("multiply", "m", a, b) for a, b in pairs]
+            )
 
         return CValue(
-            kind, (*left.shape[:-1], *right.shape[1:]), element, indexable_in_loop=columns == 1 and left.indexable_in_loop
+            type_name, (*left.shape[:-1], *right.shape[1:]), element, indexable_in_loop=columns == 1 and left.indexable_in_loop
         )
 
-    def _if(self, node: flat_model.If) -> CValue:
+    def _if(self, node: syntax_tree.If) -> CValue:
         (condition, yes), rest = node.branches[0], node.branches[1:]
         test = self.scalar_of(condition)
         with self.collect_lines() as yes_lines:
             first = self.lower(yes)
         with self.collect_lines() as no_lines:
-            second = self.lower(flat_model.If(rest, node.otherwise) if rest else node.otherwise)
-        kind = common_type([first.type, second.type])
+            second = self.lower(syntax_tree.If(rest, node.otherwise) if rest else node.otherwise)
+        type_name = common_type([first.type, second.type])
         if not (yes_lines or no_lines or first.shape):
-            return scalar_value(kind, conditional(test, first.text, second.text))
-        result = self.new_temporary(kind, first.shape)
+            return scalar_value(type_name, conditional(test, first.text, second.text))
+        result = self.new_temporary(type_name, first.shape)
         for opening, lines, value in ((f"if ({test.code}) {{", yes_lines, first), ("} else {", no_lines, second)):
             with self.collect_lines() as copying:
                 self.copy_elements(result, value)
@@ -175,26 +177,34 @@ class ExpressionLowering(SubscriptLowering):
 
     # functions
 
-    def _builtin(self, node: flat_model.Builtin) -> CValue:
+    def _builtin(self, node: syntax_tree.Builtin) -> CValue:
         if node.name not in BUILTINS:
             raise_model_error(f"{node.name}() is not supported here", node.where)
         return BUILTINS[node.name](self, node)
 
-    def _call(self, node: flat_model.Call) -> CValue:
+    def _call(self, node: syntax_tree.Call) -> CValue:
         return self.lower_call(node)[0]
 
-    def lower_call(self, node: flat_model.Call, target: str | None = None) -> tuple[CValue, ...]:
-        """Calls a function; its array results go to temporaries, or the first one to the C array `target`."""
+    def lower_call(self, node: syntax_tree.Call, target: str | None = None) -> tuple[CValue, ...]:
+        """Lower a call of a function of the model.
+
+        Args:
+            node: The call.
+            target: A C array for the only result. Without it, results that are not returned are stored in new temporaries.
+
+        Returns:
+            The results of the function.
+        """
         arguments = [self.lower(argument) for argument in node.arguments]
         function = self.translation_unit.function_instance(node, tuple(argument.shape for argument in arguments))
-        passed = ["m"] * function.takes_model
-        for argument, wanted in zip(arguments, function.inputs, strict=True):
-            passed.append(self.as_c_array(argument, wanted.type) if argument.shape else argument.text.code)
+        c_arguments = ["m"] * function.takes_model
+        for argument, parameter in zip(arguments, function.inputs, strict=True):
+            c_arguments.append(self.as_c_array(argument, parameter.type) if argument.shape else argument.text.code)
         if function.returns_scalar:
-            return (scalar_value(function.outputs[0].type, c_call(function.name, *passed)),)
+            return (scalar_value(function.outputs[0].type, c_call(function.name, *c_arguments)),)
         results = tuple(
             variable_value(o.type, o.shape, target) if target else self.new_temporary(o.type, o.shape) for o in function.outputs
         )
-        passed += [result.pointer or "&" + result.text.code for result in results]
-        self.lines.append(c_call(function.name, *passed).code + ";")
+        c_arguments += [result.pointer or "&" + result.text.code for result in results]
+        self.lines.append(c_call(function.name, *c_arguments).code + ";")
         return results

@@ -1,4 +1,4 @@
-"""Lines of C: wrapping, and what occurs in them."""
+"""Formatting of C code and search for identifiers in it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ _WIDTH = 118
 
 
 def function_definition(head: str, body: Iterable[str]) -> str:
-    """A C function from its head and the unindented lines of its body."""
+    """Return a C function definition with the given signature and unindented lines of its body."""
     return "\n".join([head, "{", *wrap_lines(body), "}"])
 
 
 def wrap_lines(lines: Iterable[str]) -> Iterator[str]:
-    """The lines indented by one level; those that are too long go on in the next one."""
+    """Yield the lines indented by one level; long lines are wrapped."""
     for line in lines:
         indent = " " * (8 + len(line) - len(line.lstrip()))
         yield from textwrap.wrap(
@@ -24,5 +24,5 @@ def wrap_lines(lines: Iterable[str]) -> Iterator[str]:
 
 
 def uses_variable(name: str, lines: Iterable[str]) -> bool:
-    """Whether a C variable of this name (not a member) occurs."""
+    """Return whether a C variable with this name (not a struct member) occurs in the lines."""
     return any(re.search(rf"(?<![\w>.]){re.escape(name)}\b", line) for line in lines)

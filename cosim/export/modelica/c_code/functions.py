@@ -1,12 +1,13 @@
-"""Modelica functions as C functions: one for each combination of argument shapes, so that all sizes are constants."""
+"""Code generation for Modelica functions: one C function per combination of argument shapes, so that all sizes are constant."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from ..model import flat_model
-from ..model.flat_model import Function, FunctionVariable, SourceLocation, raise_model_error, referenced_variable
+from ..model import syntax_tree
+from ..model.flat_model import Function, FunctionVariable
+from ..model.syntax_tree import SourceLocation, raise_model_error, referenced_variable
 from ..model.traversal import read_references
 from .c_values import C_TYPES, CValue, c_identifier, variable_value
 from .formatting import uses_variable, wrap_lines
@@ -18,16 +19,22 @@ Shapes = tuple[tuple[int, ...], ...]
 
 @dataclass
 class FunctionTranslator:
-    """The C functions that the calls of a model have asked for so far; `texts` holds them in order of definition."""
+    """Translator of the functions that a model calls; it is the `TranslationUnit` of their calls."""
 
     functions: dict[str, Function]
+    #: returns the number of a failure reason, for the C code
     failure_code: Callable[[str, SourceLocation | None], str]
+    #: definitions of the translated functions, each after those that it calls
     definitions: list[str] = field(default_factory=list)
     _instances: dict[tuple[str, Shapes], FunctionInstance] = field(default_factory=dict)
     _in_translation: list[str] = field(default_factory=list)
 
-    def function_instance(self, call: flat_model.Call, shapes: Shapes) -> FunctionInstance:
-        """The C function for this call; translated at the first call with arguments of these shapes."""
+    def function_instance(self, call: syntax_tree.Call, shapes: Shapes) -> FunctionInstance:
+        """Return the C function for a call; it is translated at the first call with arguments of these shapes.
+
+        Raises:
+            InputError: The function is recursive, unknown, or uses an unsupported feature.
+        """
         key = (call.function, shapes)
         if key not in self._instances:
             if call.function in self._in_translation:
@@ -41,51 +48,52 @@ class FunctionTranslator:
 
     def _translate(self, function: Function, shapes: Shapes, where: SourceLocation | None) -> FunctionInstance:
         if len(shapes) != len(function.inputs):
-            raise_model_error(f"{function.name} takes {len(function.inputs)} arguments, not {len(shapes)}", where)
+            raise_model_error(f"{function.name}: found {len(shapes)} arguments, expected {len(function.inputs)}", where)
         lowering = StatementLowering(self, {})
         inputs = [self._declare(lowering, local, shape, where) for local, shape in zip(function.inputs, shapes, strict=True)]
         outputs = [self._declare(lowering, local, None, where) for local in function.outputs]
-        inner = [self._declare(lowering, local, None, where) for local in function.locals]
+        local_values = [self._declare(lowering, local, None, where) for local in function.locals]
         self._initialize_variables(lowering, (*function.outputs, *function.locals))
         lowering.body(function.body)
         instance = FunctionInstance(self._name(function.name), tuple(inputs), tuple(outputs), uses_variable("m", lowering.lines))
-        self.definitions.append(_function_text(function, instance, inner, lowering.lines))
+        self.definitions.append(_function_text(function, instance, local_values, lowering.lines))
         return instance
 
     def _declare(
         self, lowering: StatementLowering, local: FunctionVariable, shape: tuple[int, ...] | None, where: SourceLocation | None
     ) -> CValue:
-        """Puts a variable of the function into its scope."""
+        """Add a variable of the function to its scope; `shape` is that of the argument of an input, else None."""
         if local.type not in C_TYPES:
             raise_model_error(f"{local.name}: the type {local.type} is not supported", local.where)
         declared = [None if d is None else lowering.static_integer(d) for d in local.dimensions]
         unknown = [d for d, n in zip(local.dimensions, declared, strict=True) if n is None and (shape is None or d is not None)]
         if unknown:
             raise_model_error(f"the size of {local.name} must be constant, or the size() of an input", local.where)
-        actual = tuple(declared) if shape is None else shape
+        actual = tuple(n for n in declared if n is not None) if shape is None else shape
         if len(actual) != len(declared) or any(n not in (None, k) for n, k in zip(declared, actual, strict=True)):
-            raise_model_error(f"the argument for {local.name} has the wrong size {list(actual)}", where)
-        value = variable_value(local.type, actual, c_identifier(local.name))  # type: ignore[arg-type]
+            expected = ", ".join(":" if n is None else str(n) for n in declared)
+            raise_model_error(f"the argument for {local.name}: found size {list(actual)}, expected [{expected}]", where)
+        value = variable_value(local.type, actual, c_identifier(local.name))
         lowering.scope[local.name] = value
         return value
 
     def _initialize_variables(self, lowering: StatementLowering, variables: tuple[FunctionVariable, ...]) -> None:
         for local in variables:
             if local.default is not None:
-                lowering.store(lowering.scope[local.name], local.default, flat_model.Name(local.name))
+                lowering.store(lowering.scope[local.name], local.default, syntax_tree.Name(local.name))
 
     def _name(self, name: str) -> str:
-        plain = c_identifier(name) if "." in name else c_identifier(name) + "_"
-        taken = {instance.name for instance in self._instances.values()}
-        return next(n for n in (plain, *(f"{plain}_{k}" for k in range(2, len(taken) + 3))) if n not in taken)
+        base = c_identifier(name) if "." in name else c_identifier(name) + "_"
+        used = {instance.name for instance in self._instances.values()}
+        return next(n for n in (base, *(f"{base}_{k}" for k in range(2, len(used) + 3))) if n not in used)
 
 
-def _function_text(function: Function, instance: FunctionInstance, inner: list[CValue], body: list[str]) -> str:
-    """The whole C function; results that do not fit into a return value go through pointers."""
+def _function_text(function: Function, instance: FunctionInstance, local_values: list[CValue], body: list[str]) -> str:
+    """Return the definition of a C function; it returns a single scalar result and writes all other results via pointers."""
     inputs = [_parameter(value, "const ") for value in instance.inputs]
     results = [] if instance.returns_scalar else [_result_parameter(value) for value in instance.outputs]
     parameters = ", ".join([*["Model *m"] * instance.takes_model, *inputs, *results]) or "void"
-    lines = [*_opening_lines(function, instance, inner, body), *body, *_closing_lines(instance)]
+    lines = [*_opening_lines(function, instance, local_values, body), *body, *_closing_lines(instance)]
     return "\n".join(
         [
             f"/* {function.name} ({function.where.file_and_line if function.where else 'no source'}) */",
@@ -97,13 +105,15 @@ def _function_text(function: Function, instance: FunctionInstance, inner: list[C
     )
 
 
-def _opening_lines(function: Function, instance: FunctionInstance, inner: list[CValue], body: list[str]) -> list[str]:
-    """Declarations, and a (void) for what C would call unused."""
+def _opening_lines(function: Function, instance: FunctionInstance, local_values: list[CValue], body: list[str]) -> list[str]:
+    """Return the declarations, and `(void)` statements for variables that C compilers would report as unused."""
     lines = [
         _declaration(output) if instance.returns_scalar or not output.shape else _zero_fill(output) for output in instance.outputs
     ]
     used = [
-        (value, local.name) for value, local in zip(inner, function.locals, strict=True) if uses_variable(_c_name(value), body)
+        (value, local.name)
+        for value, local in zip(local_values, function.locals, strict=True)
+        if uses_variable(_c_name(value), body)
     ]
     lines += [_declaration(value) for value, _ in used]
     read = {referenced_variable(reference) for reference in read_references(function.body)}

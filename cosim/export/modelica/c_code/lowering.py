@@ -1,82 +1,100 @@
-"""What lowering to C needs besides the expressions themselves: the scope, statements in front, temporaries, constants."""
+"""Base of the lowering to C: the scope, generated statements, temporary variables and static evaluation."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import prod
 from typing import Protocol
 
-from ..model import flat_model
-from ..model.flat_model import Expression, SourceLocation, raise_model_error
+from ..model import syntax_tree
+from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
 from .c_values import C_TYPES, CExpression, CValue, scalar_value, variable_value
 
 
 @dataclass(frozen=True, slots=True)
 class FunctionInstance:
-    """A function of the model for arguments of given shapes, as a C function; `outputs` tell types and shapes."""
+    """A C function: a function of the model, translated for arguments of given shapes."""
 
     name: str
     inputs: tuple[CValue, ...]
     outputs: tuple[CValue, ...]
+    #: true if the first parameter is the model, which is needed to report failures
     takes_model: bool
 
     @property
     def returns_scalar(self) -> bool:
-        """Whether there is one scalar result, which is the value of the C function."""
+        """True if the C function returns its result: there is only one, and it is a scalar."""
         return len(self.outputs) == 1 and not self.outputs[0].shape
 
 
 class TranslationUnit(Protocol):
-    """What expressions need to know of the C file around them."""
+    """The C file that contains the lowered code: its failure reasons and functions."""
 
     def failure_code(self, reason: str, where: SourceLocation | None) -> str:
-        """The number of a reason why a step can fail."""
+        """Return the number of a failure reason."""
 
-    def function_instance(self, call: flat_model.Call, shapes: tuple[tuple[int, ...], ...]) -> FunctionInstance:
-        """The C function for a call with arguments of these shapes."""
+    def function_instance(self, call: syntax_tree.Call, shapes: tuple[tuple[int, ...], ...]) -> FunctionInstance:
+        """Return the C function for a call with arguments of these shapes."""
 
 
 @dataclass
 class Lowering:
-    """One scope, the model (`m->x`) or the body of a function, and the C statements written so far."""
+    """Lowering in one scope: the model, or the body of a function.
+
+    The methods of the subclasses for the kinds of nodes are named after the classes of `syntax_tree`.
+    """
 
     translation_unit: TranslationUnit
+    #: Modelica name -> current value
     scope: dict[str, CValue]
+    #: Modelica name -> value before the event, for pre()
     pre_scope: dict[str, CValue] = field(default_factory=dict)
+    #: generated C statements
     lines: list[str] = field(default_factory=list)
+    #: number of temporary variables
     temporaries: int = 0
 
     def lower(self, node: Expression) -> CValue:
-        lowering = getattr(self, f"_{type(node).__name__.lower()}", None)
-        if lowering is None:
-            raise_model_error(f"{type(node).__name__} cannot stand here", getattr(node, "where", None))
-        return lowering(node)
+        """Lower an expression.
+
+        Raises:
+            InputError: The expression is not supported.
+        """
+        method: Callable[[Expression], CValue] | None = getattr(self, f"_{type(node).__name__.lower()}", None)
+        if method is None:
+            raise_model_error(f"{type(node).__name__} is not supported here", getattr(node, "where", None))
+        return method(node)
 
     def scalar_of(self, node: Expression) -> CExpression:
+        """Lower a scalar expression.
+
+        Raises:
+            InputError: The expression is an array or is not supported.
+        """
         value = self.lower(node)
         if value.shape:
-            raise_model_error("a scalar is expected here, not an array", getattr(node, "where", None))
+            raise_model_error("found an array, expected a scalar", getattr(node, "where", None))
         return value.text
 
     @contextmanager
     def collect_lines(self) -> Iterator[list[str]]:
-        """Collects the statements that are written meanwhile, indented."""
+        """Collect the statements that are generated in this block in a separate list, indented by one level."""
         outer, self.lines = self.lines, []
         yield self.lines
         inner, self.lines = self.lines, outer
         inner[:] = ["    " + line for line in inner]
 
-    def new_temporary(self, kind: str, shape: tuple[int, ...]) -> CValue:
-        """A new C variable that is declared here and not yet set."""
+    def new_temporary(self, type_name: str, shape: tuple[int, ...]) -> CValue:
+        """Declare a temporary C variable or array without initialization."""
         self.temporaries += 1
         name = f"tmp_{self.temporaries}"
-        self.lines.append(f"{C_TYPES[kind]} {name}{f'[{prod(shape)}]' if shape else ''};")
-        return variable_value(kind, shape, name)
+        self.lines.append(f"{C_TYPES[type_name]} {name}{f'[{prod(shape)}]' if shape else ''};")
+        return variable_value(type_name, shape, name)
 
     def evaluated_once(self, value: CValue) -> CValue:
-        """The same value, computed once."""
+        """Return a reusable value; the value is stored in a temporary variable if it is not reusable yet."""
         if value.reusable:
             return value
         if value.shape:
@@ -86,18 +104,18 @@ class Lowering:
         self.temporaries += 1
         name = f"tmp_{self.temporaries}"
         self.lines.append(f"const {C_TYPES[value.type]} {name} = {value.text.code};")
-        return scalar_value(value.type, CExpression(name), simple=True)
+        return scalar_value(value.type, CExpression(name), reusable=True)
 
-    def as_c_array(self, value: CValue, kind: str) -> str:
-        """The name of a C array of this type that holds the value."""
-        if value.pointer is not None and C_TYPES[value.type] == C_TYPES[kind]:
+    def as_c_array(self, value: CValue, type_name: str) -> str:
+        """Return the name of a C array with the elements of a value, which is copied if there is none of this type."""
+        if value.pointer is not None and C_TYPES[value.type] == C_TYPES[type_name]:
             return value.pointer
-        target = self.new_temporary(kind, value.shape)
+        target = self.new_temporary(type_name, value.shape)
         self.copy_elements(target, value)
         return str(target.pointer)
 
     def copy_elements(self, target: CValue, value: CValue) -> None:
-        """Element by element; the caller makes sure that the value does not read what is overwritten."""
+        """Generate the assignment of all elements; the value must not depend on the target."""
         if value.indexable_in_loop and target.indexable_in_loop and value.size > 4:
             self.lines.append(f"for (int each = 0; each < {value.size}; each++)")
             self.lines.append(f"    {target.element('each').code} = {value.element('each').code};")
@@ -105,32 +123,38 @@ class Lowering:
             self.lines += [f"{target.element(k).code} = {value.element(k).code};" for k in range(value.size)]
 
     def shape_of(self, node: Expression) -> tuple[int, ...]:
+        """Return the shape of an expression; no code is generated."""
         with self.collect_lines():
             return self.lower(node).shape
 
-    # what is known while translating
+    # static evaluation
 
     def static_integer(self, node: Expression) -> int | None:
-        """The value of an Integer expression that does not depend on variables: literals, size() and sums of them."""
-        if isinstance(node, flat_model.Literal) and node.type in ("Integer", "Enumeration"):
-            return int(node.value)
-        if isinstance(node, flat_model.Unary) and node.operator == "-":
+        """Evaluate an Integer expression of literals, size(), `+`, `-` and `*`; return None for all other expressions."""
+        if isinstance(node, syntax_tree.Literal) and node.type in ("Integer", "Enumeration"):
+            return int(node.number)
+        if isinstance(node, syntax_tree.Unary) and node.operator == "-":
             operand = self.static_integer(node.operand)
             return None if operand is None else -operand
-        if isinstance(node, flat_model.Binary) and node.operator in ("+", "-", "*"):
+        if isinstance(node, syntax_tree.Binary) and node.operator in ("+", "-", "*"):
             left, right = self.static_integer(node.left), self.static_integer(node.right)
             if left is None or right is None:
                 return None
             return {"+": left + right, "-": left - right, "*": left * right}[node.operator]
-        if isinstance(node, flat_model.Builtin) and node.name == "size" and len(node.arguments) == 2:
+        if isinstance(node, syntax_tree.Builtin) and node.name == "size" and len(node.arguments) == 2:
             dimension = self.static_integer(node.arguments[1])
             return None if dimension is None else self.shape_of(node.arguments[0])[dimension - 1]
         return None
 
-    def static_range(self, node: flat_model.Range) -> list[int]:
+    def static_range(self, node: syntax_tree.Range) -> list[int]:
+        """Return the values of a range.
+
+        Raises:
+            InputError: The bounds or the step are not constant.
+        """
         start, step, stop = (
-            self.static_integer(e) for e in (node.start, node.step or flat_model.Literal(1, "Integer"), node.stop)
+            self.static_integer(e) for e in (node.start, node.step or syntax_tree.Literal(1, "Integer"), node.stop)
         )
         if start is None or step is None or stop is None:
-            raise_model_error("the bounds of a slice must be constant", getattr(node.stop, "where", None))
+            raise_model_error("the bounds of a range must be constant here", getattr(node.stop, "where", None))
         return list(range(start, stop + (1 if step > 0 else -1), step))

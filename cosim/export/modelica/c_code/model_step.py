@@ -1,13 +1,20 @@
-"""The body of model_step: the events of a communication step, and the integration of continuous states between them.
-
-`event` is the C statement that calls the function of that name at the time `now`.
-"""
+"""Code generation of model_step: the events of a communication step and the integration of continuous states between them."""
 
 from __future__ import annotations
 
 
 def sampled_step_body(clocks: int, event: str) -> list[str]:
-    """A model without continuous states: an event at every tick; without a clock, one at the end of the step."""
+    """Generate the body of model_step for a model without continuous states.
+
+    There is an event at every tick, or at the end of the step if the model has no clock.
+
+    Args:
+        clocks: The number of clocks.
+        event: The C statement that evaluates an event at the time `now`.
+
+    Returns:
+        The lines of C code.
+    """
     if clocks == 0 and "now" not in event:
         return _with_failure_check(["(void)time;", "(void)step_size;", event])
     if clocks == 0:
@@ -16,13 +23,23 @@ def sampled_step_body(clocks: int, event: str) -> list[str]:
 
 
 def continuous_step_body(clocks: int, event: str) -> list[str]:
-    """A model with continuous states: they advance to each tick, and to the end of the step, where there is one more event."""
+    """Generate the body of model_step for a model with continuous states.
+
+    The states are integrated to each tick and to the end of the step. There is an event at every tick and at the end.
+
+    Args:
+        clocks: The number of clocks.
+        event: The C statement that evaluates an event at the time `now`.
+
+    Returns:
+        The lines of C code.
+    """
     if clocks == 0:
         return _with_failure_check(["const double now = time + step_size;", "advance(m, time, now);", event])
-    idle = [f"const bool due[{clocks}] = {{false}};"] if "due" in event else []
-    last = ["const double now = time + step_size;", *idle, "advance(m, reached, now);", event]
+    no_tick = [f"const bool due[{clocks}] = {{false}};"] if "due" in event else []
+    final_event = ["const double now = time + step_size;", *no_tick, "advance(m, reached, now);", event]
     return _with_failure_check(
-        ["double reached = time;", *_multi_clock_loop(clocks, ["reached = advance(m, reached, now);", event]), *last]
+        ["double reached = time;", *_multi_clock_loop(clocks, ["reached = advance(m, reached, now);", event]), *final_event]
     )
 
 

@@ -1,4 +1,4 @@
-/* Continuous states: the classical Runge-Kutta method of order 4 in equal steps of at most 5 ms. */
+/* Integration of continuous states: the classical Runge-Kutta method of order 4 in equal steps of at most 5 ms. */
 #ifndef RUNGE_KUTTA_H
 #define RUNGE_KUTTA_H
 
@@ -6,7 +6,7 @@
 
 #define LONGEST_STEP 0.005
 
-/* The states of a model, where their derivatives stand, and the function that computes those at a time. */
+/* Pointers to the states of a model and to their derivatives, and the function that computes the derivatives. */
 typedef struct {
     double *x[STATES];
     const double *dx[STATES];
@@ -31,7 +31,7 @@ static inline void runge_kutta(Model *m, const System *s, double time, double h)
     }
 }
 
-/* Integrates from one time to another and returns the time reached: not further than it was where there is nothing to do. */
+/* Integrates to the time `to` if it is later than `from`; returns the time of the states. */
 static inline double integrate(Model *m, const System *s, double from, double to)
 {
     const double count = ceil((to - from) / LONGEST_STEP - 1e-9);

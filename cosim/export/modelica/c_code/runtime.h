@@ -1,4 +1,4 @@
-/* What every model from Modelica uses: arithmetic that fails instead of overflowing, and clocks that count. */
+/* Runtime functions of compiled Modelica models: Integer arithmetic with overflow checks, and clocks. */
 #ifndef RUNTIME_H
 #define RUNTIME_H
 
@@ -10,13 +10,13 @@
 
 enum { OVERFLOW_OF_INTEGER = 1, DIVISION_BY_ZERO = 2, PERIOD_NOT_POSITIVE = 3 };
 
-/* The first failure counts. */
+/* Records a failure; the first one is reported. */
 static inline void fail(Model *m, int32_t reason)
 {
     if (m->failure == 0) m->failure = reason;
 }
 
-/* Subscript k of an array of n elements as a place in C; the first place after a failure. */
+/* The C index (from 0) for subscript k (from 1) of an array with n elements; 0 after a failure. */
 static inline int32_t element(Model *m, int32_t k, int32_t n, int32_t reason)
 {
     if (k >= 1 && k <= n) return k - 1;
@@ -36,7 +36,7 @@ static inline int32_t subtract(Model *m, int32_t a, int32_t b) { return integer(
 static inline int32_t multiply(Model *m, int32_t a, int32_t b) { return integer(m, (int64_t)a * b); }
 static inline int32_t absolute(Model *m, int32_t a) { return a < 0 ? subtract(m, 0, a) : a; }
 
-/* div(a, b): the quotient without its fraction. */
+/* div(a, b): the quotient, rounded toward zero. */
 static inline int32_t divide(Model *m, int32_t a, int32_t b)
 {
     if (b != 0) return integer(m, (int64_t)a / b);
@@ -71,12 +71,12 @@ static inline double real_quotient(double a, double b) { return trunc(a / b); }
 static inline double real_remainder(double a, double b) { return a - trunc(a / b) * b; }
 static inline double real_modulo(double a, double b) { return a - floor(a / b) * b; }
 
-/* Part of a period by which a tick may seem to lie off the communication points. */
+/* Tolerance for comparing the times of ticks and communication points, as a fraction of the period. */
 #define TOLERANCE 1e-6
 
 static inline double next_tick(const Clock *c) { return c->start + (double)c->ticks * c->period; }
 
-/* The first tick of a clock is the first one not before the start time of the simulation. */
+/* Initializes a clock: ticks before the start time of the simulation are skipped. */
 static inline void set_clock(Model *m, Clock *c, double start, double period, double time)
 {
     const double passed = ceil((time - start) / period - TOLERANCE);
@@ -91,7 +91,7 @@ static inline double shortest_period(const Clock *clocks, int count)
     return period;
 }
 
-/* The time of the next event and which clocks tick in it. */
+/* Returns the time of the next event; due[k] is true if clock k ticks in it. */
 static inline double next_event(const Clock *clocks, int count, bool *due)
 {
     double now = next_tick(&clocks[0]);

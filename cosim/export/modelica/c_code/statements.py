@@ -1,11 +1,11 @@
-"""Modelica statements in C."""
+"""Lowering of Modelica statements to C."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ..model import flat_model
-from ..model.flat_model import Body, Expression, Statement, raise_model_error
+from ..model import syntax_tree
+from ..model.syntax_tree import Body, Expression, Statement, raise_model_error
 from ..model.traversal import assigned_references, read_references, variable_names
 from .c_values import CExpression, CValue, c_identifier, scalar_value
 from .expressions import ExpressionLowering
@@ -15,26 +15,39 @@ _MAX_CONDITIONAL_LENGTH = 90
 
 @dataclass
 class StatementLowering(ExpressionLowering):
-    """Lowers statements; assignments go to the names of the scope. `initial`: for the initialization, not for an event."""
+    """Lowering of statements."""
 
+    #: true for the initialization, false for an event
     initial: bool = False
 
     def body(self, body: Body) -> None:
+        """Lower several statements."""
         for statement in body:
             self.statement(statement)
 
     def statement(self, node: Statement) -> None:
+        """Lower a statement.
+
+        Raises:
+            InputError: The statement contains an unsupported expression.
+        """
         getattr(self, f"_{type(node).__name__.lower()}")(node)
 
-    def _assign(self, node: flat_model.Assign) -> None:
+    def _assign(self, node: syntax_tree.Assign) -> None:
         self.store(self.lower(node.target), node.value, node.target)
 
     def store(self, target: CValue, value: Expression, reference: Expression) -> None:
-        """Writes an expression to a target; `reference` names it, to see whether the expression reads what it overwrites."""
-        if isinstance(value, flat_model.If) and (target.shape or self._needs_if_statement(target, value)):
+        """Lower the assignment of an expression.
+
+        Args:
+            target: The value of the assigned variable.
+            value: The expression.
+            reference: The assigned variable as an expression. It determines whether `value` depends on the target.
+        """
+        if isinstance(value, syntax_tree.If) and (target.shape or self._needs_if_statement(target, value)):
             self._lower_choice(target, value, reference)
         elif (
-            isinstance(value, flat_model.Call)
+            isinstance(value, syntax_tree.Call)
             and target.pointer
             and not _variables_read(value) & variable_names(reference)
             and self._can_return_into(value, target)
@@ -46,40 +59,41 @@ class StatementLowering(ExpressionLowering):
     def _store_value(self, target: CValue, value: Expression, reference: Expression) -> None:
         lowered = self.lower(value)
         if lowered.shape not in ((), target.shape):
-            raise_model_error(f"sizes differ: {list(target.shape)} := {list(lowered.shape)}", getattr(reference, "where", None))
+            sizes = f"found size {list(lowered.shape)}, expected {list(target.shape)}"
+            raise_model_error(f"assignment of an array: {sizes}", getattr(reference, "where", None))
         if lowered.shape != target.shape:
             lowered = replace(self.evaluated_once(lowered), shape=target.shape)
         if target.shape and _variables_read(value) & variable_names(reference):
             lowered = self.evaluated_once(replace(lowered, reusable=False))
         self.copy_elements(target, lowered)
 
-    def _can_return_into(self, value: flat_model.Call, target: CValue) -> bool:
-        """Whether a function can write its result straight to the target."""
+    def _can_return_into(self, value: syntax_tree.Call, target: CValue) -> bool:
+        """Return whether a function can write its result to the target without a copy."""
         outputs = self.translation_unit.function_instance(value, tuple(map(self.shape_of, value.arguments))).outputs
         return [(output.type, output.shape) for output in outputs] == [(target.type, target.shape)]
 
-    def _needs_if_statement(self, target: CValue, value: flat_model.If) -> bool:
+    def _needs_if_statement(self, target: CValue, value: syntax_tree.If) -> bool:
         if len(value.branches) > 1:
             return True
         with self.collect_lines() as lines:
             text = self.lower(value).text
         return bool(lines) or len(target.text.code) + len(text.code) > _MAX_CONDITIONAL_LENGTH
 
-    def _lower_choice(self, target: CValue, value: flat_model.If, reference: Expression) -> None:
-        """`if` instead of `? :`; an `else if` whose condition needs statements of its own is nested."""
+    def _lower_choice(self, target: CValue, value: syntax_tree.If, reference: Expression) -> None:
+        """Lower an if-expression to an if-statement; an `else if` is nested if its condition requires statements."""
         (condition, first), rest = value.branches[0], value.branches[1:]
         self.lines.append(f"if ({self.scalar_of(condition).code}) {{")
         with self.collect_lines() as yes:
             self.store(target, first, reference)
         with self.collect_lines() as no:
             if rest:
-                self._lower_choice(target, flat_model.If(rest, value.otherwise), reference)
+                self._lower_choice(target, syntax_tree.If(rest, value.otherwise), reference)
             else:
                 self.store(target, value.otherwise, reference)
         self._close_if(yes, no)
 
     def _close_if(self, yes: list[str], no: list[str]) -> None:
-        """The branches of an `if` that is open; `else { if ... }` becomes `else if` where that is all there is."""
+        """Append the branches of an if-statement; `else { if ... }` is shortened to `else if` where possible."""
         self.lines += yes
         if no and _is_one_if(no):
             self.lines += ["} else " + no[0].strip(), *(line[4:] for line in no[1:])]
@@ -88,25 +102,25 @@ class StatementLowering(ExpressionLowering):
         else:
             self.lines.append("}")
 
-    def _ifstatement(self, node: flat_model.IfStatement) -> None:
+    def _ifstatement(self, node: syntax_tree.IfStatement) -> None:
         (condition, body), rest = node.branches[0], node.branches[1:]
         self.lines.append(f"if ({self.scalar_of(condition).code}) {{")
         with self.collect_lines() as yes:
             self.body(body)
         with self.collect_lines() as no:
             if rest:
-                self._ifstatement(flat_model.IfStatement(rest, node.otherwise, node.where))
+                self._ifstatement(syntax_tree.IfStatement(rest, node.otherwise, node.where))
             else:
                 self.body(node.otherwise)
         self._close_if(yes, no)
 
-    def _for(self, node: flat_model.For) -> None:
+    def _for(self, node: syntax_tree.For) -> None:
         start, stop = self.scalar_of(node.range.start), self.scalar_of(node.range.stop)
         step = self.static_integer(node.range.step) if node.range.step else 1
         if not step:
             raise_model_error("the step of a for-loop must be a constant other than 0", node.where)
         if not stop.code.lstrip("-").isdigit() and _variables_read(node.range.stop) & {
-            flat_model.referenced_variable(t) for t in assigned_references(node.body)
+            syntax_tree.referenced_variable(t) for t in assigned_references(node.body)
         }:
             stop = self.evaluated_once(scalar_value("Integer", stop)).text
         index = c_identifier(node.index)
@@ -115,27 +129,27 @@ class StatementLowering(ExpressionLowering):
         self.lines.append(
             f"for (int32_t {index} = {start.code}; {index} {'<=' if step > 0 else '>='} {stop.code}; {index} += {step}) {{"
         )
-        hidden = self.scope.get(node.index)
-        self.scope[node.index] = replace(scalar_value("Integer", CExpression(index), simple=True), bounds=bounds)
+        shadowed = self.scope.get(node.index)
+        self.scope[node.index] = replace(scalar_value("Integer", CExpression(index), reusable=True), bounds=bounds)
         with self.collect_lines() as lines:
             self.body(node.body)
-        if hidden is None:
+        if shadowed is None:
             del self.scope[node.index]
         else:
-            self.scope[node.index] = hidden
+            self.scope[node.index] = shadowed
         self.lines += [*lines, "}"]
 
-    def _assert(self, node: flat_model.Assert) -> None:
+    def _assert(self, node: syntax_tree.Assert) -> None:
         condition = self.scalar_of(node.condition)
         failure = self.translation_unit.failure_code(node.message, node.where)
         self.lines.append(f"if (!{condition.parenthesized(13)}) fail(m, {failure});")
 
-    def _multiassign(self, node: flat_model.MultiAssign) -> None:
+    def _multiassign(self, node: syntax_tree.MultiAssign) -> None:
         for target, result in zip(node.targets, self.lower_call(node.call), strict=False):
             self.copy_elements(self.lower(target), result)
 
-    def _edgedetector(self, node: flat_model.EdgeDetector) -> None:
-        """Sets the flag of a condition that has become true since the last event."""
+    def _edgedetector(self, node: syntax_tree.EdgeDetector) -> None:
+        """Set the flag risen(k) if the condition has become true since the previous event."""
         condition = self.scalar_of(node.condition).code
         if self.initial:
             self.lines.append(f"m->held[{node.index}] = {condition};")
@@ -148,10 +162,10 @@ class StatementLowering(ExpressionLowering):
 
 
 def _variables_read(node: Expression) -> set[str]:
-    """The variables whose present value an expression reads."""
-    return {flat_model.referenced_variable(reference) for reference in read_references(node)}
+    """Return the variables whose current value an expression reads."""
+    return {syntax_tree.referenced_variable(reference) for reference in read_references(node)}
 
 
 def _is_one_if(lines: list[str]) -> bool:
-    """Whether the lines are a single `if` with its branches: it opens in the first and closes for good in the last line."""
+    """Return whether the lines are one if-statement, which begins in the first line and ends in the last one."""
     return lines[0].startswith("    if (") and lines[0].endswith("{") and lines.index("    }") == len(lines) - 1

@@ -1,50 +1,59 @@
-"""Subscripts: elements and parts of arrays, as values and as targets of assignments."""
+"""Lowering of subscripts: elements and slices of arrays, as values and as targets of assignments."""
 
 from __future__ import annotations
 
 from itertools import product
 from math import prod
 
-from ..model import flat_model
-from ..model.flat_model import Expression, SourceLocation, raise_model_error
+from ..model import syntax_tree
+from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
 from .c_values import CValue, c_call, linear_index, variable_value
 from .lowering import Lowering
 
 
 class SubscriptLowering(Lowering):
-    """Adds `a[i]` to a lowering."""
+    """Lowering of subscripted expressions such as `a[i]`."""
 
-    def _index(self, node: flat_model.Index) -> CValue:
+    def _index(self, node: syntax_tree.Index) -> CValue:
         base = self.lower(node.base)
         return self.select_elements(base, node)
 
-    def select_elements(self, base: CValue, node: flat_model.Index) -> CValue:
-        """The element or the part of an array that subscripts name; also as the target of an assignment."""
+    def select_elements(self, base: CValue, node: syntax_tree.Index) -> CValue:
+        """Return the element or slice of an array; it can be the target of an assignment.
+
+        Args:
+            base: The array.
+            node: The expression with the subscripts.
+
+        Raises:
+            InputError: A subscript is not supported, or a constant subscript is out of range.
+        """
         if len(node.subscripts) > len(base.shape):
-            raise_model_error("more subscripts than dimensions", node.where)
-        label = node.base.name if isinstance(node.base, flat_model.Name) else "array"
-        subscripts = [*node.subscripts, *[flat_model.Colon()] * (len(base.shape) - len(node.subscripts))]
-        places = [self._element_offsets(s, n, label, node.where) for s, n in zip(subscripts, base.shape, strict=True)]
-        if any(isinstance(place, str) for place in places) and base.pointer is None:
+            found = f"found {len(node.subscripts)} {'subscript' if len(node.subscripts) == 1 else 'subscripts'}"
+            raise_model_error(f"{found}, expected at most {len(base.shape)}", node.where)
+        label = node.base.name if isinstance(node.base, syntax_tree.Name) else "array"
+        subscripts = [*node.subscripts, *[syntax_tree.Colon()] * (len(base.shape) - len(node.subscripts))]
+        offsets = [self._element_offsets(s, n, label, node.where) for s, n in zip(subscripts, base.shape, strict=True)]
+        if any(isinstance(offset, str) for offset in offsets) and base.pointer is None:
             base = variable_value(base.type, base.shape, self.as_c_array(base, base.type))
-        choices = [place if isinstance(place, list) else [place] for place in places]
-        shape = tuple(len(place) for place in places if isinstance(place, list))
+        offset_lists = [offset if isinstance(offset, list) else [offset] for offset in offsets]
+        shape = tuple(len(offset) for offset in offsets if isinstance(offset, list))
         factors = [prod(base.shape[d + 1 :]) for d in range(len(base.shape))]
-        selected = [linear_index(list(zip(factors, index, strict=True))) for index in product(*choices)]
+        selected = [linear_index(list(zip(factors, index, strict=True))) for index in product(*offset_lists)]
         if shape == base.shape and selected == list(range(base.size)):
             return base
         return CValue(base.type, shape, lambda k: base.element(selected[int(k)]), indexable_in_loop=False, reusable=base.reusable)
 
     def _element_offsets(
-        self, subscript: Expression | flat_model.Colon, size: int, label: str, where: SourceLocation | None
+        self, subscript: Expression | syntax_tree.Colon, size: int, label: str, where: SourceLocation | None
     ) -> list[int] | int | str:
-        """Places counted from 0: several for a slice, a number or C text for one element."""
-        if isinstance(subscript, flat_model.Colon):
+        """Return the offset (from 0) of an element as a number or C code, or the offsets of a slice as a list."""
+        if isinstance(subscript, syntax_tree.Colon):
             return list(range(size))
-        if isinstance(subscript, flat_model.Range):
+        if isinstance(subscript, syntax_tree.Range):
             return [self._check_bounds(k, size, label, where) for k in self.static_range(subscript)]
-        if (fixed := self.static_integer(subscript)) is not None:
-            return self._check_bounds(fixed, size, label, where)
+        if (static := self.static_integer(subscript)) is not None:
+            return self._check_bounds(static, size, label, where)
         value = self.lower(subscript)
         if value.shape or value.type == "Boolean":
             raise_model_error(f"this kind of subscript of {label} is not supported", where)

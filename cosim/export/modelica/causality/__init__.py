@@ -1,1 +1,1 @@
-"""Order of computation: matching, sorting, clocks, states, parameter roles."""
+"""Causality analysis of a flat model: matching, sorting, clocks, continuous states and parameter roles."""

@@ -1,4 +1,4 @@
-"""Continuous states: der(x) becomes a variable of its own, named "der(x)", that an equation has to define."""
+"""Continuous states: replacement of der(x) by a variable with the name "der(x)", which an equation must define."""
 
 from __future__ import annotations
 
@@ -6,17 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from ..model.flat_model import (
-    Builtin,
-    Expression,
-    Index,
-    Model,
-    Name,
-    Variable,
-    derivative_name,
-    raise_model_error,
-    referenced_variable,
-)
+from ..model.flat_model import Model, Variable, derivative_name
+from ..model.syntax_tree import Builtin, Expression, Index, Name, raise_model_error, referenced_variable
 from ..model.traversal import rewrite, walk
 from .matching import is_input
 
@@ -24,14 +15,15 @@ _SECTIONS = ("equations", "whens", "algorithms", "asserts", "initial_equations",
 
 
 def introduce_derivatives(model: Model) -> Model:
-    """The same model with `states`, and with their derivatives as variables instead of der().
+    """Return the model with its continuous states, and with variables for their derivatives instead of der().
 
-    Raises InputError for the derivative of anything but a continuous Real variable.
+    Raises:
+        InputError: The argument of der() is not a continuous Real variable.
     """
-    found = dict(_der_calls(model))
-    for name, call in found.items():
+    der_calls = dict(_der_calls(model))
+    for name, call in der_calls.items():
         _check_state(model, name, call)
-    states = tuple(name for name in model.variables if name in found)
+    states = tuple(name for name in model.variables if name in der_calls)
     return replace(
         model,
         variables={**model.variables, **{derivative_name(name): _derivative_variable(model.variables[name]) for name in states}},
@@ -41,7 +33,7 @@ def introduce_derivatives(model: Model) -> Model:
 
 
 def _der_calls(model: Model) -> Iterator[tuple[str, Builtin]]:
-    """Every variable under der(), with the call."""
+    """Yield the argument of each der() (the variable name), with the call."""
     for item in walk(tuple(getattr(model, section) for section in _SECTIONS)):
         if isinstance(item, Builtin) and item.name == "der":
             yield referenced_variable(_der_argument(item)), item
@@ -49,11 +41,11 @@ def _der_calls(model: Model) -> Iterator[tuple[str, Builtin]]:
 
 def _der_argument(call: Builtin) -> Name | Index:
     (argument,) = call.arguments
-    if isinstance(argument, Name) or (isinstance(argument, Index) and isinstance(argument.base, Name)):
-        return argument
-    raise_model_error(
-        "der() of an expression is not supported; give the expression a variable with an equation der(x) = ...", call.where
-    )
+    if not (isinstance(argument, Name) or (isinstance(argument, Index) and isinstance(argument.base, Name))):
+        raise_model_error(
+            "der() of an expression is not supported; declare a variable x for the expression and use der(x)", call.where
+        )
+    return argument
 
 
 def _check_state(model: Model, name: str, call: Builtin) -> None:
@@ -63,7 +55,7 @@ def _check_state(model: Model, name: str, call: Builtin) -> None:
 
 
 def _derivative_variable(state: Variable) -> Variable:
-    """The declaration of the derivative of a state."""
+    """Return the declaration of the derivative of a state."""
     return replace(
         state,
         name=derivative_name(state.name),

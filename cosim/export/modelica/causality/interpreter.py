@@ -1,4 +1,4 @@
-"""A flat model that runs in plain Python: the second opinion on the emitted C, and the value of constant expressions."""
+"""Interpreter of a flat model: reference for tests of the generated C code, and evaluation of default values."""
 
 from __future__ import annotations
 
@@ -23,9 +23,15 @@ _MAX_STEP_SIZE = 0.005
 
 
 class Interpreter:
-    """One instance of a model with the life of a Block: values are set, `initialize`, `step`, values are read.
+    """An instance of a model with the life cycle of a block: `set`, `initialize`, `step` and `get`.
 
-    Scalars are float, int or bool, arrays are numpy arrays. A failing model raises ComponentError.
+    Scalars are float, int or bool, arrays are NumPy arrays.
+
+    Args:
+        model: The flat model, with continuous states introduced.
+
+    Raises:
+        InputError: The model has structural errors, for example an algebraic loop.
     """
 
     def __init__(self, model: Model):
@@ -49,17 +55,23 @@ class Interpreter:
         self._apply_start_values(inputs=True)
 
     def set(self, name: str, value: Any) -> None:
-        """Set a parameter or an input, arrays whole; parameters that depend on it follow."""
+        """Set a parameter or an input (arrays as a whole) and update the parameters that depend on it."""
         self._assign(name, value)
         if self.model.variables[name].variability == "parameter":
             self._update_dependent_parameters()
 
     def get(self, name: str) -> Any:
+        """Return a copy of the value of a variable."""
         return deepcopy(self.values[name])
 
     def initialize(self, time: float = 0.0) -> None:
-        """Start values, the first ticks of the clocks, and the equations at the start time."""
+        """Apply the start values, set the first ticks of the clocks and evaluate the equations at the start time (s).
+
+        Raises:
+            ComponentError: The model has failed.
+        """
         self._apply_start_values(inputs=False)
+        #: start (s), period (s) and number of past ticks of each clock
         self.clocks = []
         for clock in self.schedule.clocks:
             start, period = self.evaluate(clock.start), self.evaluate(clock.period)
@@ -70,7 +82,17 @@ class Interpreter:
         self.evaluate.event_flags.clear()
 
     def step(self, time: float, step_size: float) -> None:
-        """All ticks t with time <= t < time + step_size; with states or without any clock, the equations at time + step_size."""
+        """Execute all ticks t with time <= t < time + step_size.
+
+        A model with continuous states or without clocks is also evaluated at time + step_size.
+
+        Args:
+            time: The current time (s).
+            step_size: The communication step size (s).
+
+        Raises:
+            ComponentError: The model has failed.
+        """
         end, reached = time + step_size, self._run_ticks(time, time + step_size)
         if self.model.states or not self.clocks:
             self._integrate(reached, end)
@@ -78,23 +100,23 @@ class Interpreter:
             self._evaluate_event("step", end)
 
     def _run_ticks(self, time: float, end: float) -> float:
-        """All ticks in time <= t < end; returns the time that the states have reached."""
+        """Execute all ticks in time <= t < end; return the time of the states after the last one."""
         reached = time
         while self.clocks:
             ticks = [start + count * period for start, period, count in self.clocks]
-            now = min(ticks)
-            if not now < end - _TICK_TOLERANCE * min(period for _, period, _ in self.clocks):
+            next_tick = min(ticks)
+            if not next_tick < end - _TICK_TOLERANCE * min(period for _, period, _ in self.clocks):
                 break
-            reached = self._integrate(reached, now)
+            reached = self._integrate(reached, next_tick)
             for k, (clock, tick) in enumerate(zip(self.clocks, ticks, strict=True)):
-                self.evaluate.event_flags["due", k] = tick <= now + _TICK_TOLERANCE * clock[1]
-            self._evaluate_event("step", now)
+                self.evaluate.event_flags["due", k] = tick <= next_tick + _TICK_TOLERANCE * clock[1]
+            self._evaluate_event("step", next_tick)
             for k, clock in enumerate(self.clocks):
                 clock[2] += self.evaluate.event_flags["due", k]
         return reached
 
     def _integrate(self, start: float, end: float) -> float:
-        """The states from one time to another in equal steps of at most 5 ms; returns the time reached."""
+        """Integrate the states from `start` to `end` in equal steps of at most 5 ms; return the time of the states."""
         count = math.ceil((end - start) / _MAX_STEP_SIZE - 1e-9) if self.model.states else 0
         if count <= 0:
             return start
@@ -104,7 +126,7 @@ class Interpreter:
         return end
 
     def _runge_kutta(self, time: float, h: float) -> None:
-        """One step of the classical method of order 4."""
+        """Integrate one step of the classical Runge-Kutta method of order 4."""
         start = self._state_values()
         k1 = self._evaluate_derivatives(time)
         k2 = self._evaluate_derivatives(time + h / 2, [x + h / 2 * k for x, k in zip(start, k1, strict=True)])
@@ -117,7 +139,7 @@ class Interpreter:
         return [self.get(name) for name in self.model.states]
 
     def _evaluate_derivatives(self, time: float, states: Sequence[Any] | None = None) -> list[Any]:
-        """The derivatives at a time, for the given states or the present ones."""
+        """Return the derivatives at a time, for the given states or the current ones."""
         for name, value in zip(self.model.states, states or (), strict=False):
             self._assign(name, value)
         self.values["time"] = time
@@ -143,7 +165,7 @@ class Interpreter:
                 self._assign(variable.name, self.evaluate(start_value(self.model, variable.name)))
 
     def _evaluate_event(self, function: str, time: float) -> None:
-        """One event, or the initialization."""
+        """Evaluate the equations at an event (`function` "step") or at the initialization ("initialize")."""
         body = self.schedule.event if function == "step" else self.schedule.initialization
         self.values["time"] = time
         self.evaluate.pre_values = {name: deepcopy(self.values[name]) for name in self._pre_variables[function]}
@@ -156,8 +178,8 @@ class Interpreter:
     def _as_component_error(self, function: str, time: float) -> Iterator[None]:
         try:
             yield
-        except EvaluationError as failure:
-            raise ComponentError(self.model.name, function, str(failure), time) from None
+        except EvaluationError as error:
+            raise ComponentError(self.model.name, function, str(error), time) from None
 
     def _check_finite(self) -> None:
         for name in self._finite_variables:

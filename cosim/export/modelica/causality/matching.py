@@ -1,6 +1,6 @@
-"""Which continuous equation defines which variable.
+"""Matching: assignment of each continuous equation to the variable that it defines.
 
-Only equations with a variable alone on one side are accepted (`y = f(...)`, a connection `a = b`): nothing is solved for.
+Equations are not solved symbolically. Therefore one side must be a variable (`y = f(...)`, or a connection `a = b`).
 """
 
 from __future__ import annotations
@@ -9,83 +9,83 @@ from collections.abc import Collection, Iterable, Mapping
 from itertools import product
 from math import prod
 
-from ..model.flat_model import (
-    Assign,
-    Builtin,
-    Colon,
-    Equation,
-    Expression,
-    Index,
-    Literal,
-    Model,
-    Name,
-    Variable,
-    raise_model_error,
-)
+from ..model.flat_model import Equation, Model, Variable
+from ..model.syntax_tree import Assign, Builtin, Colon, Expression, Index, Literal, Name, raise_model_error
 
-#: one scalar: the name of the variable and the place of the element, row by row
+#: a scalar: variable name and row-major index of the element
 ScalarKey = tuple[str, int]
 
 
 def scalar_keys(variables: Mapping[str, Variable], reference: Name | Index) -> set[ScalarKey]:
-    """The scalars that a reference names; subscripts that are not literal mean the whole variable."""
+    """Return the scalars that a reference denotes; with a non-literal subscript, all elements of the variable."""
     name = reference if isinstance(reference, Name) else reference.base
     if not isinstance(name, Name) or (variable := variables.get(name.name)) is None:
         return set()
     shape = variable.shape
     if isinstance(reference, Name) or not all(isinstance(s, Literal | Colon) for s in reference.subscripts):
         return {(name.name, k) for k in range(prod(shape))}
-    choices = [range(n) if isinstance(s, Colon) else [int(s.value) - 1] for s, n in zip(reference.subscripts, shape)]  # type: ignore[union-attr]  # noqa: B905
-    choices += [range(n) for n in shape[len(choices) :]]
-    return {(name.name, _flat_index(index, shape)) for index in product(*choices)}
+    literals = [int(s.number) - 1 if isinstance(s, Literal) else None for s in reference.subscripts]
+    literals += [None] * (len(shape) - len(literals))
+    indices = [range(n) if k is None else range(k, k + 1) for k, n in zip(literals, shape, strict=False)]
+    return {(name.name, _flat_index(index, shape)) for index in product(*indices)}
 
 
 def _flat_index(index: Iterable[int], shape: Iterable[int]) -> int:
-    place = 0
+    result = 0
     for k, n in zip(index, shape, strict=True):
-        place = place * n + k
-    return place
+        result = result * n + k
+    return result
 
 
 def match_equations(model: Model, assigned: Collection[str]) -> list[Assign]:
-    """The continuous equations as assignments, in the order in which they were written.
+    """Match the continuous equations with variables.
 
-    `assigned` are the variables that when-clauses and algorithms define. An equation between two variables (`a = b`) defines
-    the one that nothing else defines, so those wait until all others have found their variable.
+    An equation between two variables (`a = b`) defines the one that no other equation defines. It is matched after the other
+    equations have been matched.
+
+    Args:
+        model: The flat model.
+        assigned: The variables that when-clauses and algorithms assign.
+
+    Returns:
+        The equations as assignments, in the order of the model.
+
+    Raises:
+        InputError: An equation defines no variable, or a variable has no equation.
     """
     defined = {key for name in assigned for key in scalar_keys(model.variables, Name(name))}
     for variable in model.variables.values():
         if variable.variability in ("constant", "parameter") or is_input(variable):
             defined |= scalar_keys(model.variables, Name(variable.name))
-    pending, found = list(enumerate(model.equations)), dict[int, Assign]()
+    pending, matched = list(enumerate(model.equations)), dict[int, Assign]()
     while pending:
-        waiting = []
+        unmatched = []
         for number, equation in pending:
-            sides = _candidates(model, equation, defined)
-            if len(sides) == 1:
-                defined |= scalar_keys(model.variables, sides[0].target)
-                found[number] = sides[0]
+            candidates = _candidates(model, equation, defined)
+            if len(candidates) == 1:
+                defined |= scalar_keys(model.variables, candidates[0].target)
+                matched[number] = candidates[0]
             else:
-                waiting.append((number, equation))
-        if len(waiting) == len(pending):
-            _raise_unmatched([equation for _, equation in waiting], model, defined)
-        pending = waiting
+                unmatched.append((number, equation))
+        if len(unmatched) == len(pending):
+            _raise_unmatched([equation for _, equation in unmatched], model, defined)
+        pending = unmatched
     _check_complete(model, defined)
-    return [found[number] for number in sorted(found)]
+    return [matched[number] for number in sorted(matched)]
 
 
 def is_input(variable: Variable) -> bool:
-    """Whether the value comes from outside the model (inputs of inner blocks do not)."""
+    """Return whether a variable is an input of the model itself (not of a component)."""
     return variable.causality == "input" and variable.top_level
 
 
 def _candidates(model: Model, equation: Equation, defined: Collection[ScalarKey]) -> list[Assign]:
-    """The ways to read the equation as an assignment to a scalar or array that nothing has defined yet."""
+    """Return the assignments of an undefined variable that are equivalent to the equation: none, one or two."""
     sides = ((equation.left, equation.right), (equation.right, equation.left))
     return [
         Assign(side, other, equation.where)
         for side, other in sides
-        if isinstance(side, Name | Index) and (named := scalar_keys(model.variables, side)) and not named & set(defined)
+        if isinstance(side, Name | Index) and (keys := scalar_keys(model.variables, side)) and not keys & set(defined)
     ]
 
 
@@ -94,11 +94,10 @@ def _raise_unmatched(equations: list[Equation], model: Model, defined: Collectio
     if _candidates(model, equation, defined):
         names = ", ".join(sorted({side.name for e in equations for side in (e.left, e.right) if isinstance(side, Name)}))
         raise_model_error(
-            f"these variables are only connected to each other, nothing gives them a value: {names}", equation.where
+            f"these variables are only connected to each other, no equation gives them a value: {names}", equation.where
         )
     raise_model_error(
-        "this equation defines no variable: write it with a variable, or der() of one, alone on one side "
-        "that no other equation defines",
+        "this equation defines no variable: one side must be a variable, or der() of one, that no other equation defines",
         equation.where,
     )
 
@@ -110,19 +109,30 @@ def _check_complete(model: Model, defined: Collection[ScalarKey]) -> None:
 
 
 def match_initial_equations(model: Model, assigned: Collection[str]) -> list[Assign]:
-    """Initial equations as assignments to continuous states and to what a when-clause or algorithm assigns later.
+    """Match the initial equations with variables; an equation `pre(x) = ...` defines x.
 
-    `pre(x) = ...` is x.
+    Args:
+        model: The flat model.
+        assigned: The continuous states and the variables that when-clauses and algorithms assign.
+
+    Returns:
+        The initial equations as assignments.
+
+    Raises:
+        InputError: An initial equation defines none of these variables.
     """
     return [_initial_assignment(model, equation, assigned) for equation in model.initial_equations]
 
 
 def _initial_assignment(model: Model, equation: Equation, assigned: Collection[str]) -> Assign:
+    assignments = []
     for side, other in ((equation.left, equation.right), (equation.right, equation.left)):
         target: Expression = side.arguments[0] if isinstance(side, Builtin) and side.name == "pre" else side
         if isinstance(target, Name | Index) and {name for name, _ in scalar_keys(model.variables, target)} & set(assigned):
-            return Assign(target, other, equation.where)
-    raise_model_error(
-        "an initial equation must have a continuous state, or a variable that a when-clause assigns, alone on one side",
-        equation.where,
-    )
+            assignments.append(Assign(target, other, equation.where))
+    if not assignments:
+        raise_model_error(
+            "one side of an initial equation must be a continuous state, or a variable that a when-clause assigns",
+            equation.where,
+        )
+    return assignments[0]

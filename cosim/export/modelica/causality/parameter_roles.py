@@ -1,4 +1,4 @@
-"""Who owns a parameter: which ones can be set, and in which order those that depend on others are computed."""
+"""Roles of parameters: settable, fixed or dependent, and the order in which dependent parameters are computed."""
 
 from __future__ import annotations
 
@@ -6,55 +6,66 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 
-from ..model.flat_model import Model, Variable, raise_model_error
+from ..model.flat_model import Model, Variable
+from ..model.syntax_tree import raise_model_error
 from ..model.traversal import variable_names
 from .schedule import Schedule
 
 _STRUCTURAL_USES = {
-    "ArrayDimension": "it decides the size of an array",
-    "BranchSelection": "it selects equations (an if-expression would not)",
-    "ForRange": "it decides the range of a for-loop",
+    "ArrayDimension": "it determines the size of an array",
+    "BranchSelection": "it selects equations (use an if-expression instead)",
+    "ForRange": "it determines the range of a for-loop",
 }
 
 
 @dataclass(frozen=True)
 class ParameterRoles:
-    """The parameters and constants of a model by name.
+    """The names of a model's parameters and constants, by role."""
 
-    `settable` can be set from outside; `fixed` have a value that nothing changes; `dependent` follow from others, in this
-    order. `timing` are settable ones that clocks depend on: they have no effect after the initialization.
-    """
-
+    #: can be set by the importer
     settable: Sequence[str]
+    #: have a constant value
     fixed: Sequence[str]
+    #: are computed from other parameters, in this order
     dependent: Sequence[str]
+    #: settable parameters that determine the start or period of a clock; changes after the initialization have no effect
     clock_parameters: Sequence[str]
 
 
-def classify_parameters(model: Model, plan: Schedule) -> ParameterRoles:
-    """Raises InputError where a settable parameter has shaped the model, and for parameters that depend on themselves."""
+def classify_parameters(model: Model, schedule: Schedule) -> ParameterRoles:
+    """Determine the role of each parameter and constant.
+
+    Args:
+        model: The flat model.
+        schedule: Its order of computation, with the clocks.
+
+    Raises:
+        InputError: A settable parameter determines the structure of the model, or parameters depend on each other cyclically.
+    """
     parameters = [v for v in model.variables.values() if v.variability in ("parameter", "constant")]
-    needs = {v.name: _dependencies(v) for v in parameters}
-    _check_dependencies(model, needs)
-    settable = [v.name for v in parameters if v.variability == "parameter" and not (needs[v.name] or v.final or v.protected)]
-    _check_structure(model, needs, settable)
+    dependencies = {v.name: _dependencies(v) for v in parameters}
+    _check_dependencies(model, dependencies)
+    settable = [
+        v.name for v in parameters if v.variability == "parameter" and not (dependencies[v.name] or v.final or v.protected)
+    ]
+    _check_structure(model, dependencies, settable)
     try:
-        order = [name for name in TopologicalSorter(needs).static_order() if needs[name]]
+        dependent = [name for name in TopologicalSorter(dependencies).static_order() if dependencies[name]]
     except CycleError as error:
         raise_model_error(
             f"these parameters depend on each other: {', '.join(error.args[1])}", model.variables[error.args[1][0]].where
         )
-    clocked = {
-        base
-        for clock in plan.clocks
+    used_by_clocks = {
+        parameter
+        for clock in schedule.clocks
         for name in variable_names((clock.start, clock.period))
-        for base in _transitive_dependencies(name, needs)
+        for parameter in _transitive_dependencies(name, dependencies)
     }
     return ParameterRoles(
         settable,
-        [v.name for v in parameters if not needs[v.name] and v.name not in settable],
-        order,
-        [name for name in settable if name in clocked],
+        [v.name for v in parameters if not dependencies[v.name] and v.name not in settable],
+        dependent,
+        [name for name in settable if name in used_by_clocks],
     )
 
 
@@ -63,24 +74,26 @@ def _dependencies(parameter: Variable) -> list[str]:
     return sorted(variable_names(value))
 
 
-def _check_dependencies(model: Model, needs: dict[str, list[str]]) -> None:
-    for name, others in needs.items():
-        if unknown := [other for other in others if other not in needs]:
-            raise_model_error(f"the parameter {name} depends on {unknown[0]}, which is no parameter", model.variables[name].where)
+def _check_dependencies(model: Model, dependencies: dict[str, list[str]]) -> None:
+    for name, others in dependencies.items():
+        if invalid := [other for other in others if other not in dependencies]:
+            raise_model_error(
+                f"the parameter {name} depends on {invalid[0]}, which is not a parameter", model.variables[name].where
+            )
 
 
-def _transitive_dependencies(name: str, needs: dict[str, list[str]]) -> Iterator[str]:
+def _transitive_dependencies(name: str, dependencies: dict[str, list[str]]) -> Iterator[str]:
     yield name
-    for other in needs.get(name, ()):
-        yield from _transitive_dependencies(other, needs)
+    for other in dependencies.get(name, ()):
+        yield from _transitive_dependencies(other, dependencies)
 
 
-def _check_structure(model: Model, needs: dict[str, list[str]], settable: Sequence[str]) -> None:
+def _check_structure(model: Model, dependencies: dict[str, list[str]], settable: Sequence[str]) -> None:
     for structural in model.structural:
         used = [name for name in structural.parameters if name in model.variables]
-        for owner in dict.fromkeys(base for name in used for base in _transitive_dependencies(name, needs)):
-            if owner in settable:
-                purpose = _STRUCTURAL_USES.get(structural.purpose, f"it decides the structure ({structural.purpose})")
+        for parameter in dict.fromkeys(base for name in used for base in _transitive_dependencies(name, dependencies)):
+            if parameter in settable:
+                purpose = _STRUCTURAL_USES.get(structural.purpose, f"it determines the structure ({structural.purpose})")
                 raise_model_error(
-                    f"the parameter {owner} cannot be settable: {purpose}; declare it final or constant", structural.where
+                    f"the parameter {parameter} cannot be settable: {purpose}; declare it final or constant", structural.where
                 )

@@ -1,13 +1,15 @@
-"""When-conditions: the sampled clocks, the conditions that are watched for a rising edge, and initialization.
+"""Conditions of when-clauses: clocks, edge detectors and initialization.
 
-A `when` becomes an `if` on the flags due(k), "clock k ticks in this event", and risen(k), "condition k has become true".
+A when-clause becomes an if-statement on the event flags due(k), "clock k ticks in this event", and risen(k), "the condition of
+edge detector k has become true in this event".
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..model.flat_model import (
+from ..model.flat_model import Model
+from ..model.syntax_tree import (
     Array,
     Binary,
     Body,
@@ -16,7 +18,6 @@ from ..model.flat_model import (
     Expression,
     IfStatement,
     Literal,
-    Model,
     SourceLocation,
     When,
     raise_model_error,
@@ -26,23 +27,27 @@ from ..model.traversal import PRE_OPERATORS, has_builtin
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """Ticks at start + k*period, k = 0, 1, ...; both are expressions of parameters, in seconds."""
+    """Clock of a sample(start, period), with ticks at start + k*period for k = 0, 1, ..."""
 
+    #: time of the first tick (s), an expression of parameters
     start: Expression
+    #: period (s), an expression of parameters
     period: Expression
     where: SourceLocation | None = field(default=None, compare=False)
 
 
 def edge_flag(index: int) -> Builtin:
+    """Return the event flag of an edge detector."""
     return Builtin("risen", (Literal(index, "Integer"),))
 
 
 def tick_flag(index: int) -> Builtin:
+    """Return the event flag of a clock."""
     return Builtin("due", (Literal(index, "Integer"),))
 
 
 class WhenConditions:
-    """Numbers the clocks and watched conditions of a model; equal ones share a number."""
+    """Translation of when-clauses; numbers the clocks and edge detectors of a model, equal ones once."""
 
     def __init__(self, model: Model):
         self._model = model
@@ -50,13 +55,13 @@ class WhenConditions:
         self.edge_detectors: list[EdgeDetector] = []
 
     def at_event(self, when: When) -> Body:
-        """The when-clause as seen in an event; branches that only initial() activates are left out."""
+        """Translate a when-clause for an event; branches that only initial() activates are omitted."""
         flagged = [(self._flags(condition, when.where), body) for condition, body in when.branches]
         branches = tuple((_disjunction(flags), body) for flags, body in flagged if flags)
         return (IfStatement(branches, (), when.where),) if branches else ()
 
     def at_initialization(self, when: When) -> Body:
-        """What of the when-clause is active in the initialization: the first branch with initial() in its condition."""
+        """Return the statements of a when-clause for the initialization: the first branch with initial() in its condition."""
         return next((body for condition, body in when.branches if Builtin("initial", ()) in _alternatives(condition)), ())
 
     def _flags(self, condition: Expression, where: SourceLocation | None) -> list[Builtin]:
@@ -65,32 +70,33 @@ class WhenConditions:
 
     def _flag(self, condition: Expression, where: SourceLocation | None) -> Builtin:
         if isinstance(condition, Builtin) and condition.name == "sample":
-            return tick_flag(_index_of(self.clocks, self._clock(condition, where)))
+            return tick_flag(self._clock_index(condition, where))
         if has_builtin(condition, "sample", "initial"):
-            raise_model_error("sample() must stand alone in a when-condition; put further conditions into an if inside", where)
+            raise_model_error(
+                "sample() cannot be combined with other conditions in a when-condition; use an if inside the when-clause", where
+            )
         if has_builtin(condition, *PRE_OPERATORS):
             raise_model_error(
-                "pre(), edge() and change() in a when-condition are not supported: a when-clause reacts to edges anyway", where
+                "pre(), edge() and change() in a when-condition are not supported: a when-clause is active at rising edges only",
+                where,
             )
-        return edge_flag(_index_of(self.edge_detectors, EdgeDetector(len(self.edge_detectors), condition, where)))
+        return edge_flag(self._edge_detector_index(condition, where))
 
-    def _clock(self, sample: Builtin, where: SourceLocation | None) -> Clock:
+    def _edge_detector_index(self, condition: Expression, where: SourceLocation | None) -> int:
+        conditions = [detector.condition for detector in self.edge_detectors]
+        if condition not in conditions:
+            conditions.append(condition)
+            self.edge_detectors.append(EdgeDetector(len(self.edge_detectors), condition, where))
+        return conditions.index(condition)
+
+    def _clock_index(self, sample: Builtin, where: SourceLocation | None) -> int:
         if len(sample.arguments) != 2:
-            raise_model_error("sample() needs a start and a period", where)
+            raise_model_error("sample() must have a start and a period", where)
         start, period = map(_to_real, sample.arguments)
-        return Clock(start, period, where)
-
-
-def _index_of(items: list, item: Clock | EdgeDetector) -> int:
-    """The place of an item in the list, where it is put when it is new; a Watch is compared by its condition alone."""
-    same = [
-        k
-        for k, other in enumerate(items)
-        if other == item or (isinstance(item, EdgeDetector) and other.condition == item.condition)
-    ]
-    if not same:
-        items.append(item)
-    return same[0] if same else len(items) - 1
+        clock = Clock(start, period, where)
+        if clock not in self.clocks:
+            self.clocks.append(clock)
+        return self.clocks.index(clock)
 
 
 def _alternatives(condition: Expression) -> tuple[Expression, ...]:
@@ -105,4 +111,4 @@ def _disjunction(flags: list[Builtin]) -> Expression:
 
 
 def _to_real(expression: Expression) -> Expression:
-    return Literal(float(expression.value), "Real") if isinstance(expression, Literal) else expression
+    return Literal(float(expression.number), "Real") if isinstance(expression, Literal) else expression

@@ -1,1 +1,1 @@
-"""Reading of Modelica files into a flat model."""
+"""Front end: flattening of Modelica files by rumoca and conversion to the flat model."""

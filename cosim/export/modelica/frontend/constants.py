@@ -1,4 +1,4 @@
-"""Scalar constants of the model become literals, so that they can stand where a number must be known: sizes, slices, loops."""
+"""Replacement of scalar constants by literals, so that they can determine array sizes, slices and loop ranges."""
 
 from __future__ import annotations
 
@@ -6,28 +6,29 @@ from dataclasses import replace
 from typing import Any
 
 from ..model.evaluate import Evaluator
-from ..model.flat_model import Literal, Model, Name, Variable
+from ..model.flat_model import Model, Variable
+from ..model.syntax_tree import Literal, Name
 from ..model.traversal import rewrite, variable_names
 
 
 def inline_constants(model: Model) -> Model:
-    """The same model without its scalar constants."""
+    """Return the model with its scalar constants replaced by their values."""
     constants = {v.name: v for v in model.variables.values() if v.variability == "constant" and not v.shape}
-    known: dict[str, Literal] = {}
-    while ready := [v for v in constants.values() if v.name not in known and variable_names(v.binding) <= set(known)]:
-        values = {name: literal.value for name, literal in known.items()}
-        known |= {v.name: Literal(Evaluator(model.functions, values)(v.binding or Literal(0, v.type)), v.type) for v in ready}
+    literals: dict[str, Literal] = {}
+    while ready := [v for v in constants.values() if v.name not in literals and variable_names(v.binding) <= set(literals)]:
+        evaluate = Evaluator(model.functions, {name: literal.value for name, literal in literals.items()})
+        literals |= {v.name: Literal(evaluate(v.binding or Literal(0, v.type)), v.type) for v in ready}
 
-    def literal(node: Any) -> Any:
-        return known.get(node.name, node) if isinstance(node, Name) else node
+    def replace_constant(node: Any) -> Any:
+        return literals.get(node.name, node) if isinstance(node, Name) else node
 
-    def inlined(variable: Variable) -> Variable:
+    def inline_in_variable(variable: Variable) -> Variable:
         expressions = ("start", "binding", "minimum", "maximum")
-        return replace(variable, **{key: rewrite(getattr(variable, key), literal) for key in expressions})
+        return replace(variable, **{key: rewrite(getattr(variable, key), replace_constant) for key in expressions})
 
     sections = ("equations", "whens", "algorithms", "asserts", "initial_equations", "initial_algorithms")
     return replace(
         model,
-        variables={name: inlined(variable) for name, variable in model.variables.items() if name not in known},
-        **{section: rewrite(getattr(model, section), literal) for section in sections},
+        variables={name: inline_in_variable(variable) for name, variable in model.variables.items() if name not in literals},
+        **{section: rewrite(getattr(model, section), replace_constant) for section in sections},
     )

@@ -1,4 +1,4 @@
-"""Reads the expressions of rumoca's JSON. What is not known here is refused, never dropped."""
+"""Conversion of expressions from rumoca's JSON to the flat model; unknown elements are errors, they are never ignored."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..model import flat_model
-from ..model.flat_model import Expression, SourceLocation, raise_model_error
+from ..model import syntax_tree
+from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
 from .rumoca_frontend import ModelicaSources
 
 Json = Mapping[str, Any]
@@ -28,51 +28,58 @@ _MODELICA_SPELLING = {"noevent": "noEvent", "outerproduct": "outerProduct"}
 
 
 def split_tagged(node: Json) -> tuple[str, Any]:
-    """The kind and the payload of a node `{kind: payload}`."""
+    """Return the kind and the payload of a node `{kind: payload}`."""
     ((kind, payload),) = node.items()
     return kind, payload
 
 
 def _fold_constants(node: Expression) -> Expression:
-    """An Integer in place of sums and products of Integers, such as the subscripts of an unrolled loop have."""
-    if not (isinstance(node, flat_model.Binary) and node.operator in _INTEGER_OPERATORS):
+    """Evaluate sums, differences and products of Integer literals, as they occur in the subscripts of an unrolled loop."""
+    if not (isinstance(node, syntax_tree.Binary) and node.operator in _INTEGER_OPERATORS):
         return node
     left, right = _fold_constants(node.left), _fold_constants(node.right)
-    if isinstance(left, flat_model.Literal) and isinstance(right, flat_model.Literal) and left.type == right.type == "Integer":
-        return flat_model.Literal(_INTEGER_OPERATORS[node.operator](left.value, right.value), "Integer")
+    if isinstance(left, syntax_tree.Literal) and isinstance(right, syntax_tree.Literal) and left.type == right.type == "Integer":
+        return syntax_tree.Literal(_INTEGER_OPERATORS[node.operator](left.number, right.number), "Integer")
     return node
 
 
 @dataclass(frozen=True)
 class ExpressionReader:
-    """`json` is the whole document: names and functions are looked up in it."""
+    """Reader of expressions."""
 
+    #: rumoca's document of the flat model
     json: Json
     sources: ModelicaSources
 
     def locate(self, node: Json) -> SourceLocation | None:
+        """Return the source location of a node, or None for a node that the front end has generated."""
         return self.sources.locate(node.get("span") or node.get("source_span"))
 
     def _type(self, canonical: int) -> str:
-        predefined = {number: name.capitalize() for name, number in self.json["predefined_types"].items()}
+        predefined: dict[int, str] = {number: name.capitalize() for name, number in self.json["predefined_types"].items()}
         return predefined.get(canonical, "Enumeration")
 
     def _optional(self, node: Json | None) -> Expression | None:
         return None if node is None else self.read_expression(node)
 
     def read_expression(self, node: Json) -> Expression:
+        """Convert an expression.
+
+        Raises:
+            InputError: The expression is not supported.
+        """
         kind, payload = split_tagged(node)
         readers: Mapping[str, Callable[[Json], Expression]] = {
             "Literal": self._literal,
             "VarRef": self._reference,
-            "Index": lambda n: flat_model.Index(
+            "Index": lambda n: syntax_tree.Index(
                 self.read_expression(n["base"]), self._subscripts(n["subscripts"]), self.locate(n)
             ),
             "Unary": self._unary,
             "Binary": self._binary,
             "If": self._if,
-            "Array": lambda n: flat_model.Array(tuple(map(self.read_expression, n["elements"]))),
-            "Range": lambda n: flat_model.Range(
+            "Array": lambda n: syntax_tree.Array(tuple(map(self.read_expression, n["elements"]))),
+            "Range": lambda n: syntax_tree.Range(
                 self.read_expression(n["start"]), self._optional(n["step"]), self.read_expression(n["end"])
             ),
             "BuiltinCall": self._builtin,
@@ -82,25 +89,25 @@ class ExpressionReader:
             raise_model_error(f"the expression {kind} is not supported", self.locate(payload))
         return readers[kind](payload)
 
-    def _literal(self, node: Json) -> flat_model.Literal:
+    def _literal(self, node: Json) -> syntax_tree.Literal:
         kind, value = split_tagged(node["value"])
-        return flat_model.Literal(value, kind)
+        return syntax_tree.Literal(value, kind)
 
     def _reference(self, node: Json) -> Expression:
         name, where = node["name"]["name"], self.locate(node)
         if (ordinal := self.json["enum_literal_ordinals"].get(name)) is not None:
-            return flat_model.Literal(ordinal, "Enumeration")
-        base = flat_model.Name(name, where)
-        return flat_model.Index(base, self._subscripts(node["subscripts"]), where) if node["subscripts"] else base
+            return syntax_tree.Literal(ordinal, "Enumeration")
+        base = syntax_tree.Name(name, where)
+        return syntax_tree.Index(base, self._subscripts(node["subscripts"]), where) if node["subscripts"] else base
 
-    def _subscripts(self, nodes: list[Json]) -> tuple[Expression | flat_model.Colon, ...]:
+    def _subscripts(self, nodes: list[Json]) -> tuple[Expression | syntax_tree.Colon, ...]:
         return tuple(self._subscript(*split_tagged(node)) for node in nodes)
 
-    def _subscript(self, kind: str, node: Json) -> Expression | flat_model.Colon:
+    def _subscript(self, kind: str, node: Json) -> Expression | syntax_tree.Colon:
         if kind == "Colon":
-            return flat_model.Colon()
+            return syntax_tree.Colon()
         return (
-            flat_model.Literal(node["value"], "Integer")
+            syntax_tree.Literal(node["value"], "Integer")
             if kind == "Index"
             else _fold_constants(self.read_expression(node["expr"]))
         )
@@ -111,37 +118,41 @@ class ExpressionReader:
             return operand
         if node["op"] not in ("Minus", "Not"):
             raise_model_error(f"the operator {node['op']} is not supported", self.locate(node))
-        return flat_model.Unary("-" if node["op"] == "Minus" else "not", operand)
+        return syntax_tree.Unary("-" if node["op"] == "Minus" else "not", operand)
 
-    def _binary(self, node: Json) -> flat_model.Binary:
+    def _binary(self, node: Json) -> syntax_tree.Binary:
         operator = _OPERATORS.get(node["op"]) or raise_model_error(
             f"the operator {node['op']} is not supported", self.locate(node)
         )
-        return flat_model.Binary(
+        return syntax_tree.Binary(
             operator, self.read_expression(node["lhs"]), self.read_expression(node["rhs"]), self.locate(node)
         )
 
-    def _if(self, node: Json) -> flat_model.If:
+    def _if(self, node: Json) -> syntax_tree.If:
         branches = tuple((self.read_expression(condition), self.read_expression(value)) for condition, value in node["branches"])
-        return flat_model.If(branches, self.read_expression(node["else_branch"]))
+        return syntax_tree.If(branches, self.read_expression(node["else_branch"]))
 
-    def _builtin(self, node: Json) -> flat_model.Builtin:
+    def _builtin(self, node: Json) -> syntax_tree.Builtin:
         name = node["function"].lower()
         if name in _UNSUPPORTED_BUILTINS:
             raise_model_error(_UNSUPPORTED_BUILTINS[name], self.locate(node))
-        return flat_model.Builtin(
+        return syntax_tree.Builtin(
             _MODELICA_SPELLING.get(name, name), tuple(map(self.read_expression, node["args"])), self.locate(node)
         )
 
-    def _call(self, node: Json) -> flat_model.Call:
+    def _call(self, node: Json) -> syntax_tree.Call:
         if node["is_constructor"]:
             raise_model_error("a record constructor is not supported; assign the fields", self.locate(node))
         return self._function_call(node["name"], node["args"], self.locate(node))
 
-    def _function_call(self, reference: Json, arguments: list[Json], where: SourceLocation | None) -> flat_model.Call:
-        """A call; rumoca knows functions by name and would silently take another package's function of the same short name."""
+    def _function_call(self, reference: Json, arguments: list[Json], where: SourceLocation | None) -> syntax_tree.Call:
+        """Convert a function call.
+
+        rumoca identifies functions by their short names and would silently use a function of another package with the same
+        name. Such calls are rejected.
+        """
         name = reference["name"]
         function = self.json["functions"].get(name) or raise_model_error(f"unknown function {name}", where)
         if reference["component_ref"]["parts"][-1]["def_id"] != function["def_id"]:
             raise_model_error(f'the model uses several functions named "{name}"; give them different names', where)
-        return flat_model.Call(name, tuple(map(self.read_expression, arguments)), where)
+        return syntax_tree.Call(name, tuple(map(self.read_expression, arguments)), where)

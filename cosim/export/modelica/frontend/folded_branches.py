@@ -1,8 +1,8 @@
-"""Finds if-equations that the front end has decided on its own, with the default value of a parameter.
+"""Detection of if-equations that the front end has replaced by one of their branches (constant folding).
 
-Inside a when-clause rumoca silently replaces `if p then ... else ... end if` by one of its branches when it can compute the
-condition from defaults; a parameter set later would have no effect. The flat model keeps no trace of it, but the sources do:
-an equation that stands in fewer `if` in the flat model than in the file has lost one.
+Inside a when-clause rumoca silently replaces `if p then ... else ... end if` by one branch if the condition can be evaluated
+with default values. A parameter that is set later would have no effect. The flat model does not record this. Therefore the
+nesting depths are compared: an equation inside fewer `if` in the flat model than in the source file has lost one.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..model.flat_model import SourceLocation, raise_model_error
+from ..model.syntax_tree import SourceLocation, raise_model_error
 from .rumoca_frontend import ModelicaSources
 
 _TOKEN = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])*\'|[A-Za-z_]\w*|\d[\w.]*|\S', re.DOTALL)
@@ -23,25 +23,36 @@ _BODY_TERMINATORS = {"end", "else", "elseif", "elsewhen"} | _SECTIONS
 
 @dataclass(frozen=True)
 class _IfEquation:
-    """An if-equation inside a when-clause: byte range of it and of the when, and the identifiers in its conditions."""
+    """An if-equation inside a when-clause, from the source file."""
 
+    #: byte range
     start: int
     end: int
+    #: byte range of the when-clause
     when: tuple[int, int]
+    #: all identifiers in the conditions
     identifiers: frozenset[str]
 
 
 def check_folded_branches(json: Mapping[str, Any], sources: ModelicaSources) -> None:
-    """Raises InputError at the first if-equation on a settable parameter that is missing from the flat model."""
+    """Check that the flat model contains all if-equations whose conditions depend on a settable parameter.
+
+    Args:
+        json: rumoca's document of the flat model.
+        sources: The Modelica files.
+
+    Raises:
+        InputError: An if-equation has been replaced by one of its branches.
+    """
     settable = {name.rpartition(".")[2] for name in json["variables"] if _is_settable(json, name)}
-    for file, found in _equations_by_file(json, sources).items():
+    for file, flat_equations in _equations_by_file(json, sources).items():
         text = file.read_bytes()
         for statement, depth in _Scanner(text.decode("latin-1")).if_equations():
             names = ", ".join(sorted(statement.identifiers & settable))
-            if names and _is_folded(statement, depth, found):
+            if names and _is_folded(statement, depth, flat_equations):
                 where = SourceLocation(file, text.count(b"\n", 0, statement.start) + 1)
-                remedy = "write an if-expression or an algorithm"
-                raise_model_error(f"the front end would decide this if-equation by the default of {names}; {remedy}", where)
+                message = f"the front end evaluates the condition of this if-equation with the default value of {names}"
+                raise_model_error(f"{message}; use an if-expression or an algorithm", where)
 
 
 def _is_settable(json: Mapping[str, Any], name: str) -> bool:
@@ -49,21 +60,21 @@ def _is_settable(json: Mapping[str, Any], name: str) -> bool:
     return isinstance(variability, dict) and "Parameter" in variability and not json["variable_final_flags"].get(name)
 
 
-def _is_folded(statement: _IfEquation, depth: int, found: list[tuple[int, int]]) -> bool:
-    """Whether equations of the statement have lost an `if` around them, or all are gone though their when-clause is there."""
-    inside = [level for start, level in found if statement.start <= start < statement.end]
-    used = any(statement.when[0] <= start < statement.when[1] for start, _ in found)
-    return used and (not inside or min(inside) < depth)
+def _is_folded(statement: _IfEquation, depth: int, flat_equations: list[tuple[int, int]]) -> bool:
+    """Return whether an equation of the statement has lost an `if`, or all are missing from an existing when-clause."""
+    depths = [flat_depth for start, flat_depth in flat_equations if statement.start <= start < statement.end]
+    when_exists = any(statement.when[0] <= start < statement.when[1] for start, _ in flat_equations)
+    return when_exists and (not depths or min(depths) < depth)
 
 
 def _equations_by_file(json: Mapping[str, Any], sources: ModelicaSources) -> dict[Path, list[tuple[int, int]]]:
-    """Byte offset and depth of `if` of every equation in the when-clauses of the flat model."""
+    """Return (byte offset, nesting depth in `if`) of all equations in when-clauses of the flat model, by source file."""
     result: dict[Path, list[tuple[int, int]]] = {}
     for chain in json["when_chains"]:
         for block in (chain["first"], *chain["else_when"]):
             for span, depth in _equation_spans(block["equations"], 0):
-                if place := sources.locate(span):
-                    result.setdefault(place.path, []).append((span["start"], depth))
+                if location := sources.locate(span):
+                    result.setdefault(location.path, []).append((span["start"], depth))
     return result
 
 
@@ -81,7 +92,7 @@ def _equation_spans(nodes: list[Mapping[str, Any]], depth: int) -> Iterator[tupl
 
 
 class _Scanner:
-    """Finds the if-equations in a file without understanding the rest of the language."""
+    """Scanner for the if-equations of a Modelica file; it tokenizes the file and skips all other parts of the language."""
 
     def __init__(self, text: str):
         matches = [m for m in _TOKEN.finditer(text) if not m[0].startswith(("//", "/*"))]
@@ -91,7 +102,7 @@ class _Scanner:
         self._found: list[tuple[_IfEquation, int]] = []
 
     def if_equations(self) -> list[tuple[_IfEquation, int]]:
-        """All if-equations in when-clauses, each with its depth: 1 for those directly in the when-clause."""
+        """Return all if-equations in when-clauses with their nesting depth, which is 1 directly inside the when-clause."""
         while self._next < len(self._tokens) - 1:
             self._next += 1
             if self._tokens[self._next - 1] == "equation":
@@ -99,7 +110,7 @@ class _Scanner:
         return self._found
 
     def _body(self, depth: int, when: int | None) -> None:
-        """Equations up to the word that ends them; `when` is the place of the when-clause around them in the result."""
+        """Scan equations up to the keyword that ends them; `when` is the token index of the enclosing when-clause."""
         while (word := self._tokens[self._next]) not in _BODY_TERMINATORS:
             if word == "if":
                 self._if(depth, when)
@@ -136,7 +147,7 @@ class _Scanner:
             self._found.append((_IfEquation(*span, span, frozenset(identifiers)), depth + 1))
 
     def _condition(self) -> None:
-        """Past the `then` of a condition; those of if-expressions inside do not count."""
+        """Advance past the `then` that ends a condition; a `then` of an if-expression inside it does not end it."""
         open_ifs = 0
         while True:
             self._next += 1
@@ -149,11 +160,11 @@ class _Scanner:
                     return
 
     def _skip(self, word: str) -> None:
-        """Past the next such word; semicolons in a matrix do not count."""
+        """Advance past the next occurrence of a symbol outside brackets (a matrix may contain semicolons)."""
         brackets = 0
         while self._next < len(self._tokens) - 1:
             self._next += 1
-            found = self._tokens[self._next - 1]
-            brackets += (found == "[") - (found == "]")
-            if found == word and brackets == 0:
+            symbol = self._tokens[self._next - 1]
+            brackets += (symbol == "[") - (symbol == "]")
+            if symbol == word and brackets == 0:
                 return

@@ -1,7 +1,7 @@
-"""Export by OpenModelica, for models beyond our own emitter: the standard library, implicit equations, state events.
+"""Export by OpenModelica, for features that the built-in compiler lacks: standard library, implicit equations, state events.
 
-Written from OpenModelica's documentation and not tried with OpenModelica itself: the tests know the command, not its result.
-The FMU contains OpenModelica's solver (Euler by default): compare its results with a reference before use.
+This module follows OpenModelica's documentation. It has not been tested with OpenModelica itself: the tests check the command
+and not its result. The FMU contains OpenModelica's solver (Euler by default): compare its results with a reference before use.
 """
 
 from __future__ import annotations
@@ -21,10 +21,15 @@ _TIMEOUT = 1800.0
 
 
 def export_with_omc(path: Path, target: Path, model: str | None = None) -> None:
-    """Write the Modelica model `model` (default: named as the file) as an FMI 2.0 Co-Simulation FMU to `target`.
+    """Export a Modelica model as an FMI 2.0 Co-Simulation FMU with the OpenModelica compiler `omc`, found on PATH.
 
-    Needs the OpenModelica compiler `omc` on PATH, and runs it in a temporary folder. The file may use the packages in folders
-    beside it and the libraries that OpenModelica knows. Raises InputError without omc, and for everything that omc refuses.
+    Args:
+        path: The Modelica file. It may use the packages in folders beside it and OpenModelica's libraries.
+        target: The FMU to write.
+        model: Name of the model. None selects the model with the name of the file.
+
+    Raises:
+        InputError: The compiler is not installed, or it reports errors.
     """
     compiler = shutil.which("omc")
     if compiler is None:
@@ -36,29 +41,29 @@ def export_with_omc(path: Path, target: Path, model: str | None = None) -> None:
         script = Path(folder) / "export.mos"
         script.write_text(_script(path, model), encoding="utf-8")
         log = _run_omc(compiler, script)
-        made = next(Path(folder).glob("*.fmu"), None)
-        if made is None:
+        fmu = next(Path(folder).glob("*.fmu"), None)
+        if fmu is None:
             raise InputError(_parse_errors(log, path))
         target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.move(made, target)
+        shutil.move(fmu, target)
 
 
 def _script(path: Path, model: str | None) -> str:
-    """What omc is to do: load the file, and what it may use, and build the FMU."""
+    """Return the script for omc: load the packages and the file, and build the FMU."""
     text = path.read_text(encoding="utf-8")
     packages = find_packages(path, text)
-    own = [] if any(map(path.is_relative_to, packages)) else [path]  # a package loads its members
-    files = [*(package / "package.mo" for package in packages), *own]
+    model_files = [] if any(map(path.is_relative_to, packages)) else [path]  # a package loads its members
+    files = [*(package / "package.mo" for package in packages), *model_files]
     loads = [f"loadFile({json.dumps(str(file), ensure_ascii=False)});" for file in files]
     build = f'buildModelFMU({model_name(path, text, model)}, version="2.0", fmuType="cs", platforms={{"static"}});'
     return "\n".join([*loads, build, "print(getErrorString());"]) + "\n"
 
 
 def _run_omc(compiler: str, script: Path) -> str:
-    """All that omc prints."""
+    """Run omc and return its output."""
     command = [compiler, script.name]
     try:
-        done = subprocess.run(  # noqa: S603
+        process = subprocess.run(  # noqa: S603
             command,
             cwd=script.parent,
             stdout=subprocess.PIPE,
@@ -68,11 +73,11 @@ def _run_omc(compiler: str, script: Path) -> str:
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise InputError(f"OpenModelica was not ready after {_TIMEOUT:.0f} s") from None
-    return done.stdout
+        raise InputError(f"OpenModelica did not finish within {_TIMEOUT:.0f} s") from None
+    return process.stdout
 
 
 def _parse_errors(log: str, path: Path) -> list[Problem]:
-    """The errors in what omc printed, else all of it."""
-    found = [Problem(e["what"], f"{e['file']}:{e['line']}" if e["file"] else str(path)) for e in _ERROR.finditer(log)]
-    return found or [Problem(f"OpenModelica has made no FMU: {log.strip() or 'it printed nothing'}", str(path))]
+    """Return the errors in the output of omc, or the whole output if it contains none."""
+    problems = [Problem(e["what"], f"{e['file']}:{e['line']}" if e["file"] else str(path)) for e in _ERROR.finditer(log)]
+    return problems or [Problem(f"OpenModelica has created no FMU: {log.strip() or 'it printed nothing'}", str(path))]

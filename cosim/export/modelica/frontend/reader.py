@@ -1,21 +1,29 @@
-"""Reads rumoca's JSON of a flat model into `flat.Model`. What is not known here is refused, never dropped."""
+"""Conversion of rumoca's JSON to the flat model; unknown elements are errors, they are never ignored."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any
 
-from ..model import flat_model
-from ..model.flat_model import Body, Expression, SourceLocation, Statement, raise_model_error
+from ..model import flat_model, syntax_tree
+from ..model.syntax_tree import Body, Expression, SourceLocation, Statement, raise_model_error
 from .expression_reader import Json, split_tagged
 from .statement_reader import StatementReader
 from .unrolling import unroll_equations
 
 
 class ModelReader(StatementReader):
-    """Reads one flat model; `json` is the whole document."""
+    """Reader of a flat model."""
 
     def read_model(self, name: str) -> flat_model.Model:
+        """Convert the whole document.
+
+        Args:
+            name: The name of the model.
+
+        Raises:
+            InputError: The model contains an element that is not supported.
+        """
         self._check_document()
         names = self.json["variables"]
         return flat_model.Model(
@@ -51,12 +59,13 @@ class ModelReader(StatementReader):
             raise_model_error("a for-equation among the initial equations was not unrolled by the front end", None)
 
     def _resolve_name(self, candidates: list[str]) -> str:
-        """Of the names by which a parameter may be meant, from the inside out, the one that exists."""
+        """Return the first of the candidate names (innermost scope first) that is a variable."""
         return next((name for name in candidates if name in self.json["variables"]), candidates[0])
 
     # variables
 
     def read_variable(self, name: str) -> flat_model.Variable:
+        """Convert the declaration of a variable."""
         node = self.json["variables"][name]
         type_name = self.json["variable_type_names"][name]
         kind = self._type(self.json["effective_types"][str(node["type_id"])]["canonical_type"])
@@ -93,7 +102,7 @@ class ModelReader(StatementReader):
         return "local" if word == "empty" else word
 
     def _is_top_level(self, name: str) -> bool:
-        """Whether a name is the model's own, if need be as a field of its own records or connectors."""
+        """Return whether a variable belongs to the model itself, also as a field of its records or connectors."""
         parts = name.split(".")
         owners = (".".join(parts[:depth]) for depth in range(1, len(parts)))
         return parts[0] in self.json["top_level_connectors"] or all(owner in self.json["record_instances"] for owner in owners)
@@ -104,94 +113,95 @@ class ModelReader(StatementReader):
         literal = self.read_expression(node)
         return (
             str(literal.value)
-            if isinstance(literal, flat_model.Literal)
-            else raise_model_error("a text literal is expected", self.locate(node))
+            if isinstance(literal, syntax_tree.Literal)
+            else raise_model_error("a String literal is expected", self.locate(node))
         )
 
     def _enumerations(self) -> dict[str, tuple[str, ...]]:
         types: dict[str, dict[int, str]] = {}
         for key, ordinal in self.json["enum_literal_ordinals"].items():
-            owner, _, literal = key.rpartition(".")
+            type_name, _, literal = key.rpartition(".")
             if not literal.startswith("'"):
-                types.setdefault(owner, {})[ordinal] = literal
-        return {owner: tuple(literals[k] for k in sorted(literals)) for owner, literals in types.items()}
+                types.setdefault(type_name, {})[ordinal] = literal
+        return {type_name: tuple(literals[k] for k in sorted(literals)) for type_name, literals in types.items()}
 
     # equations
 
     def read_equations(self, section: str) -> tuple[flat_model.Equation, ...]:
+        """Convert the equations of a section of the document."""
         return tuple(pair for node in self.json[section] for pair in self._equation(node))
 
     def _unrolled_equations(self) -> Iterator[flat_model.Equation]:
-        """The equations with the for-equations that the front end has left rolled up."""
-        true = dict(unroll_equations(self.json, "structured_equations"))
-        for place, node in enumerate(self.json["equations"]):
-            written = self._equation({**node, "residual": true.get(place, node["residual"])})
-            if [e.left for e in written] != [e.left for e in self._equation(node)]:
+        """Yield all equations, with the placeholders of for-equations replaced (see `unrolling`)."""
+        replacements = dict(unroll_equations(self.json, "structured_equations"))
+        for index, node in enumerate(self.json["equations"]):
+            equations = self._equation({**node, "residual": replacements.get(index, node["residual"])})
+            if [e.left for e in equations] != [e.left for e in self._equation(node)]:
                 raise_model_error(
                     "this for-equation was not unrolled by the front end; write its equations one by one", self.locate(node)
                 )
-            yield from written
+            yield from equations
 
     def _equation(self, node: Json) -> list[flat_model.Equation]:
         kind, residual = split_tagged(node["residual"])
         if kind != "Binary" or residual["op"] != "Sub":
-            raise_model_error("an equation that is not of the form a = b", self.locate(node))
+            raise_model_error("this equation does not have the form a = b", self.locate(node))
         left, right, where = self.read_expression(residual["lhs"]), self.read_expression(residual["rhs"]), self.locate(node)
         return [flat_model.Equation(a, b, where) for a, b in self._split_records(left, right)]
 
     def _split_records(self, left: Expression, right: Expression) -> list[tuple[Expression, Expression]]:
-        """The pairs of fields when two records are equated, else the pair itself."""
+        """Return the pairs of fields of an equation between two records, or the pair itself for all other equations."""
         records = self.json["record_instances"]
-        if not (isinstance(left, flat_model.Name) and left.name in records):
+        if not (isinstance(left, syntax_tree.Name) and left.name in records):
             return [(left, right)]
-        if not (isinstance(right, flat_model.Name) and right.name in records):
+        if not (isinstance(right, syntax_tree.Name) and right.name in records):
             raise_model_error(
                 "a record can only be equated with a record variable; write one equation for each field", left.where
             )
         names = [name for name in self.json["variables"] if name.startswith(left.name + ".")]
         return [
-            (flat_model.Name(n, left.where), flat_model.Name(right.name + n.removeprefix(left.name), right.where)) for n in names
+            (syntax_tree.Name(n, left.where), syntax_tree.Name(right.name + n.removeprefix(left.name), right.where))
+            for n in names
         ]
 
     def _declaration_equations(self) -> list[flat_model.Equation]:
-        """`Real y = 2*u;` of a variable that is no parameter."""
+        """Return the declaration equations (`Real y = 2*u;`) of all variables that are neither parameters nor constants."""
         variables = [self.read_variable(name) for name in self.json["variables"]]
         return [
-            flat_model.Equation(flat_model.Name(v.name, v.where), v.binding, v.where)
+            flat_model.Equation(syntax_tree.Name(v.name, v.where), v.binding, v.where)
             for v in variables
             if v.binding is not None and v.variability not in ("constant", "parameter")
         ]
 
-    def read_when_chain(self, chain: Json) -> flat_model.When:
+    def read_when_chain(self, chain: Json) -> syntax_tree.When:
+        """Convert a when-clause of an equation section, with its `elsewhen` branches."""
         blocks = [chain["first"], *chain["else_when"]]
         branches = tuple((self.read_expression(block["condition"]), self._when_body(block["equations"])) for block in blocks)
-        return flat_model.When(branches, self.locate(chain))
+        return syntax_tree.When(branches, self.locate(chain))
 
     def _when_body(self, nodes: list[Json]) -> Body:
         return tuple(self._when_equation(*split_tagged(node)) for node in nodes)
 
     def _when_equation(self, kind: str, node: Json) -> Statement:
-        if kind == "Assign":
-            where = self.locate(node)
-            return flat_model.Assign(self._parse_target(node["target"], where), self.read_expression(node["value"]), where)
-        if kind == "Reinit":
-            where = self.locate(node)
-            return flat_model.Assign(self._parse_target(node["state"], where), self.read_expression(node["value"]), where)
         if kind == "Conditional":
             branches = tuple((self.read_expression(condition), self._when_body(body)) for condition, body in node["branches"])
-            return flat_model.IfStatement(branches, self._when_body(node["else_branch"] or []), self.locate(node))
+            return syntax_tree.IfStatement(branches, self._when_body(node["else_branch"] or []), self.locate(node))
         if kind == "Assert":
             return self._assert(node)
-        raise_model_error(f"{kind} in a when-equation is not supported", self.locate(node))
+        where = self.locate(node)
+        if kind not in ("Assign", "Reinit"):
+            raise_model_error(f"{kind} in a when-equation is not supported", where)
+        target = self._parse_target(node["target" if kind == "Assign" else "state"], where)
+        return syntax_tree.Assign(target, self.read_expression(node["value"]), where)
 
-    def _parse_target(self, target: str, where: SourceLocation | None) -> flat_model.Name | flat_model.Index:
-        """A target of a when-equation comes as text: a name, perhaps with constant subscripts."""
+    def _parse_target(self, target: str, where: SourceLocation | None) -> syntax_tree.Name | syntax_tree.Index:
+        """Parse the target of a when-equation, given as text: a name, perhaps with constant subscripts."""
         if target in self.json["variables"]:
-            return flat_model.Name(target, where)
+            return syntax_tree.Name(target, where)
         base, bracket, subscripts = target.rpartition("[")
         if not bracket or base not in self.json["variables"]:
             raise_model_error(f'cannot assign "{target}" in a when-equation; write one equation for each variable', where)
         numbers = subscripts.rstrip("]").split(",")
-        return flat_model.Index(
-            flat_model.Name(base, where), tuple(flat_model.Literal(int(k), "Integer") for k in numbers), where
+        return syntax_tree.Index(
+            syntax_tree.Name(base, where), tuple(syntax_tree.Literal(int(k), "Integer") for k in numbers), where
         )

@@ -1,7 +1,7 @@
-"""Runs the front end rumoca: Modelica files in, one flat model (JSON) out.
+"""Invocation of the front end rumoca, which flattens a model and returns it as JSON.
 
-Names resolve deterministically: the file itself, plus every package folder (a folder with `package.mo`) beside it. Other files
-beside it are never read. A file that belongs to a package (`within P;`) is loaded as that member of its package.
+Names are looked up in the file itself and in every package folder (a folder with `package.mo`) beside it. Other files beside it
+are never read. A file that belongs to a package (`within P;`) is loaded as a member of this package.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ....core.errors import InputError, Problem
-from ..model.flat_model import SourceLocation
+from ..model.syntax_tree import SourceLocation
 
 RUMOCA_VERSION = "0.10.2"
 _WITHIN = re.compile(r"^\s*within\s+([\w.]+)\s*;", re.MULTILINE)
@@ -28,23 +28,25 @@ _SYNTAX_ERROR = re.compile(r"×\s*(?P<what>.+?)\n.*?\[[^\]]*:(?P<line>\d+):\d+\]
 
 @dataclass(frozen=True)
 class ModelicaSources:
-    """The Modelica files that were given to the front end, and how its spans (file hash, byte offset) map to lines."""
+    """The Modelica files that the front end has read, and the conversion of its spans (file hash, byte offset) to lines."""
 
+    #: the file of the model first
     files: Sequence[Path]
+    #: rumoca's hash of the file name -> file
     _by_hash: Mapping[int, Path]
 
     @classmethod
     def from_files(cls, files: Sequence[Path]) -> ModelicaSources:
-        """The model's own file comes first."""
-        own = {_fnv1a(_display_name(file)): file for file in files[:1]}
-        return cls(files, own | {_fnv1a(str(file)): file for file in files})
+        """Create the sources from files, with the file of the model first."""
+        model_file = {_fnv1a(_display_name(file)): file for file in files[:1]}
+        return cls(files, model_file | {_fnv1a(str(file)): file for file in files})
 
     def find(self, name: str) -> Path | None:
-        """The file of this name, as the front end writes it."""
+        """Return the file with the name that the front end uses in messages, or None."""
         return self._by_hash.get(_fnv1a(name))
 
     def locate(self, span: Mapping[str, int] | None) -> SourceLocation | None:
-        """The line at which a span starts; None for what the front end made itself."""
+        """Return the line at which a span starts, or None for a span that is not in these files."""
         path = self._by_hash.get(span["source"]) if span else None
         if span is None or path is None:
             return None
@@ -52,9 +54,17 @@ class ModelicaSources:
 
 
 def flatten_model(path: Path, model: str | None) -> tuple[dict[str, Any], ModelicaSources]:
-    """The flat model `model` (default: the file's stem) of the file as rumoca's JSON, and its sources.
+    """Flatten a Modelica model with rumoca.
 
-    Raises InputError for syntax errors, unknown names and everything else that the front end refuses.
+    Args:
+        path: The Modelica file.
+        model: Name of the model. None selects the model with the name of the file.
+
+    Returns:
+        The flat model as rumoca's JSON, and its sources.
+
+    Raises:
+        InputError: The front end reports errors, for example syntax errors and unknown names.
     """
     path = path.resolve()
     rumoca = _import_rumoca()
@@ -73,12 +83,12 @@ def flatten_model(path: Path, model: str | None) -> tuple[dict[str, Any], Modeli
         return json.loads(compiled.to_json("flat")), sources
     except (KeyboardInterrupt, SystemExit):
         raise
-    except BaseException as error:  # rumoca's panics are not Exceptions
+    except BaseException as error:  # a panic of rumoca is not derived from Exception
         raise InputError(_to_problems(error, name, path, sources)) from error
 
 
 def _load_text(session: Any, path: Path, text: str, name: str) -> Any:
-    """Loads the text under a name that lies in no folder: rumoca reads all siblings of an existing file."""
+    """Load the text under a name without a folder, because rumoca reads all files beside an existing file."""
     return session.loads(text, model=name, filename=_display_name(path))
 
 
@@ -91,21 +101,25 @@ def _import_rumoca() -> Any:
         import rumoca
     except ImportError as error:
         raise InputError('Modelica needs the compiler front end rumoca: pip install "fmi-cosim[build]"') from error
-    if (found := rumoca.version()) != RUMOCA_VERSION:
-        raise InputError(
-            f"rumoca {found} is installed, but only {RUMOCA_VERSION} is known to work: pip install rumoca=={RUMOCA_VERSION}"
-        )
+    if (version := rumoca.version()) != RUMOCA_VERSION:
+        raise InputError(f"found rumoca {version}, but only {RUMOCA_VERSION} is supported: pip install rumoca=={RUMOCA_VERSION}")
     return rumoca
 
 
 def model_name(path: Path, text: str, model: str | None) -> str:
-    """The full name of a model of a file, by default of the one that is named as the file."""
+    """Return the full name of a model; the default is the model with the name of the file.
+
+    Args:
+        path: The Modelica file.
+        text: Its contents.
+        model: The name of the model, or None.
+    """
     within = _WITHIN.search(text)
     return model or (f"{within[1]}.{path.stem}" if within else path.stem)
 
 
 def find_packages(path: Path, text: str) -> list[Path]:
-    """The package folders whose names the file may use."""
+    """Return the folders of the packages that a file may use, for the file and its contents `text`."""
     folder = path.parent
     if _WITHIN.search(text):
         while (folder / "package.mo").is_file():
@@ -114,20 +128,20 @@ def find_packages(path: Path, text: str) -> list[Path]:
 
 
 def _check_syntax(rumoca: Any, files: Sequence[Path]) -> None:
-    """Syntax errors with file and line; when loading, the front end reports only their consequences."""
+    """Raise all syntax errors with file and line; loading a model only reports errors that follow from them."""
     problems = []
     for file in files:
-        for found in rumoca.validate_source(file.read_text(encoding="utf-8"), filename=str(file)):
-            if found.rule == "syntax-error":
-                detail = _SYNTAX_ERROR.search(found.message)
-                line = int(detail["line"]) if detail else found.line
-                problems.append(Problem(detail["what"] if detail else found.message, f"{file}:{line}"))
+        for diagnostic in rumoca.validate_source(file.read_text(encoding="utf-8"), filename=str(file)):
+            if diagnostic.rule == "syntax-error":
+                detail = _SYNTAX_ERROR.search(diagnostic.message)
+                line = int(detail["line"]) if detail else diagnostic.line
+                problems.append(Problem(detail["what"] if detail else diagnostic.message, f"{file}:{line}"))
     if problems:
         raise InputError(problems)
 
 
 def _to_problems(error: BaseException, name: str, path: Path, sources: ModelicaSources) -> list[Problem]:
-    """One problem per line of the front end's message that says something."""
+    """Convert the front end's message to problems, one for each informative line."""
     if panic := _PANIC.search(str(error)):
         return [Problem(panic["what"], str(sources.locate({key: int(panic[key]) for key in ("source", "start")}) or path))]
     lines = [line.rpartition("[Resolve]:")[2].strip(" -") for line in str(error).splitlines()]
@@ -139,7 +153,7 @@ def _to_problems(error: BaseException, name: str, path: Path, sources: ModelicaS
 
 
 def _locate_problem(reason: str, path: Path, sources: ModelicaSources) -> Problem:
-    """A reason with the place that it ends with or, since most have none, with the line that holds the name it quotes."""
+    """Add a location to a reason: the one at its end or, if it has none, the first line with the name that it quotes."""
     if ending := _LOCATION_SUFFIX.search(reason):
         where = SourceLocation(sources.find(ending["file"]) or path, int(ending["line"]))
         return Problem(reason[: ending.start()].rstrip(), str(where))
@@ -147,7 +161,7 @@ def _locate_problem(reason: str, path: Path, sources: ModelicaSources) -> Proble
 
 
 def _find_quoted_name(reason: str, sources: ModelicaSources) -> SourceLocation | None:
-    """The first line that holds the name which the message quotes: rumoca's own messages carry no place."""
+    """Return the first source line with the name that a message quotes."""
     quoted = _QUOTED.search(reason)
     if quoted is None:
         return None
@@ -160,7 +174,7 @@ def _find_quoted_name(reason: str, sources: ModelicaSources) -> SourceLocation |
 
 
 def _fnv1a(text: str) -> int:
-    """The 64-bit FNV-1a hash, by which rumoca names source files."""
+    """Return the 64-bit FNV-1a hash, by which rumoca identifies source files."""
     value = 0xCBF29CE484222325
     for byte in text.encode():
         value = (value ^ byte) * 0x100000001B3 & 0xFFFFFFFFFFFFFFFF

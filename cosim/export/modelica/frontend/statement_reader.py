@@ -1,29 +1,30 @@
-"""Reads the statements and functions of rumoca's JSON."""
+"""Conversion of statements and functions from rumoca's JSON to the flat model."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import cast
 
-from ..model import flat_model
-from ..model.flat_model import Body, Expression, SourceLocation, Statement, raise_model_error
+from ..model import flat_model, syntax_tree
+from ..model.syntax_tree import Body, Expression, SourceLocation, Statement, raise_model_error
 from .expression_reader import ExpressionReader, Json, split_tagged
 
 
 class StatementReader(ExpressionReader):
-    """Adds statements and functions."""
+    """Reader of statements and functions."""
 
     def read_body(self, nodes: list[Json]) -> Body:
+        """Convert a list of statements."""
         return tuple(self._statement(*split_tagged(node)) for node in nodes)
 
     def _statement(self, kind: str, node: Json) -> Statement:
         readers: Mapping[str, Callable[[Json], Statement]] = {
-            "Assignment": lambda n: flat_model.Assign(self._target(n["comp"]), self.read_expression(n["value"]), self.locate(n)),
+            "Assignment": lambda n: syntax_tree.Assign(self._target(n["comp"]), self.read_expression(n["value"]), self.locate(n)),
             "FunctionCall": self._multi_assign,
             "If": self._if_statement,
             "For": self._for,
             "Assert": self._assert,
-            "When": lambda n: flat_model.When(
+            "When": lambda n: syntax_tree.When(
                 tuple((self.read_expression(block["cond"]), self.read_body(block["stmts"])) for block in n["blocks"]),
                 self.locate(n),
             ),
@@ -32,63 +33,68 @@ class StatementReader(ExpressionReader):
             raise_model_error(f"the statement {kind} is not supported", self.locate(node))
         return readers[kind](node)
 
-    def _target(self, component: Json) -> flat_model.Name | flat_model.Index:
+    def _target(self, component: Json) -> syntax_tree.Name | syntax_tree.Index:
         where, parts = self.locate(component), component["parts"]
         owners = "".join(part["ident"] + self._constant_subscripts(part["subs"], where) + "." for part in parts[:-1])
-        name = flat_model.Name(owners + parts[-1]["ident"], where)
+        name = syntax_tree.Name(owners + parts[-1]["ident"], where)
         subscripts = self._subscripts(parts[-1]["subs"])
-        return flat_model.Index(name, subscripts, where) if subscripts else name
+        return syntax_tree.Index(name, subscripts, where) if subscripts else name
 
     def _constant_subscripts(self, nodes: list[Json], where: SourceLocation | None) -> str:
-        """Subscripts of a component array are part of the flat name: "b[1]"."""
+        """Return the constant subscripts of a component array as text; they are part of the flat name: "b[1]"."""
         numbers = [payload["value"] for kind, payload in map(split_tagged, nodes) if kind == "Index"]
         if len(numbers) != len(nodes):
             raise_model_error("a component of an array can only be assigned with a constant subscript", where)
         return f"[{','.join(map(str, numbers))}]" if numbers else ""
 
-    def _multi_assign(self, node: Json) -> flat_model.MultiAssign:
+    def _multi_assign(self, node: Json) -> syntax_tree.MultiAssign:
         where = self.locate(node)
-        return flat_model.MultiAssign(
+        return syntax_tree.MultiAssign(
             tuple(map(self._target, node["outputs"])), self._function_call(node["comp"], node["args"], where), where
         )
 
-    def _if_statement(self, node: Json) -> flat_model.IfStatement:
+    def _if_statement(self, node: Json) -> syntax_tree.IfStatement:
         branches = tuple((self.read_expression(block["cond"]), self.read_body(block["stmts"])) for block in node["cond_blocks"])
-        return flat_model.IfStatement(branches, self.read_body(node["else_block"] or []), self.locate(node))
+        return syntax_tree.IfStatement(branches, self.read_body(node["else_block"] or []), self.locate(node))
 
-    def _for(self, node: Json) -> flat_model.For:
+    def _for(self, node: Json) -> syntax_tree.For:
         body = self.read_body(node["equations"])
         where = self.locate(node)
         for index in reversed(node["indices"]):
             steps = self.read_expression(index["range"])
-            if not isinstance(steps, flat_model.Range):
+            if not isinstance(steps, syntax_tree.Range):
                 raise_model_error("a for-loop needs a range such as 1:n", where)
-            body = (flat_model.For(index["ident"], steps, body, where),)
-        return cast(flat_model.For, body[0])
+            body = (syntax_tree.For(index["ident"], steps, body, where),)
+        return cast(syntax_tree.For, body[0])
 
-    def _assert(self, node: Json) -> flat_model.Assert:
+    def _assert(self, node: Json) -> syntax_tree.Assert:
         message, where = self.read_expression(node["message"]), self.locate(split_tagged(node["condition"])[1])
-        if node["level"] is not None and self.read_expression(node["level"]) != flat_model.Literal(2, "Integer"):
-            raise_model_error("assert() with a level below error is not supported", where)
-        return flat_model.Assert(self.read_expression(node["condition"]), self._message_text(message, where), where)
+        if node["level"] is not None and self.read_expression(node["level"]) != syntax_tree.Literal(2, "Integer"):
+            raise_model_error("assert() with a level other than AssertionLevel.error is not supported", where)
+        return syntax_tree.Assert(self.read_expression(node["condition"]), self._message_text(message, where), where)
 
     def _message_text(self, message: Expression, where: SourceLocation | None) -> str:
-        if isinstance(message, flat_model.Literal) and message.type == "String":
-            return str(message.value)
-        if isinstance(message, flat_model.Binary) and message.operator == "+":
+        if isinstance(message, syntax_tree.Binary) and message.operator == "+":
             return self._message_text(message.left, where) + self._message_text(message.right, where)
-        raise_model_error("the message of an assert() must be a literal text", where)
+        if not (isinstance(message, syntax_tree.Literal) and message.type == "String"):
+            raise_model_error("the message of an assert() must be a String literal", where)
+        return str(message.value)
 
     def read_function(self, node: Json) -> flat_model.Function:
+        """Convert a function.
+
+        Raises:
+            InputError: The function is external or contains an unsupported element.
+        """
         if node["external"]:
             raise_model_error(f"the external function {node['name']} is not supported", self.locate(node))
-        inputs, outputs, inner = (tuple(map(self._local, node[kind])) for kind in ("inputs", "outputs", "locals"))
-        return flat_model.Function(node["name"], inputs, outputs, inner, self.read_body(node["body"]), self.locate(node))
+        inputs, outputs, local = (tuple(map(self._local, node[kind])) for kind in ("inputs", "outputs", "locals"))
+        return flat_model.Function(node["name"], inputs, outputs, local, self.read_body(node["body"]), self.locate(node))
 
     def _local(self, node: Json) -> flat_model.FunctionVariable:
         where = self.locate(node)
         if node["type_class"] == "Record":
             raise_model_error(f"the record {node['name']} inside a function is not supported; pass its fields", where)
-        dimensions = tuple(None if isinstance(d, flat_model.Colon) else d for d in self._subscripts(node["shape_expr"]))
+        dimensions = tuple(None if isinstance(d, syntax_tree.Colon) else d for d in self._subscripts(node["shape_expr"]))
         kind = self._type(node["effective_type"]["canonical_type"])
         return flat_model.FunctionVariable(node["name"], kind, dimensions, self._optional(node["default"]), where)

@@ -1,6 +1,7 @@
-"""For-equations that the front end has left rolled up: it writes down the first points and a template for all of them.
+"""Unrolling of for-equations that the front end has unrolled only in part.
 
-The other points stand in its list of equations as placeholders such as `der(x[3]) = 0.0`, whose left sides alone are true.
+For these, rumoca's document contains the equations of the first iterations and a template for all iterations. The equations of
+the other iterations are placeholders such as `der(x[3]) = 0.0`, in which only the left side is correct.
 """
 
 from __future__ import annotations
@@ -13,14 +14,22 @@ from .expression_reader import Json
 
 
 def unroll_equations(json: Json, section: str) -> Iterator[tuple[int, Json]]:
-    """For every equation that may be a placeholder, its place in the list of equations and what stands there in truth."""
+    """Generate the equations of all for-equations that may have placeholders.
+
+    Args:
+        json: rumoca's document of the flat model.
+        section: The key of the for-equations.
+
+    Yields:
+        The index in the list of equations, and the equation that belongs there.
+    """
     for family in json[section]:
         if not family["interiors_materialized"]:
             yield from _unroll(family)
 
 
 def _unroll(family: Json) -> Iterator[tuple[int, Json]]:
-    """All combinations of the loop indices, the last one running fastest."""
+    """Generate the equations for all combinations of the loop indices; the last index varies fastest."""
     binders = family["domain"]["binders"]
     ranges = [range(b["lower"], b["upper"] + (1 if b["step"] > 0 else -1), b["step"]) for b in binders]
     bodies = family["template"]["body"]
@@ -36,7 +45,7 @@ def _index_names(binders: list[Json]) -> list[str]:
 
 
 def _substitute_indices(node: Any, indices: Mapping[str, int]) -> Any:
-    """The tree with numbers in the place of loop indices."""
+    """Return the tree with the loop indices replaced by numbers."""
     if isinstance(node, list):
         return [_substitute_indices(item, indices) for item in node]
     if not isinstance(node, dict):

@@ -1,1 +1,1 @@
-"""The flat model as data, and its evaluation."""
+"""The flat model as immutable data, its traversal and its evaluation."""

@@ -1,7 +1,7 @@
-"""Operators and built-in functions for the interpreter: what the emitted C computes, bit for bit.
+"""Operators and built-in functions of the interpreter, with the same results as the generated C code, bit for bit.
 
-The same order of operations, the C library's functions through `math`, and IEEE results (NaN, infinity) where Python would
-raise an exception. Arrays are numpy arrays, but are computed element by element.
+The order of operations is that of the C code, and `math` provides the functions of the C library. Where Python would raise an
+exception, the result is that of IEEE 754 (NaN or infinity). Arrays are NumPy arrays that are computed element by element.
 """
 
 from __future__ import annotations
@@ -9,25 +9,25 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Mapping
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
 
-from .flat_model import SourceLocation
+from .syntax_tree import SourceLocation
 
 _INT32 = range(-(2**31), 2**31)
 
 
 class EvaluationError(Exception):
-    """A model has failed; the text is the reason."""
+    """Failure of a model during its evaluation, for example a violated assert(); the text is the reason."""
 
     def __init__(self, reason: str, where: SourceLocation | None = None):
         super().__init__(f"{reason} ({where.file_and_line})" if where else reason)
 
 
 def elementwise(function: Callable[..., Any], *arguments: Any) -> Any:
-    """The function of scalars, or element by element of arrays."""
+    """Apply a function of scalars to scalars, or element by element to arrays of equal shape."""
     if not any(isinstance(a, np.ndarray) for a in arguments):
         return function(*arguments)
     arrays = np.broadcast_arrays(*arguments)
@@ -36,17 +36,23 @@ def elementwise(function: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def to_python_scalar(value: Any) -> Any:
+    """Convert a NumPy scalar to a Python scalar; return all other values unchanged."""
     return value.item() if isinstance(value, np.generic) else value
 
 
 def check_int32(value: float | int) -> float | int:
+    """Return a number after the check that it is not an Integer outside the range of int32.
+
+    Raises:
+        EvaluationError: The number is an Integer outside the range of int32.
+    """
     if isinstance(value, int) and value not in _INT32:
         raise EvaluationError("Integer overflow")
     return value
 
 
 def matrix_product(left: np.ndarray, right: np.ndarray) -> Any:
-    """Sums from left to right, as in the C: numpy's own product may add in another order."""
+    """Return the matrix product, with sums from left to right as in the C code; NumPy may add in another order."""
     rows, columns = left.reshape(-1, left.shape[-1]), right.reshape(right.shape[0], -1)
     sums = [
         [_sum([check_int32(to_python_scalar(a) * to_python_scalar(b)) for a, b in zip(r, c, strict=True)]) for c in columns.T]
@@ -60,7 +66,7 @@ def _sum(values: Any) -> Any:
 
 
 def divide(a: float, b: float) -> float:
-    """a / b as IEEE 754 has it."""
+    """Return `a / b` as defined by IEEE 754, also for b = 0."""
     if b != 0:
         return a / b
     with np.errstate(all="ignore"):
@@ -68,7 +74,7 @@ def divide(a: float, b: float) -> float:
 
 
 def _with_ieee_results(function: Callable[..., float], at_pole: float = math.nan) -> Callable[..., float]:
-    """A function of the C library; Python's errors become NaN, infinity or the value at the pole."""
+    """Wrap a function of `math` so that it returns NaN, infinity or the value at its pole where Python raises an error."""
 
     def wrapped(*arguments: float) -> float:
         try:
@@ -88,7 +94,7 @@ def _floor_to_int32(x: float) -> int:
 
 
 def _real_or_integer(real: Callable[[float, float], float], whole: Callable[[int, int], int]) -> Callable[[Any, Any], Any]:
-    """A function with one meaning for Real and one for Integer, where division by zero is a failure."""
+    """Combine a function for Real and one for Integer arguments; for Integers division by zero is a failure."""
 
     def wrapped(a: Any, b: Any) -> Any:
         if isinstance(a, float) or isinstance(b, float):
@@ -101,7 +107,7 @@ def _real_or_integer(real: Callable[[float, float], float], whole: Callable[[int
 
 
 def _quotient(a: int, b: int) -> int:
-    """a / b without its fraction."""
+    """Return the quotient rounded toward zero."""
     return abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
 
 
@@ -114,7 +120,7 @@ def _maximum(*arguments: Any) -> Any:
 
 
 def _flat_elements(arguments: tuple[Any, ...]) -> list[Any]:
-    """All elements, as Real where one of them is."""
+    """Return all elements of the arguments, converted to Real if one of them is Real."""
     elements = [to_python_scalar(x) for argument in arguments for x in np.asarray(argument).flat]
     return [float(x) for x in elements] if any(isinstance(x, float) for x in elements) else elements
 
@@ -145,7 +151,7 @@ _MATH_FUNCTIONS = {function.__name__: _with_ieee_results(function) for function 
 _MATH_FUNCTIONS |= {function.__name__: _with_ieee_results(function, -math.inf) for function in (math.log, math.log10)}
 _MATH_FUNCTIONS |= {"floor": lambda x: float(np.floor(x)), "ceil": lambda x: float(np.ceil(x))}
 BUILTINS: Mapping[str, Callable[..., Any]] = {
-    **{name: lambda x, f=f: elementwise(f, x) for name, f in _MATH_FUNCTIONS.items()},  # type: ignore[misc]
+    **{name: partial(elementwise, function) for name, function in _MATH_FUNCTIONS.items()},
     "abs": lambda x: elementwise(lambda y: check_int32(abs(y)), x),
     "atan2": math.atan2,
     "cat": lambda _, *arrays: np.concatenate(arrays),

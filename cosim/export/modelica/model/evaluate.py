@@ -1,4 +1,4 @@
-"""Evaluates expressions and executes statements of a flat model in plain Python."""
+"""Evaluation of the expressions and execution of the statements of a flat model in Python."""
 
 from __future__ import annotations
 
@@ -10,100 +10,122 @@ from typing import Any
 
 import numpy as np
 
-from . import flat_model
+from . import syntax_tree
 from .arithmetic import BUILTINS, OPERATORS, EvaluationError, check_int32, elementwise, matrix_product, to_python_scalar
-from .flat_model import Body, Expression, Function, FunctionVariable
+from .flat_model import Function, FunctionVariable
+from .syntax_tree import Body, Expression
 
 DTYPES = {"Real": np.float64, "Integer": np.int64, "Enumeration": np.int64, "Boolean": np.bool_}
 
 
-def convert_to_type(value: Any, kind: str, shape: tuple[int, ...]) -> Any:
-    """The value as a variable of this type and shape holds it: a Python scalar or a numpy array of its own."""
+def convert_to_type(value: Any, type_name: str, shape: tuple[int, ...]) -> Any:
+    """Convert a value to a Modelica type and shape.
+
+    Returns:
+        A Python scalar for the shape (), else a new NumPy array.
+    """
     if shape:
-        return np.array(np.broadcast_to(np.asarray(value, DTYPES[kind]), shape))
-    return float(value) if kind == "Real" else bool(value) if kind == "Boolean" else int(value)
+        return np.array(np.broadcast_to(np.asarray(value, DTYPES[type_name]), shape))
+    return float(value) if type_name == "Real" else bool(value) if type_name == "Boolean" else int(value)
 
 
 @dataclass
 class Evaluator:
-    """`values` are the variables that can be seen, `memory` their values before the event, `flags` the due(k) and risen(k)."""
+    """Evaluator of expressions and statements in one scope: the model, or the body of a function.
+
+    The methods for the kinds of nodes are named after the classes of `syntax_tree`.
+    """
 
     functions: Mapping[str, Function]
+    #: variable -> current value
     values: MutableMapping[str, Any]
+    #: variable -> value before the current event
     pre_values: MutableMapping[str, Any] = field(default_factory=dict)
+    #: ("due", k): clock k ticks in the current event; ("risen", k): edge detector k has detected a rising edge
     event_flags: dict[tuple[str, int], bool] = field(default_factory=dict)
+    #: edge detector -> its condition at the previous event
     previous_conditions: dict[int, bool] = field(default_factory=dict)
 
     # statements
 
     def execute(self, body: Body) -> None:
+        """Execute statements in order.
+
+        Raises:
+            EvaluationError: The model has failed.
+        """
         for statement in body:
             getattr(self, f"_{type(statement).__name__.lower()}")(statement)
 
-    def _assign(self, node: flat_model.Assign) -> None:
+    def _assign(self, node: syntax_tree.Assign) -> None:
         self._store(node.target, self(node.value))
 
-    def _store(self, target: flat_model.Name | flat_model.Index, value: Any) -> None:
-        name = flat_model.referenced_variable(target)
-        old = self.values[name]
-        if isinstance(target, flat_model.Index):
-            old[self._indices(target, old.shape)] = value
-        elif isinstance(old, np.ndarray):
-            old[...] = value
+    def _store(self, target: syntax_tree.Name | syntax_tree.Index, value: Any) -> None:
+        name = syntax_tree.referenced_variable(target)
+        current = self.values[name]
+        if isinstance(target, syntax_tree.Index):
+            current[self._indices(target, current.shape)] = value
+        elif isinstance(current, np.ndarray):
+            current[...] = value
         else:
-            self.values[name] = type(old)(value)
+            self.values[name] = type(current)(value)
 
-    def _multiassign(self, node: flat_model.MultiAssign) -> None:
+    def _multiassign(self, node: syntax_tree.MultiAssign) -> None:
         for target, value in zip(node.targets, self._call_function(node.call), strict=False):
             self._store(target, value)
 
-    def _ifstatement(self, node: flat_model.IfStatement) -> None:
+    def _ifstatement(self, node: syntax_tree.IfStatement) -> None:
         self.execute(next((body for condition, body in node.branches if self(condition)), node.otherwise))
 
-    def _for(self, node: flat_model.For) -> None:
-        hidden = self.values.get(node.index)
+    def _for(self, node: syntax_tree.For) -> None:
+        shadowed = self.values.get(node.index)
         for index in self._range(node.range):
             self.values[node.index] = int(index)
             self.execute(node.body)
         self.values.pop(node.index, None)
-        if hidden is not None:
-            self.values[node.index] = hidden
+        if shadowed is not None:
+            self.values[node.index] = shadowed
 
-    def _assert(self, node: flat_model.Assert) -> None:
+    def _assert(self, node: syntax_tree.Assert) -> None:
         if not self(node.condition):
             raise EvaluationError(node.message, node.where)
 
-    def _edgedetector(self, node: flat_model.EdgeDetector) -> None:
-        holds = bool(self(node.condition))
-        self.event_flags["risen", node.index] = holds and not self.previous_conditions.get(node.index, True)
-        self.previous_conditions[node.index] = holds
+    def _edgedetector(self, node: syntax_tree.EdgeDetector) -> None:
+        condition = bool(self(node.condition))
+        self.event_flags["risen", node.index] = condition and not self.previous_conditions.get(node.index, True)
+        self.previous_conditions[node.index] = condition
 
     # expressions
 
     def __call__(self, node: Expression) -> Any:
+        """Return the value of an expression.
+
+        Raises:
+            EvaluationError: The model has failed.
+        """
         return getattr(self, f"_{type(node).__name__.lower()}")(node)
 
-    def _literal(self, node: flat_model.Literal) -> Any:
-        return float(node.value) if node.type == "Real" else node.value
+    def _literal(self, node: syntax_tree.Literal) -> Any:
+        return float(node.number) if node.type == "Real" else node.value
 
-    def _name(self, node: flat_model.Name) -> Any:
+    def _name(self, node: syntax_tree.Name) -> Any:
         return self.values[node.name]
 
-    def _array(self, node: flat_model.Array) -> np.ndarray:
+    def _array(self, node: syntax_tree.Array) -> np.ndarray:
         return np.array([self(element) for element in node.elements])
 
-    def _range(self, node: flat_model.Range) -> np.ndarray:
+    def _range(self, node: syntax_tree.Range) -> np.ndarray:
         step = self(node.step) if node.step else 1
         return np.arange(self(node.start), self(node.stop) + (1 if step > 0 else -1), step)
 
-    def _if(self, node: flat_model.If) -> Any:
+    def _if(self, node: syntax_tree.If) -> Any:
         return self(next((value for condition, value in node.branches if self(condition)), node.otherwise))
 
-    def _unary(self, node: flat_model.Unary) -> Any:
+    def _unary(self, node: syntax_tree.Unary) -> Any:
         value = self(node.operand)
         return elementwise(operator.not_, value) if node.operator == "not" else elementwise(lambda x: check_int32(-x), value)
 
-    def _binary(self, node: flat_model.Binary) -> Any:
+    def _binary(self, node: syntax_tree.Binary) -> Any:
         if node.operator == "and":
             return bool(self(node.left)) and bool(self(node.right))
         if node.operator == "or":
@@ -111,55 +133,55 @@ class Evaluator:
         left, right = self(node.left), self(node.right)
         if node.operator == "*" and isinstance(left, np.ndarray) and isinstance(right, np.ndarray):
             return matrix_product(left, right)
-        if node.operator == "^" and node.right == flat_model.Literal(2, "Integer"):
+        if node.operator == "^" and node.right == syntax_tree.Literal(2, "Integer"):
             return elementwise(lambda x: float(x) * float(x), left)
         return elementwise(OPERATORS[node.operator.removeprefix(".")], left, right)
 
-    def _index(self, node: flat_model.Index) -> Any:
+    def _index(self, node: syntax_tree.Index) -> Any:
         base = self(node.base)
         return to_python_scalar(base[self._indices(node, base.shape)])
 
-    def _indices(self, node: flat_model.Index, shape: tuple[int, ...]) -> tuple[Any, ...]:
+    def _indices(self, node: syntax_tree.Index, shape: tuple[int, ...]) -> tuple[Any, ...]:
         return tuple(self._index_of(s, n, node) for s, n in zip(node.subscripts, shape, strict=False))
 
-    def _index_of(self, subscript: Expression | flat_model.Colon, size: int, node: flat_model.Index) -> Any:
-        if isinstance(subscript, flat_model.Colon):
+    def _index_of(self, subscript: Expression | syntax_tree.Colon, size: int, node: syntax_tree.Index) -> Any:
+        if isinstance(subscript, syntax_tree.Colon):
             return slice(None)
         index = self(subscript)
         if not all(1 <= k <= size for k in np.atleast_1d(index)):
-            label = node.base.name if isinstance(node.base, flat_model.Name) else "array"
+            label = node.base.name if isinstance(node.base, syntax_tree.Name) else "array"
             raise EvaluationError(f"{label}: subscript outside 1..{size}", node.where)
         return index - 1
 
-    def _call(self, node: flat_model.Call) -> Any:
+    def _call(self, node: syntax_tree.Call) -> Any:
         return self._call_function(node)[0]
 
-    def _call_function(self, node: flat_model.Call) -> list[Any]:
+    def _call_function(self, node: syntax_tree.Call) -> list[Any]:
         function, arguments = self.functions[node.function], [self(argument) for argument in node.arguments]
-        inside = Evaluator(self.functions, {})
+        scope = Evaluator(self.functions, {})
         for local, value in zip(function.inputs, arguments, strict=True):
-            inside.values[local.name] = convert_to_type(value, local.type, np.shape(value))
+            scope.values[local.name] = convert_to_type(value, local.type, np.shape(value))
         for local in (*function.outputs, *function.locals):
-            inside._declare(local)
-        inside.execute(function.body)
-        return [inside.values[local.name] for local in function.outputs]
+            scope._declare(local)
+        scope.execute(function.body)
+        return [scope.values[local.name] for local in function.outputs]
 
     def _declare(self, local: FunctionVariable) -> None:
         shape = tuple(int(self(d)) for d in local.dimensions if d is not None)
         self.values[local.name] = convert_to_type(self(local.default) if local.default is not None else 0, local.type, shape)
 
-    def _builtin(self, node: flat_model.Builtin) -> Any:
+    def _builtin(self, node: syntax_tree.Builtin) -> Any:
         if node.name in ("due", "risen"):
-            return self.event_flags[node.name, node.arguments[0].value]  # type: ignore[union-attr, index]
+            return self.event_flags[node.name, self(node.arguments[0])]
         if node.name in ("pre", "edge", "change"):
             return self._evaluate_pre(node)
         if node.name == "smooth":
             return self(node.arguments[1])
         return BUILTINS[node.name](*map(self, node.arguments))
 
-    def _evaluate_pre(self, node: flat_model.Builtin) -> Any:
-        before = Evaluator(self.functions, ChainMap(self.pre_values, self.values))(node.arguments[0])
+    def _evaluate_pre(self, node: syntax_tree.Builtin) -> Any:
+        previous = Evaluator(self.functions, ChainMap(self.pre_values, self.values))(node.arguments[0])
         if node.name == "pre":
-            return before
-        now = self(node.arguments[0])
-        return (now and not before) if node.name == "edge" else now != before
+            return previous
+        current = self(node.arguments[0])
+        return (current and not previous) if node.name == "edge" else current != previous

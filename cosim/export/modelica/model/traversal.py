@@ -1,4 +1,4 @@
-"""Walking and rewriting the trees of a flat model."""
+"""Traversal and rewriting of the syntax trees of a flat model."""
 
 from __future__ import annotations
 
@@ -6,14 +6,25 @@ from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from .flat_model import Assign, Builtin, Colon, Expression, Index, Literal, MultiAssign, Name, SourceLocation, referenced_variable
+from .syntax_tree import (
+    Assign,
+    Builtin,
+    Colon,
+    Expression,
+    Index,
+    Literal,
+    MultiAssign,
+    Name,
+    SourceLocation,
+    referenced_variable,
+)
 
-#: operators on the value before the present event
+#: operators that use the value of a variable before the current event
 PRE_OPERATORS = ("pre", "edge", "change")
 
 
 def walk(node: Any) -> Iterator[Any]:
-    """The node and everything below it, in order of writing."""
+    """Yield a node and all nodes below it in pre-order."""
     if isinstance(node, tuple) and not isinstance(node, SourceLocation | Colon):
         for item in node:
             yield from walk(item)
@@ -24,7 +35,12 @@ def walk(node: Any) -> Iterator[Any]:
 
 
 def rewrite(node: Any, change: Callable[[Any], Any]) -> Any:
-    """The tree with `change` applied to each of its nodes, from the leaves to the root."""
+    """Return the tree with `change` applied to each node in post-order.
+
+    Args:
+        node: A node, or a tuple of nodes.
+        change: Returns the replacement of a node, whose children are already replaced.
+    """
     if isinstance(node, tuple) and not isinstance(node, SourceLocation | Colon):
         return tuple(rewrite(item, change) for item in node)
     if not is_dataclass(node) or isinstance(node, type):
@@ -33,7 +49,7 @@ def rewrite(node: Any, change: Callable[[Any], Any]) -> Any:
 
 
 def read_references(node: Any) -> Iterator[Name | Index]:
-    """The references whose present value is read: not the targets of assignments, and not what stands under pre()."""
+    """Yield the references whose current value is read: neither assignment targets nor arguments of pre()."""
     if isinstance(node, Assign):
         yield from _references_in_subscripts(node.target)
         yield from read_references(node.value)
@@ -41,7 +57,7 @@ def read_references(node: Any) -> Iterator[Name | Index]:
         for target in node.targets:
             yield from _references_in_subscripts(target)
         yield from read_references(node.call)
-    elif isinstance(node, Name) or (isinstance(node, Index) and _is_constant(node)):
+    elif isinstance(node, Name) or (isinstance(node, Index) and _has_literal_subscripts(node)):
         yield node
     elif isinstance(node, tuple) and not isinstance(node, SourceLocation | Colon):
         for item in node:
@@ -56,17 +72,17 @@ def _references_in_subscripts(target: Name | Index) -> Iterator[Name | Index]:
         yield from read_references(target.subscripts)
 
 
-def _is_constant(node: Index) -> bool:
+def _has_literal_subscripts(node: Index) -> bool:
     return isinstance(node.base, Name) and all(isinstance(s, Literal) for s in node.subscripts)
 
 
 def variable_names(node: Any) -> set[str]:
-    """Every variable that occurs below a node."""
+    """Return the names of all variables that occur in a tree."""
     return {item.name for item in walk(node) if isinstance(item, Name)}
 
 
 def assigned_references(node: Any) -> Iterator[Name | Index]:
-    """What the statements below a node assign."""
+    """Yield the targets of all assignments in a tree."""
     for item in walk(node):
         if isinstance(item, Assign):
             yield item.target
@@ -75,11 +91,12 @@ def assigned_references(node: Any) -> Iterator[Name | Index]:
 
 
 def pre_references(node: Any) -> Iterator[tuple[str, Builtin]]:
-    """The variables under pre(), edge() and change(), each with the call."""
+    """Yield the argument of each pre(), edge() and change() in a tree (the variable name), with the call."""
     for item in walk(node):
         if isinstance(item, Builtin) and item.name in PRE_OPERATORS:
             yield referenced_variable(item.arguments[0]), item
 
 
 def has_builtin(node: Expression, *builtins: str) -> bool:
+    """Return whether an expression calls one of these built-in functions."""
     return any(isinstance(item, Builtin) and item.name in builtins for item in walk(node))

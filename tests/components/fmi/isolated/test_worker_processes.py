@@ -1,4 +1,4 @@
-"""Worker processes come, answer, and go without a trace; they share nothing with the importer but their own block."""
+"""Worker processes: start, answers, end, and separation from the importer process."""
 
 from __future__ import annotations
 
@@ -30,14 +30,15 @@ from cosim.components.fmi.isolated.pipes import (
     write_line,
 )
 from cosim.components.fmi.isolated.shared_memory import SharedMemoryBlock
-from cosim.components.fmi.isolated.worker_process import WorkerLost, WorkerProcess
+from cosim.components.fmi.isolated.worker_process import WorkerLostError, WorkerProcess
 from cosim.core.component import Ports, Variable
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.run_loop import Settings, simulate
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Settings
 from cosim.process.journal import CHANGE_COUNT
 
 DESCRIPTORS = Path("/proc/self/fd")
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 
 def block(values: int = 1) -> SharedMemoryBlock:
@@ -47,13 +48,13 @@ def block(values: int = 1) -> SharedMemoryBlock:
 
 @pytest.fixture
 def worker():
-    """Starts processes that answer each command with the outcome of a function."""
+    """Function that starts a worker process which answers each command with the result of a function."""
     started = []
 
     def start(answer: Callable[[bytes], bytes], shared: SharedMemoryBlock | None = None) -> WorkerProcess:
         def serve(commands: int, answers: int) -> None:
-            vigil = SpinningPoller([commands])
-            while line := read_line(commands, vigil):
+            poller = SpinningPoller([commands])
+            while line := read_line(commands, poller):
                 write_line(answers, answer(line))
 
         started.append(WorkerProcess("w", (shared or block()).journal, serve))
@@ -66,7 +67,7 @@ def worker():
 
 @pytest.fixture
 def children() -> Callable[[], list[str]]:
-    """Processes that this one has started since; other tests may have left some at work."""
+    """Function that lists the processes that this one has started since the fixture was set up."""
 
     def now() -> list[str]:
         return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
@@ -75,48 +76,48 @@ def children() -> Callable[[], list[str]]:
     return lambda: [process for process in now() if process not in before]
 
 
-def test_lines_come_back_whole_however_long_they_are(worker):
+def test_messages_of_any_size_are_transferred_completely(worker):
     echo = worker(lambda line: line)
     for size in (0, 1, 70_000, 1_000_000):
         message = ["x" * size, 0.1, float("inf"), 2**63, b"\x00\xff", None, "\N{SNOWMAN}\n"]
         assert decode_line(echo.request(encode_line(message), 5.0)) == message
 
 
-def test_an_empty_line_comes_back(worker):
+def test_an_empty_line_is_transferred(worker):
     assert worker(lambda line: line).request(STEP_COMMAND, 5.0) == STEP_DONE
 
 
-def test_who_waits_in_vain_sleeps_at_once_and_ever_longer(monkeypatch):
-    """Looking pays where the answer comes soon; the first one that does makes a worker look again."""
+def test_unsuccessful_spinning_is_skipped_ever_longer(monkeypatch):
+    """A successful poll resets the number of waits without spinning."""
     reader, writer = os.pipe()
-    poll, looks = select.poll(), []
+    poll, polls = select.poll(), []
     counted = SimpleNamespace(register=poll.register, unregister=poll.unregister)
-    counted.poll = lambda milliseconds: (looks.append(milliseconds == 0), poll.poll(min(milliseconds, 1)))[1]
+    counted.poll = lambda milliseconds: (polls.append(milliseconds == 0), poll.poll(min(milliseconds, 1)))[1]
     monkeypatch.setattr(select, "poll", lambda: counted)
-    vigil = SpinningPoller([reader])
+    poller = SpinningPoller([reader])
 
-    def looked() -> int:
-        looks.clear()
-        vigil.wait(60_000)
-        return sum(looks)
+    def count_polls() -> int:
+        polls.clear()
+        poller.wait(60_000)
+        return sum(polls)
 
-    assert [looked() for _ in range(8)] == [SPIN_COUNT, 0, SPIN_COUNT, 0, 0, SPIN_COUNT, 0, 0]
+    assert [count_polls() for _ in range(8)] == [SPIN_COUNT, 0, SPIN_COUNT, 0, 0, SPIN_COUNT, 0, 0]
     os.write(writer, STEP_COMMAND)
-    assert [looked() for _ in range(5)] == [0, 0, 1, 1, 1]
+    assert [count_polls() for _ in range(5)] == [0, 0, 1, 1, 1]
     os.read(reader, 1)
-    assert [looked() for _ in range(4)] == [SPIN_COUNT, 0, SPIN_COUNT, 0]
+    assert [count_polls() for _ in range(4)] == [SPIN_COUNT, 0, SPIN_COUNT, 0]
     os.close(writer)
     os.close(reader)
 
 
-def test_a_process_that_does_not_answer_is_found_at_its_deadline(worker):
+def test_a_process_that_does_not_answer_is_reported_at_its_deadline(worker):
     began = time.monotonic()
-    with pytest.raises(WorkerLost, match=r"did not return within 0\.2 s"):
-        worker(lambda line: time.sleep(60)).request(STEP_COMMAND, 0.2)
+    with pytest.raises(WorkerLostError, match=r"did not return within 0\.2 s"):
+        worker(lambda _: time.sleep(60)).request(STEP_COMMAND, 0.2)
     assert 0.2 < time.monotonic() - began < 0.7
 
 
-def test_the_deadline_holds_for_each_call_that_the_journal_tells_of(worker):
+def test_the_deadline_applies_to_each_call_in_the_journal(worker):
     shared = block()
 
     def ten_calls(line: bytes) -> bytes:
@@ -128,31 +129,31 @@ def test_the_deadline_holds_for_each_call_that_the_journal_tells_of(worker):
     assert worker(ten_calls, shared).request(STEP_COMMAND, 0.5) == STEP_DONE
 
 
-def test_the_exit_code_of_a_process_is_told(worker):
-    process = worker(lambda line: os._exit(3))
-    with pytest.raises(WorkerLost, match="it ended the process with exit code 3"):
+def test_the_exit_code_of_a_process_is_reported(worker):
+    process = worker(lambda _: os._exit(3))
+    with pytest.raises(WorkerLostError, match="it ended the process with exit code 3"):
         process.request(STEP_COMMAND, 5.0)
-    with pytest.raises(WorkerLost):
+    with pytest.raises(WorkerLostError):
         process.request(STEP_COMMAND, 5.0)
 
 
-def test_a_process_that_ended_between_two_commands_is_missed(children, worker):
+def test_a_process_that_ended_between_two_commands_is_reported(children, worker):
     process = worker(lambda line: line)
     (child,) = children()
     os.kill(int(child), signal.SIGKILL)
-    with pytest.raises(WorkerLost, match="signal 9"):
+    with pytest.raises(WorkerLostError, match="signal 9"):
         process.request(STEP_COMMAND, 5.0)
 
 
-def test_what_a_process_prints_is_passed_on_up_to_a_limit(worker, capfd):
+def test_the_output_of_a_process_is_forwarded_up_to_a_limit(worker, capfd):
     process = worker(lambda line: os.write(1, b"x" * 1_000_000) and line)
     assert process.request(STEP_COMMAND, 5.0) == STEP_DONE
     process.stop()
     assert capfd.readouterr().err.count("x") == 1 << 16
 
 
-def test_python_code_prints_as_c_code_does(worker, capfd, monkeypatch, tmp_path):
-    """Whatever the importer's own streams are."""
+def test_python_output_is_forwarded_like_c_output(worker, capfd, monkeypatch, tmp_path):
+    """The importer's own streams do not matter."""
     with (tmp_path / "stream").open("w") as stream:
         monkeypatch.setattr("sys.stdout", stream)
         process = worker(lambda line: print("hello") or line)
@@ -162,7 +163,7 @@ def test_python_code_prints_as_c_code_does(worker, capfd, monkeypatch, tmp_path)
 
 
 def test_an_interrupt_reaches_the_importer_while_it_waits(worker):
-    process = worker(lambda line: time.sleep(60))
+    process = worker(lambda _: time.sleep(60))
     before = signal.signal(signal.SIGALRM, signal.default_int_handler)
     signal.setitimer(signal.ITIMER_REAL, 0.1)
     with pytest.raises(KeyboardInterrupt):
@@ -170,46 +171,47 @@ def test_an_interrupt_reaches_the_importer_while_it_waits(worker):
     signal.signal(signal.SIGALRM, before)
 
 
-def test_a_worker_can_change_its_own_block_only(worker):
-    """Both are memory that the importer shares; of the other one the worker gets a copy of nothing."""
+def test_a_worker_cannot_change_other_shared_memory(worker):
+    """The importer shares both mappings; the worker replaces the other one by private memory."""
     own, other = block(), mmap.mmap(-1, 4096)
     (mirror,) = own.inputs.arrays.values()
     other[:4] = b"mine"
 
-    def scribble(line: bytes) -> bytes:
+    def overwrite(line: bytes) -> bytes:
         own.unshare_other_memory()
         mirror[0], other[:4] = 2.5, b"evil"
         return line
 
-    assert worker(scribble, own).request(STEP_COMMAND, 5.0) == STEP_DONE
+    assert worker(overwrite, own).request(STEP_COMMAND, 5.0) == STEP_DONE
     assert (mirror[0], other[:4]) == (2.5, b"mine")
 
 
 def test_a_worker_inherits_no_descriptors(worker):
-    """But its own pipes, the standard ones, and the folder that it reads to find out."""
+    """Except its own pipes, the standard streams, and the folder that it reads for this test."""
 
-    def look(line: bytes) -> bytes:
-        return encode_line([os.readlink(path) if path.exists() else "" for path in DESCRIPTORS.iterdir() if int(path.name) > 2])  # noqa: PTH115
+    def list_descriptors(_: bytes) -> bytes:
+        paths = [path for path in DESCRIPTORS.iterdir() if int(path.name) > 2]
+        return encode_line([str(path.readlink()) if path.exists() else "" for path in paths])
 
     with tempfile.TemporaryFile() as secret:
-        opened = decode_line(worker(look).request(b"[]\n", 5.0))
+        opened = decode_line(worker(list_descriptors).request(b"[]\n", 5.0))
         assert secret.fileno() > 2
     assert {path.partition(":")[0] for path in opened} <= {"pipe", ""}
     assert len(opened) <= 3
 
 
-def lags(probe: Path, *names: str) -> dict[str, object]:
+def isolated_instances(probe: Path, *names: str) -> dict[str, object]:
     file = FmuFile(probe)
     return {name: create_component(file, name, isolation=Isolation()) for name in names}
 
 
-def test_many_runs_leave_nothing_behind(children, probe, tmp_path, monkeypatch):
+def test_many_runs_leave_no_descriptors_files_and_processes(children, probe, tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    run_system(make_system(lags(probe, "a")), "1/100")  # imports
+    run_system(make_system(isolated_instances(probe, "a")), "1/100")  # imports
     descriptors = sorted(DESCRIPTORS.iterdir())
     for fail_time in (1e9, 0.025):
         for _ in range(5):
-            built = make_system(lags(probe, "a", "b"), "a.y > b.u", start_values={"a": {"fail_time": fail_time}})
+            built = make_system(isolated_instances(probe, "a", "b"), "a.y > b.u", start_values={"a": {"fail_time": fail_time}})
             outcome = simulate(
                 built, Settings(exact_fraction(0), exact_fraction("1/10"), exact_fraction("1/100"), {"b.y": endpoint("b.y")})
             )
@@ -218,8 +220,8 @@ def test_many_runs_leave_nothing_behind(children, probe, tmp_path, monkeypatch):
     assert (list(tmp_path.iterdir()), children()) == ([], [])
 
 
-def test_an_instance_that_is_never_bound_needs_no_process(children, probe):
-    for component in lags(probe, "a", "b").values():
+def test_no_process_is_started_before_instantiate(children, probe):
+    for component in isolated_instances(probe, "a", "b").values():
         component.free()
     assert children() == []
 
@@ -230,7 +232,8 @@ sys.path.insert(0, sys.argv[1])
 from systems import make_system
 from pathlib import Path
 from cosim.components.fmi import FmuFile, Isolation, create_component
-from cosim.engine.run_loop import Settings, simulate
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Settings
 from cosim.core.time_grid import exact_fraction
 def killed(n, count):
     print(Path(f"/proc/self/task/{os.getpid()}/children").read_text(), flush=True)
@@ -241,9 +244,9 @@ simulate(make_system({"a": fmu}), Settings(exact_fraction(0), exact_fraction(1),
 
 
 def test_a_worker_ends_with_its_importer(probes, tmp_path, monkeypatch):
-    monkeypatch.setenv("TMPDIR", str(tmp_path))  # where an importer that is killed leaves its files
-    words = [sys.executable, "-c", IMPORTER, Path(__file__).parents[3] / "support", probes[2]]
-    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))  # the killed importer leaves its files here
+    command = [sys.executable, "-c", IMPORTER, Path(__file__).parents[3] / "support", probes[2]]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
     (worker,) = done.stdout.split()
     latest = time.monotonic() + 5
     while Path(f"/proc/{worker}").exists() and time.monotonic() < latest:

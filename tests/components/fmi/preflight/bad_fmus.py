@@ -1,4 +1,4 @@
-"""Bad FMUs, each made from a good one by one change."""
+"""Invalid FMUs, each made from a valid one by one change."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def read_members(fmu: Path) -> dict[str, bytes]:
 
 @dataclass(frozen=True)
 class Member:
-    """A member of an archive that may lie about itself: `local` and `central` replace fields of its two headers."""
+    """Member of an archive; `local` and `central` replace fields of its local file header and central directory header."""
 
     name: str | bytes
     content: bytes = b""
@@ -34,7 +34,7 @@ class Member:
     local: Mapping[str, Any] = field(default_factory=dict)
     central: Mapping[str, Any] = field(default_factory=dict)
     trailing_bytes: bytes = b""
-    #: None: has a place of its own; otherwise where its header is said to be
+    #: offset in the central directory if the member is not to be written (bytes)
     offset: int | None = None
 
     @property
@@ -45,8 +45,8 @@ class Member:
     def data(self) -> bytes:
         if not self.deflated:
             return self.content
-        engine = zlib.compressobj(9, zlib.DEFLATED, -15)
-        return engine.compress(self.content) + engine.flush()
+        compressor = zlib.compressobj(9, zlib.DEFLATED, -15)
+        return compressor.compress(self.content) + compressor.flush()
 
     def fields(self) -> dict[str, Any]:
         return {
@@ -86,16 +86,16 @@ class Member:
 
 
 def pack_archive(members: Iterable[Member], comment: bytes = b"", count: int | None = None, front: bytes = b"") -> bytes:
-    """An archive as bytes."""
-    body, table, number = bytearray(front), bytearray(), 0
+    """Write an archive; `count` replaces the number of members, `front` is data before the first one."""
+    body, directory, number = bytearray(front), bytearray(), 0
     for member in members:
-        table += member.central_header(len(body) if member.offset is None else member.offset)
+        directory += member.central_header(len(body) if member.offset is None else member.offset)
         number += 1
         if member.offset is None:
             body += member.local_header() + member.data + member.trailing_bytes
     number = number if count is None else count
-    end = struct.pack("<4s4H2LH", b"PK\5\6", 0, 0, number, number, len(table), len(body), len(comment))
-    return bytes(body + table + end + comment)
+    end = struct.pack("<4s4H2LH", b"PK\5\6", 0, 0, number, number, len(directory), len(body), len(comment))
+    return bytes(body + directory + end + comment)
 
 
 def members(files: Mapping[str, bytes]) -> list[Member]:
@@ -103,20 +103,25 @@ def members(files: Mapping[str, bytes]) -> list[Member]:
 
 
 def with_headers(member: Member, **headers: Any) -> Member:
-    """The member with the same fields changed in both of its headers."""
+    """Return the member with the same fields changed in both of its headers."""
     return replace(member, local=headers, central=headers)
 
 
 def find_problems(path: Path) -> list[Finding]:
+    """Return the findings of `cosim validate`."""
     return list(validate_fmu(path))
 
 
-def refusal_message(path: Path) -> str:
-    """What cosim says when the FMU is to be run; every line names the file."""
+def _load_fmu(path: Path) -> None:
     file = FmuFile(path)
+    _ = file.description
+    file.acquire()
+
+
+def refusal_message(path: Path) -> str:
+    """Return the message of the InputError when the FMU is loaded; every line of it names the file."""
     with pytest.raises(InputError) as error:
-        _ = file.description
-        file.acquire()
+        _load_fmu(path)
     lines = str(error.value).splitlines()
     assert all(line.startswith((f'"{path}": ', f'FMU "{path}" ')) for line in lines), lines
     assert all(line.isprintable() for line in lines)
@@ -124,14 +129,14 @@ def refusal_message(path: Path) -> str:
 
 
 def with_description(text: str, files: Mapping[str, bytes], folder: Path) -> Path:
-    """The FMU with another modelDescription.xml."""
+    """Write the FMU with another modelDescription.xml."""
     path = folder / "bad.fmu"
     path.write_bytes(pack_archive(members({**files, "modelDescription.xml": text.encode()})))
     return path
 
 
 def with_change(old: str, new: str, files: Mapping[str, bytes], folder: Path) -> Path:
-    """The FMU with one change in its modelDescription.xml."""
+    """Write the FMU with one change in its modelDescription.xml."""
     text = files["modelDescription.xml"].decode()
     assert old in text
     return with_description(text.replace(old, new, 1), files, folder)

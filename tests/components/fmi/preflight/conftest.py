@@ -1,4 +1,4 @@
-"""The good FMUs that everything here is made from."""
+"""Valid FMUs from which the tests of this folder make invalid ones."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ from bad_fmus import read_members
 
 @pytest.fixture(scope="session")
 def good(probes: dict[int, Path]) -> dict[int, dict[str, bytes]]:
-    """Members of the hand-written FMUs, by FMI version."""
+    """Contents of the members of the probe FMUs, by FMI major version."""
     return {version: read_members(path) for version, path in probes.items()}

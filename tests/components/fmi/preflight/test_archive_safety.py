@@ -33,44 +33,44 @@ def overlapping(good):
 
 
 def nested(good):
-    """A member that lies inside the data of a stored one."""
+    """A member inside the data of a stored member."""
     inner = Member("resources/inner", b"inside")
     outer = Member("resources/outer", inner.local_header() + inner.data, deflated=False)
-    place = sum(len(m.local_header() + m.data) for m in good) + len(outer.local_header())
-    return pack_archive([*good, outer, replace(inner, offset=place)])
+    offset = sum(len(m.local_header() + m.data) for m in good) + len(outer.local_header())
+    return pack_archive([*good, outer, replace(inner, offset=offset)])
 
 
 def two_ends(good):
-    """The comment of an archive holds a second archive with another description."""
+    """An archive whose comment contains a second archive with another description."""
     hidden = pack_archive([Member("modelDescription.xml", b"<other/>")])
     return pack_archive(good, comment=hidden)
 
 
 NAMES = {
-    "parent": ("../evil.txt", "archive.name", "leaves its folder"),
-    "parent inside": ("resources/../../evil.txt", "archive.name", "leaves its folder"),
+    "parent": ("../evil.txt", "archive.name", 'contains an empty, "." or ".." part'),
+    "parent inside": ("resources/../../evil.txt", "archive.name", 'contains an empty, "." or ".." part'),
     "absolute": ("/etc/evil.txt", "archive.name", "relative path"),
     "here": ("./evil.txt", "archive.name", "relative path"),
-    "double slash": ("resources//evil.txt", "archive.name", "empty parts"),
+    "double slash": ("resources//evil.txt", "archive.name", "contains an empty"),
     "backslash": ("..\\evil.txt", "archive.name", "backslash"),
     "drive": ("C:/evil.txt", "archive.name", "colon"),
     "stream": ("resources/a.txt:stream", "archive.name", "colon"),
     "null": ("resources/a\0.txt", "archive.name", "control characters"),
     "escape": ("resources/\x1b[2J.txt", "archive.name", "control characters"),
     "newline": ("resources/a\n.txt", "archive.name", "control characters"),
-    "right to left": ("resources/\u202etxt.exe", "archive.name", "invisible"),
-    "empty": ("", "archive.name", "empty parts"),
+    "right to left": ("resources/\u202etxt.exe", "archive.name", "non-printable characters"),
+    "empty": ("", "archive.name", "contains an empty"),
     "long": ("resources/" + "a" * 300, "archive.name", "longer than 255 bytes"),
-    "deep": ("a/" * 80 + "b", "archive.name", "lies 80 folders deep, expected at most 64"),
+    "deep": ("a/" * 80 + "b", "archive.name", "is nested 80 folders deep, expected at most 64"),
     "no UTF-8": (b"resources/\xff\xfe", "archive.name", "not UTF-8"),
-    "twice": ("modelDescription.xml", "archive.collision", "stands twice"),
+    "twice": ("modelDescription.xml", "archive.collision", "occurs twice"),
     "other case": ("MODELDESCRIPTION.XML", "archive.collision", "differs only in case"),
     "below a file": ("modelDescription.xml/evil", "archive.collision", "which is a file"),
 }
 HEADERS = {
     "symbolic link": (with_extra(lambda m: with_headers(m, mode=0o120777)), "archive.kind", "is a symbolic link"),
-    "device": (with_extra(lambda m: with_headers(m, mode=0o060644)), "archive.kind", "of kind b"),
-    "pipe": (with_extra(lambda m: with_headers(m, mode=0o010644)), "archive.kind", "of kind p"),
+    "device": (with_extra(lambda m: with_headers(m, mode=0o060644)), "archive.kind", "is a device"),
+    "pipe": (with_extra(lambda m: with_headers(m, mode=0o010644)), "archive.kind", "is a named pipe"),
     "folder with content": (with_member("resources/x/"), "archive.kind", "is a folder with 4 bytes"),
     "encrypted": (with_extra(lambda m: with_headers(m, flags=0x801)), "archive.encryption", "is encrypted"),
     "strongly encrypted": (with_extra(lambda m: with_headers(m, flags=0x841)), "archive.encryption", "is encrypted"),
@@ -98,13 +98,13 @@ DATA = {
     "stored size": (
         with_extra(lambda m: with_headers(replace(m, deflated=False), size=9)),
         "archive.size",
-        "stored in 250 bytes but has 9",
+        "stored in 250 bytes but has a size of 9",
     ),
 }
 STRUCTURE = {
-    "empty file": (lambda good: b"", "archive.zip", "is no FMU: File is not a zip file"),
-    "text": (lambda good: b"hello" * 100, "archive.zip", "is no FMU: File is not a zip file"),
-    "no members": (lambda good: pack_archive([]), "archive.description", "no item named 'modelDescription.xml'"),
+    "empty file": (lambda _: b"", "archive.zip", "is not an FMU: it is not a ZIP file"),
+    "text": (lambda _: b"hello" * 100, "archive.zip", "is not an FMU: it is not a ZIP file"),
+    "no members": (lambda _: pack_archive([]), "archive.description", "no member 'modelDescription.xml'"),
     "cut in half": (lambda good: pack_archive(good)[: len(pack_archive(good)) // 2], "archive.zip", "its end is missing"),
     "cut at the end": (lambda good: pack_archive(good)[:-1], "archive.zip", "its end is missing"),
     "cut at the front": (lambda good: pack_archive(good)[100:], "archive.contents", "should end at byte"),
@@ -117,7 +117,7 @@ STRUCTURE = {
         "several parts",
     ),
     "too many listed": (lambda good: pack_archive(good, count=99), "archive.contents", "damaged"),
-    "too few listed": (lambda good: pack_archive(good, count=1), "archive.contents", "bytes more than its 1 members need"),
+    "too few listed": (lambda good: pack_archive(good, count=1), "archive.contents", "bytes longer than its 1 header"),
     "10001 members": (
         lambda good: pack_archive([*good, *(Member(f"resources/{i}") for i in range(10_000))]),
         "archive.contents",
@@ -184,7 +184,7 @@ def test_a_good_fmu_has_no_findings(version, probes):
     ],
     ids=["folder", "UTF-8", "code page 437", "stored", "no mode", "executable", "sizes behind the data", "ZIP64"],
 )
-def test_what_common_tools_write_is_accepted(harmless, good, tmp_path):
+def test_archives_of_common_tools_are_accepted(harmless, good, tmp_path):
     path = tmp_path / "good.fmu"
     path.write_bytes(pack_archive([*members(good[2]), harmless]))
     assert find_problems(path) == []
@@ -195,7 +195,7 @@ def test_what_common_tools_write_is_accepted(harmless, good, tmp_path):
 
 
 @pytest.mark.parametrize("front", [b"x" * 100], ids=["hidden bytes"])
-def test_bytes_of_no_member_are_a_warning(front, good, tmp_path):
+def test_bytes_between_members_are_a_warning(front, good, tmp_path):
     path = tmp_path / "gap.fmu"
     path.write_bytes(pack_archive(members(good[2]), front=front))
     assert [(f.rule.name, f.rule.severity) for f in find_problems(path)] == [("archive.gap", "warning")]
@@ -217,7 +217,7 @@ def special_files(folder):
     }
 
 
-def test_what_is_no_regular_file_is_refused_without_waiting(tmp_path, monkeypatch):
+def test_special_files_are_refused_without_blocking(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name, words in special_files(tmp_path).items():
         assert words in refusal_message(Path(name))
@@ -225,7 +225,7 @@ def test_what_is_no_regular_file_is_refused_without_waiting(tmp_path, monkeypatc
             _ = FmuFile(Path(name)).sha256
 
 
-def test_a_link_to_a_good_file_is_good(probes, tmp_path):
+def test_a_symbolic_link_to_a_valid_fmu_is_accepted(probes, tmp_path):
     (tmp_path / "link.fmu").symlink_to(probes[2])
     assert find_problems(tmp_path / "link.fmu") == []
 
@@ -241,14 +241,14 @@ def test_a_link_to_a_good_file_is_good(probes, tmp_path):
         (PreflightLimits(max_xml_tags=5), "tags, expected at most 5"),
     ],
 )
-def test_limits_are_the_callers(limits, words, good, tmp_path):
+def test_the_caller_sets_the_limits(limits, words, good, tmp_path):
     path = tmp_path / "good.fmu"
     path.write_bytes(pack_archive(members(good[2])))
     with pytest.raises(InputError, match=words):
         FmuFile(path, limits).check_binary()
 
 
-def test_a_member_that_lies_about_its_size_costs_no_memory(good, tmp_path):
+def test_a_member_with_a_false_size_needs_no_memory(good, tmp_path):
     path = tmp_path / "bomb.fmu"
     path.write_bytes(pack_archive([*members(good[2]), with_headers(Member("resources/zeros", bytes(1 << 25)), size=1000)]))
     tracemalloc.start()
@@ -257,14 +257,14 @@ def test_a_member_that_lies_about_its_size_costs_no_memory(good, tmp_path):
     tracemalloc.stop()
 
 
-def test_a_huge_table_of_contents_is_not_read(good, tmp_path):
+def test_a_huge_central_directory_is_not_read(good, tmp_path):
     path = tmp_path / "bad.fmu"
     path.write_bytes(pack_archive([*members(good[2]), with_headers(EXTRA, extra=bytes(60_000))]))
-    with pytest.raises(InputError, match=r"found a table of contents of 60[0-9]+ bytes, expected at most 12288"):
+    with pytest.raises(InputError, match=r"found a central directory of 60[0-9]+ bytes, expected at most 12288"):
         _ = FmuFile(path, PreflightLimits(max_members=3)).description
 
 
-def test_of_very_many_problems_the_first_ones_are_told(good, tmp_path):
+def test_only_the_first_of_many_problems_are_listed(good, tmp_path):
     path = tmp_path / "bad.fmu"
     path.write_bytes(pack_archive([*members(good[2]), *(Member(f"../{i}") for i in range(5000))]))
     lines = refusal_message(path).splitlines()
@@ -272,21 +272,21 @@ def test_of_very_many_problems_the_first_ones_are_told(good, tmp_path):
     assert lines[-1].endswith("and 4900 more errors")
 
 
-def test_deep_folders_cost_little(good, tmp_path):
+def test_deeply_nested_folders_are_checked_quickly(good, tmp_path):
     path = tmp_path / "deep.fmu"
     path.write_bytes(pack_archive([*members(good[2]), *(Member("a/" * 500 + str(i), deflated=False) for i in range(9000))]))
     begin = time.process_time()
-    assert "lies 500 folders deep" in refusal_message(path)
+    assert "is nested 500 folders deep" in refusal_message(path)
     assert time.process_time() - begin < 2
 
 
-def test_all_problems_of_an_archive_are_told_at_once(good, tmp_path):
+def test_all_problems_of_an_archive_are_reported_together(good, tmp_path):
     path = tmp_path / "bad.fmu"
     path.write_bytes(pack_archive([*members(good[2]), Member("../a"), Member("/b"), with_headers(EXTRA, mode=0o120777)]))
     assert len(refusal_message(path).splitlines()) == 3
 
 
-def test_an_fmu_that_changes_after_its_examination_is_refused(probes, good, tmp_path):
+def test_an_fmu_that_changes_after_the_check_is_refused(probes, good, tmp_path):
     path = tmp_path / "changing.fmu"
     path.write_bytes(probes[2].read_bytes())
     file = FmuFile(path)

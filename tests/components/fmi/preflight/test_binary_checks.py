@@ -1,4 +1,4 @@
-"""Libraries that cannot run here: said in words, before the loader sees them."""
+"""Libraries that this platform cannot load are reported before they reach the loader."""
 
 import shutil
 import struct
@@ -52,25 +52,25 @@ def renamed(library):
 
 
 DAMAGED = {
-    "empty": (lambda library: b"", "is no ELF file"),
-    "text": (lambda library: b"hello", "is no ELF file"),
-    "Windows": (lambda library: b"MZ" + library[2:], "is no ELF file"),
-    "cut in the header": (lambda library: library[:40], "is cut: its header is incomplete"),
-    "cut in the middle": (lambda library: library[: len(library) // 2], "is cut: "),
-    "cut after the header": (lambda library: library[:64], "is cut: "),
-    "ARM": (patched(18, "<H", 40), "is made for ARM, 64 bit, little-endian; this machine is"),
-    "aarch64": (patched(18, "<H", 183), "is made for aarch64, 64 bit"),
-    "unknown machine": (patched(18, "<H", 9999), "is made for machine 9999"),
-    "32 bit": (patched(4, "<B", 1), "is made for x86_64, 32 bit"),
+    "empty": (lambda _: b"", "is not an ELF file"),
+    "text": (lambda _: b"hello", "is not an ELF file"),
+    "Windows": (lambda library: b"MZ" + library[2:], "is not an ELF file"),
+    "cut in the header": (lambda library: library[:40], "is truncated: its header is incomplete"),
+    "cut in the middle": (lambda library: library[: len(library) // 2], "is truncated: "),
+    "cut after the header": (lambda library: library[:64], "is truncated: "),
+    "ARM": (patched(18, "<H", 40), "is built for ARM, 64 bit, little-endian; this machine is"),
+    "aarch64": (patched(18, "<H", 183), "is built for aarch64, 64 bit"),
+    "unknown machine": (patched(18, "<H", 9999), "is built for machine 9999"),
+    "32 bit": (patched(4, "<B", 1), "is built for x86_64, 32 bit"),
     "big-endian": (patched(5, "<B", 2), "64 bit, big-endian"),
     "bad class": (patched(4, "<B", 7), "has a damaged ELF header"),
     "executable": (patched(16, "<H", 2), "type 2, expected a shared library"),
     "object file": (patched(16, "<H", 1), "type 1, expected a shared library"),
     "no segments": (patched(56, "<H", 0), "has no segments to load"),
-    "segments beyond": (patched(32, "<Q", 1 << 40), "is cut: it refers to byte"),
-    "segment too long": (segment(1, 32, 1 << 40), "is cut: a segment ends at byte"),
-    "dynamic table beyond": (segment(2, 8, 1 << 40), "is cut: a segment ends at byte"),
-    "dynamic table elsewhere": (segment(2, 8, 0), "has no table of symbols"),
+    "segments beyond": (patched(32, "<Q", 1 << 40), "is truncated: it refers to byte"),
+    "segment too long": (segment(1, 32, 1 << 40), "is truncated: a segment ends at byte"),
+    "dynamic table beyond": (segment(2, 8, 1 << 40), "is truncated: a segment ends at byte"),
+    "dynamic table elsewhere": (segment(2, 8, 0), "has no symbol table"),
 }
 
 
@@ -84,7 +84,7 @@ def compiled(folder, name, code, *options):
 
 @pytest.fixture
 def fmu(good, tmp_path):
-    """Makes the good FMU with another library, or with the library under another name."""
+    """Function that writes the valid FMU with another library, or with the library under another name."""
 
     def make(library, name=LIBRARY):
         path = tmp_path / "bad.fmu"
@@ -135,8 +135,8 @@ def test_hidden_and_undefined_functions_do_not_count(tmp_path):
 
 
 @pytest.mark.parametrize("path", FMUS, ids=lambda path: str(path.relative_to(resources.root())))
-def test_exports_are_those_that_the_linkers_tools_see(path):
-    """`nm` of binutils is the reference; it comes with every C compiler."""
+def test_exports_are_those_listed_by_nm(path):
+    """The reference is `nm` of binutils."""
     file = FmuFile(path)
     folder = file.acquire()
     (library,) = (folder / "binaries").glob(f"*linux*/{file.description.model_identifier}.so")
@@ -149,19 +149,19 @@ def test_exports_are_those_that_the_linkers_tools_see(path):
 
 
 @pytest.mark.parametrize(("version", "slave", "prefix"), [(2, FMU2Slave, "fmi2"), (3, FMU3Slave, "fmi3")])
-def test_the_required_functions_are_those_that_are_bound(version, slave, prefix):
+def test_the_required_functions_are_those_of_fmpy(version, slave, prefix):
     assert {name for name in dir(slave) if name.startswith(prefix)} == REQUIRED_FUNCTIONS[version]
 
 
-def test_a_missing_dependency_is_a_warning(good, fmu, tmp_path):
+def test_a_missing_dependency_is_a_warning(fmu, tmp_path):
     compiled(tmp_path, "libnowhere", "int other(void) { return 1; }\n")
     user = compiled(tmp_path, "user", "extern int other(void); int use(void) { return other(); }\n", f"-L{tmp_path}", "-lnowhere")
     findings = find_problems(fmu(user.read_bytes()))
     assert [(f.rule.name, f.rule.severity) for f in findings] == [("binary.functions", "error"), ("binary.needed", "warning")]
-    assert "needs the library libnowhere.so, which this machine does not seem to have" in findings[1].message
+    assert "needs the library libnowhere.so, which was not found on this machine" in findings[1].message
 
 
-def test_another_platform_is_told_with_what_is_there(fmu):
+def test_another_platform_is_reported_with_the_existing_ones(fmu):
     path = fmu(b"MZ", "binaries/win64/probe.dll")
     this = current_platform()
     assert f"has no binary for {this.platform_tuple} ({this.fmi2_platform}); it has: win64" in refusal_message(path)
@@ -172,13 +172,13 @@ def test_sources_alone_are_no_binary(fmu):
     assert "it has: c-code" in refusal_message(fmu(b"int x;", "sources/model.c"))
 
 
-def test_the_library_bears_the_name_of_the_model(good, fmu):
+def test_the_library_must_have_the_name_of_the_model_identifier(good, fmu):
     path = fmu(good[2][LIBRARY], LIBRARY.replace("probe", "other"))
-    words = f"the library cannot be loaded: {LIBRARY} does not exist; there is: {LIBRARY.replace('probe', 'other')}"
+    words = f"the library cannot be loaded: {LIBRARY} does not exist; found: {LIBRARY.replace('probe', 'other')}"
     assert words in refusal_message(path)
 
 
-def test_this_machine_is_called_as_fmpy_calls_it():
+def test_the_platform_names_are_those_of_fmpy():
     assert (current_platform().fmi2_platform, current_platform().platform_tuple) == (fmpy.platform, fmpy.platform_tuple)
     assert current_platform().suffix == fmpy.sharedLibraryExtension
 
@@ -192,5 +192,5 @@ def test_this_machine_is_called_as_fmpy_calls_it():
         (FmuPlatform("linux", "x86", ".so"), ("linux32", "x86-linux")),
     ],
 )
-def test_other_machines_have_the_names_of_the_standard(machine, names):
+def test_other_platforms_have_the_names_of_the_standard(machine, names):
     assert (machine.binary_folder(2), machine.binary_folder(3)) == names

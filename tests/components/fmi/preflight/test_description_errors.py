@@ -1,15 +1,15 @@
-"""One wrong thing in a good model description: found by its rule, at its line, and refused."""
+"""Errors in a model description: each is found by its rule, at its line, and the FMU is refused."""
 
 import pytest
 from bad_fmus import find_problems, refusal_message, with_change, with_description
 
-#: FMI version, text of the good description, what stands there instead, rule, line, words
+#: case -> (FMI version, text of the valid description, its replacement, rule, line, part of the message)
 ERRORS = {
     "version 1.0": (2, 'fmiVersion="2.0"', 'fmiVersion="1.0"', "model.version", 2, "is an FMI 1.0 FMU; FMI 2.0 and 3.0 are"),
     "version 4.0": (2, 'fmiVersion="2.0"', 'fmiVersion="4.0"', "model.version", 2, "is an FMI 4.0 FMU"),
     "version 2.1": (2, 'fmiVersion="2.0"', 'fmiVersion="2.1"', "model.version", 2, "is an FMI 2.1 FMU"),
     "beta version": (3, 'fmiVersion="3.0"', 'fmiVersion="3.0-beta.1"', "model.version", 2, "is an FMI 3.0-beta.1 FMU"),
-    "no version": (2, 'fmiVersion="2.0"', "", "model.version", 2, "of unknown version"),
+    "no version": (2, 'fmiVersion="2.0"', "", "model.version", 2, "lacks the attribute fmiVersion"),
     "no guid": (2, 'guid="probe"', "", "model.token", 2, "lacks the attribute guid"),
     "no token": (3, 'instantiationToken="probe"', "", "model.token", 2, "lacks the attribute instantiationToken"),
     "only model exchange": (
@@ -37,7 +37,7 @@ ERRORS = {
         '<CoSimulation modelIdentifier="x"/><UnitDef',
         "model.repeated",
         3,
-        "<CoSimulation> stands 2 times",
+        "<CoSimulation> occurs 2 times",
     ),
     "two lists": (
         2,
@@ -45,7 +45,7 @@ ERRORS = {
         "<ModelVariables/><ModelStructure>",
         "model.repeated",
         12,
-        "<ModelVariables> stands 2 times",
+        "<ModelVariables> occurs 2 times",
     ),
     "unit twice": (2, '<Unit name="m">', '<Unit name="deg"/><Unit name="m">', "unit.unique", 6, 'unit "deg" is defined twice'),
     "unit exponent": (2, '<BaseUnit m="1"/>', '<BaseUnit m="x"/>', "unit.base", 6, 'found m="x", expected an integer'),
@@ -72,24 +72,24 @@ ERRORS = {
         'name="off" value="2"',
         "type.items",
         9,
-        'the item "off" of enumeration "Mode" stands twice',
+        'the item "off" of enumeration "Mode" occurs twice',
     ),
     "value twice": (3, 'name="on" value="2"', 'name="on" value="1"', "type.items", 6, 'the value "1" of enumeration'),
     "stop time": (2, 'stopTime="2"', 'stopTime="NaN"', "experiment.value", 11, 'found stopTime="NaN", expected a finite number'),
     "step size": (3, 'stepSize="0.01"', 'stepSize="fast"', "experiment.value", 8, 'found stepSize="fast"'),
     "no name": (2, 'name="u" ', "", "variable.name", 13, 'found the variable name ""'),
     "name with line end": (2, 'name="u" ', 'name="u&#10;v" ', "variable.name", 13, r'name "u\nv", expected one without'),
-    "name twice": (2, 'name="y" ', 'name="u" ', "variable.unique", 14, 'the variable name "u" stands in line 13 too'),
+    "name twice": (2, 'name="y" ', 'name="u" ', "variable.unique", 14, 'the variable name "u" is already used in line 13'),
     "alias twice": (
         3,
         'start="1"/>',
         'start="1"><Alias name="u"/></Float64>',
         "variable.unique",
         13,
-        'name "u" stands in line 11 too',
+        'name "u" is already used in line 11',
     ),
-    "no type": (2, '<Real start="0" unit="m"/>', "", "variable.type", 13, "has no type that this FMI version knows"),
-    "type of FMI 2": (3, '<Float64 name="u"', '<Real name="u"', "variable.type", 11, "has no type that this FMI version knows"),
+    "no type": (2, '<Real start="0" unit="m"/>', "", "variable.type", 13, "has no type that this FMI version defines"),
+    "type of FMI 2": (3, '<Float64 name="u"', '<Real name="u"', "variable.type", 11, "has no type that this FMI version defines"),
     "causality": (2, 'causality="input"', 'causality="inptu"', "variable.word", 13, 'causality="inptu"; did you mean "input"?'),
     "variability": (2, 'variability="tunable"', 'variability="always"', "variable.word", 15, 'found variability="always"'),
     "initial": (2, 'initial="calculated"', 'initial="maybe"', "variable.word", 14, 'found initial="maybe"'),
@@ -99,7 +99,7 @@ ERRORS = {
         'name="u" variability="fixed" valueR',
         "variable.combination",
         13,
-        '"input" does not go with variability="fixed"',
+        '"input" is not allowed with variability="fixed"',
     ),
     "continuous parameter": (
         2,
@@ -107,7 +107,7 @@ ERRORS = {
         "",
         "variable.combination",
         15,
-        '"parameter" does not go with variability="continuous"',
+        '"parameter" is not allowed with variability="continuous"',
     ),
     "tunable output": (
         3,
@@ -115,7 +115,7 @@ ERRORS = {
         'name="y" variability="tunable" valueR',
         "variable.combination",
         12,
-        '"output" does not go with',
+        '"output" is not allowed with',
     ),
     "continuous integer": (
         2,
@@ -123,7 +123,7 @@ ERRORS = {
         'causality="input" variability="continuous"',
         "variable.continuous",
         17,
-        "Int32 does not go with",
+        "Int32 is not allowed with",
     ),
     "exact calculated": (
         2,
@@ -131,7 +131,7 @@ ERRORS = {
         'initial="calculated" causality="parameter" variability',
         "variable.initial",
         15,
-        'initial="calculated" does not go',
+        'initial="calculated" is not allowed',
     ),
     "no reference": (2, 'name="u" valueReference="0"', 'name="u"', "reference.value", 13, 'found valueReference=""'),
     "negative reference": (3, 'valueReference="1"', 'valueReference="-1"', "reference.value", 11, 'found valueReference="-1"'),
@@ -149,7 +149,7 @@ ERRORS = {
         'name="y_start" valueReference="0"',
         "reference.shared",
         15,
-        'the value reference of "u"; of inputs',
+        'the same value reference as "u"',
     ),
     "shared in FMI 3": (
         3,
@@ -157,7 +157,7 @@ ERRORS = {
         'name="y" valueReference="1"',
         "reference.shared",
         12,
-        'has the value reference of "u", expected',
+        'has the same value reference as "u", expected',
     ),
     "unknown type": (
         2,
@@ -173,7 +173,7 @@ ERRORS = {
         '<Integer declaredType="Mode" start="1"/>',
         "variable.declared-type",
         17,
-        'type "Mode" is Enumeration, the variable Int32',
+        'type "Mode" is Enumeration, but the variable is Int32',
     ),
     "enumeration without type": (
         3,
@@ -192,14 +192,14 @@ ERRORS = {
         12,
         'found derivative="60"',
     ),
-    "clock": (3, 'start="0" unit="m"', 'start="0" clocks="2"', "variable.clocks", 11, 'found "2" among its clocks'),
+    "clock": (3, 'start="0" unit="m"', 'start="0" clocks="2"', "variable.clocks", 11, 'found "2" in its clocks'),
     "input without start": (
         2,
         '<Real start="0" unit="m"/>',
         '<Real unit="m"/>',
         "start.missing",
         13,
-        "has no start value, which is needed for inputs",
+        "has no start value, which is required for inputs",
     ),
     "exact without start": (
         3,
@@ -207,7 +207,7 @@ ERRORS = {
         'causality="output" initial="exact" unit',
         "start.missing",
         12,
-        'needed for initial="exact"',
+        'required for initial="exact"',
     ),
     "NaN": (2, '<Real start="0"', '<Real start="NaN"', "start.finite", 13, "found start value NaN, expected a finite number"),
     "infinite input": (
@@ -219,20 +219,27 @@ ERRORS = {
         "found start value INF",
     ),
     "too large": (2, '<Real start="0"', '<Real start="1e999"', "start.finite", 13, "found start value 1e999"),
-    "word": (2, '<Real start="0"', '<Real start="zero"', "start.value", 13, 'start value "zero" of variable "u" is no Float64'),
+    "word": (
+        2,
+        '<Real start="0"',
+        '<Real start="zero"',
+        "start.value",
+        13,
+        'start value "zero" of variable "u" is not a valid Float64',
+    ),
     "underscore": (2, '<Real start="0"', '<Real start="1_0"', "start.value", 13, 'start value "1_0"'),
     "C's nan": (2, '<Real start="0"', '<Real start="nan"', "start.value", 13, 'start value "nan"'),
-    "fraction": (2, '<Integer start="0"', '<Integer start="0.5"', "start.value", 17, "is no Int32"),
-    "integer range": (2, '<Integer start="0"', '<Integer start="2147483648"', "start.value", 17, "is no Int32"),
+    "fraction": (2, '<Integer start="0"', '<Integer start="0.5"', "start.value", 17, "is not a valid Int32"),
+    "integer range": (2, '<Integer start="0"', '<Integer start="2147483648"', "start.value", 17, "is not a valid Int32"),
     "byte range": (
         3,
         'name="uint8_in" valueReference="22" causality="input" start="0"',
         'name="uint8_in" valueReference="22" causality="input" start="-1"',
         "start.value",
         21,
-        "is no UInt8",
+        "is not a valid UInt8",
     ),
-    "truth": (2, '<Boolean start="false"', '<Boolean start="False"', "start.value", 22, "is no Boolean"),
+    "truth": (2, '<Boolean start="false"', '<Boolean start="False"', "start.value", 22, "is not a valid Boolean"),
     "above max": (
         2,
         'start="1" min="-10"',
@@ -267,7 +274,7 @@ ERRORS = {
         '<Dimension valueReference="1"/>',
         "variable.dimension",
         15,
-        "reference of a structural parameter",
+        "value reference of a structural parameter",
     ),
     "dimension of itself": (
         3,
@@ -276,7 +283,7 @@ ERRORS = {
         '<Float64 name="u"',
         "variable.dimension",
         11,
-        "reference of a structural parameter",
+        "value reference of a structural parameter",
     ),
     "huge dimension": (
         3,
@@ -318,13 +325,13 @@ def test_errors_are_refused(name, good, tmp_path):
     version, old, new, rule, line, words = ERRORS[name]
     path = with_change(old, new, good[version], tmp_path)
     text = refusal_message(path)
-    (told,) = [row for row in text.splitlines() if words in row]
-    assert told.startswith(f'"{path}": modelDescription.xml:{line}: ')
-    assert f" [{rule}, FMI " in told or f" [{rule}, limits]" in told
+    (line_found,) = [row for row in text.splitlines() if words in row]
+    assert line_found.startswith(f'"{path}": modelDescription.xml:{line}: ')
+    assert f" [{rule}, FMI " in line_found or f" [{rule}, limits]" in line_found
     assert (rule, "error", line) in [(f.rule.name, f.rule.severity, f.line) for f in find_problems(path)]
 
 
-def test_all_problems_are_told_at_once(good, tmp_path):
+def test_all_problems_are_reported_together(good, tmp_path):
     text = good[2]["modelDescription.xml"].decode()
     text = text.replace('guid="probe"', "").replace('<Real start="0"', '<Real start="NaN"').replace('name="y" ', 'name="u" ')
     assert len(refusal_message(with_description(text, good[2], tmp_path)).splitlines()) == 3

@@ -1,4 +1,4 @@
-"""cosim's own reading of model descriptions, held against FMPy's."""
+"""Model descriptions as read by cosim, compared with FMPy."""
 
 import math
 
@@ -17,33 +17,33 @@ def limit(text):
     return None if text is None or math.isinf(float(text)) else float(text)
 
 
-def numbers(theirs):
-    """The start value as FMPy has it, as numbers where it stands for some."""
-    if theirs.start is None or theirs.type in ("String", "Binary"):
-        return theirs.start
+def numbers(expected):
+    """Return FMPy's start value, converted to numbers for numeric types."""
+    if expected.start is None or expected.type in ("String", "Binary"):
+        return expected.start
     words = tuple(
-        {"true": 1.0, "false": 0.0}.get(word) if word in ("true", "false") else float(word) for word in theirs.start.split()
+        {"true": 1.0, "false": 0.0}.get(word) if word in ("true", "false") else float(word) for word in expected.start.split()
     )
     return words[0] if len(words) == 1 else words
 
 
 def check_like_fmpy(path):
-    ours, theirs = FmuFile(path).description, read_model_description(path)
-    assert (ours.fmi_version, ours.model_name, ours.instantiation_token) == (
-        theirs.fmiVersion,
-        theirs.modelName,
-        theirs.instantiationToken,
+    description, expected = FmuFile(path).description, read_model_description(path)
+    assert (description.fmi_version, description.model_name, description.instantiation_token) == (
+        expected.fmiVersion,
+        expected.modelName,
+        expected.instantiationToken,
     )
-    assert (ours.description, ours.generation_tool) == (theirs.description or "", theirs.generationTool or "")
-    assert ours.model_identifier == theirs.coSimulation.modelIdentifier
-    assert ours.has_state == theirs.coSimulation.canGetAndSetFMUstate
-    assert ours.once_per_process == theirs.coSimulation.canBeInstantiatedOnlyOncePerProcess
-    assert ours.needs_execution_tool == theirs.coSimulation.needsExecutionTool
-    assert sorted(ours.value_references.items()) == sorted((v.name, v.valueReference) for v in theirs.modelVariables)
-    mine = {variable.name: variable for variable in ours.variables}
-    assert len(mine) == len(theirs.modelVariables)
-    for other in theirs.modelVariables:
-        variable = mine[other.name]
+    assert (description.description, description.generation_tool) == (expected.description or "", expected.generationTool or "")
+    assert description.model_identifier == expected.coSimulation.modelIdentifier
+    assert description.has_state == expected.coSimulation.canGetAndSetFMUstate
+    assert description.once_per_process == expected.coSimulation.canBeInstantiatedOnlyOncePerProcess
+    assert description.needs_execution_tool == expected.coSimulation.needsExecutionTool
+    assert sorted(description.value_references.items()) == sorted((v.name, v.valueReference) for v in expected.modelVariables)
+    variables = {variable.name: variable for variable in description.variables}
+    assert len(variables) == len(expected.modelVariables)
+    for other in expected.modelVariables:
+        variable = variables[other.name]
         assert variable.type == FMI2_TYPES.get(other.type, other.type)
         assert (variable.causality, variable.variability) == (other.causality, other.variability)
         assert variable.start == numbers(other)
@@ -95,7 +95,7 @@ FMI3 = """<?xml version="1.0"?>
 </fmiModelDescription>"""
 
 
-def test_what_only_fmi3_has(tmp_path):
+def test_features_of_fmi3(tmp_path):
     path = tmp_path / "m.fmu"
     path.write_bytes(pack_archive(members({"modelDescription.xml": FMI3.encode()})))
     description = FmuFile(path).description
@@ -107,10 +107,10 @@ def test_what_only_fmi3_has(tmp_path):
         True,
         False,
     )
-    assert found["gauge"].unit is None  # nothing says what it is
+    assert found["gauge"].unit is None  # a unit without BaseUnit whose name is not a known unit
     assert found["mode"].items == (("off", -1), ("on", 4))
     assert (found["v"].description, found["speed"].description, found["v"].start) == ("short", "a speed", 50.0)
     assert description.value_references["v"] == description.value_references["speed"] == 2
     assert (found["b"].start, found["i"].start, found["n"].variability) == ("00ff", -128, "fixed")
     assert (description.default_experiment.start_time, float(description.default_experiment.stop_time)) == (1, 2.5)
-    assert description.once_per_process and not description.has_state
+    assert (description.once_per_process, description.has_state) == (True, False)

@@ -1,11 +1,11 @@
-"""What breaks the standard without harm to a run is told by its rule, at its line, and not refused."""
+"""Harmless violations of the standard are warnings: each is found by its rule, at its line, and the FMU is accepted."""
 
 import pytest
 from bad_fmus import find_problems, with_change, with_description
 
 from cosim.components.fmi import FmuFile
 
-#: FMI version, text of the good description, what stands there instead, rule, line, words
+#: case -> (FMI version, text of the valid description, its replacement, rule, line, part of the message)
 WARNINGS = {
     "limit": (2, 'min="-10"', 'min="low"', "variable.limit-value", 15, 'found min="low", expected a number'),
     "wide limit": (
@@ -41,7 +41,7 @@ WARNINGS = {
         '<LogCategories><Category name="a"/><Category name="a"/></LogCategories><DefaultExp',
         "categories.unique",
         11,
-        '"a" stands twice',
+        '"a" occurs twice',
     ),
     "implied variability": (
         2,
@@ -49,7 +49,7 @@ WARNINGS = {
         'causality="input"><Int',
         "variable.implied-continuous",
         17,
-        "Int32 is taken as discrete",
+        "Int32 is treated as discrete",
     ),
     "initial of input": (
         2,
@@ -122,7 +122,7 @@ WARNINGS = {
         "<Outputs>",
         "structure.outputs",
         14,
-        'variable "y": is missing among the outputs',
+        'variable "y": is an output but is missing in the outputs',
     ),
     "input listed": (
         2,
@@ -130,7 +130,7 @@ WARNINGS = {
         '<Outputs><Unknown index="2"/><Unknown index="1"/>',
         "structure.outputs",
         13,
-        'variable "u": is among the outputs',
+        'variable "u": is listed in the outputs',
     ),
     "listed twice": (
         3,
@@ -138,7 +138,7 @@ WARNINGS = {
         '<Output valueReference="6"/><Output valueReference="6"/>',
         "structure.unique",
         43,
-        'Output "6" stands twice',
+        'Output "6" occurs twice',
     ),
     "unknown not listed": (
         2,
@@ -146,7 +146,7 @@ WARNINGS = {
         "<InitialUnknowns>",
         "structure.initial-unknowns",
         14,
-        "is missing among the initial",
+        "is an initial unknown but is missing in the initial unknowns",
     ),
     "derivative without state": (
         2,
@@ -162,7 +162,7 @@ WARNINGS = {
         '<Outputs><Unknown index="2" dependencies="1" dependenciesKind="fixed fixed"/>',
         "structure.dependencies",
         28,
-        "has 2 kinds of dependencies for 1",
+        "has 2 dependenciesKind for 1",
     ),
     "kind": (
         2,
@@ -185,7 +185,7 @@ WARNINGS = {
 
 
 @pytest.mark.parametrize("name", WARNINGS)
-def test_warnings_are_told_but_do_not_keep_from_running(name, good, tmp_path):
+def test_warnings_are_reported_but_do_not_prevent_a_run(name, good, tmp_path):
     version, old, new, rule, line, words = WARNINGS[name]
     path = with_change(old, new, good[version], tmp_path)
     findings = find_problems(path)

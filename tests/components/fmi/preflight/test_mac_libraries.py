@@ -1,4 +1,4 @@
-"""macOS libraries are read on any machine; those that FMPy brings along are real ones."""
+"""Reader of macOS libraries, tested on any platform with the libraries in FMPy."""
 
 import random
 import struct
@@ -12,7 +12,7 @@ from cosim.components.fmi.preflight import DEFAULT_LIMITS, examine, macho, open_
 from cosim.components.fmi.preflight.archive import Archive
 from cosim.components.fmi.preflight.binary import REQUIRED_FUNCTIONS, check_binary
 from cosim.components.fmi.preflight.fmu_platform import FmuPlatform
-from cosim.components.fmi.preflight.library import InvalidLibrary
+from cosim.components.fmi.preflight.library import InvalidLibraryError, SharedLibrary
 
 FMPY = Path(fmpy.__file__).parent
 MACHINES = {"aarch64": "x86_64", "x86_64": "aarch64"}
@@ -24,7 +24,7 @@ def architecture(request):
 
 
 def container(architecture):
-    """An FMU's library for one architecture."""
+    """Return the library of an FMU for one architecture."""
     return (FMPY / f"container_fmu/binaries/{architecture}-darwin/container_fmu.dylib").read_bytes()
 
 
@@ -34,7 +34,7 @@ def library(architecture):
 
 
 def without_commands(library, kinds):
-    """The library with these commands for the loader replaced by ones that nobody knows."""
+    """Return the library with the given load commands replaced by unknown ones."""
     content, place = bytearray(library), 32
     for _ in range(struct.unpack_from("<L", library, 16)[0]):
         command, size = struct.unpack_from("<2L", library, place)
@@ -53,8 +53,8 @@ def patched(offset, form, value):
     return change
 
 
-def both():
-    """A universal file of both libraries."""
+def universal_library():
+    """Return a universal file with the libraries of both architectures."""
     parts = [container(architecture) for architecture in sorted(MACHINES)]
     offsets = [4096, 4096 + len(parts[0])]
     entries = zip((macho.MACHINES[a] for a in sorted(MACHINES)), offsets, parts, strict=True)
@@ -63,20 +63,20 @@ def both():
     return head.ljust(4096, b"\0") + parts[0] + parts[1]
 
 
-def test_a_real_library_exports_what_fmi_demands(library, architecture):
+def test_a_real_library_exports_the_functions_of_fmi(library, architecture):
     exports = macho.read_library(library, architecture).exports
     assert REQUIRED_FUNCTIONS[2] | REQUIRED_FUNCTIONS[3] <= exports
 
 
-def test_symbols_and_tree_of_exports_say_the_same(library, architecture):
-    """Two tables of one library, made by the linker for different readers."""
+def test_symbol_table_and_export_trie_agree(library, architecture):
+    """The linker writes both tables of a library."""
     symbols = macho.read_library(without_commands(library, macho._EXPORT_TRIE_COMMANDS), architecture).exports
     tree = macho.read_library(without_commands(library, {macho._LC_SYMTAB}), architecture).exports
     assert symbols == tree == macho.read_library(library, architecture).exports
 
 
-def test_of_a_universal_library_the_right_part_is_read(library, architecture):
-    assert macho.read_library(both(), architecture) == macho.read_library(library, architecture)
+def test_the_part_for_the_architecture_is_read_from_a_universal_library(library, architecture):
+    assert macho.read_library(universal_library(), architecture) == macho.read_library(library, architecture)
     real = (FMPY / "logging/darwin64/logging.dylib").read_bytes()
     assert macho.read_library(real, architecture).exports == {"addLoggerProxy"}
 
@@ -87,39 +87,39 @@ def test_a_missing_function_is_named(library, architecture):
 
 
 DAMAGED = {
-    "empty": (lambda library: b"", "is no macOS library"),
-    "ELF": (lambda library: b"\x7fELF" + library[4:], "is no macOS library"),
-    "only a magic number": (lambda library: library[:4], "is cut: it refers to byte 4, but has 4"),
-    "cut": (lambda library: library[: len(library) // 2], "is cut: a segment ends at byte"),
-    "32 bit": (lambda library: b"\xce\xfa\xed\xfe" + library[4:], "is made for 32 bit"),
-    "unknown machine": (patched(4, "<L", 99), "is made for machine 0x63"),
+    "empty": (lambda _: b"", "is not a macOS library"),
+    "ELF": (lambda library: b"\x7fELF" + library[4:], "is not a macOS library"),
+    "only a magic number": (lambda library: library[:4], "is truncated: it refers to byte 4, but has 4"),
+    "cut": (lambda library: library[: len(library) // 2], "is truncated: a segment ends at byte"),
+    "32 bit": (lambda library: b"\xce\xfa\xed\xfe" + library[4:], "is built for 32 bit"),
+    "unknown machine": (patched(4, "<L", 99), "is built for machine 0x63"),
     "program": (patched(12, "<L", 2), "is of type 2, expected a dynamic library"),
     "object file": (patched(12, "<L", 1), "is of type 1"),
-    "command of no size": (patched(36, "<L", 0), "has damaged commands for the loader"),
-    "command beyond": (patched(36, "<L", 2**31), "has damaged commands for the loader"),
-    "more commands": (patched(16, "<L", 10**6), "has damaged commands for the loader"),
-    "universal, cut": (lambda library: both()[:9000], "is cut: the part for"),
-    "universal, for nobody": (lambda library: both()[:4] + bytes(8), "is made for nothing"),
-    "universal, countless": (lambda library: both()[:4] + b"\xff" * 4, "claims 4294967295 architectures"),
+    "command of no size": (patched(36, "<L", 0), "has damaged load commands"),
+    "command beyond": (patched(36, "<L", 2**31), "has damaged load commands"),
+    "more commands": (patched(16, "<L", 10**6), "has damaged load commands"),
+    "universal, cut": (lambda _: universal_library()[:9000], "is truncated: the part for"),
+    "universal, for nobody": (lambda _: universal_library()[:4] + bytes(8), "is built for no architecture"),
+    "universal, countless": (lambda _: universal_library()[:4] + b"\xff" * 4, "claims 4294967295 architectures"),
 }
 
 
 @pytest.mark.parametrize("case", DAMAGED)
-def test_damaged_libraries_are_told(case, library, architecture):
+def test_damaged_libraries_are_refused(case, library, architecture):
     change, words = DAMAGED[case]
-    with pytest.raises(InvalidLibrary, match=words):
+    with pytest.raises(InvalidLibraryError, match=words):
         macho.read_library(change(library), architecture)
 
 
-def test_another_architecture_is_told(library, architecture):
+def test_another_architecture_is_refused(library, architecture):
     other = MACHINES[architecture]
-    with pytest.raises(InvalidLibrary, match=f"is made for {architecture}; this machine is {other}"):
+    with pytest.raises(InvalidLibraryError, match=f"is built for {architecture}; this machine is {other}"):
         macho.read_library(library, other)
 
 
 @pytest.mark.parametrize("content", [b"\xcf\xfa\xed\xfe", None], ids=["damaged", "good"])
-def test_an_fmu_is_examined_for_a_mac(content, good, tmp_path, library, architecture):
-    """By what is in the library, not by its name."""
+def test_an_fmu_is_checked_for_macos(content, good, tmp_path, library, architecture):
+    """The content of the library decides, not its name."""
     machine = FmuPlatform("darwin", architecture, ".dylib")
     files = {"modelDescription.xml": good[2]["modelDescription.xml"], "binaries/darwin64/probe.dylib": content or library}
     path = tmp_path / "mac.fmu"
@@ -129,16 +129,15 @@ def test_an_fmu_is_examined_for_a_mac(content, good, tmp_path, library, architec
     assert [finding.rule.name for finding in findings] == (["binary.format"] if content else [])
 
 
-def test_mutants_are_read_or_damaged(library, architecture):
-    draw = random.Random(1)  # noqa: S311 - mutants have to come back the same
+def test_mutants_are_read_or_refused(library, architecture):
+    rng = random.Random(1)  # noqa: S311 - seeded for reproducible mutants
     outcomes = set()
     for _ in range(300):
         content = bytearray(library)
         for _ in range(4):
-            content[draw.randrange(4096)] = draw.randrange(256)
+            content[rng.randrange(4096)] = rng.randrange(256)
         try:
             outcomes.add(type(macho.read_library(bytes(content), architecture)))
-        except InvalidLibrary as damage:
-            assert str(damage).startswith(("is ", "has "))
-            outcomes.add(InvalidLibrary)
-    assert len(outcomes) == 2
+        except InvalidLibraryError as error:
+            outcomes.add(InvalidLibraryError if str(error).startswith(("is ", "has ")) else str(error))
+    assert outcomes == {SharedLibrary, InvalidLibraryError}

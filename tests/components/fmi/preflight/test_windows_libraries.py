@@ -1,4 +1,4 @@
-"""Windows libraries are read on any machine; PythonFMU's is a real one."""
+"""Reader of Windows libraries, tested on any platform with the library of PythonFMU."""
 
 import random
 import struct
@@ -10,7 +10,7 @@ from cosim.components.fmi.preflight import DEFAULT_LIMITS, examine, open_regular
 from cosim.components.fmi.preflight.archive import Archive
 from cosim.components.fmi.preflight.binary import REQUIRED_FUNCTIONS, check_binary
 from cosim.components.fmi.preflight.fmu_platform import FmuPlatform
-from cosim.components.fmi.preflight.library import InvalidLibrary
+from cosim.components.fmi.preflight.library import InvalidLibraryError
 from cosim.core import resources
 
 FMU = resources.root() / "fmus/python/vtol.fmu"
@@ -28,11 +28,11 @@ def patched(content, offset, form, value):
     return bytes(content)
 
 
-def test_a_real_library_exports_what_fmi_demands(library):
+def test_a_real_library_exports_the_functions_of_fmi(library):
     assert REQUIRED_FUNCTIONS[2] <= pe.read_library(library, "x86_64").exports
 
 
-def test_an_fmu_is_good_for_windows():
+def test_an_fmu_with_a_windows_library_is_accepted():
     with open_regular_file(FMU) as file:
         assert list(check_binary(Archive(file, DEFAULT_LIMITS), examine(FMU).model, WINDOWS, DEFAULT_LIMITS)) == []
 
@@ -47,39 +47,39 @@ def header(library):
 
 
 DAMAGED = {
-    "empty": (lambda dll: b"", "is no Windows library"),
-    "ELF": (lambda dll: b"\x7fELF" + dll[4:], "is no Windows library"),
-    "only a header": (lambda dll: dll[:60], "is cut: it refers to byte 60"),
+    "empty": (lambda _: b"", "is not a Windows library"),
+    "ELF": (lambda dll: b"\x7fELF" + dll[4:], "is not a Windows library"),
+    "only a header": (lambda dll: dll[:60], "is truncated: it refers to byte 60"),
     "header beyond": (lambda dll: patched(dll, 0x3C, "<L", 2**31), "has a damaged PE header"),
-    "cut": (lambda dll: dll[:-2000], "is cut: a section ends at byte"),
-    "ARM": (lambda dll: patched(dll, header(dll) + 4, "<H", 0xAA64), "is made for aarch64; this machine is x86_64"),
-    "32 bit": (lambda dll: patched(dll, header(dll) + 4, "<H", 0x14C), "is made for x86; this machine is x86_64"),
-    "program": (lambda dll: patched(dll, header(dll) + 22, "<H", 0x22), "is no library but a program"),
+    "cut": (lambda dll: dll[:-2000], "is truncated: a section ends at byte"),
+    "ARM": (lambda dll: patched(dll, header(dll) + 4, "<H", 0xAA64), "is built for aarch64; this machine is x86_64"),
+    "32 bit": (lambda dll: patched(dll, header(dll) + 4, "<H", 0x14C), "is built for x86; this machine is x86_64"),
+    "program": (lambda dll: patched(dll, header(dll) + 22, "<H", 0x22), "is a program, expected a library"),
     "optional header": (lambda dll: patched(dll, header(dll) + 24, "<H", 7), "has a damaged PE header"),
-    "exports elsewhere": (lambda dll: patched(dll, header(dll) + 24 + 112, "<L", 2**31), "lies in no section"),
+    "exports elsewhere": (lambda dll: patched(dll, header(dll) + 24 + 112, "<L", 2**31), "is in no section"),
 }
 
 
 @pytest.mark.parametrize("case", DAMAGED)
-def test_damaged_libraries_are_told(case, library):
+def test_damaged_libraries_are_refused(case, library):
     change, words = DAMAGED[case]
-    with pytest.raises(InvalidLibrary, match=words):
+    with pytest.raises(InvalidLibraryError, match=words):
         pe.read_library(change(library), "x86_64")
 
 
-def test_no_exports_at_all(library):
+def test_a_library_without_export_table(library):
     assert pe.read_library(patched(library, header(library) + 24 + 112, "<L", 0), "x86_64").exports == frozenset()
 
 
-def test_mutants_are_read_or_damaged(library):
-    draw = random.Random(1)  # noqa: S311 - mutants have to come back the same
+def test_mutants_are_read_or_refused(library):
+    rng = random.Random(1)  # noqa: S311 - seeded for reproducible mutants
     outcomes = set()
     for _ in range(300):
         content = bytearray(library)
         for _ in range(4):
-            content[draw.randrange(1024)] = draw.randrange(256)
+            content[rng.randrange(1024)] = rng.randrange(256)
         try:
             outcomes.add(type(pe.read_library(bytes(content), "x86_64")))
-        except InvalidLibrary:
-            outcomes.add(InvalidLibrary)
+        except InvalidLibraryError:
+            outcomes.add(InvalidLibraryError)
     assert len(outcomes) == 2

@@ -1,4 +1,4 @@
-"""Dangerous and broken XML: refused with its line, quickly, without a look at other files or at the network."""
+"""Dangerous and malformed XML is refused quickly and with its line, without access to other files and the network."""
 
 import re
 import socket
@@ -56,30 +56,30 @@ CASES = {
     "EBCDIC": (edited('"UTF-8"', '"IBM037"'), "xml.encoding", 'found encoding "ibm037"'),
     "no such encoding": (edited('"UTF-8"', '"x-none"'), "xml.encoding", 'found encoding "x-none"'),
     "wrong bytes": (edited("a lag", b"a l\xff\xfeg"), "xml.encoding", ":2: is not utf-8 text"),
-    "undefined entity": (edited("a lag", "&secret;"), "xml.syntax", ":2: is no XML: Entity 'secret' not defined"),
-    "cut in the middle": (lambda xml: xml[: len(xml) // 2], "xml.syntax", "is no XML: "),
-    "empty": (lambda xml: b"", "xml.syntax", "is no XML"),
-    "text": (lambda xml: b"hello", "xml.syntax", ":1: is no XML: Start tag expected"),
-    "binary": (lambda xml: bytes(range(1, 128)), "xml.syntax", "is no XML"),
+    "undefined entity": (edited("a lag", "&secret;"), "xml.syntax", ":2: is not well-formed XML: Entity 'secret' not defined"),
+    "cut in the middle": (lambda xml: xml[: len(xml) // 2], "xml.syntax", "is not well-formed XML: "),
+    "empty": (lambda _: b"", "xml.syntax", "is not well-formed XML"),
+    "text": (lambda _: b"hello", "xml.syntax", ":1: is not well-formed XML: Start tag expected"),
+    "binary": (lambda _: bytes(range(1, 128)), "xml.syntax", "is not well-formed XML"),
     "wrong end tag": (edited("</ModelVariables>", "</ModelVariable>"), "xml.syntax", "tag mismatch: ModelVariables"),
     "attribute twice": (edited('name="u"', 'name="u" name="v"'), "xml.syntax", "Attribute name redefined"),
-    "control character": (edited("a lag", "a\x07lag"), "xml.syntax", ":2: is no XML: "),
-    "control reference": (edited("a lag", "a&#7;lag"), "xml.syntax", "is no XML: xmlParseCharRef"),
+    "control character": (edited("a lag", "a\x07lag"), "xml.syntax", ":2: is not well-formed XML: "),
+    "control reference": (edited("a lag", "a&#7;lag"), "xml.syntax", "is not well-formed XML: xmlParseCharRef"),
     "two roots": (lambda xml: xml + b"<more/>", "xml.syntax", "Extra content at the end"),
     "too deep": (deep, "xml.syntax", "Excessive depth"),
     "too many attributes": (many_attributes, "xml.size", "<DefaultExperiment> has more than 100 attributes"),
-    "other root": (lambda xml: b"<fmu/>", "model.root", ":1: found <fmu>, expected <fmiModelDescription>"),
+    "other root": (lambda _: b"<fmu/>", "model.root", ":1: found <fmu>, expected <fmiModelDescription>"),
     "namespace": (edited("<fmiModelDescription ", '<fmiModelDescription xmlns="urn:x" '), "model.root", "found <{urn:x}"),
 }
 
 
 @contextmanager
 def listener():
-    """The port of a server that notes who connects."""
+    """Yield the port of a server and the list of its connections."""
     server = socket.create_server(("127.0.0.1", 0))
-    visits = []
-    threading.Thread(target=lambda: visits.append(server.accept()), daemon=True).start()
-    yield server.getsockname()[1], visits
+    connections = []
+    threading.Thread(target=lambda: connections.append(server.accept()), daemon=True).start()
+    yield server.getsockname()[1], connections
     with socket.create_connection(server.getsockname()):
         pass
     server.close()
@@ -108,21 +108,21 @@ def test_bad_xml_is_refused(case, good, tmp_path):
         '<?xml-stylesheet href="http://127.0.0.1:{port}/s.xsl"?>',
     ],
 )
-def test_nobody_is_called(prolog, good, tmp_path):
+def test_no_network_connection_is_made(prolog, good, tmp_path):
     path = tmp_path / "calling.fmu"
     schema = (
         ' xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="http://127.0.0.1:{port}/x.xsd" '
     )
-    with listener() as (port, visits):
+    with listener() as (port, connections):
         xml = with_prolog(prolog.format(port=port))(good[2]["modelDescription.xml"])
         xml = xml.replace(b" modelName", schema.format(port=port).encode() + b" modelName")
         path.write_bytes(pack_archive(members(good[2] | {"modelDescription.xml": xml})))
         find_problems(path)
-        assert visits == []
+        assert connections == []
 
 
 @pytest.mark.parametrize("member", ["sources/buildDescription.xml", "terminalsAndIcons/terminalsAndIcons.xml"])
-def test_the_other_xml_files_are_as_safe(member, good, tmp_path):
+def test_other_xml_files_are_checked_too(member, good, tmp_path):
     path = tmp_path / "bad.fmu"
     xml = b'<!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]><fmiBuildDescription>&e;</fmiBuildDescription>'
     path.write_bytes(pack_archive(members(good[3] | {member: xml})))
@@ -131,7 +131,7 @@ def test_the_other_xml_files_are_as_safe(member, good, tmp_path):
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "iso-8859-1", "windows-1252", "us-ascii"])
-def test_clear_encodings_are_read(encoding, good, tmp_path):
+def test_unambiguous_encodings_are_read(encoding, good, tmp_path):
     path = tmp_path / "good.fmu"
     text = good[2]["modelDescription.xml"].decode().replace("UTF-8", encoding.removesuffix("-sig"))
     text = text.replace("a lag", "a lag" if encoding == "us-ascii" else "ein Glätter")
@@ -152,7 +152,7 @@ def test_clear_encodings_are_read(encoding, good, tmp_path):
     ],
     ids=["a long text", "many units", "many parts", "many bad variables", "many dependencies"],
 )
-def test_large_xml_costs_little(xml, good, tmp_path):
+def test_large_xml_is_checked_quickly(xml, good, tmp_path):
     path = tmp_path / "large.fmu"
     path.write_bytes(pack_archive(members(good[2] | {"modelDescription.xml": xml(good[2]["modelDescription.xml"])})))
     begin = time.process_time()
@@ -168,8 +168,8 @@ def test_very_many_tags_are_refused_before_they_are_parsed(good, tmp_path):
 
 
 @pytest.mark.parametrize("case", [case for case, (_, rule, _) in CASES.items() if rule.startswith("xml.")])
-def test_what_is_to_be_exported_is_refused_as_well(case, good, tmp_path):
-    """A description that came with C or Python sources never reaches FMPy's reader, which knows no caution."""
+def test_descriptions_to_be_exported_are_checked_too(case, good, tmp_path):
+    """FMPy's XML reader has no such checks, so an unsafe description of C or Python sources must not reach it."""
     change, rule, words = CASES[case]
     with pytest.raises(InputError, match=re.escape(rule)) as error:
         validate_description(change(good[2]["modelDescription.xml"]), tmp_path / "modelDescription.xml")

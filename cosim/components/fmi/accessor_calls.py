@@ -1,0 +1,81 @@
+"""Prepared calls of fmi*Get... and fmi*Set... functions, which transfer the bound variables of an instance."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any, Literal
+
+import numpy as np
+
+from ...core.component import NativeGetSet, Ports, PreparedCall, Variable
+from .c_functions import FunctionTable, as_pointer, as_size, function_address
+
+
+@dataclass(frozen=True, slots=True)
+class AccessorCallFactory:
+    """Factory of the prepared get and set calls of one FMU instance.
+
+    Attributes:
+        fmi_major: FMI major version, 2 or 3.
+        functions: C functions of the FMU's library.
+        instance: Address of the FMU instance (fmi2Component, fmi3Instance).
+        value_references: Value references by variable name.
+        accessors: FMI 3.0 type names -> the part of the function name after Get or Set.
+    """
+
+    fmi_major: int
+    functions: FunctionTable
+    instance: int
+    value_references: Mapping[str, int]
+    accessors: Mapping[str, str]
+
+    def prepare(
+        self, verb: Literal["Get", "Set"], ports: Ports, transfer_object: Callable[[str, np.ndarray, int], int]
+    ) -> list[PreparedCall]:
+        """Prepare calls for all bound variables: one for adjacent variables of the same accessor.
+
+        Args:
+            verb: Direction of the transfer.
+            ports: Bound variables and their arrays.
+            transfer_object: Transfers one String or Binary variable, given its name, its array and its index in the array.
+        """
+        calls: list[PreparedCall] = []
+        for dtype, array in ports.arrays.items():
+            begin = 0
+            same_dtype = [variable for variable in ports.variables if variable.dtype == dtype]
+            for accessor, group in groupby(same_dtype, lambda variable: self.accessors[variable.type]):
+                variables, function = list(group), f"fmi{self.fmi_major}{verb}{accessor}"
+                end = begin + sum(len(variable.scalar_names) for variable in variables)
+                if dtype.hasobject:
+                    indexed = enumerate(variables, begin)
+                    calls += [PreparedCall(transfer_object, (v.name, array, index), function) for index, v in indexed]
+                else:
+                    calls.append(self._prepare_numeric(function, variables, array[begin:end]))
+                begin = end
+        return calls
+
+    def _prepare_numeric(self, name: str, variables: Sequence[Variable], values: np.ndarray) -> PreparedCall:
+        references = (ctypes.c_uint32 * len(variables))(*(self.value_references[variable.name] for variable in variables))
+        function = self.functions[name]
+        references_address, values_address = ctypes.addressof(references), values.ctypes.data
+        arguments: tuple[Any, ...] = (
+            as_pointer(self.instance),
+            as_pointer(references_address),
+            as_size(len(variables)),
+            as_pointer(values_address),
+        )
+        if self.fmi_major > 2:
+            arguments += (as_size(len(values)),)
+        native = NativeGetSet(
+            self.fmi_major,
+            function_address(function),
+            self.instance,
+            references_address,
+            len(variables),
+            values_address,
+            len(values),
+        )
+        return PreparedCall(function, arguments, name, native, (references, values))

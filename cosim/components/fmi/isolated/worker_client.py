@@ -1,0 +1,106 @@
+"""Importer side of the commands to a worker process: sends them, and converts answers to results and errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from ....core import component_log
+from ....core.errors import ComponentError, InputError
+from ....process.journal import CALL_NUMBER, Phase
+from ..file import FmuFile
+from .pipes import STEP_DONE, decode_line, encode_line
+from .shared_memory import SharedMemoryBlock
+from .worker_process import WorkerLostError, WorkerProcess
+
+
+class WorkerEndedError(ComponentError):
+    """Failure of a component whose worker process ended or was stopped."""
+
+
+class WorkerClient:
+    """Client of one worker process, which executes the commands of `Worker`."""
+
+    #: memory shared with the worker process, set before its start
+    _shared_memory: SharedMemoryBlock
+
+    def __init__(self, file: FmuFile, name: str, deadline: float):
+        """Create a client without a worker process.
+
+        Args:
+            file: The FMU.
+            name: Name of the component.
+            deadline: Deadline (s) of the first calls.
+        """
+        self.name, self._file = name, file
+        self._process: WorkerProcess | None = None
+        #: deadline (s) of the calls in the present phase of the life cycle
+        self._deadline = deadline
+        #: command that the worker process executes now
+        self._command = "instantiate"
+        #: names of the FMI calls of a prepared step, in their order
+        self._call_names: Sequence[str] = [""]
+
+    def _execute(self, command: str, *arguments: Any) -> Any:
+        self._command = command
+        return self._parse_answer(self._request(encode_line([command, *arguments])))
+
+    def _request(self, line: bytes) -> bytes:
+        process = self._process
+        if process is None:
+            raise WorkerEndedError(self.name, self._command, "its worker process has already ended")
+        try:
+            return process.request(line, self._deadline)
+        except WorkerLostError as error:
+            self._stop_worker()
+            raise self._worker_ended_error(str(error)) from None
+        except BaseException:  # after an interrupt, the pending answer would be taken for that of the next command
+            self._stop_worker()
+            raise
+
+    def _parse_answer(self, answer: bytes) -> Any:
+        if answer == STEP_DONE:
+            return None
+        message = self._decode_answer(answer)
+        self._file.has_fatal_error = self._file.has_fatal_error or bool(message.get("fatal"))
+        if "component_error" in message:
+            raise ComponentError(*message["component_error"])
+        if "input_error" in message:
+            raise InputError(message["input_error"])
+        return message["value"]
+
+    def _decode_answer(self, answer: bytes) -> dict[str, Any]:
+        try:
+            message = decode_line(answer)
+        except ValueError:
+            message = None
+        if not isinstance(message, dict) or not {"value", "component_error", "input_error"} & message.keys():
+            self._stop_worker()
+            raise WorkerEndedError(self.name, self._command, "its worker process sent an invalid answer")
+        return message
+
+    def _worker_ended_error(self, reason: str) -> WorkerEndedError:
+        """Return the error for an ended worker process; its journal names the FMI function that was being called."""
+        journal = self._shared_memory.journal
+        if journal.phase == Phase.CALLING:
+            activity = journal.activity()
+            time = None if math.isnan(activity.time) else activity.time
+            return WorkerEndedError(self.name, activity.function, reason, time)
+        if self._command == "step" and 0 <= journal[CALL_NUMBER] < len(self._call_names):
+            function = self._call_names[journal[CALL_NUMBER]]
+            return WorkerEndedError(self.name, function, reason, self._shared_memory.current_time.value)
+        return WorkerEndedError(self.name, self._command, reason)
+
+    def _execute_or_warn(self, command: str) -> None:
+        """Execute a command after the last step; an end of the worker process is only a warning, as all results are complete."""
+        try:
+            if self._process:
+                self._execute(command)
+        except WorkerEndedError as error:
+            component_log.log_message(self.name, component_log.WARNING, f"{error.function} failed: {error.reason}")
+
+    def _stop_worker(self) -> None:
+        assert self._process is not None
+        self._process.stop()
+        self._process = None

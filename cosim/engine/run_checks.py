@@ -1,0 +1,112 @@
+"""Checks of a system and its settings before a run, and the variables that can be set during a run."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator, Set
+from math import inf
+from pathlib import Path
+
+from ..core.component import Variable
+from ..core.errors import Problem
+from ..core.system import Endpoint, System
+from ..core.time_grid import TimeGrid
+from ..process.journal import current_journal
+from .settings import Event, Settings
+
+#: bytes of a recorded number in the rows and in the CSV file, approximately
+_BYTES_PER_VALUE = 8 + 20
+#: size of the recording (bytes) from which the free disk space is checked
+_SIZE_CHECK_THRESHOLD = 1_000_000_000
+
+
+def find_problems(system: System, settings: Settings) -> list[Problem]:
+    """Return all reasons why the system cannot be simulated with these settings; empty if it can.
+
+    The `subject` of a problem names the setting: ("stop_time",), ("components", NAME, "period"), ("events", "time"), ...
+    """
+    problems = [*system.problems(), *_find_event_problems(system, settings.events)]
+    if settings.real_time is not None and not 0 < settings.real_time < inf:
+        problems.append(Problem(f"expected a positive factor for real time, found {settings.real_time!r}"))
+    try:
+        grid = TimeGrid.from_times(settings.start_time, settings.stop_time, settings.step_size)
+    except ValueError as error:
+        problems.append(Problem(str(error), subject=("stop_time",)))
+        if settings.step_size <= 0:
+            return problems
+        grid = TimeGrid.from_times(settings.start_time, settings.start_time, settings.step_size)
+    problems += _find_period_problems(system, grid)
+    problems += _find_recording_problems(settings, grid)
+    problems += _find_event_time_problems(settings.events, grid)
+    return problems
+
+
+def settable_variables(system: System) -> Iterator[tuple[str, Variable]]:
+    """Yield (component, variable) for all variables that can be set during a run."""
+    connected = {connection.target for connection in system.connections}
+    for name, component in system.components.items():
+        for variable in component.variables:
+            if not _not_settable_reason(name, variable, connected):
+                yield name, variable
+
+
+def _not_settable_reason(name: str, variable: Variable, connected: Set[Endpoint]) -> str:
+    """Return why an event cannot set a variable; "" for tunable parameters and for inputs without a connection."""
+    if variable.causality == "input" and any(Endpoint(name, scalar) in connected for scalar in variable.scalar_names):
+        return f"{name}.{variable.name} is fed by a connection, an event cannot set it"
+    if variable.causality != "input" and (variable.causality, variable.variability) != ("parameter", "tunable"):
+        return f"{name}.{variable.name} is neither a tunable parameter nor an input, an event cannot set it"
+    return ""
+
+
+def _find_event_problems(system: System, events: Iterable[Event]) -> Iterator[Problem]:
+    connected = {connection.target for connection in system.connections}
+    for event in events:
+        for name, values in event.values.items():
+            variables = {variable.name: variable for variable in system.components[name].variables}
+            for variable_name in values:
+                if reason := _not_settable_reason(name, variables[variable_name], connected):
+                    yield Problem(reason, event.where)
+
+
+def _find_event_time_problems(events: Iterable[Event], grid: TimeGrid) -> Iterator[Problem]:
+    for event in events:
+        try:
+            grid.index(event.time)
+        except ValueError as error:
+            yield Problem(f"event time {error}", event.where, subject=("events", "time"))
+
+
+def _find_period_problems(system: System, grid: TimeGrid) -> Iterator[Problem]:
+    step, duration = float(grid.step), float(grid.step * grid.count)
+    for name, period in system.periods.items():
+        subject = ("components", name, "period")
+        ratio = period / grid.step
+        if ratio < 1 or ratio.denominator != 1:
+            yield Problem(f"period {float(period)!r} s is no multiple of the step size {step!r} s", subject=subject)
+        elif grid.count % int(ratio):
+            yield Problem(f"the duration {duration!r} s is no multiple of the period {float(period)!r} s", subject=subject)
+
+
+def _find_recording_problems(settings: Settings, grid: TimeGrid) -> Iterator[Problem]:
+    interval = settings.record_interval or grid.step
+    if interval < grid.step or (interval / grid.step).denominator != 1:
+        text = f"recording interval {float(interval)!r} s is no multiple of the step size {float(grid.step)!r} s"
+        yield Problem(text, subject=("record", "interval"))
+    elif text := _disk_space_problem(settings, grid, int(interval / grid.step)):
+        yield Problem(text, subject=("step_size",))
+
+
+def _disk_space_problem(settings: Settings, grid: TimeGrid, every: int) -> str:
+    """Return a message if the recording is larger than the free disk space, else ""."""
+    rows = grid.count // every + 1
+    size = rows * (len(settings.columns) + 1) * _BYTES_PER_VALUE
+    if size < _SIZE_CHECK_THRESHOLD:
+        return ""
+    journal = current_journal()
+    folder = (journal and journal.folder) or Path(tempfile.gettempdir())
+    free = shutil.disk_usage(folder).free
+    signals = f"{len(settings.columns)} signal{'' if len(settings.columns) == 1 else 's'}"
+    text = f"{rows} rows of {signals} take about {size / 1e9:.3g} GB, {free / 1e9:.3g} GB are free in {folder}"
+    return f'{text}; make the step longer, or set "record": {{"interval": ...}}' if size > free else ""

@@ -1,0 +1,67 @@
+"""The steps of a plan as numbered calls."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ..core.component import PreparedCall
+from .component_step import ScheduledStep
+from .iteration import FixedPointIteration, IterationPhase
+from .plan import Loop, Phase, Plan, Step
+from .step_runner import StepRunner
+from .transfer_calls import DelayLine, compile_transfer
+from .transfer_plan import Transfer
+
+
+class Schedule:
+    """Scheduled steps of all phases; their calls are numbered consecutively from 0.
+
+    Attributes:
+        phases: the steps of each phase of the plan, in order.
+    """
+
+    def __init__(self, plan: Plan, runner: StepRunner, delay_lines: Mapping[Transfer, DelayLine]):
+        self._plan, self._runner, self._delay_lines = plan, runner, delay_lines
+        self._steps: list[ScheduledStep] = []
+        self.phases: list[list[ScheduledStep]] = []
+
+    def prepare(self) -> None:
+        """Schedule all phases; the components must be in step mode, since they prepare their calls here."""
+        self.phases = [self._schedule_phase(phase) for phase in self._plan.phases]
+
+    def add_step(self, step: Step, calls: Sequence[PreparedCall]) -> ScheduledStep:
+        """Number the calls of a step, after those of all earlier steps."""
+        first_call = self._steps[-1].first_call + len(self._steps[-1].calls) if self._steps else 0
+        self._steps.append(ScheduledStep(step, calls, first_call))
+        return self._steps[-1]
+
+    def find_call(self, number: int) -> tuple[ScheduledStep, PreparedCall]:
+        """Return the call with this number and the step that it belongs to."""
+        step = next(step for step in reversed(self._steps) if step.first_call <= number)
+        return step, step.calls[number - step.first_call]
+
+    @property
+    def call_names(self) -> list[tuple[str, str]]:
+        """(component, function) of every call, by number."""
+        return [(step.step.name, call.name) for step in self._steps for call in step.calls]
+
+    def _schedule_phase(self, phase: Phase) -> list[ScheduledStep]:
+        steps = [self.add_step(step, self._step_calls(step)) for step in phase.steps]
+        return [*steps, self._schedule_loop(phase.loop)] if phase.loop else steps
+
+    def _step_calls(self, step: Step) -> Sequence[PreparedCall]:
+        return step.component.prepare_step_calls(self._runner.current_time, step.step_size) or [
+            PreparedCall(self._runner.run_python_component, (step,), "do_step")
+        ]
+
+    def _schedule_loop(self, loop: Loop) -> ScheduledStep:
+        """Schedule all iterations of a loop as one call."""
+        phases = [self._iteration_phase(phase) for phase in loop.phases]
+        iteration = FixedPointIteration(loop, self._plan.outputs, phases, self._runner.run_step)
+        step = Step(loop.name, next(iter(loop.components.values())), 1, 0.0)
+        return self.add_step(step, [PreparedCall(self._runner.run_iteration, (iteration,), "iterated step")])
+
+    def _iteration_phase(self, phase: Phase) -> IterationPhase:
+        every_iteration = [compile_transfer(transfer) for transfer in phase.transfers if not transfer.delay]
+        first_iteration = [self._delay_lines[transfer].apply for transfer in phase.transfers if transfer.delay]
+        return IterationPhase(every_iteration, first_iteration, self._schedule_phase(phase))

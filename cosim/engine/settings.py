@@ -1,0 +1,64 @@
+"""Settings of one simulation run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from ..core.system import Endpoint
+from . import ExecutorKind
+from .pacer import LatePolicy
+
+#: called with n before the macro step that starts at communication point n; may wait, and may set variables like an event
+StepHook = Callable[[int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Values that are set at a time, before the macro step that starts there; an event after the stop time has no effect.
+
+    Attributes:
+        time: a communication point (s, exact).
+        values: component -> variable -> value.
+        where: location in the scenario file, for messages.
+    """
+
+    time: Fraction
+    values: Mapping[str, Mapping[str, Any]]
+    where: str = ""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """When and how a system is simulated.
+
+    Attributes:
+        start_time: start time (s, exact).
+        stop_time: stop time (s, exact).
+        step_size: size of a macro step (s, exact).
+        columns: recorded name -> output.
+        record_interval: time between recorded points (s, exact); None: every macro step.
+        events: values to set during the run.
+        executor: kind of the executor.
+        require_finite: a connected output that is NaN or infinite ends the run.
+        real_time: simulated seconds per second of wall time; None: as fast as possible.
+        late: reaction to a step that is more than one step late in real time.
+        step_hook: called before every macro step.
+        rows_file: file for the recorded rows; None: in memory, or in a temporary file if there are very many.
+    """
+
+    start_time: Fraction
+    stop_time: Fraction
+    step_size: Fraction
+    columns: Mapping[str, Endpoint] = field(default_factory=dict)
+    record_interval: Fraction | None = None
+    events: Sequence[Event] = ()
+    executor: ExecutorKind = "auto"
+    require_finite: bool = True
+    real_time: float | None = None
+    late: LatePolicy = "warn"
+    step_hook: StepHook | None = None
+    rows_file: Path | None = None

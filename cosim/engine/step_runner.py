@@ -1,0 +1,125 @@
+"""Execution of scheduled steps from Python, and what a call's status or result means for the run."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import NamedTuple, NoReturn
+
+import numpy as np
+
+from ..core.component import SUCCESS_STATUSES, PreparedCall, StepResult
+from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, describe_exception
+from ..process import float_mode
+from ..process.journal import CALL_NUMBER, STEP_COUNT
+from .component_step import ScheduledStep
+from .iteration import FixedPointIteration
+from .plan import Step
+
+#: status of a call into Python during which a component requested termination; no FMU can return it
+_STATUS_TERMINATION = 1 << 32
+
+
+class Termination(NamedTuple):
+    """A component's request to end the simulation at `time` (s).
+
+    `complete`: the component reached the end of its step, so the macro step counts.
+    """
+
+    component: str
+    time: float
+    complete: bool = True
+
+
+class StepRunner:
+    """Runs scheduled steps call by call, collects the termination request and raises the errors.
+
+    Attributes:
+        current_time: start of the current macro step (s), at an address that the calls share.
+        termination: the request to end the simulation, if any.
+    """
+
+    def __init__(self, marker: np.ndarray):
+        self.current_time = ctypes.c_double()
+        self.termination: Termination | None = None
+        self._marker = marker
+
+    @property
+    def completed_steps(self) -> int:
+        """Number of macro steps completed so far, which is the number of the current one."""
+        return int(self._marker[STEP_COUNT])
+
+    @property
+    def termination_status(self) -> int:
+        """Status of a call into Python: not 0 after a termination request."""
+        return _STATUS_TERMINATION if self.termination else 0
+
+    def run_step(self, step: ScheduledStep, first: int = 0) -> None:
+        """Run the calls of a step, beginning with the call at index `first`.
+
+        Raises:
+            ComponentError: a call failed or changed the floating-point mode.
+        """
+        for number, call in enumerate(step.calls[first:], start=step.first_call + first):
+            self._marker[CALL_NUMBER] = number
+            if (status := call.function(*call.arguments)) not in SUCCESS_STATUSES:
+                self.handle_status(step, call, status)
+        if float_mode.is_changed():
+            self.raise_float_mode_changed(step, step.calls[-1])
+
+    def run_python_component(self, step: Step) -> int:
+        """Run set_inputs, do_step and get_outputs of a component without prepared calls; returns a status.
+
+        Raises:
+            ComponentError: the component raised an exception or did not reach the end of its step.
+        """
+        component = step.component
+        try:  # written out: the context manager `as_component_error` costs as much as the step of some components
+            component.set_inputs()
+            result = component.do_step(self.current_time.value, step.step_size)
+            if result is not None:
+                self._handle_step_result(step, result)
+            component.get_outputs()
+        except (CosimError, *PASS_THROUGH_EXCEPTIONS):
+            raise
+        except BaseException as error:
+            raise ComponentError(step.name, "do_step", describe_exception(error), self.current_time.value) from error
+        return self.termination_status
+
+    def run_iteration(self, iteration: FixedPointIteration) -> int:
+        """Iterate the current macro step of a loop until it converges; returns a status.
+
+        Raises:
+            ComponentError: a component failed, or the iteration did not converge.
+        """
+        earlier_request = self.termination
+
+        def discard_requests() -> None:
+            self.termination = earlier_request
+
+        iteration.step(self.current_time.value, discard_requests)
+        return self.termination_status
+
+    def handle_status(self, step: ScheduledStep, call: PreparedCall, status: int) -> None:
+        """Interpret a status that is neither OK nor a warning.
+
+        Raises:
+            ComponentError: the status means that the call failed.
+        """
+        if status != _STATUS_TERMINATION:
+            self._handle_step_result(step.step, step.step.component.interpret_status(call.name, status))
+
+    def _handle_step_result(self, step: Step, result: StepResult) -> None:
+        time = self.current_time.value
+        if not isinstance(result, StepResult):
+            raise ComponentError(step.name, "do_step", f"returned {result!r}, expected None or a StepResult", time)
+        complete = result.time_reached >= time + step.step_size
+        if result.terminate_requested:
+            if not self.termination or (self.termination.complete and not complete):
+                self.termination = Termination(step.name, result.time_reached, complete)
+        elif not complete:
+            reached = f"reached only t = {result.time_reached!r} s of {time + step.step_size!r} s"
+            raise ComponentError(step.name, "do_step", f"{reached}; early return is not supported", time)
+
+    def raise_float_mode_changed(self, step: ScheduledStep, call: PreparedCall) -> NoReturn:
+        """Raise a ComponentError: `call` changed the floating-point mode."""
+        raise ComponentError(step.step.name, call.name, float_mode.CHANGE_REASON, self.current_time.value)

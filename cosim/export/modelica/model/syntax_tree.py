@@ -1,0 +1,217 @@
+"""Syntax tree of a flat model: expressions and statements as immutable data, with their source locations.
+
+The attribute `where` of a node is its location in the source; it does not take part in comparisons.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal as OneOf
+from typing import NamedTuple, NoReturn, TypeAlias
+
+from ....core.errors import InputError, Problem
+
+
+class SourceLocation(NamedTuple):
+    """A line of a Modelica file."""
+
+    path: Path
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.path}:{self.line}"
+
+    @property
+    def file_and_line(self) -> str:
+        """Location without the folder, so that it does not depend on the machine."""
+        return f"{self.path.name}:{self.line}"
+
+
+def raise_model_error(message: str, where: SourceLocation | None) -> NoReturn:
+    """Raise an InputError for a part of the model that cannot be translated, with its location."""
+    raise InputError(Problem(message, str(where or "")))
+
+
+Expression: TypeAlias = "Literal | Name | Index | Unary | Binary | If | Array | Range | Builtin | Call"
+Statement: TypeAlias = "Assign | MultiAssign | IfStatement | For | Assert | When | EdgeDetector"
+Body: TypeAlias = "tuple[Statement, ...]"
+
+
+@dataclass(frozen=True, slots=True)
+class Literal:
+    """A literal of a predefined type or of an enumeration (its number)."""
+
+    value: float | int | bool | str
+    type: str
+
+    @property
+    def number(self) -> float:
+        """Value of a literal that is not text."""
+        assert not isinstance(self.value, str)
+        return self.value
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """A reference to a variable, a function local, a loop index or `time`."""
+
+    name: str
+    where: SourceLocation | None = field(default=None, compare=False)
+
+
+class Colon(NamedTuple):
+    """The subscript `:`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Index:
+    """A subscripted expression: `a[i, :]`."""
+
+    base: Expression
+    subscripts: tuple[Expression | Colon, ...]
+    where: SourceLocation | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Unary:
+    """A unary operation."""
+
+    operator: OneOf["-", "not"]
+    operand: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Binary:
+    """A binary operation; the operators are those of Modelica, with ".+", ".-", ".*", "./" and ".^" for elementwise ones."""
+
+    operator: str
+    left: Expression
+    right: Expression
+    where: SourceLocation | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class If:
+    """An if-expression: pairs of condition and value, and the value after `else`."""
+
+    branches: tuple[tuple[Expression, Expression], ...]
+    otherwise: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Array:
+    """An array constructor: `{a, b}`."""
+
+    elements: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """A range: `start:stop` or `start:step:stop`."""
+
+    start: Expression
+    step: Expression | None
+    stop: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Builtin:
+    """A call of a built-in function or operator of Modelica: sin, pre, sample, size, ..."""
+
+    name: str
+    arguments: tuple[Expression, ...]
+    where: SourceLocation | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A call of a function of the model, with one argument for each of its inputs."""
+
+    function: str
+    arguments: tuple[Expression, ...]
+    where: SourceLocation | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Assign:
+    """An assignment `target := value`, from an algorithm or from an equation after causality analysis."""
+
+    target: Name | Index
+    value: Expression
+    where: SourceLocation | None = field(default=None, compare=False)
+
+    @property
+    def name(self) -> str:
+        """Name of the variable that is assigned as a whole or in part."""
+        return referenced_variable(self.target)
+
+
+@dataclass(frozen=True, slots=True)
+class MultiAssign:
+    """An assignment of several results of a function: `(a, b[i]) := f(x)`."""
+
+    targets: tuple[Name | Index, ...]
+    call: Call
+    where: SourceLocation | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class IfStatement:
+    """An if-statement: pairs of condition and body, and the body after `else`."""
+
+    branches: tuple[tuple[Expression, Body], ...]
+    otherwise: Body
+    where: SourceLocation | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class For:
+    """A for-loop over a range."""
+
+    index: str
+    range: Range
+    body: Body
+    where: SourceLocation | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Assert:
+    """An `assert` with the level error."""
+
+    condition: Expression
+    message: str
+    where: SourceLocation | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class When:
+    """A when-clause, `when ... elsewhen ... end when`; in an equation section the order of its body has no meaning."""
+
+    branches: tuple[tuple[Expression, Body], ...]
+    where: SourceLocation | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeDetector:
+    """A comparison of a condition with its value at the previous event; sets the flag risen(index) at a rising edge.
+
+    It is inserted by the analysis of when-clauses.
+    """
+
+    index: int
+    condition: Expression
+    where: SourceLocation | None = field(default=None, compare=False)
+
+
+def referenced_variable(target: Expression) -> str:
+    """Return the name of the variable in a reference such as `q` or `q[i]`.
+
+    Raises:
+        TypeError: The expression is not a reference.
+    """
+    while isinstance(target, Index):
+        target = target.base
+    if not isinstance(target, Name):
+        raise TypeError(f"expected a reference, found {target}")
+    return target.name

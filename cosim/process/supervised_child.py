@@ -1,0 +1,57 @@
+"""Child process of a supervisor."""
+
+from __future__ import annotations
+
+import os
+import resource
+import sys
+import tempfile
+from collections.abc import Callable
+from typing import NoReturn
+
+from . import journal as journals
+from .journal import EXIT_CODE, Journal, Phase
+from .sandbox.limits import detach, lower_limit
+from .standard_streams import ignoring_broken_pipe
+
+#: limit of the private memory of a supervised run (bytes); mapped files of rows do not count
+MEMORY_LIMIT = 4 << 30
+
+
+def run_child(entry: Callable[[], int], journal: Journal, output: int, temporary_folder: str, supervisor: int) -> NoReturn:
+    """Run `entry` in this process, which was just forked, and end the process.
+
+    Args:
+        entry: Returns the exit code.
+        journal: Journal in memory that the supervisor reads.
+        output: Descriptor of the pipe for the output of foreign code.
+        temporary_folder: Folder for temporary files.
+        supervisor: Process id of the supervisor.
+    """
+    code = 70
+    try:
+        _isolate(output, supervisor)
+        tempfile.tempdir = os.environ["TMPDIR"] = temporary_folder
+        journals.set_current_journal(journal)
+        code = entry()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        journal[EXIT_CODE] = code
+        journal.enter_phase(Phase.DONE)
+    finally:
+        os._exit(code)  # skips the exit handlers of foreign code
+
+
+def _isolate(output: int, supervisor: int) -> None:
+    """Enter a new session that ends with the supervisor, limit memory, and connect descriptors 1 and 2 to the pipe `output`.
+
+    Python's own output goes to duplicates of the former descriptors. The limit keeps a component that allocates without end from
+    affecting other processes. Core files are not written.
+    """
+    detach(supervisor)
+    lower_limit(resource.RLIMIT_DATA, MEMORY_LIMIT)
+    lower_limit(resource.RLIMIT_CORE, 0)
+    sys.stdout, sys.stderr = ignoring_broken_pipe(sys.stdout, duplicate=True), ignoring_broken_pipe(sys.stderr, duplicate=True)
+    os.dup2(output, 1)
+    os.dup2(output, 2)
+    os.close(output)

@@ -1,0 +1,74 @@
+"""Errors, integrals and step responses of recorded signals."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .result import Result
+
+
+class StepResponse(NamedTuple):
+    """Step response scaled to 0 at the initial value and 1 at the target; both arrays of shape (rows,)."""
+
+    time: np.ndarray
+    fraction: np.ndarray
+
+
+def step_response(
+    result: Result, signal: str, start: float, stop: float, initial: float | None, target: float | None
+) -> StepResponse:
+    """Return the scaled step response.
+
+    Args:
+        result: The run.
+        signal: Name of the signal.
+        start: Time (s) of the first row that counts.
+        stop: Time (s) of the last row that counts.
+        initial: Value before the step; None: value of the first row.
+        target: Value after the step; None: value of the last row.
+
+    Returns:
+        A response without rows if initial value and target are equal.
+    """
+    rows = row_slice(result, start, stop)
+    time, values = result.time[rows], result[signal][rows].astype(np.float64)
+    if not values.size:
+        return StepResponse(time, values)
+    begin = float(values[0]) if initial is None else initial
+    end = float(values[-1]) if target is None else target
+    return StepResponse(time, (values - begin) / (end - begin)) if end != begin else StepResponse(time[:0], values[:0])
+
+
+def row_slice(result: Result, start: float, stop: float) -> slice:
+    """Return the rows with start <= time <= stop (s)."""
+    return slice(int(np.searchsorted(result.time, start, "left")), int(np.searchsorted(result.time, stop, "right")))
+
+
+def control_error(result: Result, signal: str, target: str | float, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return time (s) and error, both of shape (rows,).
+
+    Args:
+        result: The run.
+        signal: Name of the signal.
+        target: A number, or the name of another signal, which is subtracted.
+        start: Time (s) of the first row that counts.
+        stop: Time (s) of the last row that counts.
+    """
+    rows = row_slice(result, start, stop)
+    reference = result[target] if isinstance(target, str) else target
+    return result.time[rows], (result[signal].astype(np.float64) - reference)[rows]
+
+
+def integrate(time: np.ndarray, values: np.ndarray) -> float:
+    """Return the integral over time by the trapezoidal rule, NaN without rows."""
+    return float(np.trapezoid(values, time)) if time.size else math.nan
+
+
+def time_average(time: np.ndarray, values: np.ndarray) -> float:
+    """Return the mean over time by the trapezoidal rule, NaN without rows."""
+    if not time.size:
+        return math.nan
+    return integrate(time, values) / float(time[-1] - time[0]) if time[-1] > time[0] else float(values.mean())

@@ -1,0 +1,21 @@
+"""Views of variables in arrays that hold the values of several variables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from cosim.core.component import Variable
+
+
+def variable_views(
+    variables: Sequence[Variable], arrays: Mapping[np.dtype[Any], np.ndarray]
+) -> Iterator[tuple[Variable, np.ndarray]]:
+    """Yield each variable with a view of its values; each array holds the variables of its dtype in order."""
+    ends = dict.fromkeys(arrays, 0)
+    for variable in variables:
+        first = ends[variable.dtype]
+        ends[variable.dtype] = first + len(variable.scalar_names)
+        yield variable, arrays[variable.dtype][first : ends[variable.dtype]]

@@ -1,0 +1,101 @@
+"""Contact functions (`common/contact_maps.py`) of vessels in the horizontal plane."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import casadi as ca
+
+from cosim.export.equations.model import ContinuousModel
+
+from ..common import kinematics
+from ..common.contact_maps import (
+    contact_impulse,
+    correct_function,
+    correct_symbols,
+    create_symbols,
+    parameters_and_constants,
+    predict_symbols,
+    predicted_state,
+    step_status,
+)
+
+
+@dataclass(frozen=True)
+class PlanarContactMaps:
+    """Contact functions of a vessel in the horizontal plane with the state (x, y, yaw, surge, sway, yaw rate).
+
+    Bullet's body cannot roll or pitch, but it can heave. A load presses it down; the lift that cancels this is predicted from the
+    impulses of the last two steps, and Bullet receives it as an upward velocity. If Bullet finds the same impulse again, the
+    body keeps its height. Of two unequal impulses the weaker one is used, so that an impact does not lift the vessel.
+
+    The argument `vertical_load` holds the downward impulses of the last two steps (N s) and the heave in Bullet (m).
+
+    Attributes:
+        model: Equations of the vessel.
+        mass: Mass of the hull (kg).
+        yaw_inertia: Moment of inertia about the yaw axis, on which the centre of mass lies (kg m2).
+        height: Height of the centre of mass (m, world frame).
+        observe: Function from the state to the published motion.
+    """
+
+    model: ContinuousModel
+    mass: float
+    yaw_inertia: float
+    height: float
+    observe: Callable[[ca.SX], ca.SX]
+
+    def functions(self) -> list[ca.Function]:
+        """Return the functions to export."""
+        return [self._initialize_function(), self._predict_function(), self._correct_function()]
+
+    def _initialize_function(self) -> ca.Function:
+        parameters, constants = parameters_and_constants(self.model)
+        state = self.model.initial_state(constants)
+        twist = _planar_twist(_planar_rotation(state[2]) @ state[3:5], ca.SX(0), state[5])
+        return ca.Function("contact_initialize", [parameters], [constants, state, twist, twist, self._bullet_pose(state)])
+
+    def _predict_function(self) -> ca.Function:
+        arguments = predict_symbols(self.model)
+        state, end, step = arguments[0], predicted_state(self.model, *arguments[:5]), arguments[4]
+        (vertical_load,) = create_symbols(vertical_load=3)
+        rates = (end[0:3] - state[0:3]) / step
+        twist = _planar_twist(rates[0:2], _minmod(vertical_load[0], vertical_load[1]) / self.mass, rates[2])
+        endpoints = ca.vertcat(self.observe(state)[0:3], self.observe(end)[0:3])
+        previous_load = ca.vertcat(vertical_load[0], vertical_load[2])
+        status = step_status(end, endpoints, arguments)
+        results = [state, end, twist, twist, self._bullet_pose(state), previous_load, endpoints, status]
+        return ca.Function("contact_predict", [*arguments, vertical_load], results)
+
+    def _correct_function(self) -> ca.Function:
+        start, predicted, twist, bullet_twist, _, step = arguments = correct_symbols(self.model)
+        (previous_load,) = create_symbols(previous_vertical_load=2)
+        change = bullet_twist - twist
+        velocity = predicted[3:6] + ca.vertcat(_planar_rotation(predicted[2]).T @ change[0:2], change[5])
+        impulse = contact_impulse(ca.norm_2(ca.vertcat(self.mass * change[0:3], self.yaw_inertia * change[5])))
+        pose = start[0:3] + step * ca.vertcat(bullet_twist[0:2], bullet_twist[5])
+        published = ca.vertcat(pose, _planar_rotation(pose[2]).T @ bullet_twist[0:2], bullet_twist[5])
+        vertical_load = ca.vertcat(-self.mass * change[2], previous_load[0], previous_load[1] + bullet_twist[2] * step)
+        corrected = ca.vertcat(pose, velocity)
+        return correct_function(
+            [*arguments, previous_load], impulse, predicted, corrected, self.observe, published, vertical_load
+        )
+
+    def _bullet_pose(self, state: ca.SX) -> ca.SX:
+        q = kinematics.quaternion_about_z(state[2])
+        return ca.vertcat(state[0:2], self.height, q[1:4], q[0])
+
+
+def _planar_twist(horizontal: ca.SX, vertical: ca.SX, yaw_rate: ca.SX) -> ca.SX:
+    return ca.vertcat(horizontal, vertical, 0, 0, yaw_rate)
+
+
+def _minmod(a: ca.SX, b: ca.SX) -> ca.SX:
+    """Return the number with the smaller magnitude, or zero for different signs."""
+    return ca.if_else(a * b > 0, ca.if_else(ca.fabs(a) < ca.fabs(b), a, b), 0)
+
+
+def _planar_rotation(yaw: ca.SX) -> ca.SX:
+    """Return the rotation matrix (2, 2) body to world frame."""
+    return ca.vertcat(ca.horzcat(ca.cos(yaw), -ca.sin(yaw)), ca.horzcat(ca.sin(yaw), ca.cos(yaw)))
