@@ -1,6 +1,7 @@
 """Sensors and faults in the shipped scenarios and in both executors."""
 
 import numpy as np
+import pytest
 
 import cosim
 from cosim.core.component import Component
