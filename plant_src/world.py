@@ -6,7 +6,7 @@ import ctypes
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from .physics.fleet import Fleet, FleetState
 from .scene import replay
 from .variable_views import variable_views
 from .world_settings import WorldSettings
+
+if TYPE_CHECKING:
+    from cosim.results import Result
 
 #: upper limit of a Bullet step (s); a longer `do_step` is split into equal steps
 MAX_BULLET_STEP = 0.01
@@ -97,6 +100,13 @@ class World(Component):
     def scene(name: str, scenario: Mapping[str, Any]) -> dict[str, Any]:
         """Return the scene of the 3-D replay, see `scene.replay`."""
         return replay.world_scene(name, scenario)
+
+    @staticmethod
+    def video_frames(result: Result, camera: str, times: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray]:
+        """Render the frames of a video, see `scene.video`."""
+        from .scene.video import frames
+
+        return frames(result, camera, times, size)
 
     def _populate(self, settings: WorldSettings) -> None:
         names = {create_platform(self._client, platform): f"platforms.{platform.name}" for platform in settings.platforms}

@@ -125,6 +125,11 @@ def test_cosim_knows_no_vehicle_and_no_bullet():
         assert not {"pybullet", "plant_src"} & {module.split(".")[0] for module in modules}, path
 
 
+def test_only_the_build_names_files_of_the_plant():
+    named = [path for path in sources("cosim") if "plant_src" in path.read_text()]
+    assert {module_name(path) for path in named} <= {"cosim.export.sources"}
+
+
 def test_only_fmi_components_and_export_use_fmpy():
     users = {layer(module_name(path)) for path in sources("cosim") if "fmpy" in path.read_text() and imports(path, "fmpy")}
     assert users <= {"components", "export"}

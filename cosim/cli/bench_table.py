@@ -1,4 +1,4 @@
-"""The table that shows a candidate's KPIs beside those of others."""
+"""Table of a candidate's KPIs and those of the runs it is compared with."""
 
 from __future__ import annotations
 
@@ -16,9 +16,11 @@ _COLOURS = {"better": "[green]better[/]", "worse": "[red]worse[/]", "": ""}
 
 
 def print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:
-    """One line for each KPI: numbers of the candidate, the shipped controller and the last run, which are better, and checks.
+    """Print one line per KPI: values of the candidate, of the shipped controller and of the last run, verdicts and checks.
 
-    Prints nothing when there are no KPIs; colours as `cosim.report.tables.print_kpis`.
+    Args:
+        rows: the KPIs; without any, nothing is printed.
+        candidate: name of the candidate.
     """
     from rich import box
     from rich.console import Console

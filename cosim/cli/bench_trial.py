@@ -1,4 +1,4 @@
-"""A candidate and a shipped controller in the same scenario, and what is to be said about them."""
+"""Trials of a candidate and of the shipped controller in the same scenario."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ControllerTrial:
-    """A scenario with the candidate in it, the original, and the folders for the results of both."""
+    """Scenario with the candidate, the original scenario, and the output directories of both."""
 
     file: Path
     original: Path
@@ -25,14 +25,14 @@ class ControllerTrial:
     shipped_folder: Path
 
     def run(self) -> TrialResult:
-        """Run the scenario with the candidate."""
+        """Run the scenario with the candidate and return the result."""
         from ..studies.controller_bench.score import RunKpis
 
         last = RunKpis.read(self.candidate_folder)
         return TrialResult(self, Regression(self.file, self.candidate_folder, update=False).run(), last)
 
     def run_shipped(self) -> None:
-        """Run the original, unless what the last run of it has left is what it would be again."""
+        """Run the original scenario unless the results of its last run are up to date."""
         from ..studies.controller_bench.score import is_current
 
         if not is_current(self.shipped_folder, self.original):
@@ -41,7 +41,7 @@ class ControllerTrial:
 
 @dataclass(frozen=True)
 class TrialResult:
-    """The candidate's outcome in a scenario, and what its run before this one had left."""
+    """Outcome of the candidate in a scenario, and the KPIs of its previous run."""
 
     trial: ControllerTrial
     outcome: RegressionOutcome
@@ -49,18 +49,19 @@ class TrialResult:
 
     @property
     def name(self) -> str:
+        """Name of the scenario."""
         return self.trial.file.stem
 
     def rows(self) -> list[KpiComparison]:
-        """The KPIs, none when the run did not come to its end."""
+        """Return the compared KPIs; none if the run did not reach its end."""
         from ..studies.controller_bench.score import RunKpis, compare_kpis
 
-        scores = RunKpis.read(self.trial.candidate_folder) if self.outcome.code in (0, 3) else None
+        kpis = RunKpis.read(self.trial.candidate_folder) if self.outcome.code in (0, 3) else None
         checks = json.loads(self.trial.file.read_text(encoding="utf-8"))["checks"]
-        return compare_kpis(scores, RunKpis.read(self.trial.shipped_folder), self.previous, checks) if scores else []
+        return compare_kpis(kpis, RunKpis.read(self.trial.shipped_folder), self.previous, checks) if kpis else []
 
 
 def run_trials(trials: Sequence[ControllerTrial], jobs: int) -> Iterator[TrialResult]:
-    """All flights in order, each as soon as it and the shipped controller's have ended; `jobs` run at a time."""
+    """Run all trials, `jobs` at a time; yield the results in order, as soon as both controllers have run."""
     work: list[Callable[[], TrialResult | None]] = [each for trial in trials for each in (trial.run_shipped, trial.run)]
-    return (flight for flight in run_in_parallel(work, jobs) if flight)
+    return (result for result in run_in_parallel(work, jobs) if result)

@@ -1,4 +1,4 @@
-"""`cosim run --view`: the page of a run while it goes on."""
+"""`cosim run --view`: live page of a run."""
 
 from __future__ import annotations
 
@@ -18,71 +18,82 @@ if TYPE_CHECKING:
     from ..report.live.control import LiveControl
     from ..scenario import PreparedRun
 
-#: simulated seconds per second, unless `--real-time` says otherwise: what runs as fast as it can is over before it is seen
+#: simulated seconds per second of wall time without `--real-time`; at full speed a run ends before it can be seen
 _DEFAULT_SPEED = 1.0
 
 _view = click.option(
     "--view",
     is_flag=True,
-    help="Show the run while it goes on, on a page for this machine's browser: pause, step, set its speed, tunable parameters "
-    "and unconnected inputs. Begins in real time, or at the FACTOR of --real-time.",
+    help="Show the run live in a browser on this machine: pause, step, set the speed, tunable parameters and unconnected "
+    "inputs. Starts in real time, or with the FACTOR of --real-time.",
 )
-_port = click.option("--view-port", type=click.IntRange(0, 65535), default=0, help="Port of that page; default: any free one.")
+_port = click.option(
+    "--view-port", type=click.IntRange(0, 65535), default=0, help="Port of the live page; default: any free port."
+)
 
 
 def view_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Whether and where the run is shown: `view` and `view_port`."""
+    """Add the options `--view` and `--view-port` to a command."""
     return _view(_port(command))
 
 
 def check_view_options(isolation: str, sandbox: str | None, late: str) -> None:
-    """Raises UsageError when a run under these conditions cannot be shown."""
+    """Raise UsageError if these options exclude a live view."""
     from ..process.supervisor import can_supervise
 
     if isolation == "none" or not can_supervise():
-        raise click.UsageError("--view shows a supervised run: it does not go with --isolation none, nor where there is none")
+        raise click.UsageError(
+            "--view requires a supervised run: it cannot be combined with --isolation none, and needs a platform with supervision"
+        )
     if sandbox == "strict":
-        raise click.UsageError("--view needs the network of this machine, which --sandbox strict takes away")
+        raise click.UsageError("--view requires a network connection to the browser, which --sandbox strict blocks")
     if late == "fail":
-        raise click.UsageError("--late fail does not go with --view: whoever looks may stop the clock")
+        raise click.UsageError("--view cannot be combined with --late fail: the user may pause the run")
 
 
 def run_with_view(
-    run: Callable[[Connection], int], isolation: str, salvage: Callable[[SupervisedOutcome], None], port: int
+    run: Callable[[Connection], int], isolation: str, save_partial: Callable[[SupervisedOutcome], None], port: int
 ) -> int:
-    """Do as `supervision.protected` while the page is served; `run` gets the pipe that commands come through."""
+    """Run a command in a supervised child process while this process serves the live page.
+
+    Args:
+        run: the command's work in the child; receives the connection to the page and returns the exit code.
+        isolation: value of `--isolation`.
+        save_partial: see `run_supervised_command`.
+        port: port of the page; 0: any free port.
+    """
     from ..process.temporary_folders import temporary_run_folder
     from ..report.live.live_view import LiveView, has_display, open_browser
 
-    viewing = LiveView(port)
-    click.echo(f"live view: {viewing.url}")
+    view = LiveView(port)
+    click.echo(f"live view: {view.url}")
     with temporary_run_folder() as folder:
         if has_display():
-            open_browser(viewing.url, Path(folder))
-        return supervision.run_supervised_command(lambda: run(viewing.open_in_child()), isolation, salvage, viewing.serve)
+            open_browser(view.url, Path(folder))
+        return supervision.run_supervised_command(lambda: run(view.open_in_child()), isolation, save_partial, view.serve)
 
 
-def create_control(assembly: PreparedRun, link: Connection) -> LiveControl:
-    """What steers a run from the other end of `link`."""
+def create_control(prepared: PreparedRun, link: Connection) -> LiveControl:
+    """Return the control that executes the page's commands, which arrive through `link`."""
     from ..core.time_grid import TimeGrid
     from ..report.live.control import LiveControl
     from ..report.scene import build_scene
 
-    settings, value = assembly.settings, assembly.document.value
+    settings, value = prepared.settings, prepared.document.value
     grid = TimeGrid.from_times(settings.start_time, settings.stop_time, settings.step_size)
     every = int((settings.record_interval or grid.step) / grid.step)
     about = {
-        "name": assembly.spec.name,
-        "description": assembly.spec.description,
-        "scene": build_scene({"scenario": value, "scenario_file": str(assembly.document.file.resolve())}),
+        "name": prepared.spec.name,
+        "description": prepared.spec.description,
+        "scene": build_scene({"scenario": value, "scenario_file": str(prepared.document.file.resolve())}),
         "rows": grid.count // every + 1,
         "stop_time": float(settings.stop_time),
     }
-    return LiveControl(link, assembly.system, grid, settings.real_time or _DEFAULT_SPEED, about)
+    return LiveControl(link, prepared.system, grid, settings.real_time or _DEFAULT_SPEED, about)
 
 
-def with_control(assembly: PreparedRun, control: LiveControl | None) -> PreparedRun:
-    """The same to run with a control, which keeps pace itself."""
+def with_control(prepared: PreparedRun, control: LiveControl | None) -> PreparedRun:
+    """Return the run with `control` as step hook; the control also paces the run, in place of `real_time`."""
     if control is None:
-        return assembly
-    return replace(assembly, settings=replace(assembly.settings, real_time=None, step_hook=control))
+        return prepared
+    return replace(prepared, settings=replace(prepared.settings, real_time=None, step_hook=control))

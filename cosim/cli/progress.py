@@ -1,4 +1,4 @@
-"""The progress bar of commands that take a while."""
+"""Progress bar of long commands."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def progress_bar(description: str) -> Iterator[Callable[[int, int], None] | None]:
-    """What to tell (finished, total) on a terminal; None elsewhere."""
+    """Show a progress bar and yield the function that updates it with (finished, total); None without a terminal."""
     if not sys.stderr.isatty():
         yield None
         return

@@ -1,4 +1,4 @@
-"""`--sandbox strict`: the same command once more inside bubblewrap, while this process only waits for it."""
+"""`--sandbox strict`: the same command in a child process inside bubblewrap, for which this process only waits."""
 
 from __future__ import annotations
 
@@ -15,22 +15,25 @@ from typing import IO
 
 import click
 
-#: kinds of sandbox; `--sandbox` alone is the first one
+from . import current_command_line
+
+#: kinds of sandbox; `--sandbox` without a value selects the first
 SANDBOX_KINDS = ("default", "strict")
 
 _INSIDE_VARIABLE = "COSIM_INSIDE_STRICT_SANDBOX"
 
-#: where programs put what they make for themselves
+#: variables that name folders for a program's own files
 _HOME_VARIABLES = ("TMPDIR", "HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME")
 
-#: programs (compilers for Modelica sources), shared libraries and fonts; they hold nothing private and nobody listens there
+#: programs (compilers for Modelica sources), shared libraries and fonts; without private files and sockets
 _SYSTEM_PATHS = ("/usr", "/bin", "/lib", "/lib64", "/etc/ld.so.cache", "/etc/alternatives", "/etc/fonts")
 
 
 class SandboxCommand(click.Command):
-    """A command whose `--sandbox` may stand alone, also before an argument."""
+    """Command whose option `--sandbox` has an optional value, even before an argument."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments after adding the default value to a bare `--sandbox`."""
         return super().parse_args(ctx, list(_with_explicit_kind(args)))
 
 
@@ -40,13 +43,20 @@ def _with_explicit_kind(words: list[str]) -> Iterator[str]:
 
 
 def must_rerun(sandbox: str | None) -> bool:
-    """Whether the command has to go into the sandbox yet."""
+    """Return whether the command must be run again inside the strict sandbox."""
     return sandbox == "strict" and _INSIDE_VARIABLE not in os.environ
 
 
 def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
-    """Run this command again where it sees only the folders of `files` and what Python needs, and writes only to the folder
-    `output`; returns its exit code. Raises InputError when bubblewrap cannot do that."""
+    """Run this command again inside bubblewrap and return its exit code.
+
+    Args:
+        files: files whose folders the command may read, in addition to those of Python and cosim.
+        output: the only folder that the command may write, apart from a temporary one; None: no other.
+
+    Raises:
+        InputError: if bubblewrap is missing or cannot start the command.
+    """
     from ..core.errors import InputError
     from ..process.sandbox import bubblewrap_command
     from ..process.supervisor import interrupt_on_termination
@@ -58,53 +68,53 @@ def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
         reader, writer = os.pipe()
         status = stack.enter_context(os.fdopen(reader))
         with os.fdopen(writer):
-            python = [sys.executable, "-P", "-m", "cosim", *click.get_current_context().find_root().obj]
+            python = [sys.executable, "-P", "-m", "cosim", *current_command_line().arguments]
             writable = [temporary, *([output] if output else [])]
             words = bubblewrap_command(python, _readable_folders(files), writable, status=writer)
             if output:
                 stack.enter_context(_output_folder(output))
-            own = dict.fromkeys(_HOME_VARIABLES, str(temporary))
+            homes = dict.fromkeys(_HOME_VARIABLES, str(temporary))
             process = subprocess.Popen(  # noqa: S603
-                words, pass_fds=[writer], env={**os.environ, **own, _INSIDE_VARIABLE: "1"}, start_new_session=True
+                words, pass_fds=[writer], env={**os.environ, **homes, _INSIDE_VARIABLE: "1"}, start_new_session=True
             )
-        told = _wait_for_exit(process, status)
-    if "exit-code" not in told:
+        report = _wait_for_exit(process, status)
+    if "exit-code" not in report:
         raise InputError(f"bubblewrap could not start the command (exit code {process.returncode})")
-    return int(told["exit-code"])
+    return int(report["exit-code"])
 
 
 @contextmanager
 def _output_folder(path: Path) -> Iterator[None]:
-    """A folder for results; what is new of it goes again when nothing was written there."""
+    """Create the output directory; afterwards, remove the folders created for it if they are empty."""
     from ..results.files import check_writable
 
-    new = [folder for folder in (path, *path.parents) if not folder.exists()]
+    created = [folder for folder in (path, *path.parents) if not folder.exists()]
     check_writable(path)
     yield
     with suppress(OSError):
-        for folder in new:
+        for folder in created:
             folder.rmdir()
 
 
 def _wait_for_exit(process: subprocess.Popen[bytes], status: IO[str]) -> dict[str, int]:
-    """What bubblewrap tells until the end; interrupts are passed on to the command, which ends in order."""
-    told: dict[str, int] = {}
+    """Return the status that bubblewrap reports until it exits; forward interrupts to the command, which ends cleanly."""
+    report: dict[str, int] = {}
     while True:
         try:
             while line := status.readline():
-                told |= json.loads(line)
+                report |= json.loads(line)
             process.wait()
-            return told
+            return report
         except KeyboardInterrupt:
             with suppress(ProcessLookupError):
-                os.kill(told.get("child-pid", process.pid), SIGINT)
+                os.kill(report.get("child-pid", process.pid), SIGINT)
 
 
 def _readable_folders(files: Iterable[Path]) -> list[Path]:
-    """Folders of the files, those that links lead to, too, and of Python and of what is shipped."""
+    """Return the folders of the files, also of link targets, and those of Python, of the system and of cosim."""
     from ..core import resources
     from ..process.sandbox import interpreter_folders
 
     named = [Path(path) for file in files for path in (os.path.abspath(file), os.path.realpath(file))]  # noqa: PTH100
-    own = [*map(Path, _SYSTEM_PATHS), resources.root()]
-    return [path for path in (*interpreter_folders(), *own, *(file.parent for file in named)) if path.exists()]
+    system = [*map(Path, _SYSTEM_PATHS), resources.root()]
+    return [path for path in (*interpreter_folders(), *system, *(file.parent for file in named)) if path.exists()]

@@ -1,8 +1,7 @@
-"""What `cosim sweep` and `cosim tune` have in common: engines and progress."""
+"""Common parts of `cosim sweep` and `cosim tune`: options, run store, runner, progress and tables."""
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -12,76 +11,90 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..core.processors import available_processors
+
 if TYPE_CHECKING:
     from ..studies.execution.job import Record
     from ..studies.execution.run_store import RunStore
     from ..studies.study import CheckingRunner, Study
 
-#: without a terminal a line of progress is printed so often (s)
+#: time between two lines of progress without a terminal (s)
 _LINE_INTERVAL = 30.0
 
 _workers = click.option(
-    "--workers", type=click.IntRange(min=1), help="Runs at a time on this machine; default: one per processor."
+    "--workers", type=click.IntRange(min=1), help="Number of runs at a time on this machine; default: one per processor."
 )
 _scheduler = click.option(
-    "--scheduler", metavar="tcp://HOST:PORT", help="Run on the Dask cluster of this scheduler (extra `cluster`)."
+    "--scheduler", metavar="tcp://HOST:PORT", help="Run on the Dask cluster with this scheduler (extra `cluster`)."
 )
-_retry = click.option("--retry-failed", is_flag=True, help="Run again what failed in an earlier call.")
+_retry = click.option("--retry-failed", is_flag=True, help="Repeat the runs that failed in an earlier call.")
 
 
 def study_options(command: Callable[..., int]) -> Callable[..., int]:
-    """Where runs are made."""
+    """Add the options `--workers`, `--scheduler` and `--retry-failed` to a command."""
     return _workers(_scheduler(_retry(command)))
 
 
 def open_run_store(folder: Path, retry: bool) -> RunStore:
-    """The finished runs of a folder; says how many of them cannot be read."""
+    """Open the store of finished runs in a folder and report how many of its lines are unreadable.
+
+    Args:
+        folder: the output directory.
+        retry: treat failed runs as not finished.
+
+    Raises:
+        InputError: if the folder cannot be used.
+    """
     from ..results.files import check_writable
     from ..studies.execution.run_store import RunStore
 
     check_writable(folder)
-    found = RunStore(folder, retry)
-    if found.unreadable_lines:
-        click.echo(f"unreadable lines in {found.path}, whose runs are made again: {found.unreadable_lines}", err=True)
-    return found
+    run_store = RunStore(folder, retry)
+    if count := run_store.unreadable_lines:
+        lines = "1 unreadable line" if count == 1 else f"{count} unreadable lines"
+        click.echo(f"{run_store.path}: {lines}; the missing runs are repeated", err=True)
+    return run_store
 
 
 def create_runner(study: Study, workers: int | None, scheduler: str | None) -> CheckingRunner:
-    """The engine that the options ask for."""
+    """Return the runner for the options `--workers` and `--scheduler`."""
     if scheduler is None:
         from ..studies.execution.local import LocalRunner
 
         return LocalRunner(study.context, workers or available_processors())
     if workers is not None:
-        raise click.UsageError("--workers counts processes of this machine, a --scheduler has its own")
+        raise click.UsageError("--workers is the number of processes on this machine; it cannot be combined with --scheduler")
     from ..studies.cluster import ClusterRunner
 
     return ClusterRunner(study, scheduler)
 
 
-def available_processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 class StudyProgress:
-    """Counts runs, and says now and then how many there are, how many a second, and how long the rest takes."""
+    """Counter of finished runs that shows their number, rate and remaining time."""
 
     def __init__(self, total: int, show: Callable[[str, int], None]):
-        self._total, self._show, self._began = total, show, time.monotonic()
-        self.finished = self.failed = self._before = 0
+        """Start to count.
 
-    def start(self, done: int) -> None:
-        """So many were there already."""
-        self._before = done
+        Args:
+            total: number of runs of the study.
+            show: called with a text and the number of finished runs.
+        """
+        self._total, self._show, self._began = total, show, time.monotonic()
+        self.finished = self.failed = self._earlier = 0
+
+    def start(self, earlier: int) -> None:
+        """Set the number of runs that an earlier call has finished."""
+        self._earlier = earlier
 
     def __call__(self, record: Record) -> None:
+        """Count a finished run and show the progress."""
         self.finished += 1
         self.failed += bool(record.failure)
-        self._show(self.text(time.monotonic() - self._began), self._before + self.finished)
+        self._show(self.text(time.monotonic() - self._began), self._earlier + self.finished)
 
     def text(self, seconds: float) -> str:
-        """ "120 of 1000 runs, 3 failed, 7.5 per second, 2 min left"."""
-        done = self._before + self.finished
+        """Return the progress, such as "120 of 1000 runs, 3 failed, 7.5 per second, 2 min left"."""
+        done = self._earlier + self.finished
         rate = self.finished / max(seconds, 1e-9)
         left = format_duration((self._total - done) / rate) if rate else "?"
         failed = f", {self.failed} failed" if self.failed else ""
@@ -89,7 +102,7 @@ class StudyProgress:
 
 
 def format_duration(seconds: float) -> str:
-    """ "45 s", "12 min" or "3.5 h"."""
+    """Return a duration such as "45 s", "12 min" or "3.5 h"."""
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
@@ -97,7 +110,7 @@ def format_duration(seconds: float) -> str:
 
 @contextmanager
 def show_progress(total: int) -> Iterator[StudyProgress]:
-    """A bar on a terminal, lines elsewhere."""
+    """Show the progress of `total` runs: as a bar on a terminal, else as lines."""
     if not sys.stderr.isatty():
         yield StudyProgress(total, _ProgressLines())
         return
@@ -111,17 +124,19 @@ def show_progress(total: int) -> Iterator[StudyProgress]:
 
 
 class _ProgressLines:
+    """Printer of progress that prints a line at most every 30 s."""
+
     def __init__(self) -> None:
         self._last = time.monotonic()
 
-    def __call__(self, text: str, done: int) -> None:
+    def __call__(self, text: str, _done: int) -> None:
         if time.monotonic() - self._last > _LINE_INTERVAL:
             self._last = time.monotonic()
             click.echo(text, err=True)
 
 
 def print_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """A table whose first column is text, the others numbers."""
+    """Print a table whose first column is text; the others are numbers."""
     from rich import box
     from rich.console import Console
     from rich.markup import escape

@@ -1,4 +1,4 @@
-"""Commands that run foreign code do it in a supervised child process."""
+"""Execution of a command in a supervised child process, which protects it from crashes of foreign code."""
 
 from __future__ import annotations
 
@@ -11,32 +11,33 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..core.errors import CosimError
-from . import run_guarded
+from . import current_command_line, run_guarded
 from .strict_sandbox import SANDBOX_KINDS
 
 if TYPE_CHECKING:
     from ..core.recording import Recording
     from ..process.journal import Journal
     from ..process.supervisor import SupervisedOutcome
+    from ..scenario.schema import DeadlinesSpec
 
 _isolation = click.option(
     "--isolation",
     type=click.Choice(["run", "fmu", "none"]),
     default="run",
     show_default=True,
-    help="Run in a supervised child process, every FMU in one of its own, too, or in this process.",
+    help="run: in a supervised child process; fmu: also each FMU in its own process; none: in this process.",
 )
 _sandbox = click.option(
     "--sandbox",
     type=click.Choice(SANDBOX_KINDS),
     metavar="[strict]",
-    help="Every FMU in a process of its own that reads only its own files, writes only to a temporary folder, has no network; "
-    "with `strict` the whole command sees only the files it needs and writes only its results (needs bubblewrap).",
+    help="Run each FMU in its own process that reads only its own files, writes only to a temporary folder and has no network. "
+    "strict: also confine the whole command to the files it needs and to its output directory (requires bubblewrap).",
 )
 
 
 def supervision_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Where foreign code runs: `isolation` and `sandbox`."""
+    """Add the options `--isolation` and `--sandbox` to a command."""
     return _isolation(_sandbox(command))
 
 
@@ -46,16 +47,24 @@ def run_supervised_command(
     save_partial: Callable[[SupervisedOutcome], None],
     while_running: Callable[[Journal], AbstractContextManager[object]] = nullcontext,
 ) -> int:
-    """Run a command's work and return its exit code; when the child could not save its rows, `salvage` does. `beside` is what
-    this process does while there is a child.
+    """Run a command in a supervised child process and return its exit code.
 
-    Raises ComponentError for the component that was to blame, KeyboardInterrupt when the user ended the child.
+    Args:
+        entry: the command's work; returns the exit code.
+        isolation: value of `--isolation`; with "none", `entry` is called in this process.
+        save_partial: called if the child left files of an unfinished run, to save the rows recorded until then.
+        while_running: context of this process while the child runs.
+
+    Raises:
+        ComponentError: if the child crashed or exceeded a deadline; names the responsible component.
+        KeyboardInterrupt: if the user interrupted the child.
     """
     from ..process.supervisor import can_supervise, run_supervised
 
     if isolation == "none" or not can_supervise():
         return entry()
-    outcome = run_supervised(lambda: run_guarded(entry), while_running)
+    command_line = current_command_line()
+    outcome = run_supervised(lambda: run_guarded(entry, command_line), while_running)
     if outcome.warning:
         click.echo(f"WARNING {outcome.warning}", err=True)
     folder = outcome.journal.folder
@@ -68,10 +77,10 @@ def run_supervised_command(
     return outcome.exit_code
 
 
-def _save_partial(outcome: SupervisedOutcome, salvage: Callable[[SupervisedOutcome], None], folder: Path) -> None:
-    """What the child has reported itself, such as a full disk, is not said again."""
+def _save_partial(outcome: SupervisedOutcome, save_partial: Callable[[SupervisedOutcome], None], folder: Path) -> None:
+    """Save the rows of an unfinished run; errors that the child has reported itself, such as a full disk, are not repeated."""
     try:
-        salvage(outcome)
+        save_partial(outcome)
     except CosimError as error:
         if outcome.failure or outcome.interrupted:
             click.echo(str(error), err=True)
@@ -80,7 +89,7 @@ def _save_partial(outcome: SupervisedOutcome, salvage: Callable[[SupervisedOutco
 
 
 def results_written(code: int) -> int:
-    """All results are written and the outcome is certain: what components do from now on cannot change it."""
+    """Record the final exit code in the journal: later failures of components no longer change it; return the code."""
     from ..process.journal import EXIT_CODE, Phase, current_journal
 
     if journal := current_journal():
@@ -89,8 +98,8 @@ def results_written(code: int) -> int:
     return code
 
 
-def set_deadlines(deadlines: Any) -> None:
-    """Deadlines of a scenario for the supervisor."""
+def set_deadlines(deadlines: DeadlinesSpec) -> None:
+    """Announce the deadlines of a scenario to the supervisor."""
     from ..process.journal import Deadlines, current_journal
 
     if journal := current_journal():
@@ -98,7 +107,7 @@ def set_deadlines(deadlines: Any) -> None:
 
 
 def recover_outcome_recording(outcome: SupervisedOutcome) -> Recording:
-    """What was recorded by a child that has come to a bad end."""
+    """Return the rows that a crashed or interrupted child recorded."""
     from ..process.run_files.folder import recover_recording
 
     return recover_recording(outcome.journal.folder, outcome.row_count)

@@ -10,7 +10,7 @@ import numpy as np
 from ..core.errors import ComponentError
 from ..process.journal import MARKER_SIZE, ROW_COUNT
 from .finite_check import FiniteCheck
-from .initialization import initialize_components, instantiate_components
+from .initialization import initialize_components
 from .parallel import MEASURED_STEPS, ParallelSteps
 from .plan import Plan
 from .recorder import Recorder
@@ -54,14 +54,6 @@ class Executor(ABC):
     def call_names(self) -> list[tuple[str, str]]:
         """(component, function) of every call, by its number in the marker."""
         return self._schedule.call_names
-
-    def instantiate(self) -> None:
-        """Bind all components to their arrays and instantiate them; FMUs are extracted and loaded here.
-
-        Raises:
-            ComponentError: a component failed.
-        """
-        instantiate_components(self.plan)
 
     def initialize(self) -> None:
         """Bring the components from instantiated to step mode, and record the initial outputs as row 0.

@@ -6,7 +6,6 @@ changes a value. Python components are excluded, since they would wait for each 
 
 from __future__ import annotations
 
-import os
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from ..core.component import NativeDoStep, PreparedCall
 from ..core.errors import join_alternatives
+from ..core.processors import available_processors
 from ..core.system import Parallel
 from .component_step import ScheduledStep, run_due
 from .plan import Phase, Step
@@ -78,11 +78,6 @@ def _balance_load(
 def releases_gil(step: ScheduledStep) -> bool:
     """Return whether the step runs in C without the interpreter lock."""
     return any(isinstance(call.native, NativeDoStep) for call in step.calls)
-
-
-def available_processors() -> int:
-    """Return the number of processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class ParallelSteps:

@@ -21,6 +21,7 @@ from ..process.float_mode import default_float_mode
 from ..process.journal import MARKER_SIZE, Phase, calling_component, current_journal, suspending_deadline
 from ..process.process_state import restoring_process_state
 from . import Executor, Recorder, Termination, compile_plan, executor_class
+from .initialization import instantiate_components
 from .pacer import Pacer
 from .run_checks import find_problems
 from .saving_recorder import SavingRecorder, write_header
@@ -144,7 +145,7 @@ def _run_executor(executor: Executor, settings: Settings, observers: Sequence[Ob
     failure = None
     try:
         with watch.measure("instantiate_seconds"):
-            executor.instantiate()
+            instantiate_components(executor.plan)
         with watch.measure("initialize_seconds"):
             executor.initialize()
         if journal and journal.folder:
@@ -179,7 +180,10 @@ def _step_to_end(
     components, count = executor.plan.system.components, executor.plan.grid.count
     observed = set(range(0, count, max(1, count // 100))) if observers else set()
     for stop in sorted({*(n for n in events if n < count), *observed, count}):
-        _advance_to(executor, stop, pacer, step_hook)
+        if pacer or step_hook:
+            _run_in_single_steps(executor, stop, pacer, step_hook)
+        else:
+            executor.run(stop)
         for observe in observers:
             observe(executor.completed_steps, count)
         if executor.termination:
@@ -188,11 +192,8 @@ def _step_to_end(
             _apply_event(event, components)
 
 
-def _advance_to(executor: Executor, stop: int, pacer: Pacer | None, step_hook: StepHook | None) -> None:
-    """Run until communication point `stop`, or until a component requests termination."""
-    if pacer is None and step_hook is None:
-        executor.run(stop)
-        return
+def _run_in_single_steps(executor: Executor, stop: int, pacer: Pacer | None, step_hook: StepHook | None) -> None:
+    """Run until communication point `stop` or until a component requests termination, with hook and pacer at every step."""
     for n in range(executor.completed_steps + 1, stop + 1):
         if step_hook:
             step_hook(n - 1)

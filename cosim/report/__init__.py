@@ -1,1 +1,1 @@
-"""What people look at: figures, tables and pages made from results."""
+"""Presentation of results: figures, tables, videos and HTML pages."""

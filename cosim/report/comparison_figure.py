@@ -1,4 +1,4 @@
-"""The picture of a comparison: the worst signals, their tubes, and where they leave them."""
+"""Figure of a comparison with a reference: the signals with the largest deviations and their tolerance tubes."""
 
 from __future__ import annotations
 
@@ -11,14 +11,22 @@ from ..results import Result
 from ..results.comparison import Comparison, Tolerance, Verdict
 from ..results.comparison.comparison import Comparer, match_tolerances
 
-WIDTH, HEIGHT = 7.16, 1.7  # in: a page, each signal
+WIDTH, HEIGHT = 7.16, 1.7  # in, of the figure and of each panel
 OUTSIDE_COLOUR = "#D55E00"
 
 
 def draw_tubes(
     result: Result, reference: Result, tolerances: Mapping[str, Tolerance], comparison: Comparison, max_signals: int = 4
 ) -> Figure:
-    """The `most` signals of `comparison` that are farthest out of their tubes, or nearest to leaving them, over time (s)."""
+    """Draw the signals with the largest deviations over time, a panel each, with their tolerance tubes.
+
+    Args:
+        result: The result that was compared.
+        reference: The reference.
+        tolerances: Tolerances by pattern of signal names.
+        comparison: The outcome of the comparison.
+        max_signals: The largest number of panels.
+    """
     worst = [verdict for verdict in comparison.worst if reference[verdict.signal].dtype != object][:max_signals]
     figure = Figure(figsize=(WIDTH, HEIGHT * max(len(worst), 1)), layout="constrained")
     if not worst:

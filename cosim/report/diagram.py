@@ -1,4 +1,4 @@
-"""The system as a diagram: components in the order of their stages from left to right, and what flows between them."""
+"""Layout of the system diagram: components in the order of their stages from left to right, and their connections."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN, LANE = 152.0, 52.0, 70.0, 34.0, 44.0, 14.0  # px
-FRAME_GAP = 12.0  # px between a frame and what it holds
+FRAME_GAP = 12.0  # px between a frame and its components
 FRAME_ROWS = 0.2  # rows above and below a nested system, for its frame
 MAX_TITLE_LENGTH, MAX_ORIGIN_LENGTH = 20, 25  # characters
-MAX_TOOLTIP_LINES = 40  # lines of a tool tip
+MAX_TOOLTIP_LINES = 40
 
 
 @dataclass(frozen=True)
 class Box:
-    """A component: its place (px, of the upper left corner), and what is written on it."""
+    """Box of a component: the position of its upper left corner (px) and its texts."""
 
     name: str
     x: float
@@ -27,7 +27,7 @@ class Box:
 
 
 class Frame(NamedTuple):
-    """A nested system around its components."""
+    """Frame of a nested system around its components (px)."""
 
     name: str
     x: float
@@ -37,7 +37,7 @@ class Frame(NamedTuple):
 
 
 class Wire(NamedTuple):
-    """All connections from one component to another: a path, where their number is written, and what they are."""
+    """Line for all connections from one component to another: SVG path, position (px) of the number of connections, texts."""
 
     path: str
     x: float
@@ -48,7 +48,7 @@ class Wire(NamedTuple):
 
 @dataclass(frozen=True)
 class Diagram:
-    """What the template draws (px)."""
+    """All elements of the diagram and its size (px), for the page template."""
 
     width: float
     height: float
@@ -58,50 +58,50 @@ class Diagram:
 
 
 def build_diagram(system: Mapping[str, Any]) -> Diagram:
-    """The diagram of a system as `cosim.scenario.overview` describes it."""
+    """Return the diagram of a system that `cosim.scenario.overview.describe_system` has described."""
     known = {component["name"]: component for component in system["components"]}
-    block = _place_side_by_side(system["stages"])
-    boxes = {name: _build_box(known[name], *place) for name, place in block.places.items()}
-    flows = _connections_by_pair(system["connections"], boxes)
-    lanes = sum(boxes[target].x <= boxes[source].x for source, target in flows)
-    bottom = MARGIN + block.rows * (HEIGHT + GAP_Y)
-    width = 2 * MARGIN + block.columns * (WIDTH + GAP_X) - GAP_X
-    wires = list(_wires(flows, boxes, bottom))
-    return Diagram(width, bottom + LANE * lanes + MARGIN / 2, list(boxes.values()), list(_frames(boxes.values())), wires)
+    layout = _place_side_by_side(system["stages"])
+    boxes = {name: _build_box(known[name], *position) for name, position in layout.positions.items()}
+    connections = _connections_by_pair(system["connections"], boxes)
+    feedbacks = sum(boxes[target].x <= boxes[source].x for source, target in connections)
+    bottom = MARGIN + layout.rows * (HEIGHT + GAP_Y)
+    width = 2 * MARGIN + layout.columns * (WIDTH + GAP_X) - GAP_X
+    wires = list(_wires(connections, boxes, bottom))
+    return Diagram(width, bottom + LANE * feedbacks + MARGIN / 2, list(boxes.values()), list(_frames(boxes.values())), wires)
 
 
 class _GridLayout(NamedTuple):
-    """Components by name at (column, row), and how many columns and rows they take."""
+    """Positions (column, row) of components by name, and the size of the grid."""
 
-    places: dict[str, tuple[float, float]]
+    positions: dict[str, tuple[float, float]]
     columns: int
     rows: float
 
 
 def _place_side_by_side(stages: Sequence[Sequence[Any]]) -> _GridLayout:
-    """Stages one beside the other, each centred."""
+    """Lay out stages from left to right, each centred vertically."""
     blocks = [_place_below_each_other([_layout_member(member) for member in stage]) for stage in stages]
     rows = max((block.rows for block in blocks), default=0)
-    places: dict[str, tuple[float, float]] = {}
+    positions: dict[str, tuple[float, float]] = {}
     columns = 0
     for block in blocks:
-        places |= _shifted(block, columns, (rows - block.rows) / 2)
+        positions |= _shifted(block, columns, (rows - block.rows) / 2)
         columns += block.columns
-    return _GridLayout(places, columns, rows)
+    return _GridLayout(positions, columns, rows)
 
 
 def _place_below_each_other(blocks: Sequence[_GridLayout]) -> _GridLayout:
-    """What steps side by side, one below the other."""
-    places: dict[str, tuple[float, float]] = {}
+    """Lay out the members of a stage from top to bottom."""
+    positions: dict[str, tuple[float, float]] = {}
     rows = 0.0
     for block in blocks:
-        places |= _shifted(block, 0, rows)
+        positions |= _shifted(block, 0, rows)
         rows += block.rows
-    return _GridLayout(places, max((block.columns for block in blocks), default=0), rows)
+    return _GridLayout(positions, max((block.columns for block in blocks), default=0), rows)
 
 
 def _layout_member(member: Any) -> _GridLayout:
-    """A component, or a nested system with room for its frame."""
+    """Lay out a component, or a nested system with space for its frame."""
     if isinstance(member, str):
         return _GridLayout({member: (0, 0)}, 1, 1)
     block = _place_side_by_side(member["stages"])
@@ -109,15 +109,16 @@ def _layout_member(member: Any) -> _GridLayout:
 
 
 def _shifted(block: _GridLayout, columns: float, rows: float) -> dict[str, tuple[float, float]]:
-    return {name: (x + columns, y + rows) for name, (x, y) in block.places.items()}
+    return {name: (x + columns, y + rows) for name, (x, y) in block.positions.items()}
 
 
 def _build_box(component: Mapping[str, Any], column: float, row: float) -> Box:
-    place = (MARGIN + column * (WIDTH + GAP_X), MARGIN + row * (HEIGHT + GAP_Y))
+    position = (MARGIN + column * (WIDTH + GAP_X), MARGIN + row * (HEIGHT + GAP_Y))
     name, origin = component["name"], component["origin"]
     every = f", every {component['period']:g} s" if component["period"] else ""
-    about = f"{name}\n{origin}\n{component['inputs']} inputs, {component['outputs']} outputs{every}"
-    return Box(name, *place, _truncate(name, MAX_TITLE_LENGTH), _truncate(origin.rpartition("/")[2], MAX_ORIGIN_LENGTH), about)
+    tooltip = f"{name}\n{origin}\n{component['inputs']} inputs, {component['outputs']} outputs{every}"
+    file = origin.rpartition("/")[2]
+    return Box(name, *position, _truncate(name, MAX_TITLE_LENGTH), _truncate(file, MAX_ORIGIN_LENGTH), tooltip)
 
 
 def _truncate(text: str, length: int) -> str:
@@ -125,47 +126,47 @@ def _truncate(text: str, length: int) -> str:
 
 
 def _connections_by_pair(connections: Sequence[Sequence[str]], boxes: Mapping[str, Box]) -> dict[tuple[str, str], list[str]]:
-    """(from component, to component) -> a line for each connection."""
-    flows: dict[tuple[str, str], list[str]] = {}
+    """Return a line of text for each connection, by (source component, target component)."""
+    lines: dict[tuple[str, str], list[str]] = {}
     for source, target, unit, note in connections:
         ends = _component_of(source, boxes), _component_of(target, boxes)
         text = f"{source} → {target}" + (f"  [{unit}]" if unit else "") + (f"  ({note})" if note else "")
         if ends[0] and ends[1]:
-            flows.setdefault(ends, []).append(text)
-    return flows
+            lines.setdefault(ends, []).append(text)
+    return lines
 
 
 def _component_of(name: str, boxes: Mapping[str, Box]) -> str:
-    """The component that a variable belongs to."""
+    """Return the component that a variable belongs to, or ""."""
     return max((box for box in boxes if name.startswith(f"{box}.")), key=len, default="")
 
 
-def _wires(flows: Mapping[tuple[str, str], list[str]], boxes: Mapping[str, Box], bottom: float) -> Iterator[Wire]:
-    lanes = 0
-    for (source, target), lines in flows.items():
+def _wires(connections: Mapping[tuple[str, str], list[str]], boxes: Mapping[str, Box], bottom: float) -> Iterator[Wire]:
+    feedbacks = 0
+    for (source, target), lines in connections.items():
         start, end = boxes[source], boxes[target]
         more = [f"and {len(lines) - MAX_TOOLTIP_LINES} more"] if len(lines) > MAX_TOOLTIP_LINES else []
-        about = "\n".join([*lines[:MAX_TOOLTIP_LINES], *more])
+        tooltip = "\n".join([*lines[:MAX_TOOLTIP_LINES], *more])
         if end.x > start.x:
             path, x, y = _forward_path(start, end)
         else:
-            path, x, y = _feedback_path(start, end, lanes, bottom)
-            lanes += 1
-        yield Wire(path, x, y, len(lines), about)
+            path, x, y = _feedback_path(start, end, feedbacks, bottom)
+            feedbacks += 1
+        yield Wire(path, x, y, len(lines), tooltip)
 
 
 def _forward_path(start: Box, end: Box) -> tuple[str, float, float]:
-    """A curve from the right side of a box to the left side of one further right; it bows around what lies between."""
+    """Return a curve from a box to one further right, bent around the boxes between them, and its middle (px)."""
     x1, y1, x2, y2 = start.x + WIDTH, start.y + HEIGHT / 2, end.x, end.y + HEIGHT / 2
     bend = (x2 - x1) / 2
-    far = x2 - x1 > GAP_X + 1 and abs(y1 - y2) < HEIGHT
-    lift = -(HEIGHT + GAP_Y) * 0.8 if far else 0.0
+    passes_boxes = x2 - x1 > GAP_X + 1 and abs(y1 - y2) < HEIGHT
+    lift = -(HEIGHT + GAP_Y) * 0.8 if passes_boxes else 0.0
     path = f"M{x1:g} {y1:g}C{x1 + bend:g} {y1 + lift:g} {x2 - bend:g} {y2 + lift:g} {x2:g} {y2:g}"
     return path, (x1 + x2) / 2, (y1 + y2) / 2 + 0.75 * lift
 
 
 def _feedback_path(start: Box, end: Box, number: int, bottom: float) -> tuple[str, float, float]:
-    """From the right side of a box, along a lane of its own below everything, to the left side of a box further left."""
+    """Return a path from a box to one further left, along a lane of its own below all boxes, and its middle (px)."""
     aside, lane = 12 + 4 * (number % 6), bottom - GAP_Y / 2 + LANE * (number + 1)
     x1, y1, x2, y2 = start.x + WIDTH, start.y + 0.75 * HEIGHT, end.x, end.y + 0.75 * HEIGHT
     right, left = x1 + aside, x2 - aside
@@ -173,7 +174,7 @@ def _feedback_path(start: Box, end: Box, number: int, bottom: float) -> tuple[st
 
 
 def _rounded_path(points: Sequence[tuple[float, float]], radius: float = 6.0) -> str:
-    """A path along horizontal and vertical lines through `points`, with round corners."""
+    """Return a path along horizontal and vertical lines through `points`, with round corners of `radius` (px)."""
     path = "M{:g} {:g}".format(*points[0])
     for before, corner, after in zip(points, points[1:], points[2:], strict=False):
         (x1, y1), (x2, y2) = (_point_towards(corner, other, radius) for other in (before, after))
@@ -187,7 +188,7 @@ def _point_towards(corner: tuple[float, float], other: tuple[float, float], dist
 
 
 def _frames(boxes: Iterable[Box]) -> Iterator[Frame]:
-    """A frame for each outermost nested system."""
+    """Yield a frame for each outermost nested system."""
     groups: dict[str, list[Box]] = {}
     for box in boxes:
         outer, dot, _ = box.name.partition(".")

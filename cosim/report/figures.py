@@ -1,7 +1,7 @@
-"""Figures into files: one style for all of them, the same bytes for the same result.
+"""Figures in a common style, written to files that are reproducible byte by byte.
 
-A figure is made by a plain function `function(result, **arguments) -> matplotlib.figure.Figure`, named by the scenario just
-as a KPI is. Figures are made without pyplot: nothing global is left behind and no window system is asked for.
+A scenario names functions `function(result, **arguments) -> matplotlib.figure.Figure`, as it does for KPIs. They should not
+use pyplot, which keeps global state and may need a window system.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .figure_data import write_figure_data
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: for a column of 3.5 in or a page of 7.16 in of a two-column paper; colours for colour-blind readers (Okabe and Ito 2008)
+#: matplotlib settings for a column (3.5 in) of a two-column paper; colours for colour-blind readers (Okabe and Ito 2008)
 STYLE: Mapping[Any, Any] = {
     "axes.axisbelow": True,
     "axes.edgecolor": "#444444",
@@ -47,10 +47,13 @@ STYLE: Mapping[Any, Any] = {
     "ytick.labelsize": 7,
 }
 
+#: keeps SVG files reproducible
+_SVG_METADATA: dict[str, Any] = {"Date": None, "Creator": None}
+
 
 @contextmanager
 def figure_style() -> Iterator[None]:
-    """Within the block STYLE holds, whatever the user's own matplotlib settings are."""
+    """Use STYLE in this block instead of the user's own matplotlib settings."""
     from matplotlib import rc_context, rcdefaults, rcParams
 
     with rc_context():
@@ -60,7 +63,18 @@ def figure_style() -> Iterator[None]:
 
 
 def draw_figure(result: Result, name: str, function: Callable[..., Figure], arguments: Mapping[str, Any]) -> Figure:
-    """The figure `name` in the common style. Raises InputError or ComponentError that name the figure."""
+    """Draw a figure in the common style.
+
+    Args:
+        result: The result to draw.
+        name: The name of the figure, for messages.
+        function: The figure function of the scenario.
+        arguments: Its keyword arguments.
+
+    Raises:
+        InputError: The result lacks a signal that the function needs.
+        ComponentError: The function fails or does not return a matplotlib figure.
+    """
     from matplotlib.figure import Figure
 
     evaluation = ResultFunction(name, function, arguments)
@@ -72,24 +86,17 @@ def draw_figure(result: Result, name: str, function: Callable[..., Figure], argu
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG or SVG, whichever the suffix of `path` says: atomically, without dates and versions."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-
+    """Write a figure as PNG or SVG, according to the suffix of `path`: atomically, without dates and versions."""
     with figure_style(), writing_atomically(path) as temporary:
-        if path.suffix == ".png":
-            FigureCanvasAgg(figure).print_png(temporary, metadata={"Software": None})
-        else:
-            FigureCanvasSVG(figure).print_svg(temporary, metadata={"Date": None, "Creator": None})
+        metadata = {"Software": None} if path.suffix == ".png" else _SVG_METADATA
+        figure.savefig(temporary, format=path.suffix[1:], dpi="figure", metadata=metadata)
 
 
 def figure_to_svg(figure: Figure) -> str:
-    """A figure as the text of an SVG file, without dates and versions."""
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-
+    """Return a figure as the text of an SVG file, without dates and versions."""
     text = StringIO()
     with figure_style():
-        FigureCanvasSVG(figure).print_svg(text, metadata={"Date": None, "Creator": None})
+        figure.savefig(text, format="svg", dpi="figure", metadata=_SVG_METADATA)
     return text.getvalue()
 
 
@@ -100,9 +107,14 @@ def draw_figures(
     suffixes: Sequence[str] = (".png",),
     write_data: bool = False,
 ) -> list[Path]:
-    """Draw all figures, given as (name, function, arguments), into `directory`/NAME.png (or .svg); returns the files.
+    """Draw figures into files and return their paths.
 
-    With `numbers`, the numbers behind each are written to NAME.csv beside it.
+    Args:
+        result: The result to draw.
+        figures: Name, function and arguments of each figure.
+        directory: The folder of the files.
+        suffixes: The suffixes of the files of each figure: ".png", ".svg".
+        write_data: Also write the data of each figure to NAME.csv.
     """
     files = []
     for name, function, arguments in figures:

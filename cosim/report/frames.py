@@ -1,7 +1,7 @@
-"""Frames of a video, rendered by several processes: frame i comes from process i modulo their number.
+"""Parallel rendering of video frames: of n worker processes, number k renders the frames k, k + n, k + 2n, ...
 
-Each is this module as a program: it reads its job from standard input and writes one pickle a frame to standard output, where
-it waits while nobody reads, so that no frames pile up.
+A worker process runs this module as a program. It reads a pickled job from standard input and writes one pickle per frame to
+standard output. The pipe blocks it until the frames are read, so that they do not fill the memory.
 """
 
 from __future__ import annotations
@@ -14,24 +14,26 @@ import sys
 from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..components.python_import import load_object
 from ..core.errors import CosimError
-from ..core.resources import root
 from ..results import Result
 
 if TYPE_CHECKING:
     import numpy as np
 
-#: frames that are worth the start of a process
-MIN_FRAMES_PER_PROCESS = 25
-MAX_PROCESSES = 8
+#: fewest frames for which another process is started, and the largest number of processes
+MIN_FRAMES_PER_PROCESS, MAX_PROCESSES = 25, 8
+
+#: static method of a component class that renders frames (see `video`)
+RENDER_METHOD = "video_frames"
 
 
 @dataclass(frozen=True)
 class RenderJob:
-    """What to render: `source` names a function(result, camera, moments, size) that yields a frame for each moment (s)."""
+    """Frames to render: the class `source` ("file.py:Class") renders one at each of `times` (s) with its `video_frames`."""
 
     source: str
     result: Result
@@ -40,13 +42,21 @@ class RenderJob:
     size: tuple[int, int]
 
     def frames(self) -> Iterator[np.ndarray]:
-        """The frames, uint8 (height, width, 3), rendered here."""
-        function: Callable[..., Iterator[Any]] = load_object(self.source, root())
-        return function(self.result, self.camera, self.times, self.size)
+        """Render the frames in this process: uint8, shape (height, width, 3)."""
+        render: Callable[..., Iterator[np.ndarray]] = getattr(load_object(self.source, Path()), RENDER_METHOD)
+        return render(self.result, self.camera, self.times, self.size)
 
 
 def render_frames(job: RenderJob, processes: int | None = None) -> Generator[np.ndarray, None, None]:
-    """The frames of a job, by as many processes (None: as there are processors, and as are worth it)."""
+    """Yield the frames of a job in their order, rendered by several processes.
+
+    Args:
+        job: The frames to render.
+        processes: The number of processes; None: one per processor, but fewer for a short video.
+
+    Raises:
+        CosimError: A process ended without an error of its own, such as after a crash.
+    """
     if processes is None:
         processes = min(os.cpu_count() or 1, MAX_PROCESSES, len(job.times) // MIN_FRAMES_PER_PROCESS)
     if processes < 2:
@@ -60,7 +70,7 @@ def render_frames(job: RenderJob, processes: int | None = None) -> Generator[np.
 
 @contextmanager
 def _render_process(job: RenderJob) -> Iterator[subprocess.Popen[bytes]]:
-    """A process at work, ended with the block."""
+    """Run a worker process for a job; it is killed at the end of the block."""
     command = [sys.executable, "-P", "-m", __name__]
     worker = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)  # noqa: S603
     with worker:
@@ -74,7 +84,7 @@ def _render_process(job: RenderJob) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def _receive_frame(worker: subprocess.Popen[bytes]) -> np.ndarray:
-    """The next frame of a process; what it raised is raised here."""
+    """Return the next frame of a worker process, or raise the exception that it raised."""
     assert worker.stdout is not None
     try:
         item: np.ndarray | BaseException = pickle.load(worker.stdout)  # noqa: S301
@@ -86,10 +96,10 @@ def _receive_frame(worker: subprocess.Popen[bytes]) -> np.ndarray:
 
 
 def main() -> None:
-    """Render the job on standard input. Libraries may print: their standard output is not ours."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted as well, and ends this process
+    """Render the job on standard input and write the frames to standard output."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt reaches the parent too, which kills this process
     with os.fdopen(os.dup(1), "wb") as channel:
-        os.dup2(2, 1)
+        os.dup2(2, 1)  # what libraries print goes to standard error
         job: RenderJob = pickle.load(sys.stdin.buffer)  # noqa: S301
         try:
             for frame in job.frames():

@@ -1,4 +1,4 @@
-"""JUnit XML, the form in which CI services read which tests passed."""
+"""JUnit XML files, in which CI services read the outcomes of tests."""
 
 from __future__ import annotations
 
@@ -14,23 +14,28 @@ _INVALID_XML_CHARACTERS = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U0001000
 
 
 class JUnitCase(NamedTuple):
-    """One test: it passed ("passed"), its result is not as expected ("failure"), or there is none ("error").
-
-    `seconds` is its wall time, `details` says line by line what is wrong.
-    """
+    """Outcome of one test."""
 
     name: str
+    #: "passed", "failure" (the result is not as expected) or "error" (there is no result)
     outcome: str
+    #: wall time (s)
     seconds: float
+    #: lines that describe a failure or an error
     details: Sequence[str] = ()
 
 
 def write_junit(suite: str, cases: Sequence[JUnitCase], path: Path) -> None:
-    """Write all cases as one suite; raises InputError when the file cannot be written."""
+    """Write the cases as one test suite.
+
+    Raises:
+        InputError: The file cannot be written.
+        OutputError: The disk is full or failed.
+    """
     counts = {kind: str(sum(case.outcome == word for case in cases)) for kind, word in _OUTCOME_COUNTERS.items()}
-    about = {"name": suite, "tests": str(len(cases)), **counts, "time": f"{sum(case.seconds for case in cases):.3f}"}
+    attributes = {"name": suite, "tests": str(len(cases)), **counts, "time": f"{sum(case.seconds for case in cases):.3f}"}
     root = ElementTree.Element("testsuites")
-    element = ElementTree.SubElement(root, "testsuite", about)
+    element = ElementTree.SubElement(root, "testsuite", attributes)
     for case in cases:
         _add_case(element, suite, case)
     ElementTree.indent(root)
@@ -38,6 +43,7 @@ def write_junit(suite: str, cases: Sequence[JUnitCase], path: Path) -> None:
         ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
 
 
+#: attribute of the suite that counts each outcome
 _OUTCOME_COUNTERS = {"failures": "failure", "errors": "error"}
 
 

@@ -1,4 +1,4 @@
-"""Pages as single files that open from disk: templates, the built script and style, and data, all in one HTML text."""
+"""Self-contained HTML pages: template, script, style and data in one file that opens from disk without a network."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 TEMPLATE_FOLDER = Path(__file__).with_name("page")
 
-#: a page runs its own script, has its own style and pictures, and asks nobody for anything
+#: allows the scripts, styles and pictures inside the page and forbids all network requests
 CONTENT_SECURITY_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; form-action 'none'"
 )
@@ -40,18 +40,18 @@ def _page_assets() -> dict[str, Any]:
 
 
 def safe_markup(text: str) -> str:
-    """Text that stands in a page as it is; only for what this package has made."""
+    """Mark text as HTML that is not escaped; only for text that this package has generated."""
     from markupsafe import Markup
 
     return Markup(text)  # noqa: S704
 
 
 def render_page(template: str, **values: Any) -> str:
-    """A page as text; all `values` are escaped but those that are marked as safe."""
+    """Return a page as HTML; all `values` are escaped except those of `safe_markup`."""
     return _jinja_environment().get_template(template).render(**{**_page_assets(), **values})
 
 
 def embed_json(data: Any) -> str:
-    """Data as JSON that can stand in a script element, whatever texts it contains."""
+    """Return data as JSON that is safe inside a script element, whatever texts it contains."""
     text = json.dumps(to_json_types(data), ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     return safe_markup(text.replace("<", "\\u003c"))

@@ -1,4 +1,4 @@
-"""The 3-D replay of one run, or of two laid over each other, as one file."""
+"""The page with the 3-D replay of one run, or of two runs for comparison."""
 
 from __future__ import annotations
 
@@ -14,22 +14,26 @@ from .pages import embed_json, render_page
 from .samples import is_constant, pack_run
 from .scene import build_scene
 
-#: of a run without a scene: plots, and signals in each
+#: largest number of plots for a run without a scene, and of signals in each
 MAX_PLOTS, MAX_SIGNALS_PER_PLOT = 6, 6
 
 
 def replay_data(runs: Sequence[Result]) -> dict[str, Any]:
-    """What the page needs: the scene of the first run, and the signals of all. Raises InputError for a run without rows."""
+    """Return the data of the page: the scene of the first run and the signals of all runs.
+
+    Raises:
+        InputError: A run has no rows, or its scene cannot be built.
+    """
     for result in runs:
         if not len(result.time):
-            raise InputError(f"the result {result.metadata.get('name', '')} holds no rows, so there is nothing to replay")
+            raise InputError(f"the result {result.metadata.get('name', '')} has no rows, so there is nothing to replay")
     scene = build_scene(runs[0].metadata)
     plots = scene["plots"] or ([] if scene["bodies"] else _default_plots(runs[0]))
     return {"scene": {**scene, "plots": plots}, "runs": [pack_run(result) for result in runs]}
 
 
 def _default_plots(result: Result) -> list[list[str]]:
-    """For a run of which nobody says what to draw: its first numeric signals that change, if any does; one plot for a unit."""
+    """Return the first numeric signals, grouped by unit; constant ones only if all are constant."""
     numeric = [name for name in result if result[name].dtype != object]
     plots: dict[str, list[str]] = {}
     for name in [name for name in numeric if not is_constant(result[name])] or numeric:
@@ -38,7 +42,7 @@ def _default_plots(result: Result) -> list[list[str]]:
 
 
 def write_replay(runs: Sequence[Result], path: Path) -> None:
-    """Write the replay of `runs` (one, or two to compare) to `path`, a page that needs no other file and no network."""
+    """Write the replay of one run, or of two runs for comparison, as a self-contained page."""
     names = dict.fromkeys(str(result.metadata.get("name", "run")) for result in runs)
     description = "Two runs; the second is tinted and dashed" if len(runs) > 1 else _description(runs[0])
     text = render_page("replay.html", title=" and ".join(names), description=description, data=embed_json(replay_data(runs)))

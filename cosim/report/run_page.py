@@ -1,4 +1,4 @@
-"""`report.html`: everything about a run on one page, in one file that needs no network."""
+"""The report of a run, `report.html`: one self-contained page."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .pages import embed_json, render_page, safe_markup
 from .replay import replay_data
 from .tables import format_number
 
-#: what timings measure, in the order in which things happen
+#: labels of timings in the order of the run
 TIMING_LABELS = {
     "load_seconds": "load",
     "initialize_seconds": "initialise",
@@ -24,12 +24,12 @@ TIMING_LABELS = {
     "simulate_seconds": "simulate, in all",
 }
 
-#: files whose hashes are shown
+#: largest number of file hashes on the page
 MAX_HASHES = 300
 
 
 class KpiRow(NamedTuple):
-    """A KPI as it is shown; with `limits` where it has a check."""
+    """Row of the KPI table; `limits` is "" without a check."""
 
     name: str
     value: str
@@ -39,10 +39,17 @@ class KpiRow(NamedTuple):
 
 
 def write_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Mapping[str, str], path: Path) -> None:
-    """Write the page about `result` to `path`: KPIs with their checks, the figures (`pictures`: name -> SVG), the system with
-    its connections and units, scenario, versions, timings and warnings, and the replay.
+    """Write the report of a run: KPIs, checks, figures, system diagram, scenario, versions, timings, warnings and replay.
 
-    Raises InputError for a result without rows, and when the file cannot be written.
+    Args:
+        result: The run.
+        outcomes: The outcomes of the scenario's checks.
+        figures: The figures as SVG text, by name.
+        path: The HTML file to write.
+
+    Raises:
+        InputError: The result has no rows, or the file cannot be written.
+        OutputError: The disk is full or failed.
     """
     about, units = _metadata_with_defaults(result), result.metadata.get("kpi_units", {})
     text = render_page(
@@ -66,7 +73,7 @@ def write_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Mapp
 
 
 def _metadata_with_defaults(result: Result) -> dict[str, Any]:
-    """What run.json says, with everything that the template names."""
+    """Return the metadata of a run with defaults for all keys that the template uses."""
     missing: dict[str, Any] = {
         "name": "run",
         "failure": None,
@@ -89,9 +96,9 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
     yield "signals", str(len(result))
     yield "rows", str(len(result.time))
     if events := result.metadata.get("live_events"):
-        yield "set by hand", f"{len(events)} times"
-    if by := result.metadata.get("terminated_by"):
-        yield "ended by", f"{by['component']} at {by['time']:g} s"
+        yield "set by hand", f"{len(events)} time{'s' * (len(events) != 1)}"
+    if termination := result.metadata.get("terminated_by"):
+        yield "ended by", f"{termination['component']} at {termination['time']:g} s"
 
 
 def _kpi_row(name: str, value: Number, units: Mapping[str, str]) -> KpiRow:
@@ -104,7 +111,7 @@ def _check_row(outcome: CheckOutcome, units: Mapping[str, str]) -> KpiRow:
 
 
 def _group_kpis(kpis: Mapping[str, Number], units: Mapping[str, str]) -> dict[str, list[KpiRow]]:
-    """The numbers of each KPI function, without its name before theirs."""
+    """Return the values of each KPI function, by its name and without its name as their prefix."""
     groups: dict[str, list[KpiRow]] = {}
     for name, value in kpis.items():
         group, _, own = name.partition(".")
@@ -121,5 +128,5 @@ def _timings(result: Result) -> Iterator[tuple[str, str]]:
 
 
 def _figure_element(name: str, svg: str) -> dict[str, Any]:
-    """An SVG file as an element of a page, without the declarations before it; `drawn`: there is no photograph in it."""
+    """Return an SVG file as an element of the page; `drawn` is False if it contains a bitmap."""
     return {"name": name, "svg": safe_markup(svg[svg.index("<svg") :]), "drawn": "<image" not in svg}

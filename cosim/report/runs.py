@@ -1,4 +1,4 @@
-"""What `cosim run` left behind, read again: results, and the figures that their scenarios ask for."""
+"""Results folders of `cosim run`: read results and load the figure functions of their scenarios."""
 
 from __future__ import annotations
 
@@ -13,13 +13,17 @@ from ..core.errors import InputError
 from ..results import Kpis, Result
 from ..scenario.named_functions import load_function
 
+#: name, function and keyword arguments of a figure
 NamedCall = tuple[str, Callable[..., Any], Mapping[str, Any]]
 
 
 def read_run(directory: str | Path) -> Result:
-    """The result in a folder that `cosim run` wrote, with its KPIs, timing and metadata.
+    """Read the result, KPIs, timing and metadata from a folder that `cosim run` wrote.
 
-    Booleans return as 0 and 1, see `Result.from_csv`. Raises InputError when a file cannot be read.
+    Boolean signals become 0 and 1, see `Result.from_csv`.
+
+    Raises:
+        InputError: A file is missing or invalid.
     """
     directory = Path(directory)
     about = _read_json(directory / "run.json")
@@ -36,18 +40,22 @@ def _read_json(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}; expected a folder that `cosim run` wrote") from error
     except ValueError as error:
-        raise InputError(f"{path} is no JSON: {error}") from error
+        raise InputError(f"{path} is not valid JSON: {error}") from error
     if not isinstance(value, dict):
-        raise InputError(f"{path} holds no JSON object; expected what `cosim run` wrote")
+        raise InputError(f"{path} is not a JSON object; expected a file that `cosim run` wrote")
     return value
 
 
 def load_figures(result: Result) -> list[NamedCall]:
-    """(name, function, arguments) of every figure that the result's scenario asks for."""
+    """Import the figure functions of a result's scenario and return (name, function, arguments) of each.
+
+    Raises:
+        InputError: The scenario file is unknown, or a function does not exist.
+    """
     specs = result.metadata.get("scenario", {}).get("figures", [])
     if not specs:
         return []
     if "scenario_file" not in result.metadata:
-        raise InputError("run.json does not say where its scenario is (scenario_file): run the scenario again")
+        raise InputError('run.json has no "scenario_file", so the figure functions cannot be found: run the scenario again')
     folder = Path(result.metadata["scenario_file"]).parent
     return [(spec["name"], load_function(spec["python"], folder), spec.get("arguments", {})) for spec in specs]

@@ -1,4 +1,4 @@
-"""A recorded run as the replay page takes it: 32-bit floats, thinned and packed."""
+"""Compact form of a recorded run for the replay page: 32-bit floats, downsampled and compressed."""
 
 from __future__ import annotations
 
@@ -11,23 +11,26 @@ import numpy as np
 
 from ..results import Result
 
-#: rows of a run, and values of all its signals together, that a page can hold at ease
+#: largest number of rows of a run, and of values of all its signals together, on a page
 MAX_ROWS, MAX_VALUES = 5000, 1_000_000
 
 
 def pack_run(result: Result) -> dict[str, Any]:
-    """Time and all numeric signals of a run.
+    """Return time and numeric signals of a run in the form that `page/src/run.js` unpacks.
 
-    `samples` is what `src/run.js` unpacks: float32 columns named by `columns`, of `rows` rows each; of each column the
-    differences of its 32-bit words from row to row, of these first all lowest bytes, then all next; compressed by zlib, base64.
-    Signals that never change stand in `constants`. Longer runs are thinned; extremes of signals are kept (see `thinned`).
+    Signals that never change are in `constants`. Long runs are downsampled, but keep the extremes of signals. `samples` holds
+    the float32 columns of the names `columns`, with `rows` rows each, encoded in these steps:
+
+    1. differences of the 32-bit words from row to row
+    2. for each column all lowest bytes, then all second bytes, and so on
+    3. zlib, then base64
     """
     numeric = {name: result[name] for name in result if result[name].dtype != object}
     constants = {name: _to_float32(values[0]) for name, values in numeric.items() if is_constant(values)}
     varying = {name: values for name, values in numeric.items() if name not in constants}
-    most = max(2, min(MAX_ROWS, MAX_VALUES // (len(varying) + 1)))
-    columns = {"time": downsample(result.time, most)} | {
-        name: downsample_with_extremes(values, most) for name, values in varying.items()
+    max_rows = max(2, min(MAX_ROWS, MAX_VALUES // (len(varying) + 1)))
+    columns = {"time": downsample(result.time, max_rows)} | {
+        name: downsample_with_extremes(values, max_rows) for name, values in varying.items()
     }
     return {
         "name": str(result.metadata.get("name", "run")),
@@ -40,6 +43,7 @@ def pack_run(result: Result) -> dict[str, Any]:
 
 
 def is_constant(values: np.ndarray) -> bool:
+    """Return True if all values are equal and finite."""
     return bool(len(values) and np.isfinite(values[0]) and (values == values[0]).all())
 
 
@@ -47,15 +51,15 @@ def _to_float32(value: Any) -> float:
     return float(np.float32(value))
 
 
-def _stride_blocks(values: np.ndarray, most: int) -> tuple[np.ndarray, int]:
-    """Values in blocks of two strides, shape (blocks, 2 strides), the last one filled up with the last value; and the stride."""
-    stride = -(-len(values) // most)
+def _stride_blocks(values: np.ndarray, max_count: int) -> tuple[np.ndarray, int]:
+    """Return the values in blocks, shape (blocks, 2 * stride), the last one padded with the last value, and the stride."""
+    stride = -(-len(values) // max_count)
     count = -(-len(values) // (2 * stride))
     return np.pad(values, (0, 2 * stride * count - len(values)), mode="edge").reshape(count, -1), stride
 
 
 def downsample(values: np.ndarray, max_count: int) -> np.ndarray:
-    """All values if there are at most `most`; else every n-th, so that there are about as many, and the last."""
+    """Return every n-th value and the last one, about `max_count` in all; short arrays are returned as they are."""
     if len(values) <= max_count:
         return values
     blocks, stride = _stride_blocks(values, max_count)
@@ -63,17 +67,19 @@ def downsample(values: np.ndarray, max_count: int) -> np.ndarray:
 
 
 def downsample_with_extremes(values: np.ndarray, max_count: int) -> np.ndarray:
-    """As `sampled`, but so that no peak is lost: where there is one within two strides, the smallest and the largest value
-    there, in their order, stand for the two values at their beginnings."""
-    kept = downsample(values.astype(np.float32), max_count)
+    """Downsample like `downsample`, but keep peaks.
+
+    Where the values vary strongly within two strides, their minimum and maximum, in the order of time, replace the two samples.
+    """
+    samples = downsample(values.astype(np.float32), max_count)
     if len(values) <= max_count:
-        return kept
+        return samples
     blocks, _ = _stride_blocks(values.astype(np.float32), max_count)
     order = np.sort(np.stack([blocks.argmin(axis=1), blocks.argmax(axis=1)], axis=1), axis=1)
-    change = np.abs(kept[2::2] - blocks[:, 0])  # from block to block
-    rough = np.ptp(blocks, axis=1) > 4 * change
-    kept[:-1].reshape(-1, 2)[rough] = np.take_along_axis(blocks, order, axis=1)[rough]
-    return kept
+    change = np.abs(samples[2::2] - blocks[:, 0])  # from block to block
+    has_peak = np.ptp(blocks, axis=1) > 4 * change
+    samples[:-1].reshape(-1, 2)[has_peak] = np.take_along_axis(blocks, order, axis=1)[has_peak]
+    return samples
 
 
 def _encode_columns(columns: Mapping[str, np.ndarray]) -> str:

@@ -1,18 +1,18 @@
-"""What to draw in the 3-D replay, asked from the components of a scenario: the importer itself knows no vehicle.
+"""The scene of the 3-D replay, described by the components of a scenario.
 
-A Python component may say what it looks like by a static method `scene(name, scenario) -> dict`; a scenario of other components
-names a function `(scenario, **arguments) -> dict` under its key "scene". `name` is the component's, `scenario` the scenario as
-JSON, where "components" holds those of nested systems by their full names. The answer is JSON as well, with any of these keys
-(m, rad, world frame z up; colours as CSS has them):
+A Python component class may describe its scene by a static method `scene(name, scenario) -> dict`. A scenario of other
+components names a function `(scenario, **arguments) -> dict` under its key "scene". `name` is that of the component;
+`scenario` is the scenario as JSON, where "components" includes those of nested systems by their full names. The returned dict
+is JSON as well, with any of these keys (m, rad; world frame east-north-up; colours as in CSS):
 
 - `bodies`: {"name", "title", "colour", "position": [x, y, z], "orientation": [w, x, y, z] or "attitude": [roll, pitch, yaw],
   "parts"}; position, orientation and attitude are names of signals, their negatives ("-name"), or numbers
 - `parts` of a body, and `fixed`: {"shape", "size", "position", "orientation": [x, y, z, w], "colour": [r, g, b] in 0 ... 1,
-  "opacity"}, all but the first two have defaults; a "box" has its edges as size, a "cylinder" (along z) radius and length, a
-  "cone" lower and upper radius and length, a "sphere" its radius, a "ring" radius and thickness
+  "opacity"}; all but the first two have defaults. The size of a "box" is its edge lengths, of a "cylinder" (along z) radius and
+  length, of a "cone" lower and upper radius and length, of a "sphere" its radius, of a "ring" radius and thickness
 - `water`, at z = 0: {"waves": [{"amplitude", "frequency", "number", "direction", "phase"}], "gain": signal or number}
 - `markers`: {"position", "radius", "label"}; `views`: {"name", "on": a body, "eye", "target"} in axes that turn with its yaw
-- `spans`: {"signal", "label", "colour"}, a Boolean; `plots`: lists of patterns of signals
+- `spans`: {"signal", "label", "colour"} for a Boolean signal; `plots`: lists of patterns of signals
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from ..scenario.named_functions import load_function
 
 LIST_KEYS = ("bodies", "fixed", "markers", "views", "spans", "plots")
 
-#: shape -> how many numbers its size has
+#: number of elements of the size of each shape
 SHAPE_SIZES: Mapping[str, int] = {"box": 3, "cylinder": 2, "cone": 3, "sphere": 1, "ring": 2}
 
 _BODY_DEFAULTS: Mapping[str, Any] = {"colour": "#0072b2", "parts": ()}
@@ -39,9 +39,14 @@ _PART_DEFAULTS: Mapping[str, Any] = {"position": (0, 0, 0), "orientation": (0, 0
 
 
 def build_scene(metadata: Mapping[str, Any]) -> dict[str, Any]:
-    """The scene of a run, given what its run.json says; nothing to draw when no component says what it looks like.
+    """Return the scene of a run; it is empty if no component describes one.
 
-    Raises InputError when something that the scenario names is not there, ComponentError when asking fails.
+    Args:
+        metadata: The metadata of the run, as in run.json.
+
+    Raises:
+        InputError: A file or function that the scenario names does not exist.
+        ComponentError: A scene function fails or returns an invalid scene.
     """
     scene: dict[str, Any] = {**{key: [] for key in LIST_KEYS}, "water": None}
     if "scenario_file" not in metadata:
@@ -54,57 +59,73 @@ def build_scene(metadata: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _scene_parts(scenario: Mapping[str, Any], folder: Path) -> Iterator[dict[str, Any]]:
-    leaves = list(_flatten_components(scenario, folder))
-    flat = {**scenario, "components": {name: component for name, component, _ in leaves}}
-    for name, component, own_folder in leaves:
-        if isinstance(reference := component.get("python"), str):
-            ask = getattr_static(load_object(reference, own_folder), "scene", None)
-            if isinstance(ask, staticmethod):
-                yield _call_scene_function(f'component "{name}"', ask, name, flat)
+    """Yield the scenes that the components and the scenario itself describe."""
+    components = list(flatten_components(scenario, folder))
+    flat = {**scenario, "components": {name: component for name, component, _ in components}}
+    for name, component, component_folder in components:
+        if function := static_method(component, component_folder, "scene"):
+            yield _call_scene_function(f'component "{name}"', function, name, flat)
     if spec := scenario.get("scene"):
         yield _call_scene_function(
             "the scenario's scene", load_function(spec["python"], folder), flat, **spec.get("arguments", {})
         )
 
 
-def _flatten_components(system: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, dict[str, Any], Path]]:
-    """(full name, component, where its paths start) of all components, those of nested systems instead of these.
+def static_method(component: Mapping[str, Any], folder: Path, name: str) -> Callable[..., Any] | None:
+    """Return a static method of a Python component's class; None if there is none, or the component is not a Python class.
 
-    Parameters that are set from outside ("usv.waypoint_x") reach the components inside.
+    Args:
+        component: The component as in a scenario file.
+        folder: The folder that its paths start from.
+        name: The name of the method.
+
+    Raises:
+        InputError: The file or the class does not exist.
+    """
+    reference = component.get("python")
+    method = getattr_static(load_object(reference, folder), name, None) if isinstance(reference, str) else None
+    return method if isinstance(method, staticmethod) else None
+
+
+def flatten_components(system: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, dict[str, Any], Path]]:
+    """Yield (full name, component, folder that its paths start from) of all components, including those of nested systems.
+
+    Parameters that an outer system sets ("usv.waypoint_x") are added to the inner component.
     """
     for name, component in system.get("components", {}).items():
         if "system" not in component:
             yield name, component, folder
             continue
         file = folder / component["system"]
-        for inner, leaf, own_folder in _flatten_components(read_document(file).value, file.parent):
-            outside = component.get("parameters", {}).items()
-            given = {key.removeprefix(f"{inner}."): value for key, value in outside if key.startswith(f"{inner}.")}
-            yield f"{name}.{inner}", {**leaf, "parameters": {**leaf.get("parameters", {}), **given}}, own_folder
+        for inner, leaf, leaf_folder in flatten_components(read_document(file).value, file.parent):
+            parameters = component.get("parameters", {}).items()
+            outer = {key.removeprefix(f"{inner}."): value for key, value in parameters if key.startswith(f"{inner}.")}
+            yield f"{name}.{inner}", {**leaf, "parameters": {**leaf.get("parameters", {}), **outer}}, leaf_folder
 
 
-def _call_scene_function(who: str, ask: Callable[..., Any], *values: Any, **named: Any) -> dict[str, Any]:
+def _call_scene_function(owner: str, function: Callable[..., Any], *values: Any, **named: Any) -> dict[str, Any]:
+    """Return the scene of a user's function; any exception becomes a ComponentError of `owner`."""
     try:
-        answer = ask(*values, **named)
-        if not isinstance(answer, dict):
-            raise TypeError(f"returned {type(answer).__name__}, expected a dict")
-        json.dumps(to_json_types(answer))
-        return _with_defaults(answer)
+        scene = function(*values, **named)
+        if not isinstance(scene, dict):
+            raise TypeError(f"returned {type(scene).__name__}, expected a dict")
+        json.dumps(to_json_types(scene))
+        return _with_defaults(scene)
     except (InputError, *PASS_THROUGH_EXCEPTIONS):
         raise
     except BaseException as error:
-        raise ComponentError(who, "scene", f"{type(error).__name__}: {error}") from error
+        raise ComponentError(owner, "scene", f"{type(error).__name__}: {error}") from error
 
 
 def _with_defaults(scene: Mapping[str, Any]) -> dict[str, Any]:
-    """The scene with everything that may be left out. Raises TypeError or ValueError for what cannot be drawn."""
+    """Return the scene with the defaults of missing keys; raise TypeError or ValueError if it cannot be drawn."""
     if unknown := [key for key in scene if key not in (*LIST_KEYS, "water")]:
         raise ValueError(f'unknown key "{unknown[0]}"{did_you_mean(unknown[0], (*LIST_KEYS, "water"))}')
     bodies = [{**_BODY_DEFAULTS, "title": body.get("name"), **body} for body in scene.get("bodies", [])]
     for body in bodies:
         body["parts"] = [_part_with_defaults(part) for part in body["parts"]]
-        if lacking := [key for key in ("name", "position") if key not in body]:
-            raise ValueError(f'a body has no "{lacking[0]}"')
+        if missing := [key for key in ("name", "position") if key not in body]:
+            raise ValueError(f'a body has no "{missing[0]}"')
         if ("orientation" in body) == ("attitude" in body):
             raise ValueError(f'body "{body["name"]}" needs either "orientation" or "attitude"')
     return {**scene, "bodies": bodies, "fixed": [_part_with_defaults(part) for part in scene.get("fixed", [])]}

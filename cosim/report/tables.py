@@ -1,4 +1,4 @@
-"""The table of KPIs and checks that ends a run on the terminal."""
+"""The table of KPIs and checks that is printed after a run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..results.checks import CheckOutcome, Number
 if TYPE_CHECKING:
     from rich.table import Table
 
-MAX_LINE_WIDTH = 1000  # characters, where nothing but the reader's patience limits it
+MAX_LINE_WIDTH = 1000  # characters, of output that is not a terminal
 
 
 def print_kpis(
@@ -21,10 +21,15 @@ def print_kpis(
     units: Mapping[str, str] | None = None,
     file: TextIO | None = None,
 ) -> None:
-    """Print all KPIs with their units (`cosim.results.kpi.kpi_units`), and beside them their checks and whether they are met.
+    """Print a table of all KPIs with their units and checks; print nothing if there are none.
 
-    Colours only where rich sees a terminal and no NO_COLOR; elsewhere lines are as long as they need to be. Prints nothing
-    when there are no KPIs.
+    Colours are used only on a terminal without NO_COLOR. Other output has no line breaks within a row.
+
+    Args:
+        kpis: The values by name.
+        outcomes: The outcomes of the scenario's checks.
+        units: The units by name (see `cosim.results.kpi.kpi_units`).
+        file: The output stream; default: standard output.
     """
     from rich.console import Console
 
@@ -66,7 +71,7 @@ def _check_mark(passed: bool, plain: bool) -> str:
 
 
 def format_number(value: Number) -> str:
-    """A number as people read it: four significant digits, "yes" and "no", "-" for NaN."""
+    """Return a value as text: four significant digits, "yes" or "no" for a Boolean, "-" for NaN."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     return "-" if math.isnan(value) else f"{value:.4g}" if isinstance(value, float) else str(value)

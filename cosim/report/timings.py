@@ -1,4 +1,4 @@
-"""Real-time factors of runs side by side."""
+"""Figure that compares the real-time factors of runs."""
 
 from __future__ import annotations
 
@@ -12,15 +12,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLUMN_WIDTH, PAGE_WIDTH, BAR_WIDTH = 3.5, 7.16, 0.8  # in
-#: real-time factors of the published simulator (Simulink and V-REP over TCP): figure 18 and section 6.3 of the paper
+#: range of real-time factors of the published simulator (Simulink and V-REP over TCP): figure 18 and section 6.3 of the paper
 PUBLISHED_FACTORS = (0.5, 0.7)
 
 
 def draw_timings(result: Result, others: Sequence[Result] = ()) -> Figure:
-    """Bars of simulated over elapsed time (of the stepping loop) of `result` and `others`, above the band of the paper.
+    """Draw the real-time factors of `result` and `others` as bars on a logarithmic axis, with those of the paper as a band.
 
-    The axis is logarithmic; the width grows with the runs, from a column to a page. Raises InputError for a result that holds
-    no wall time.
+    The figure is as wide as a column or, for many runs, up to a page of a two-column paper.
+
+    Raises:
+        InputError: A result has no wall time of the stepping loop.
     """
     from matplotlib.figure import Figure
 
@@ -42,13 +44,19 @@ def draw_timings(result: Result, others: Sequence[Result] = ()) -> Figure:
 
 
 def real_time_factor(result: Result) -> float:
-    """Simulated time over the wall time of the stepping loop."""
+    """Return the simulated time divided by the wall time of the stepping loop.
+
+    Raises:
+        InputError: The result has no wall time of the stepping loop.
+    """
     loop = result.timing.get("loop_seconds", 0.0)
     if not loop or len(result.time) < 2:
-        raise InputError(f"{_tick_label(result)}: no wall time of the stepping loop is known (timing.loop_seconds in run.json)")
+        raise InputError(
+            f"{_tick_label(result)}: the wall time of the stepping loop is missing (timing.loop_seconds in run.json)"
+        )
     return float(result.time[-1] - result.time[0]) / loop
 
 
 def _tick_label(result: Result) -> str:
-    """The scenario's name, broken where it may be."""
+    """Return the scenario's name with line breaks instead of underscores."""
     return str(result.metadata.get("name", "run")).replace("_", "\n")

@@ -1,4 +1,8 @@
-"""A run as a video: frames of a scene, written as MP4 (H.264)."""
+"""Videos of runs: frames that a component of the scenario renders, encoded as MP4 (H.264).
+
+The class of a Python component may have a static method `video_frames(result, camera, times, size)` that yields a uint8 frame
+of shape (height, width, 3) for each of `times` (s), seen from the camera of that name; `size` is (width, height) in pixels.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +16,12 @@ from typing import TYPE_CHECKING
 from ..core.errors import InputError
 from ..results import Result
 from ..results.files import writing_atomically
-from .frames import RenderJob, render_frames
+from .frames import RENDER_METHOD, RenderJob, render_frames
+from .scene import flatten_components, static_method
 
 if TYPE_CHECKING:
     import numpy as np
 
-#: function(result, camera, moments, size) that yields a uint8 frame (height, width, 3) for each moment; of the shipped plant
-FRAME_SOURCE = "plant_src/scene/video.py:frames"
 DEFAULT_SIZE = (640, 360)  # pixels
 DEFAULT_FRAME_RATE = 25  # frames per second
 
@@ -29,16 +32,26 @@ def write_video(
     camera: str,
     size: tuple[int, int] = DEFAULT_SIZE,
     frame_rate: int = DEFAULT_FRAME_RATE,
-    frames: str = FRAME_SOURCE,
+    frame_source: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Write the run in real time to `path` as `camera` sees it; returns the path. `size` in pixels, both even.
+    """Write a video of a run in real time and return its path.
 
-    `progress` is called with the number of finished frames and of all. Raises InputError when the extra "video" is missing,
-    the camera unknown or the run without a scene.
+    Args:
+        result: The run.
+        path: The MP4 file to write.
+        camera: The name of a camera of the scene.
+        size: Width and height in pixels, both even.
+        frame_rate: Frames per second.
+        frame_source: The class "file.py:Class" with the method `video_frames`; None: that of a component of the scenario.
+        progress: Called with the number of finished frames and the number of all frames.
+
+    Raises:
+        InputError: The extra "video" is missing, the camera is unknown, or no component of the run renders frames.
     """
     encoder = _import_encoder()
-    job = RenderJob(frames, result, camera, frame_times(result, frame_rate), size)
+    source = frame_source or find_frame_source(result)
+    job = RenderJob(source, result, camera, frame_times(result, frame_rate), size)
     with writing_atomically(path) as temporary:
         file = temporary.with_suffix(".mp4")
         try:
@@ -49,12 +62,29 @@ def write_video(
     return path
 
 
+def find_frame_source(result: Result) -> str:
+    """Return the "file.py:Class" of the first component of the run's scenario that renders video frames.
+
+    Raises:
+        InputError: No component renders frames, or the source file of a component does not exist.
+    """
+    if "scenario_file" in result.metadata:
+        folder = Path(result.metadata["scenario_file"]).parent
+        for _, component, component_folder in flatten_components(result.metadata["scenario"], folder):
+            if static_method(component, component_folder, RENDER_METHOD):
+                return str(component_folder / component["python"])
+    raise InputError(
+        f'no component of the scenario renders a video: none is a Python class with a static method "{RENDER_METHOD}"'
+    )
+
+
 def frame_times(result: Result, rate: int) -> np.ndarray:
-    """`rate` moments (s) per second from the start to the end of a run."""
+    """Return the times (s) of the frames of a run, `rate` per second, shape (frames,)."""
     import numpy as np
 
-    start, stop = result.time[0], result.time[-1]
-    return start + np.arange(int((stop - start) * rate + 1e-9) + 1) / rate
+    start, stop = float(result.time[0]), float(result.time[-1])
+    times: np.ndarray = start + np.arange(int((stop - start) * rate + 1e-9) + 1) / rate
+    return times
 
 
 def _import_encoder() -> ModuleType:
@@ -70,7 +100,7 @@ def _encode_video(
     encoder: ModuleType, job: RenderJob, file: Path, rate: int, progress: Callable[[int, int], None] | None
 ) -> None:
     with closing(render_frames(job)) as frames:
-        first = next(frames)  # before anything is written, so that a refusal comes alone
+        first = next(frames)  # before the encoder starts, which would add its own message to an error
         writer = encoder.write_frames(str(file), job.size, fps=rate, macro_block_size=2, quality=7, ffmpeg_log_level="error")
         writer.send(None)
         with closing(writer):

@@ -1,4 +1,4 @@
-"""Scenario files: reading, checking, and assembling them into systems."""
+"""Scenario files: read, validate and build them into systems that are ready to run."""
 
 from .nested_systems import find_scenario, load_scenario
 from .prepared_run import PreparedRun, prepare

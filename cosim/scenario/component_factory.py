@@ -1,8 +1,8 @@
-"""The kinds of components a scenario can name, and how each is made."""
+"""The factory that creates a component from its entry in a scenario."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from ..components.fmi import FmuFile, Isolation, create_component
@@ -14,61 +14,58 @@ from .schema import ComponentSpec
 
 
 class ComponentFactory:
-    """Makes components; every FMU file is read once, however many components use it.
+    """Factory of components that reads every FMU file once, however many components use it.
 
-    `isolation` is how FMUs run that run in processes of their own: those that ask for it, with `apart` all of them, and the
-    further instances of an FMU that allows one per process. `prepared` are FMU files by resolved path that were read before.
+    Args:
+        isolation: How isolated FMUs run. An FMU is isolated if its component has `isolation`, if `isolate_fmus` is set, and
+            from the second instance on if it allows only one instance per process.
+        isolate_fmus: Isolate every FMU.
+        loaded_fmus: FMU files that have already been read, by resolved path.
     """
 
     def __init__(self, isolation: Isolation, isolate_fmus: bool, loaded_fmus: Mapping[Path, FmuFile]) -> None:
         self._isolation, self._isolate_fmus, self._loaded_fmus = isolation, isolate_fmus, loaded_fmus
+        #: FMU files in use, by resolved path
         self.fmus: dict[Path, FmuFile] = {}
-        #: source files of components
+        #: source files of the components made so far
         self.python_files: list[Path] = []
         self.modelica_files: list[Path] = []
 
     def create(self, node: Node, name: str) -> Component:
-        """The component `name` of a system. Raises InputError."""
-        spec = node.spec.components[name]
-        source = next(source for source in _FACTORY_METHODS if getattr(spec, source) is not None)
-        return _FACTORY_METHODS[source](self, node.folder, spec, node.full_name(name))
+        """Create the component `name` of the system `node`.
 
-    def from_fmu(self, folder: Path, spec: ComponentSpec, name: str) -> Component:
-        assert spec.fmu is not None
-        return self._instantiate_fmu(folder / spec.fmu, spec, name)
+        Raises:
+            InputError: The source of the component does not exist or cannot be used.
+        """
+        spec, full_name = node.spec.components[name], node.full_name(name)
+        if spec.python is not None:
+            return self._load_python(node.folder, spec, full_name)
+        path = self._build_modelica(node.folder, spec.modelica or "") if spec.fmu is None else node.folder / spec.fmu
+        key = resolve_path(path)
+        used = self.fmus.get(key)
+        needs_own_process = used is not None and used.description.once_per_process
+        if used is None:
+            self.fmus[key] = self._loaded_fmus.get(key) or FmuFile(path)
+        elif needs_own_process:  # its process must not inherit the library that is loaded in this one
+            self.fmus[key] = FmuFile(path)
+        isolated = self._isolate_fmus or spec.isolation is not None or needs_own_process
+        return create_component(self.fmus[key], full_name, isolation=self._isolation if isolated else None)
 
-    def from_modelica(self, folder: Path, spec: ComponentSpec, name: str) -> Component:
-        """Built on demand: the FMU comes from the per-user cache when source and tools are unchanged."""
-        from ..export.build import cached_fmu
-
-        assert spec.modelica is not None
-        file, _, model = spec.modelica.rpartition(":")
-        if not file.endswith(".mo"):
-            raise InputError(f'expected "file.mo:Model", found "{spec.modelica}"')
-        if not is_file(folder / file):
-            raise InputError(f'file "{file}" does not exist')
-        self.modelica_files.append(folder / file)
-        return self._instantiate_fmu(cached_fmu(folder / file, model), spec, name)
-
-    def from_python(self, folder: Path, spec: ComponentSpec, name: str) -> Component:
+    def _load_python(self, folder: Path, spec: ComponentSpec, full_name: str) -> Component:
         from ..components.python_class import load_component
 
         assert spec.python is not None
         self.python_files.append(folder / spec.python.rpartition(":")[0])
-        return load_component(spec.python, folder, name, spec.arguments)
+        return load_component(spec.python, folder, full_name, spec.arguments)
 
-    def _instantiate_fmu(self, path: Path, spec: ComponentSpec, name: str) -> Component:
-        file = self.fmus.get(resolve_path(path))
-        alone = file is not None and file.description.once_per_process
-        if file is None or alone:  # a library that was loaded before would be the same one in a worker
-            file = self._loaded_fmus.get(resolve_path(path)) if file is None else None
-            file = self.fmus[resolve_path(path)] = file or FmuFile(path)
-        apart = self._isolate_fmus or spec.isolation is not None or alone
-        return create_component(file, name, isolation=self._isolation if apart else None)
+    def _build_modelica(self, folder: Path, reference: str) -> Path:
+        """Return the FMU of "file.mo:Model", from the user's cache if source and tools are unchanged."""
+        from ..export.build import cached_fmu
 
-
-_FACTORY_METHODS: Mapping[str, Callable[[ComponentFactory, Path, ComponentSpec, str], Component]] = {
-    "fmu": ComponentFactory.from_fmu,
-    "python": ComponentFactory.from_python,
-    "modelica": ComponentFactory.from_modelica,
-}
+        file, _, model = reference.rpartition(":")
+        if not file.endswith(".mo"):
+            raise InputError(f'expected "file.mo:Model", found "{reference}"')
+        if not is_file(folder / file):
+            raise InputError(f'file "{file}" does not exist')
+        self.modelica_files.append(folder / file)
+        return cached_fmu(folder / file, model)

@@ -1,7 +1,7 @@
-"""JSON files that know where everything stands.
+"""Strict JSON reader that keeps the line and column of every value.
 
-Strict JSON: duplicate keys, NaN and Infinity, and numbers too large for a double are problems, all of them reported with
-line and column; everything else is read as usual.
+Duplicate keys, NaN, Infinity and numbers too large for a double are collected as problems with line and column, and reading
+continues. Text that is not JSON at all raises InputError.
 """
 
 from __future__ import annotations
@@ -13,26 +13,27 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from json.decoder import scanstring  # type: ignore[attr-defined]
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import InputError, Problem
 from ..core.paths import open_text
 
+#: keys and indices from the root of a document to a value
 JsonPath = tuple["str | int", ...]
+_DECODER = json.JSONDecoder()
 _WHITESPACE = re.compile(r"[ \t\r\n]*")
 _LITERAL = re.compile(r"-?Infinity|NaN|true|false|null|-?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][-+]?\d+)?")
-#: neither file names nor UTF-8 can hold these
+#: NUL is not allowed in file names, and surrogates are not allowed in UTF-8
 _FORBIDDEN_CHARACTERS = re.compile("[\0\ud800-\udfff]")
-#: characters
+#: longest number that is read (characters); a longer one counts as infinite
 _MAX_NUMBER_LENGTH = 1000
 _IDENTIFIER = re.compile(r"[A-Za-z_]\w*")
 
 
 @dataclass
 class Document:
-    """A JSON value, and the offset in the text of everything in it."""
+    """JSON value with the text offset of everything in it, and the problems found while reading."""
 
     file: Path
     text: str
@@ -41,25 +42,25 @@ class Document:
     problems: list[Problem] = field(default_factory=list)
 
     def where(self, path: Sequence[str | int]) -> str:
-        """ "file:line:column: $.json.path" of the deepest part of `path` that exists."""
+        """Return "file:line:column: $.json.path", with the position of the deepest part of `path` that exists."""
         known = tuple(path)
         while known and known not in self.offsets:
             known = known[:-1]
         return f"{self.position(self.offsets.get(known, 0))}: {json_path(path)}"
 
     def position(self, offset: int) -> str:
-        """ "file:line:column" of an offset in the text."""
+        """Return "file:line:column" of an offset in the text."""
         line = bisect_right(self._lines, offset)
         return f"{self.file}:{line}:{offset - self._lines[line - 1] + 1}"
 
     @cached_property
     def _lines(self) -> list[int]:
-        """Where each line begins."""
+        """Offset of the first character of each line."""
         return [0, *(match.end() for match in re.finditer("\n", self.text))]
 
 
 def json_path(path: Sequence[str | int]) -> str:
-    """ "$.components.uav" or "$.stages[0]" for a sequence of keys and indices."""
+    """Return a sequence of keys and indices as text, such as "$.components.uav" or "$.stages[0]"."""
     return "$" + "".join(_format_key(key) for key in path)
 
 
@@ -70,7 +71,11 @@ def _format_key(key: str | int) -> str:
 
 
 def read_document(file: Path) -> Document:
-    """Read a JSON file. Raises InputError when there is no such file or when it is not JSON at all."""
+    """Read a JSON file.
+
+    Raises:
+        InputError: The file cannot be read, is not UTF-8, or is not JSON.
+    """
     try:
         with open_text(file, encoding="utf-8") as opened:
             text = opened.read()
@@ -79,10 +84,10 @@ def read_document(file: Path) -> Document:
     except UnicodeDecodeError as error:
         raise InputError(f'"{file}" is not UTF-8 text: {error.reason} at byte {error.start}') from None
     document = Document(file, text)
-    reader = _JsonParser(document)
-    document.value, end = reader.value(_skip_whitespace(text, 0), ())
+    parser = _JsonParser(document)
+    document.value, end = parser.value(_skip_whitespace(text, 0), ())
     if _skip_whitespace(text, end) != len(text):
-        raise reader.error(_skip_whitespace(text, end), "expected the end of the file")
+        raise parser.error(_skip_whitespace(text, end), "expected the end of the file")
     return document
 
 
@@ -92,7 +97,7 @@ def _skip_whitespace(text: str, offset: int) -> int:
 
 
 class _JsonParser:
-    """Recursive descent over JSON text; every method returns (value, offset behind it)."""
+    """Recursive descent parser of JSON text; the methods for values return (value, offset of the first character after it)."""
 
     def __init__(self, document: Document):
         self.document, self.text = document, document.text
@@ -152,11 +157,11 @@ class _JsonParser:
 
     def string(self, offset: int) -> tuple[str, int]:
         try:
-            text, end = scanstring(self.text, offset + 1, True)
+            text, end = _DECODER.raw_decode(self.text, offset)
         except json.JSONDecodeError as error:
             raise self.error(error.pos, error.msg) from None
-        if found := _FORBIDDEN_CHARACTERS.search(text):
-            message = f"the character U+{ord(found.group()):04X} is not allowed"
+        if match := _FORBIDDEN_CHARACTERS.search(text):
+            message = f"the character U+{ord(match.group()):04X} is not allowed"
             self.document.problems.append(Problem(message, self.document.position(offset)))
         return _FORBIDDEN_CHARACTERS.sub("\N{REPLACEMENT CHARACTER}", text), end
 

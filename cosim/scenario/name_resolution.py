@@ -1,4 +1,4 @@
-"""From names in a scenario to components and their variables."""
+"""Resolution of the names in a scenario to components and their variables."""
 
 from __future__ import annotations
 
@@ -15,101 +15,112 @@ from ..core.component import Component, Variable
 from ..core.errors import did_you_mean
 from .nested_systems import Node
 
-_PORT = re.compile(r"[^.\[]*")
 _REALS = ("Float64", "Float32")
 
 
-class UnknownName(Exception):
-    """A name refers to nothing; the text says why. Empty when the reason was reported elsewhere."""
+class UnknownNameError(Exception):
+    """A name that refers to nothing; its text gives the reason, and is empty if the reason has already been reported."""
 
 
 class Target(NamedTuple):
-    """A variable, or a prefix of variables, of a component; "" is the whole component."""
+    """Variable of a component, or prefix of several; the prefix "" means the whole component."""
 
     component: str
     prefix: str
 
 
 def resolve_name(node: Node, text: str, ports: Sequence[str], include_inner: bool = False) -> list[Target]:
-    """What a name means in a system. Through a nested system it goes by its ports of the given kinds ("inputs", ...); with
-    `hidden`, inner components are reached by their own names too.
+    """Resolve a name in a system to variables of components.
 
-    Raises Unknown.
+    Args:
+        node: The system in which the name is used.
+        text: A name such as "uav.position"; its first part is a component.
+        ports: The kinds of ports by which a nested system is entered ("inputs", "outputs", "parameters").
+        include_inner: Accept the names of components inside nested systems as well as ports.
+
+    Raises:
+        UnknownNameError: The name refers to nothing.
     """
     component, _, rest = text.partition(".")
     if component in node.invalid_components or "components" in node.invalid_keys:
-        raise UnknownName
+        raise UnknownNameError
     if component not in node.spec.components:
-        raise UnknownName(f'unknown component "{component}"{did_you_mean(component, node.spec.components)}')
+        raise UnknownNameError(f'unknown component "{component}"{did_you_mean(component, node.spec.components)}')
     child = node.children.get(component)
     if child is None:
         return [Target(node.full_name(component), rest)]
     if not rest:
-        raise UnknownName(
+        raise UnknownNameError(
             f'"{text}" names a nested system, expected one of its ports{did_you_mean("", _port_targets(child, ports))}'
         )
-    match = _PORT.match(rest)
-    port = match.group() if match else ""
-    shown = _port_targets(child, ports)
-    if port in shown:
-        return [
-            target for inner in shown[port] for target in resolve_name(child, inner + rest[len(port) :], ports, include_inner)
-        ]
+    port = re.split(r"[.\[]", rest, maxsplit=1)[0]
+    inner_names = _port_targets(child, ports)
+    if port in inner_names:
+        suffix = rest[len(port) :]
+        return [target for inner in inner_names[port] for target in resolve_name(child, inner + suffix, ports, include_inner)]
     if include_inner and port in {*child.spec.components, *child.invalid_components}:
         return resolve_name(child, rest, ports, include_inner)
-    valid = [*shown, *(child.spec.components if include_inner else ())]
-    raise UnknownName(f'nested system "{component}" has no {ports[0].rstrip("s")} port "{port}"{did_you_mean(port, valid)}')
+    valid = [*inner_names, *(child.spec.components if include_inner else ())]
+    raise UnknownNameError(f'nested system "{component}" has no {ports[0].rstrip("s")} port "{port}"{did_you_mean(port, valid)}')
 
 
 def _port_targets(node: Node, kinds: Sequence[str]) -> Mapping[str, Sequence[str]]:
-    declared = getattr(node.spec, "ports", None)
-    shown: dict[str, Sequence[str]] = {}
-    for kind in kinds if declared else ():
-        for name, inner in getattr(declared, kind).items():
-            shown[name] = [inner] if isinstance(inner, str) else inner
-    return shown
+    """Return the inner names of every port of the given kinds."""
+    ports = [port for kind in kinds for port in getattr(node.ports, kind).items()]
+    return {name: [inner] if isinstance(inner, str) else inner for name, inner in ports}
 
 
 class PrefixIndex:
-    """Names by how they begin, found without a look at all of them."""
+    """Sorted names that are searched by prefix in logarithmic time."""
 
     def __init__(self, names: Iterable[str]):
         self._sorted = sorted(names)
 
-    def with_prefix(self, head: str) -> Sequence[str]:
-        """All names that start with `head`, sorted."""
-        if not head:
+    def with_prefix(self, prefix: str) -> Sequence[str]:
+        """Return all names that start with `prefix`, sorted."""
+        if not prefix:
             return self._sorted
-        first = bisect_left(self._sorted, head)
-        return self._sorted[first : bisect_left(self._sorted, head[:-1] + chr(ord(head[-1]) + 1), first)]
+        begin = bisect_left(self._sorted, prefix)
+        return self._sorted[begin : bisect_left(self._sorted, prefix[:-1] + chr(ord(prefix[-1]) + 1), begin)]
 
 
 class SlotIndex:
-    """The slots of one causality of a component, in order, found by prefix without a look at all of them."""
+    """Scalars of the variables of one causality of a component, searched by prefix."""
 
     def __init__(self, component: Component, causality: str):
         slots = (slot for variable in component.variables if variable.causality == causality for slot in variable.scalar_names)
-        self._positions = {slot: place for place, slot in enumerate(slots)}
+        self._positions = {slot: position for position, slot in enumerate(slots)}
         self._names = PrefixIndex(self._positions)
 
     def below(self, prefix: str) -> dict[str, str]:
-        """Slots below a prefix, by the rest of their names: "" for the prefix itself, ".position.x" below it."""
+        """Return the scalars below a prefix, keyed by the rest of their names.
+
+        The key is "" for the prefix itself, and for example ".position.x" below it. The order is that of the variables.
+        """
         if not prefix:
             return {f".{slot}": slot for slot in self._positions}
-        found = [prefix] if prefix in self._positions else []
-        found += [slot for separator in ".[" for slot in self._names.with_prefix(prefix + separator)]
-        return {slot[len(prefix) :]: slot for slot in sorted(found, key=self._positions.__getitem__)}
+        slots = [prefix] if prefix in self._positions else []
+        slots += [slot for separator in ".[" for slot in self._names.with_prefix(prefix + separator)]
+        return {slot[len(prefix) :]: slot for slot in sorted(slots, key=self._positions.__getitem__)}
 
 
 def check_assignment(
     name: str, variables: Mapping[str, Variable], text: str, value: Any, all_elements: bool = False
 ) -> dict[str, Any]:
-    """Values by variable name for `text` = value; a list sets an array, or the scalars text[1], text[2], ...
+    """Check the assignment `text` = `value` to a component and return the checked values by variable name.
 
-    `variables` are those of the component `name`, by their names. A list may be shorter than an array, whose other elements keep
-    their start values, unless it has to be `whole`.
+    A list sets an array variable, or the scalar variables text[1], text[2], ...
 
-    Raises Unknown when there is no such variable, ValueError when it does not take the value.
+    Args:
+        name: The component's name, for messages.
+        variables: The component's variables by name.
+        text: The name of a variable, or of a list of variables without their indices.
+        value: The value from the scenario or from a Python caller.
+        all_elements: Refuse a list that is shorter than the array. By default the other elements keep their start values.
+
+    Raises:
+        UnknownNameError: The component has no such variable.
+        ValueError: The variable does not accept the value.
     """
     value = value.tolist() if hasattr(value, "tolist") else value
     if text in variables:
@@ -123,7 +134,7 @@ def check_assignment(
             raise ValueError(f'"{text}" takes at most {size} values, found {len(value)}')
         return {each: _check_value(variables[each], element) for each, element in zip(names, value, strict=True)}
     settable = [v.name for v in variables.values() if v.causality in ("parameter", "input")]
-    raise UnknownName(f'component "{name}" has no variable "{text}"{did_you_mean(text, settable)}')
+    raise UnknownNameError(f'component "{name}" has no variable "{text}"{did_you_mean(text, settable)}')
 
 
 def _check_value(variable: Variable, value: Any, all_elements: bool = False) -> Any:
@@ -145,7 +156,7 @@ def _check_value(variable: Variable, value: Any, all_elements: bool = False) -> 
 
 
 def _enumeration_value(variable: Variable, value: Any) -> Any:
-    """The value of an enumeration's item, which may be given by name."""
+    """Return the number of an enumeration item that is given by its name or its number."""
     items = dict(variable.items)
     if value in items:
         return items[value]
@@ -157,7 +168,7 @@ def _enumeration_value(variable: Variable, value: Any) -> Any:
 
 
 def _scalar_value(variable: Variable, value: Any) -> Any:
-    """The value as the variable's type. Raises ValueError when it is not of that type or out of range."""
+    """Return the value in the variable's type; raise ValueError if it has another type or is out of range."""
     if variable.items:
         return _enumeration_value(variable, value)
     if not _type_accepts(variable.type, value):
@@ -170,17 +181,17 @@ def _scalar_value(variable: Variable, value: Any) -> Any:
 
 
 def _limits(variable: Variable) -> tuple[float | None, float | None]:
-    """What the variable allows, and at most what its type holds."""
+    """Return the variable's minimum and maximum, narrowed to the range of its data type."""
     low, high = variable.minimum, variable.maximum
-    least: float
+    smallest: float
     largest: float
     if variable.dtype.kind in "iu":
-        least, largest = np.iinfo(variable.dtype).min, np.iinfo(variable.dtype).max
+        smallest, largest = np.iinfo(variable.dtype).min, np.iinfo(variable.dtype).max
     elif variable.type == "Float32":
-        least, largest = float(np.finfo(np.float32).min), float(np.finfo(np.float32).max)
+        smallest, largest = float(np.finfo(np.float32).min), float(np.finfo(np.float32).max)
     else:
         return low, high
-    return least if low is None else max(low, least), largest if high is None else min(high, largest)
+    return smallest if low is None else max(low, smallest), largest if high is None else min(high, largest)
 
 
 def _type_accepts(kind: str, value: Any) -> bool:

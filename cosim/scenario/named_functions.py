@@ -1,4 +1,4 @@
-"""Functions that a scenario names: KPIs, figures, and what the 3-D replay draws."""
+"""The Python functions that a scenario names: KPIs, figures and the scene of the 3-D replay."""
 
 from __future__ import annotations
 
@@ -19,9 +19,13 @@ from .schema import CallSpec, FunctionSpec, accepted
 
 
 def function_problem(spec: CallSpec, folder: Path) -> str:
-    """Why `file.py:function` or `package.module:function` cannot be called with its arguments later; "" when it can.
+    """Return why a function cannot be called with the arguments in the scenario, or "" if it can.
 
-    The file is read, not run.
+    The source file is parsed, but not executed.
+
+    Args:
+        spec: The reference `file.py:function` or `package.module:function`, and the keyword arguments.
+        folder: The folder that the path of the file starts from.
     """
     file, _, name = spec.python.rpartition(":")
     if not name.isidentifier() or not (file.endswith(".py") or all(part.isidentifier() for part in file.split("."))):
@@ -32,16 +36,22 @@ def function_problem(spec: CallSpec, folder: Path) -> str:
     try:
         functions = _function_definitions(path.read_bytes())
     except SyntaxError as error:
-        return f'"{file}" is no Python: {error.msg} (line {error.lineno})'
+        return f'"{file}" is not valid Python: {error.msg} (line {error.lineno})'
     if name not in functions:
         return f'"{file}" defines no function "{name}"{did_you_mean(name, functions)}'
     return _argument_problem(name, functions[name].args, spec.arguments)
 
 
 def signal_problems(root: Node, kind: str, signals: Collection[str]) -> Iterator[Problem]:
-    """What is wrong with arguments of a scenario's sound "kpis" or "figures" that have to name something of `signals`.
+    """Yield a problem for every argument of a KPI or figure that should name a recorded signal and does not.
 
-    Annotations say so: `Signal` is one of them, `Prefix` something that has signals below it (see `cosim.results.kpi`).
+    The parameters are recognized by their annotations: `Signal` is the name of a signal, `Prefix` that of a group of signals
+    (see `cosim.results.kpi`). Functions that have a problem of their own are skipped.
+
+    Args:
+        root: The scenario.
+        kind: "kpis" or "figures".
+        signals: The names of the recorded signals.
     """
     for i, spec in accepted(getattr(root.spec, kind)):
         if not function_problem(spec, root.folder):
@@ -50,6 +60,7 @@ def signal_problems(root: Node, kind: str, signals: Collection[str]) -> Iterator
 
 
 def _unknown_signals(spec: CallSpec, folder: Path, signals: Collection[str]) -> Iterator[tuple[str, str]]:
+    """Yield (parameter, message) of every argument that names no recorded signal."""
     declared = _function_definition(spec, folder).args
     for parameter in (*declared.posonlyargs, *declared.args, *declared.kwonlyargs):
         value, kinds = spec.arguments.get(parameter.arg), _annotation_names(parameter.annotation)
@@ -62,7 +73,10 @@ def _unknown_signals(spec: CallSpec, folder: Path, signals: Collection[str]) -> 
 
 
 def kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> str:
-    """Why there will be no number "landing.lateral_error" among those of `kpis`; "" when there is one or may be one."""
+    """Return why a KPI value such as "landing.lateral_error" cannot result from `kpis`, or "" if it may.
+
+    The names of a function's values are known only if its `return` statements write them as literals.
+    """
     name, _, key = kpi.partition(".")
     spec = next((spec for spec in kpis if spec.name == name), None)
     if spec is None:
@@ -74,38 +88,39 @@ def kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> st
 
 
 def _source_path(file: str, folder: Path) -> Path | None:
+    """Return the source file of a Python file or an importable module."""
     return folder / file if file.endswith(".py") else _module_file(file)
 
 
 def _function_definition(spec: CallSpec, folder: Path) -> ast.FunctionDef:
-    """The definition of a function that has no problem."""
+    """Return the definition of a function for which `function_problem` finds nothing."""
     file, _, name = spec.python.rpartition(":")
     path = _source_path(file, folder)
     assert path is not None
     return _function_definitions(path.read_bytes())[name]
 
 
-@lru_cache(16)  # several functions of one file are the rule, and sweeps load a scenario again and again
+@lru_cache(16)  # a file often has several functions, and sweeps load the same scenario many times
 def _function_definitions(source: bytes) -> dict[str, ast.FunctionDef]:
-    """The functions that a file defines."""
+    """Return the functions that a source file defines at its top level, by name."""
     return {node.name: node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)}
 
 
 def _annotation_names(annotation: ast.expr | None) -> set[str]:
-    """The names in an annotation."""
+    """Return the names that an annotation contains."""
     nodes = ast.walk(annotation) if annotation else ()
     return {node.id if isinstance(node, ast.Name) else node.attr for node in nodes if isinstance(node, ast.Name | ast.Attribute)}
 
 
 def _signal_prefixes(signals: Collection[str]) -> list[str]:
-    """Everything that has signals below it."""
-    return list(dict.fromkeys(name[: place.start()] for name in signals for place in re.finditer(r"[.\[]", name)))
+    """Return all names that are prefixes of signals."""
+    return list(dict.fromkeys(name[: match.start()] for name in signals for match in re.finditer(r"[.\[]", name)))
 
 
 def _kpi_value_names(function: ast.FunctionDef) -> list[str]:
-    """What a KPI calls its numbers, without indices, when its last `return` writes them down; else nothing.
+    """Return the names of a KPI's values without indices, or nothing if its last `return` does not write them as literals.
 
-    Returns before the last one, for runs in which something did not happen, may add to them.
+    Names in earlier `return` statements, such as those for runs without a landing, are included.
     """
     returned = [list(_dict_keys(value)) for value in _returned_expressions(function)]
     known = returned and "" not in returned[-1]
@@ -113,7 +128,7 @@ def _kpi_value_names(function: ast.FunctionDef) -> list[str]:
 
 
 def _returned_expressions(node: ast.AST) -> Iterator[ast.expr | None]:
-    """What the code returns, functions inside it left out."""
+    """Yield the expressions of all `return` statements of a function, except those of functions inside it."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.Return):
             yield child.value
@@ -122,7 +137,7 @@ def _returned_expressions(node: ast.AST) -> Iterator[ast.expr | None]:
 
 
 def _dict_keys(value: ast.expr | None) -> Iterator[str]:
-    """The keys of a dictionary as it is written, "time" for f"time[{i}]"; "" stands for those that are not written down."""
+    """Yield the keys of a dictionary expression: "time" for f"time[{i}]", and "" for a key that is not a literal."""
     match value:
         case ast.Dict(keys, values):
             for key, each in zip(keys, values, strict=True):
@@ -134,6 +149,7 @@ def _dict_keys(value: ast.expr | None) -> Iterator[str]:
 
 
 def _literal_key(key: ast.expr) -> str:
+    """Return the literal beginning of a key without its index, or "" if there is none."""
     match key:
         case ast.Constant(str(text)):
             return text.partition("[")[0]
@@ -143,7 +159,7 @@ def _literal_key(key: ast.expr) -> str:
 
 
 def _module_file(module: str) -> Path | None:
-    """Where an installed module lies; the packages around it are imported."""
+    """Return the source file of an installed module; its parent packages are imported."""
     try:
         spec = find_spec(module)
     except ImportError:
@@ -152,15 +168,20 @@ def _module_file(module: str) -> Path | None:
 
 
 def load_function(reference: str, folder: Path) -> Callable[..., Any]:
-    """What `file.py:function`, relative to `folder`, or `package.module:function` is; raises InputError as `load_object`."""
+    """Import the function `file.py:function`, whose path starts from `folder`, or `package.module:function`.
+
+    Raises:
+        InputError: The file does not exist, cannot be imported, or does not define the function.
+    """
     module, _, name = reference.rpartition(":")
-    if module.endswith(".py"):
-        return load_object(reference, folder)
-    return getattr(import_module(module), name)
+    function: Callable[..., Any] = (
+        load_object(reference, folder) if module.endswith(".py") else getattr(import_module(module), name)
+    )
+    return function
 
 
 def _argument_problem(name: str, declared: ast.arguments, given: Collection[str]) -> str:
-    """What is wrong with the keyword arguments of a function whose first argument is the result (or the scenario)."""
+    """Return what is wrong with keyword arguments `given` beside the first argument (the result or the scenario), or ""."""
     positional = [argument.arg for argument in (*declared.posonlyargs, *declared.args)]
     optional = positional[len(positional) - len(declared.defaults) :]
     keywords = dict(zip((argument.arg for argument in declared.kwonlyargs), declared.kw_defaults, strict=True))

@@ -1,4 +1,4 @@
-"""A scenario file and the nested systems it uses, as a tree."""
+"""The tree of a scenario file and the nested systems that it uses."""
 
 from __future__ import annotations
 
@@ -13,44 +13,49 @@ from ..components.python_import import package_files
 from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean
 from .json_document import Document, read_document
-from .schema import CallSpec, NestedSpec, ScenarioSpec, SystemSpec, accepted
+from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, accepted
 from .validation import validate_document
 
 
 @dataclass
 class Node:
-    """One system: the scenario itself (prefix ""), or a nested system (prefix "uav").
-
-    `broken` holds the names of components whose description was refused; nothing more is said about them.
-    """
+    """System in the tree: the scenario itself (prefix ""), or a nested system (prefix "uav")."""
 
     document: Document
     spec: SystemSpec
     prefix: str = ""
     children: dict[str, Node] = field(default_factory=dict)
+    #: components whose entries are invalid; problems that only follow from that are not reported
     invalid_components: set[str] = field(default_factory=set)
-    #: keys of the file that were refused or are missing: nothing that follows from them is said
+    #: keys of the file that are invalid or missing; problems that only follow from that are not reported
     invalid_keys: set[str] = field(default_factory=set)
 
     @property
     def folder(self) -> Path:
-        """Where relative paths start."""
+        """Folder that relative paths in the file start from."""
         return self.document.file.parent
 
+    @property
+    def ports(self) -> PortsSpec:
+        """Ports of a nested system; the scenario itself has none."""
+        return self.spec.ports if isinstance(self.spec, NestedSpec) else PortsSpec()
+
     def full_name(self, component: str) -> str:
+        """Return the name of a component from the scenario's point of view, such as "uav.vtol"."""
         return f"{self.prefix}.{component}" if self.prefix else component
 
     def where(self, *path: str | int) -> str:
+        """Return the file, line and JSON path of a part of the system, for messages."""
         return self.document.where(path)
 
     def walk(self) -> Iterator[Node]:
-        """Nested systems first, then this one."""
+        """Yield all systems of the tree, nested ones before those that contain them."""
         for child in self.children.values():
             yield from child.walk()
         yield self
 
     def leaves(self) -> Iterator[tuple[Node, str]]:
-        """(system, name) of every component that is no nested system, in the order of the files; refused ones left out."""
+        """Yield (system, name) of every valid component that is not a nested system, in the order of the files."""
         for name, component in self.spec.components.items():
             if name in self.children:
                 yield from self.children[name].leaves()
@@ -60,19 +65,24 @@ class Node:
 
 @dataclass
 class Scenario:
-    """A scenario with everything that is wrong with it so far, and the variables set from outside."""
+    """Scenario as read from its files, with the problems found so far."""
 
     root: Node
     problems: list[Problem]
+    #: values of variables that the caller sets, by name
     assignments: Mapping[str, Any]
 
     @property
     def spec(self) -> ScenarioSpec:
+        """Specification of the scenario file."""
         assert isinstance(self.root.spec, ScenarioSpec)
         return self.root.spec
 
     def files(self) -> list[Path]:
-        """All files that are named, there or not: nested systems, sources with their packages, profiles, KPIs and figures."""
+        """Return all files that the scenario names, whether they exist or not.
+
+        These are the scenario and its nested systems, sources with their packages, input profiles, KPIs and figures.
+        """
         files = [node.document.file for node in self.root.walk()]
         files += [self.root.folder / spec.file for _, spec in accepted(self.spec.inputs)]
         functions: list[CallSpec] = [spec for _, spec in (*accepted(self.spec.kpis), *accepted(self.spec.figures))]
@@ -88,7 +98,11 @@ class Scenario:
 
 
 def find_scenario(scenario: str | Path) -> Path:
-    """A path as it is, or the file of a shipped scenario given by its name."""
+    """Return the path of a scenario file that is given by its path or by the name of a shipped scenario.
+
+    Raises:
+        InputError: There is neither such a file nor a shipped scenario of this name.
+    """
     path = Path(scenario)
     shipped = resources.root() / "scenarios"
     if path.suffix == ".json" or paths.is_file(path):
@@ -102,8 +116,13 @@ def find_scenario(scenario: str | Path) -> Path:
 def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = None) -> Scenario:
     """Read a scenario and its nested systems.
 
-    `settings` are changes from outside: names that start with "/" are JSON pointers into the scenario file, "stop_time" and
-    "step_size" its times, all others variables. Raises InputError when there is no file, or no JSON in it.
+    Args:
+        scenario: A path, or the name of a shipped scenario.
+        settings: Values that the caller changes. A name that starts with "/" is a JSON pointer into the scenario file; any
+            other name is that of a variable.
+
+    Raises:
+        InputError: The file does not exist or is not JSON. Other problems are collected in the result.
     """
     document = read_document(find_scenario(scenario))
     problems: list[Problem] = []
@@ -113,13 +132,14 @@ def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = Non
             problems += _set_pointer(document, name, value)
         else:
             variables[name] = value
-    spec, found, refused = validate_document(document, ScenarioSpec)
-    root = Node(document, spec, invalid_keys=refused)
-    problems += found + _load_children(root, (document.file.resolve(),))
+    spec, schema_problems, invalid_keys = validate_document(document, ScenarioSpec)
+    root = Node(document, spec, invalid_keys=invalid_keys)
+    problems += schema_problems + _load_children(root, (document.file.resolve(),))
     return Scenario(root, problems, variables)
 
 
 def _load_children(node: Node, ancestors: tuple[Path, ...]) -> list[Problem]:
+    """Read the nested systems of a system; `ancestors` are the resolved files it is nested in."""
     problems: list[Problem] = []
     if not node.spec.components and "components" not in node.invalid_keys:
         problems.append(Problem("expected at least one component, found none", node.where("components")))
@@ -138,14 +158,14 @@ def _load_children(node: Node, ancestors: tuple[Path, ...]) -> list[Problem]:
             node.invalid_components.add(name)
             problems += [Problem(p.message, p.where or node.where("components", name, "system")) for p in error.problems]
             continue
-        spec, found, refused = validate_document(document, NestedSpec)
-        node.children[name] = Node(document, spec, node.full_name(name), invalid_keys=refused)
-        problems += found + _load_children(node.children[name], (*ancestors, file.resolve()))
+        spec, schema_problems, invalid_keys = validate_document(document, NestedSpec)
+        node.children[name] = Node(document, spec, node.full_name(name), invalid_keys=invalid_keys)
+        problems += schema_problems + _load_children(node.children[name], (*ancestors, file.resolve()))
     return problems
 
 
 def pointer_keys(pointer: str) -> list[str]:
-    """The steps of a JSON pointer.
+    """Return the keys and indices of a JSON pointer (RFC 6901).
 
     >>> pointer_keys("/components/uav/and~1or")
     ['components', 'uav', 'and/or']
@@ -154,7 +174,7 @@ def pointer_keys(pointer: str) -> list[str]:
 
 
 def _set_pointer(document: Document, pointer: str, value: Any) -> list[Problem]:
-    """Change the JSON value before it is read; the last step may be new."""
+    """Set a value in the JSON document; only the last key of the pointer may be new."""
     keys = pointer_keys(pointer)
     target, where = document.value, f'setting "{pointer}"'
     for depth, key in enumerate(keys[:-1]):
@@ -179,9 +199,10 @@ def _json_child(value: Any, key: str) -> Any:
 
 
 def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
-    """The values of `NAME=value` texts: JSON where it is JSON, else text.
+    """Return the values of `NAME=value` texts by name. A value that is not JSON is taken as text.
 
-    Raises InputError for texts without "=" and for numbers that are not finite.
+    Raises:
+        InputError: A text has no name or no "=", or a number is not finite.
     """
     parsed: dict[str, Any] = {}
     problems = []
@@ -202,7 +223,7 @@ def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
 
 
 def _is_finite(value: Any) -> bool:
-    """Whether all numbers in a JSON value are finite."""
+    """Return True if all numbers in a JSON value are finite."""
     if isinstance(value, dict | list):
         return all(map(_is_finite, value.values() if isinstance(value, dict) else value))
     return not isinstance(value, float) or math.isfinite(value)

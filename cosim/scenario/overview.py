@@ -1,4 +1,4 @@
-"""A system in JSON: what people want to know of its wiring once it has run."""
+"""Description of a system as JSON for `run.json` and the report: components, stages and connections."""
 
 from __future__ import annotations
 
@@ -10,27 +10,29 @@ from ..engine.transfer_plan import unit_conversion
 from .prepared_run import PreparedRun
 
 
-def describe_system(assembly: PreparedRun) -> dict[str, Any]:
-    """Components, stages (a nested system in them: {"name", "stages"}) and connections of a scenario that is ready to run.
+def describe_system(prepared: PreparedRun) -> dict[str, Any]:
+    """Return the components, stages and connections of a prepared run as JSON values.
 
-    Of a component: its name, where it comes from, how many scalar inputs and outputs it has, and its period in s (None: every
-    macro step). Of a connection: source, target, the source's unit ("" for none) and what happens on the way ("" for nothing).
+    - `components`: {"name", "origin", "inputs", "outputs", "period"}: the source in the scenario, the numbers of scalar inputs
+      and outputs, and the period (s; None: every macro step)
+    - `stages`: lists of component names; a nested system is {"name", "stages"}
+    - `connections`: [source, target, unit of the source or "", notes on delay and conversion or ""]
     """
-    system = assembly.system
+    system = prepared.system
     return {
-        "components": [_describe_component(assembly, name) for name in system.components],
+        "components": [_describe_component(prepared, name) for name in system.components],
         "stages": _describe_stages(system.stages),
         "connections": [_describe_connection(system, connection) for connection in system.connections],
     }
 
 
-def _describe_component(assembly: PreparedRun, name: str) -> dict[str, Any]:
-    variables = assembly.system.components[name].variables
+def _describe_component(prepared: PreparedRun, name: str) -> dict[str, Any]:
+    variables = prepared.system.components[name].variables
     inputs, outputs = (sum(len(v.scalar_names) for v in variables if v.causality == kind) for kind in ("input", "output"))
-    period = assembly.system.periods.get(name)
+    period = prepared.system.periods.get(name)
     return {
         "name": name,
-        "origin": assembly.component_source(name),
+        "origin": prepared.component_source(name),
         "inputs": inputs,
         "outputs": outputs,
         "period": None if period is None else float(period),

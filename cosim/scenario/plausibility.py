@@ -1,4 +1,4 @@
-"""What is probably a mistake in a scenario that can run all the same."""
+"""Warnings about probable mistakes in a scenario that can run nevertheless."""
 
 from __future__ import annotations
 
@@ -16,43 +16,43 @@ if TYPE_CHECKING:
 VariablesByEndpoint = dict[Endpoint, Variable]
 
 
-def find_warnings(assembly: PreparedRun) -> list[Problem]:
-    """All of them, each with its place in the file."""
-    return [*missing_connections(assembly), *_missing_reference(assembly), *_late_events(assembly)]
+def find_warnings(prepared: PreparedRun) -> list[Problem]:
+    """Return all warnings about a prepared run, each with its location in the scenario file."""
+    return [*missing_connections(prepared), *_missing_reference(prepared), *_late_events(prepared)]
 
 
-def missing_connections(assembly: PreparedRun) -> Iterator[Problem]:
-    """At most one problem: inputs that nothing feeds or sets, while other components have outputs of their names."""
-    system, free = assembly.system, unconnected_inputs(assembly)
-    outputs = _outputs_by_name(system) if free else {}
-    found = {end: source for end, variable in free.items() if (source := _matching_output(end, variable, outputs, system))}
-    if found:
-        (end, source), more = next(iter(found.items())), len(found) - 1
+def missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
+    """Yield at most one warning: unconnected inputs for which another component has an output of the same name."""
+    system, inputs = prepared.system, unconnected_inputs(prepared)
+    outputs = _outputs_by_name(system) if inputs else {}
+    sources = {end: source for end, variable in inputs.items() if (source := _matching_output(end, variable, outputs))}
+    if sources:
+        (end, source), more = next(iter(sources.items())), len(sources) - 1
         others = f" and {more} more input{'s' * (more > 1)}" if more else ""
-        shown = next((port for port, inner in system.aliases.items() if inner == source), source)
-        text = f"nothing feeds or sets {end}{others}, but there is an output {shown}: is a connection missing?"
-        yield Problem(text, assembly.root.where("connections"))
+        shown_source = next((port for port, inner in system.aliases.items() if inner == source), source)
+        text = f"nothing feeds or sets {end}{others}, but there is an output {shown_source}: is a connection missing?"
+        yield Problem(text, prepared.root.where("connections"))
 
 
-def unconnected_inputs(assembly: PreparedRun) -> VariablesByEndpoint:
-    """Inputs that keep their own start values for the whole run."""
-    system = assembly.system
-    given = {connection.target for connection in system.connections}
-    changes = [system.start_values, *(event.values for event in assembly.settings.events)]
-    given_names = {(component, name) for values in changes for component, own in values.items() for name in own}
+def unconnected_inputs(prepared: PreparedRun) -> VariablesByEndpoint:
+    """Return the scalar inputs that no connection, start value or event sets, with their variables."""
+    system = prepared.system
+    connected = {connection.target for connection in system.connections}
+    changes = [system.start_values, *(event.values for event in prepared.settings.events)]
+    assigned = {(component, name) for values in changes for component, own in values.items() for name in own}
     return {
         end: variable
         for name, component in system.components.items()
         for variable in component.variables
-        if variable.causality == "input" and (name, variable.name) not in given_names
+        if variable.causality == "input" and (name, variable.name) not in assigned
         for slot in variable.scalar_names
-        if (end := Endpoint(name, slot)) not in given
+        if (end := Endpoint(name, slot)) not in connected
     }
 
 
 def _outputs_by_name(system: System) -> dict[str, VariablesByEndpoint]:
-    """All outputs, by each of the names that an input may know them by; those that nothing reads come first."""
-    read = {connection.source for connection in system.connections}
+    """Return all scalar outputs by the names that a matching input may have; unconnected outputs come first."""
+    connected = {connection.source for connection in system.connections}
     ends = {
         Endpoint(name, slot): variable
         for name, component in system.components.items()
@@ -60,41 +60,39 @@ def _outputs_by_name(system: System) -> dict[str, VariablesByEndpoint]:
         if variable.causality == "output"
         for slot in variable.scalar_names
     }
-    known: dict[str, VariablesByEndpoint] = {}
-    for end in sorted(ends, key=read.__contains__):
+    outputs: dict[str, VariablesByEndpoint] = {}
+    for end in sorted(ends, key=connected.__contains__):
         for name in _lookup_names(end.scalar):
-            known.setdefault(name, {})[end] = ends[end]
-    return known
+            outputs.setdefault(name, {})[end] = ends[end]
+    return outputs
 
 
-def _matching_output(
-    end: Endpoint, variable: Variable, outputs: dict[str, VariablesByEndpoint], system: System
-) -> Endpoint | None:
-    """An output of another component that has the name of an input and could feed it."""
+def _matching_output(end: Endpoint, variable: Variable, outputs: dict[str, VariablesByEndpoint]) -> Endpoint | None:
+    """Return an output of another component that has the name of an input and can be connected to it."""
     for name in _lookup_names(end.scalar):
         for source, other in outputs.get(name, {}).items():
-            whole = name in (end.scalar, source.scalar) or "." in name
-            if whole and source.component != end.component and not incompatibility(other, variable):
+            is_specific = name in (end.scalar, source.scalar) or "." in name
+            if is_specific and source.component != end.component and not incompatibility(other, variable):
                 return source
     return None
 
 
 def _lookup_names(slot: str) -> list[str]:
-    """A variable's name as it is and without the vehicle in front: "uav.position.x" and "position.x"."""
+    """Return a scalar's name and its name without the vehicle: "uav.position.x" and "position.x"."""
     rest = slot.partition(".")[2]
     return [slot, rest] if rest else [slot]
 
 
-def _missing_reference(assembly: PreparedRun) -> Iterator[Problem]:
-    reference = assembly.spec.reference
-    if reference and not is_file(assembly.root.folder / reference.file):
+def _missing_reference(prepared: PreparedRun) -> Iterator[Problem]:
+    reference = prepared.spec.reference
+    if reference and not is_file(prepared.root.folder / reference.file):
         text = f'file "{reference.file}" does not exist: `cosim regress --update` writes it'
-        yield Problem(text, assembly.root.where("reference", "file"))
+        yield Problem(text, prepared.root.where("reference", "file"))
 
 
-def _late_events(assembly: PreparedRun) -> Iterator[Problem]:
-    stop = assembly.settings.stop_time
-    for event in assembly.settings.events:
+def _late_events(prepared: PreparedRun) -> Iterator[Problem]:
+    stop = prepared.settings.stop_time
+    for event in prepared.settings.events:
         if event.time > stop:
             text = f"this event does not happen: {float(event.time):g} s is after the stop time {float(stop):g} s"
             yield Problem(text, event.where)

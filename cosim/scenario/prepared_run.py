@@ -1,4 +1,4 @@
-"""A scenario that is ready to run."""
+"""Preparation of a scenario: read it, create its components, connect and check them."""
 
 from __future__ import annotations
 
@@ -22,23 +22,24 @@ from ..process.journal import as_component_error
 from .component_factory import ComponentFactory
 from .json_document import Document
 from .named_functions import load_function, signal_problems
-from .nested_systems import Node, Scenario, load_scenario
+from .nested_systems import Node, load_scenario
 from .schema import FunctionSpec, ScenarioSpec
 from .system_builder import SystemBuilder
 
+#: name, function and keyword arguments of a KPI or figure
 NamedCall = tuple[str, Callable[..., Any], Mapping[str, Any]]
 
 
 @dataclass(frozen=True, repr=False)
 class PreparedRun:
-    """A scenario ready to run. Its components live until `simulate` or `free`."""
+    """Scenario that is ready to run once. Simulating it frees its components; without a simulation, call `free`."""
 
     root: Node
     spec: ScenarioSpec
     system: System
     settings: Settings
     component_factory: ComponentFactory
-    #: wall time (s) of "load_seconds" (all), of it "parse_seconds", "instantiate_seconds" and "wiring_seconds"
+    #: wall time (s) of the preparation "load_seconds" and its parts "parse_seconds", "instantiate_seconds", "wiring_seconds"
     timing: Mapping[str, float]
 
     def __repr__(self) -> str:
@@ -48,42 +49,48 @@ class PreparedRun:
 
     @property
     def document(self) -> Document:
-        """The scenario file, with the changes from outside in its value."""
+        """Scenario file, including the values that the caller changed by JSON pointers."""
         return self.root.document
 
     @property
     def checks(self) -> list[dict[str, Any]]:
-        """The scenario's checks as `cosim.results.kpi.evaluate_checks` takes them."""
+        """Checks of the scenario in the form of `cosim.results.checks.evaluate_checks`."""
         return [check.model_dump(exclude_none=True) for check in self.spec.checks]
 
     def kpis(self) -> list[NamedCall]:
-        """(name, function, arguments) of every KPI."""
+        """Import the KPI functions and return (name, function, arguments) of each."""
         return self._load_functions(self.spec.kpis)
 
     def figures(self) -> list[NamedCall]:
-        """(name, function, arguments) of every figure."""
+        """Import the figure functions and return (name, function, arguments) of each."""
         return self._load_functions(self.spec.figures)
 
     def figure_problems(self) -> list[Problem]:
-        """Why figures could not be drawn from what is recorded, which is no matter where none are drawn, as in sweeps."""
+        """Return a problem for every figure argument that names no recorded signal.
+
+        These are no problems of the run itself, because sweeps draw no figures.
+        """
         return list(signal_problems(self.root, "figures", self.settings.columns))
 
     def _load_functions(self, specs: Sequence[FunctionSpec]) -> list[NamedCall]:
         return [(spec.name, load_function(spec.python, self.root.folder), spec.arguments) for spec in specs]
 
     def files(self) -> dict[str, Path]:
-        """All files that the run depends on, by their path from the scenario: scenario, FMUs, Python, Modelica, profiles."""
+        """Return all files that the run depends on, by their path relative to the scenario's folder.
+
+        These are the scenario and its nested systems, FMUs, Python and Modelica sources, and input profiles.
+        """
         own = [node.document.file for node in self.root.walk()]
         own += [self.root.folder / spec.file for spec in self.spec.inputs]
         calls = (*self.spec.kpis, *self.spec.figures, *([self.spec.scene] if self.spec.scene else []))
-        places = (spec.python.rpartition(":")[0] for spec in calls)
-        functions = [self.root.folder / place for place in places if place.endswith(".py")]
+        modules = (spec.python.rpartition(":")[0] for spec in calls)
+        functions = [self.root.folder / module for module in modules if module.endswith(".py")]
         python = [member for file in (*functions, *self.component_factory.python_files) for member in package_files(file)]
         files = {file.resolve() for file in (*own, *python, *self.component_factory.fmus, *self.component_factory.modelica_files)}
         return {Path(relpath(file, self.root.folder.resolve())).as_posix(): file for file in sorted(files)}
 
     def component_source(self, name: str) -> str:
-        """Where a component comes from, in words."""
+        """Return the source of a component as the scenario names it: an FMU, a Python class, a Modelica model or a CSV file."""
         for node, own in self.root.leaves():
             if node.full_name(own) == name:
                 spec = node.spec.components[own]
@@ -91,6 +98,7 @@ class PreparedRun:
         return self.spec.inputs[int(name.rpartition(".")[2])].file
 
     def free(self) -> None:
+        """Free the components of a scenario that is not simulated."""
         _free_components(self.system.components)
 
 
@@ -103,36 +111,38 @@ def prepare(
     sandbox: bool = False,
     loaded_fmus: Mapping[Path, FmuFile] = MappingProxyType({}),
 ) -> PreparedRun:
-    """Read, wire and check a scenario; `settings` are changes from outside (see `tree.load`).
+    """Read a scenario, create its components, connect and check them.
 
-    With `apart` every FMU runs in a process of its own; with `sandbox` also, and those that do are confined. `prepared` are
-    FMU files by resolved path that were read before.
+    Args:
+        scenario: A path, or the name of a shipped scenario.
+        settings: Values that the caller changes, by variable name or JSON pointer (see `load_scenario`).
+        isolate_fmus: Run every FMU in a process of its own.
+        sandbox: Like `isolate_fmus`, and confine these processes to their own files, without network access.
+        loaded_fmus: FMU files that have already been read, by resolved path.
 
-    Raises InputError with every problem found, each with file, line and JSON path.
+    Raises:
+        InputError: Carries all problems, each with file, line and JSON path.
     """
     watch = Stopwatch()
     with watch.measure("load_seconds"):
         with watch.measure("parse_seconds"):
             loaded = load_scenario(scenario, settings)
-        return _build_run(loaded, SystemBuilder(loaded, isolate_fmus, sandbox, loaded_fmus), watch)
-
-
-def _build_run(loaded: Scenario, assembler: SystemBuilder, watch: Stopwatch) -> PreparedRun:
-    try:
-        with watch.measure("instantiate_seconds"):
-            assembler.make_components()
-        with watch.measure("wiring_seconds"):
-            assembler.build_system()
-        if assembler.problems:
-            raise InputError(dict.fromkeys(assembler.problems))
-    except BaseException:
-        _free_components(assembler.components)
-        raise
-    return PreparedRun(loaded.root, loaded.spec, assembler.system, assembler.settings, assembler.component_factory, watch.seconds)
+        builder = SystemBuilder(loaded, isolate_fmus, sandbox, loaded_fmus)
+        try:
+            with watch.measure("instantiate_seconds"):
+                builder.make_components()
+            with watch.measure("wiring_seconds"):
+                builder.build_system()
+            if builder.problems:
+                raise InputError(dict.fromkeys(builder.problems))
+        except BaseException:
+            _free_components(builder.components)
+            raise
+    return PreparedRun(loaded.root, loaded.spec, builder.system, builder.settings, builder.component_factory, watch.seconds)
 
 
 def _free_components(components: Mapping[str, Component]) -> None:
-    """Free all of them, even when one fails to be freed."""
+    """Free all components, even if freeing one of them fails."""
     with ExitStack() as stack:
         for name, component in components.items():
             stack.enter_context(as_component_error(name, "free"))

@@ -1,4 +1,4 @@
-"""Which signals a scenario records."""
+"""Selection of the recorded signals by patterns."""
 
 from __future__ import annotations
 
@@ -12,10 +12,14 @@ from .name_resolution import PrefixIndex
 
 
 class SignalSelector:
-    """Chooses signals by patterns in which "*" matches anything, dots too.
+    """Selector of signals by patterns in which "*" matches any characters, including dots.
 
-    Patterns choose outputs (also by the port names of nested systems, `aliases`); a pattern that matches no output may choose
-    local variables and parameters. Patterns that may mean something of the `broken` components are no problem.
+    A pattern selects outputs. A pattern that matches no output may select local variables and parameters.
+
+    Args:
+        components: The components by full name.
+        aliases: Outputs of nested systems by the names of their ports.
+        invalid: Names of invalid components; a pattern that may refer to one of them is not reported as a problem.
     """
 
     def __init__(self, components: Mapping[str, Component], aliases: Mapping[str, Endpoint], invalid: Sequence[str]):
@@ -28,18 +32,18 @@ class SignalSelector:
         self.problems: list[Problem] = []
 
     def select(self, patterns: Iterable[tuple[str, str]]) -> dict[str, Endpoint]:
-        """The signals that match (pattern, where it stands) pairs, in the order of components and variables."""
-        chosen: set[str] = set()
+        """Return the signals that match (pattern, location in the file) pairs, in the order of components and variables."""
+        selected: set[str] = set()
         for pattern, where in patterns:
             matches = _matching_names(pattern, self._output_index) or _matching_names(pattern, self._other_index)
             if not matches and not self._may_match_invalid(pattern):
                 self.problems.append(Problem(f'no output matches "{pattern}"{did_you_mean(pattern, self._outputs)}', where))
-            chosen.update(matches)
-        return {name: end for name, end in {**self._outputs, **self._others}.items() if name in chosen}
+            selected.update(matches)
+        return {name: end for name, end in {**self._outputs, **self._others}.items() if name in selected}
 
     def _may_match_invalid(self, pattern: str) -> bool:
-        head = pattern.partition("*")[0]
-        return any(head.startswith(name) or name.startswith(head) for name in self._invalid)
+        prefix = pattern.partition("*")[0]
+        return any(prefix.startswith(name) or name.startswith(prefix) for name in self._invalid)
 
 
 def _signal_endpoints(components: Mapping[str, Component], causalities: Sequence[str]) -> dict[str, Endpoint]:
@@ -56,7 +60,7 @@ def _matching_names(pattern: str, names: PrefixIndex) -> list[str]:
     if "*" not in pattern:
         return [name for name in names.with_prefix(pattern)[:1] if name == pattern]
     first, *middle, last = map(re.escape, pattern.split("*"))
-    # each part where it stands first, for good: no pattern takes longer than its length times that of the name
+    # atomic groups prevent backtracking: the time is at most proportional to the lengths of pattern and name multiplied
     parts = "".join(f"(?>.*?{part})" for part in middle if part)
     matches = re.compile(f"{first}{parts}.*{last}").fullmatch
     return [name for name in names.with_prefix(pattern.partition("*")[0]) if matches(name)]

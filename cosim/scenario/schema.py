@@ -1,4 +1,7 @@
-"""The scenario format: what a scenario or nested-system JSON may contain. `cosim schema` prints it as JSON Schema."""
+"""Data model of scenario and nested-system files.
+
+`cosim schema` prints it as JSON Schema: the docstrings of the classes and the descriptions of the fields are user documentation.
+"""
 
 from __future__ import annotations
 
@@ -79,14 +82,14 @@ NameList = Annotated[
 
 
 class InvalidElement:
-    """Stands for a list element that was refused, so that its neighbours keep their indices."""
+    """Placeholder of an invalid list element, which keeps the indices of the elements after it."""
 
 
 INVALID: Any = InvalidElement()
 
 
 class Spec(BaseModel):
-    """Base of everything in a scenario: unknown keys and loose types are refused."""
+    """Base of all parts of a scenario; unknown keys and implicit type conversions are errors."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, arbitrary_types_allowed=True)
 
@@ -97,21 +100,21 @@ class Spec(BaseModel):
 
 
 def accepted(specs: Iterable[S]) -> Iterator[tuple[int, S]]:
-    """(index, spec) of those list elements that were not refused."""
+    """Yield (index, specification) of the valid elements of a list."""
     return ((i, spec) for i, spec in enumerate(specs) if spec is not INVALID)
 
 
 class ComponentSpec(Spec):
-    """One component: exactly one source, and what it is started with."""
+    """A component with exactly one source: fmu, python, modelica or system. Paths start from the folder of this file."""
 
-    fmu: str | None = Field(None, description="path of an FMU")
-    python: str | None = Field(None, description='"file.py:Class", a PythonFMU class or a cosim component')
-    modelica: str | None = Field(None, description='"file.mo:Model", built when needed (extra "build")')
-    system: str | None = Field(None, description="path of a nested system's JSON")
-    arguments: dict[str, Any] = Field({}, description="for the constructor of a Python component")
-    parameters: dict[str, Value] = Field({}, description="parameters and start values by variable name")
-    period: Period | None = Field(None, description="seconds between two steps; default: every macro step")
-    isolation: Literal["fmu"] | None = Field(None, description="the FMU runs in a process of its own")
+    fmu: str | None = Field(default=None, description="path of an FMU")
+    python: str | None = Field(default=None, description='"file.py:Class": a PythonFMU class or a component class of cosim')
+    modelica: str | None = Field(default=None, description='"file.mo:Model"; built when needed (requires the extra "build")')
+    system: str | None = Field(default=None, description="path of the JSON file of a nested system")
+    arguments: dict[str, Any] = Field(default={}, description="arguments of the constructor; only for Python components")
+    parameters: dict[str, Value] = Field(default={}, description="values of parameters and start values, by variable name")
+    period: Period | None = Field(default=None, description="time between two steps (s); default: every macro step")
+    isolation: Literal["fmu"] | None = Field(default=None, description="run the FMU in a process of its own")
 
     @model_validator(mode="after")
     def _one_source(self) -> ComponentSpec:
@@ -126,158 +129,178 @@ class ComponentSpec(Spec):
 
 
 class ConnectionSpec(Spec):
-    """Output to input: two variables, or two prefixes whose variables are matched by the rest of their names."""
+    """A connection of an output to an input, or of two prefixes, whose variables are matched by the rest of their names."""
 
-    source: str = Field(alias="from")
-    target: str = Field(alias="to")
-    delay: int = Field(0, ge=0, le=1_000_000, description="macro steps; until then the initial output arrives")
+    source: str = Field(alias="from", description='output "component.variable", or a prefix of outputs')
+    target: str = Field(alias="to", description='input "component.variable", or a prefix of inputs')
+    delay: int = Field(
+        default=0, ge=0, le=1_000_000, description="delay in macro steps; the input keeps the initial output until then"
+    )
 
 
 class IterationSpec(Spec):
-    """Repeating every macro step from the same state until the connected outputs stand still."""
+    """Fixed-point iteration: every macro step is repeated from the same state until the connected outputs converge."""
 
-    tolerance: float = Field(1e-9, gt=0, description="y stands still when it changes by at most tolerance * (1 + |y|)")
-    limit: int = Field(50, ge=2, description="rounds in a macro step; more are an error")
+    tolerance: float = Field(
+        default=1e-9, gt=0, description="an output y has converged if it changes by at most tolerance * (1 + |y|)"
+    )
+    limit: int = Field(default=50, ge=2, description="largest number of iterations in a macro step; more are an error")
 
 
 class AlgorithmSpec(Spec):
-    """Stages step one after the other, the components of a stage side by side."""
+    """The order of execution in a macro step.
+
+    Stages step one after the other (Gauss-Seidel). The components of a stage step side by side (Jacobi).
+    """
 
     kind: Literal["staged"] = "staged"
-    stages: list[list[Name]]
+    stages: list[list[Name]] = Field(description="names of components, each in exactly one stage")
     parallel: AutoOrBool = Field(
-        "auto",
-        description="whether the FMUs of a stage step at the same time, on threads, with the same result: where their measured "
-        "steps are long enough (instances of one file never at once), always, or never",
+        default="auto",
+        description="run the FMUs of a stage in parallel threads, with identical results. true: always; false: never; auto: if "
+        'their measured steps are long enough. With "auto", instances of the same FMU file never run in parallel',
     )
     iteration: IterationSpec | None = Field(
-        None, description="repeat the stages in every macro step until they agree; all components must have states to return to"
+        default=None,
+        description="repeat the stages in every macro step until they converge; all components must save and restore states",
     )
 
 
 class RecordSpec(Spec):
-    """Which outputs are kept ("*" also matches dots) and how often."""
+    """The signals that are recorded, and the recording interval."""
 
-    signals: list[str] = ["*"]
-    interval: Period | None = None
+    signals: list[str] = Field(default=["*"], description='patterns of signal names; "*" matches any characters, including dots')
+    interval: Period | None = Field(default=None, description="time between two rows (s); default: the step size")
 
 
 class EventSpec(Spec):
-    """At a communication point, before the step that starts there, variables are set."""
+    """Values that variables are set to at a communication point, before the step that starts there."""
 
-    time: Seconds
-    values: dict[str, Value] = Field(alias="set")
+    time: Seconds = Field(description="a communication point (s)")
+    values: dict[str, Value] = Field(alias="set", description="values of tunable parameters and unconnected inputs, by name")
 
 
 class InputSpec(Spec):
-    """A profile over time from a CSV file (first column "time"), each named column to one or more inputs."""
+    """An input profile over time from a CSV file."""
 
-    file: str
-    to: dict[str, NameList]
-    interpolation: Literal["linear", "hold"] = "linear"
+    file: str = Field(description='path of the CSV file; its first column is "time" (s)')
+    to: dict[str, NameList] = Field(description="the inputs that each column is connected to")
+    interpolation: Literal["linear", "hold"] = Field(
+        default="linear", description="value between two rows; hold: that of the last row"
+    )
 
 
 class CallSpec(Spec):
-    """A Python function and its keyword arguments; the first argument is what it is about."""
+    """A Python function that is called with the scenario as its first argument."""
 
     python: str = Field(description='"file.py:function" or "package.module:function"')
-    arguments: dict[str, Any] = {}
+    arguments: dict[str, Any] = Field(default={}, description="keyword arguments of the function")
 
 
 class FunctionSpec(CallSpec):
-    """A Python function of the result: a KPI (returns numbers) or a figure (returns a matplotlib Figure)."""
+    """A Python function that is called with the result: a KPI returns numbers, a figure returns a matplotlib Figure."""
 
-    name: Name
+    name: Name = Field(description="unique name; that of a KPI is the prefix of its values, that of a figure the file name")
 
 
 class CheckSpec(Spec):
-    """A KPI and what it must be for the run to pass."""
+    """A requirement on a KPI value; a run passes if it meets all checks."""
 
-    kpi: str
-    min: float | None = None
-    max: float | None = None
-    equals: bool | int | float | None = None
+    kpi: str = Field(description='name of a KPI value, such as "landing.lateral_error"')
+    min: float | None = Field(default=None, description="smallest value that passes")
+    max: float | None = Field(default=None, description="largest value that passes")
+    equals: bool | int | float | None = Field(default=None, description="the only value that passes")
 
     @model_validator(mode="after")
     def _bounded(self) -> CheckSpec:
-        if self is not INVALID and None not in (self.min, self.max) and self.min > self.max:  # type: ignore[operator]
-            raise ValueError('expected "min" to be at most "max"')
-        if self is not INVALID and self.min is None and self.max is None and self.equals is None:
-            raise ValueError('expected at least one of "min", "max", "equals"')
+        if self is not INVALID:
+            self._check_bounds()
         return self
+
+    def _check_bounds(self) -> None:
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise ValueError('expected "min" to be at most "max"')
+        if self.min is None and self.max is None and self.equals is None:
+            raise ValueError('expected at least one of "min", "max", "equals"')
 
 
 class ToleranceSpec(Spec):
-    """Half width of the tube around a reference, in value and in time (s)."""
+    """Half width of the tolerance tube around a reference signal."""
 
-    absolute: float = Field(0.0, ge=0)
-    relative: float = Field(0.0, ge=0)
-    time: float = Field(0.0, ge=0)
+    absolute: float = Field(default=0.0, ge=0, description="in the unit of the signal")
+    relative: float = Field(default=0.0, ge=0, description="relative to the reference value")
+    time: float = Field(default=0.0, ge=0, description="along the time axis (s)")
 
 
 class ReferenceSpec(Spec):
-    """A recorded trajectory to compare with; only signals that match a pattern are compared."""
+    """A recorded reference trajectory that `cosim compare` and `cosim regress` compare the result with."""
 
-    file: str
-    tolerances: dict[str, ToleranceSpec]
+    file: str = Field(description="path of a CSV file with recorded signals")
+    tolerances: dict[str, ToleranceSpec] = Field(description="tolerances by pattern; only matching signals are compared")
 
 
 class PortsSpec(Spec):
-    """What a nested system shows to the outside: each port is one or more inner variables or prefixes."""
+    """The ports of a nested system: names for inner variables or prefixes that outer systems can connect and set."""
 
-    inputs: dict[Name, NameList] = {}
-    outputs: dict[Name, str] = {}
-    parameters: dict[Name, NameList] = {}
+    inputs: dict[Name, NameList] = Field(default={}, description="one or more inner inputs or prefixes of inputs for each port")
+    outputs: dict[Name, str] = Field(default={}, description="an inner output or prefix of outputs for each port")
+    parameters: dict[Name, NameList] = Field(default={}, description="one or more inner parameters or prefixes for each port")
 
 
 class DeadlinesSpec(Spec):
-    """How long one call into a component may take in a supervised run (s of wall time)."""
+    """The longest time that one call of a component may take in a supervised run (s, wall time)."""
 
-    load: float = Field(10.0, gt=0, description="load and instantiate")
-    initialization: float = Field(10.0, gt=0, description="until the end of initialization mode")
-    step: float = Field(5.0, gt=0, description="while stepping")
-    end: float = Field(5.0, gt=0, description="terminate and free")
+    load: float = Field(default=10.0, gt=0, description="to load and instantiate")
+    initialization: float = Field(default=10.0, gt=0, description="until the end of initialization mode")
+    step: float = Field(default=5.0, gt=0, description="while stepping")
+    end: float = Field(default=5.0, gt=0, description="to terminate and free")
 
 
 class SystemSpec(Spec):
-    """Components and how they are connected: the core of scenarios and nested systems."""
+    """Components and their connections."""
 
-    schema_: str | None = Field(None, alias="$schema")
-    name: str = ""
-    description: str = ""
-    components: dict[Name, ComponentSpec]
-    connections: list[ConnectionSpec] = []
-    algorithm: AlgorithmSpec | None = Field(None, description="default: one component per stage in the listed order")
+    schema_: str | None = Field(default=None, alias="$schema", description="path of the JSON Schema, for editors")
+    name: str = Field(default="", description="name of the system")
+    description: str = Field(default="", description="text for reports and people")
+    components: dict[Name, ComponentSpec] = Field(description="components by name")
+    connections: list[ConnectionSpec] = Field(default=[], description="connections of outputs to inputs")
+    algorithm: AlgorithmSpec | None = Field(
+        default=None, description="order of execution; default: the components step one after the other in the order of this file"
+    )
 
 
 class NestedSpec(SystemSpec):
-    """A nested system: a system without times that shows ports."""
+    """A nested system: components and connections without times, used by a scenario or another nested system."""
 
-    ports: PortsSpec = PortsSpec()
+    ports: PortsSpec = Field(default=PortsSpec(), description="inner variables that outer systems can connect and set")
 
 
 class ScenarioSpec(SystemSpec):
-    """A whole scenario: a system, its times, and what to keep, compute, check and draw."""
+    """A scenario: a system of components, its times, recorded signals, events, KPIs, checks and figures."""
 
     name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$")] = Field(
-        description="also the name of the folder for results"
+        description="name of the scenario and of its results folder"
     )
-    start_time: Seconds = Fraction(0)
-    stop_time: Seconds
-    step_size: Period
-    record: RecordSpec = RecordSpec()
-    events: list[EventSpec] = []
-    inputs: list[InputSpec] = []
-    kpis: list[FunctionSpec] = []
-    checks: list[CheckSpec] = []
-    figures: list[FunctionSpec] = []
-    scene: CallSpec | None = Field(None, description="function of the scenario that says what the 3-D replay draws")
-    reference: ReferenceSpec | None = None
-    deadlines: DeadlinesSpec = DeadlinesSpec(load=10.0, initialization=10.0, step=5.0, end=5.0)
-    non_finite: Literal["error", "allow"] = Field("error", description="what NaN or infinity on a connected output is")
+    start_time: Seconds = Field(default=Fraction(0), description="s")
+    stop_time: Seconds = Field(description="s; the duration is a multiple of the step size")
+    step_size: Period = Field(description="macro step: time between two communication points (s)")
+    record: RecordSpec = Field(
+        default=RecordSpec(), description="recorded signals; default: all outputs at every communication point"
+    )
+    events: list[EventSpec] = Field(default=[], description="values that are set during the run")
+    inputs: list[InputSpec] = Field(default=[], description="input profiles from CSV files")
+    kpis: list[FunctionSpec] = Field(default=[], description="functions that compute numbers from the result")
+    checks: list[CheckSpec] = Field(default=[], description="requirements on KPI values")
+    figures: list[FunctionSpec] = Field(default=[], description="functions that draw figures from the result")
+    scene: CallSpec | None = Field(default=None, description="function that returns the scene of the 3-D replay")
+    reference: ReferenceSpec | None = Field(default=None, description="recorded trajectory for comparisons")
+    deadlines: DeadlinesSpec = Field(default=DeadlinesSpec(), description="time limits of calls in supervised runs")
+    non_finite: Literal["error", "allow"] = Field(
+        default="error", description="treatment of NaN or infinity on a connected output"
+    )
 
 
 def json_schema(nested: bool = False) -> dict[str, Any]:
-    """JSON Schema (2020-12) of a scenario file, or of a nested system's."""
+    """Return the JSON Schema (2020-12) of scenario files, or of nested-system files."""
     schema = (NestedSpec if nested else ScenarioSpec).model_json_schema(by_alias=True)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

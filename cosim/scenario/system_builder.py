@@ -1,4 +1,4 @@
-"""From a scenario to a system that can be simulated; everything that is wrong is collected and reported together."""
+"""Construction of a system and its settings from a scenario, collecting all problems."""
 
 from __future__ import annotations
 
@@ -18,33 +18,39 @@ from ..engine.run_checks import find_problems
 from ..engine.settings import Event, Settings
 from ..process.journal import Deadlines
 from .component_factory import ComponentFactory
-from .name_resolution import SlotIndex, Target, UnknownName, check_assignment, resolve_name
+from .name_resolution import SlotIndex, Target, UnknownNameError, check_assignment, resolve_name
 from .named_functions import function_problem, kpi_name_problem, signal_problems
 from .nested_systems import Node, Scenario
 from .recorded_signals import SignalSelector
 from .schema import SystemSpec, accepted
 from .wiring import Wiring
 
-#: full name of the components made from input profiles: PROFILES.0, PROFILES.1, ...
+#: prefix of the components made from input profiles: inputs.0, inputs.1, ...
 PROFILE_PREFIX = "inputs"
+
+#: settings whose times must fit the communication points
+_TIMED_SETTINGS = (("stop_time",), ("record",), ("events",))
 
 
 class SystemBuilder:
-    """The steps of assembling, each adding to `problems`."""
+    """Builder of a system: call `make_components`, then `build_system`; each adds to `problems`.
 
-    def __init__(self, scenario: Scenario, isolate_fmus: bool, sandbox: bool, loaded_fmus: Mapping[Path, FmuFile]):
+    `system` and `settings` exist after `build_system`; they can be simulated if there are no problems.
+    """
+
+    def __init__(self, scenario: Scenario, isolate_fmus: bool, sandbox: bool, loaded_fmus: Mapping[Path, FmuFile]) -> None:
         self.root, self.spec, self.assignments = scenario.root, scenario.spec, scenario.assignments
         self.problems: list[Problem] = list(scenario.problems)
         deadlines = Deadlines(**self.spec.deadlines.model_dump())
         self.component_factory = ComponentFactory(Isolation(deadlines, sandbox), isolate_fmus or sandbox, loaded_fmus)
         self.components: dict[str, Component] = {}
         self._variables_by_component: dict[str, Mapping[str, Variable]] = {}
-        #: signals are missing because something was refused
-        self._incomplete = False
+        #: some signals are missing because of other problems
+        self._has_missing_signals = False
         self.start_values: dict[str, dict[str, Any]] = defaultdict(dict)
 
     def build_system(self) -> None:
-        """Everything that follows once the components are made."""
+        """Set start values, connections, stages, recorded signals and events, and check the result."""
         self._set_start_values()
         aliases = self._aliases()
         connections = list(self._connections())
@@ -76,7 +82,7 @@ class SystemBuilder:
     # -- components and their start values -----------------------------------------------------------------------------
 
     def make_components(self) -> None:
-        """The components of the scenario and of its nested systems, and the tables of its input profiles."""
+        """Create the components of the scenario and its nested systems, and the tables of its input profiles."""
         for node, name in self.root.leaves():
             try:
                 self.components[node.full_name(name)] = self.component_factory.create(node, name)
@@ -93,7 +99,7 @@ class SystemBuilder:
                 self._add_problems(error, self.root, "inputs", i)
 
     def _set_start_values(self) -> None:
-        """Nested systems first, so that outer values win; those from outside come last."""
+        """Collect the start values: outer systems override nested ones, and the caller's values override both."""
         for node in self.root.walk():
             for name, spec in node.spec.components.items():
                 for variable, value in spec.parameters.items():
@@ -110,7 +116,7 @@ class SystemBuilder:
                 if target.component in self.components:
                     variables = self._variables(target.component)
                     values[target.component] |= check_assignment(target.component, variables, target.prefix, value, all_elements)
-        except (UnknownName, ValueError) as error:
+        except (UnknownNameError, ValueError) as error:
             if str(error):
                 self.problems.append(Problem(str(error), where))
 
@@ -122,14 +128,14 @@ class SystemBuilder:
     # -- wiring --------------------------------------------------------------------------------------------------------
 
     def _connections(self) -> Iterator[Connection]:
-        given = {
+        inputs_with_values = {
             Endpoint(name, slot)
             for name, values in self.start_values.items()
             for variable in self.components[name].variables
             if variable.name in values
             for slot in variable.scalar_names
         }
-        wiring = Wiring(self.components, given)
+        wiring = Wiring(self.components, inputs_with_values)
         for node in self.root.walk():
             wiring.connect(node)
         for i, spec in accepted(self.spec.inputs):
@@ -142,18 +148,18 @@ class SystemBuilder:
         self.problems += wiring.problems
 
     def _stages(self, node: Node) -> tuple[Stage, ...]:
-        """Names that mean nothing, stand twice or are missing are left to the system's own checks."""
+        """Return the stages of a system. Unknown, repeated and missing names are reported by `System.problems`."""
         if "components" in node.invalid_keys:
             return ()
-        listed = node.spec.algorithm.stages if node.spec.algorithm else [[name] for name in node.spec.components]
+        stages = node.spec.algorithm.stages if node.spec.algorithm else [[name] for name in node.spec.components]
         return tuple(
             tuple(self._stage_member(node, name) for name in stage if name not in node.invalid_components)
-            for stage in listed
+            for stage in stages
             if stage
         )
 
     def _root_stages(self) -> tuple[Stage, ...]:
-        """The root's stages; when they are iterated, as a group without the profiles."""
+        """Return the root's stages; with iteration they form one group, which excludes the input profiles."""
         stages, iteration = self._stages(self.root), _iteration_settings(self.spec)
         return ((Group(self.spec.name, stages, _parallel_mode(self.spec), iteration),),) if iteration else stages
 
@@ -164,6 +170,7 @@ class SystemBuilder:
         return node.full_name(name)
 
     def _periods(self, node: Node, inherited: Fraction | None = None) -> Iterator[tuple[str, Fraction]]:
+        """Yield (full name, period in s) of all components with a period of their own or of a system around them."""
         for name, spec in node.spec.components.items():
             period = spec.period or inherited
             if name in node.children:
@@ -172,17 +179,17 @@ class SystemBuilder:
                 yield node.full_name(name), period
 
     def _aliases(self) -> dict[str, Endpoint]:
-        """Outputs of nested systems under the names of their ports."""
+        """Return the outputs of nested systems by the full names of their ports."""
         aliases: dict[str, Endpoint] = {}
         for node in self.root.walk():
             for name, child in node.children.items():
-                for port, inner in child.spec.ports.outputs.items():  # type: ignore[attr-defined]
+                for port, inner in child.ports.outputs.items():
                     if port in child.spec.components:
-                        text = f'"{port}" is the name of a component here: it cannot be that of an output port, too'
+                        text = f'"{port}" is already the name of a component here, so an output port cannot have it'
                         self.problems.append(Problem(text, child.where("ports", "outputs", port)))
                     try:
                         (target,) = resolve_name(child, inner, ("outputs",))
-                    except UnknownName as error:
+                    except UnknownNameError as error:
                         if str(error):
                             self.problems.append(Problem(str(error), child.where("ports", "outputs", port)))
                         continue
@@ -195,17 +202,17 @@ class SystemBuilder:
         slots = SlotIndex(self.components[target.component], "output").below(target.prefix)
         return {alias + rest: Endpoint(target.component, slot) for rest, slot in slots.items()}
 
-    # -- what is recorded, set and computed ----------------------------------------------------------------------------
+    # -- recorded signals, events and functions ----------------------------------------------------------------------------
 
     def _columns(self, aliases: Mapping[str, Endpoint]) -> dict[str, Endpoint]:
-        broken = [node.full_name(name) for node in self.root.walk() for name in node.invalid_components]
-        broken += [node.prefix for node in self.root.walk() if "components" in node.invalid_keys]
-        selection = SignalSelector(self.components, aliases, broken)
+        invalid = [node.full_name(name) for node in self.root.walk() for name in node.invalid_components]
+        invalid += [node.prefix for node in self.root.walk() if "components" in node.invalid_keys]
+        selector = SignalSelector(self.components, aliases, invalid)
         patterns = [(text, self.root.where("record", "signals", i)) for i, text in enumerate(self.spec.record.signals)]
-        chosen = selection.select(patterns)
-        self.problems += selection.problems
-        self._incomplete = bool(broken or selection.problems)
-        return chosen
+        columns = selector.select(patterns)
+        self.problems += selector.problems
+        self._has_missing_signals = bool(invalid or selector.problems)
+        return columns
 
     def _events(self) -> Iterator[Event]:
         for i, spec in accepted(self.spec.events):
@@ -223,11 +230,13 @@ class SystemBuilder:
             names = [spec.name for _, spec in specs]
             for i, spec in specs:
                 if spec.name in names[:i]:
-                    self.problems.append(Problem(f'the name "{spec.name}" stands twice', self.root.where(kind, i, "name")))
+                    self.problems.append(
+                        Problem(f'the name "{spec.name}" is used more than once', self.root.where(kind, i, "name"))
+                    )
         if self.spec.scene and (text := function_problem(self.spec.scene, self.root.folder)):
             self.problems.append(Problem(text, self.root.where("scene")))
         kpis = [spec for _, spec in accepted(self.spec.kpis)]
-        if not self._incomplete:
+        if not self._has_missing_signals:
             self.problems += signal_problems(self.root, "kpis", self.settings.columns)
         for i, check in accepted(self.spec.checks):
             if text := kpi_name_problem(check.kpi, kpis, self.root.folder):
@@ -236,6 +245,7 @@ class SystemBuilder:
     # -- reporting -----------------------------------------------------------------------------------------------------
 
     def _add_problems(self, error: InputError, node: Node, *path: str | int) -> None:
+        """Add the problems of an error; those without a location get that of a part of `node`."""
         self.problems += [
             replace(problem, where=node.where(*path, *problem.subject), subject=())
             if problem.subject or not problem.where
@@ -244,13 +254,12 @@ class SystemBuilder:
         ]
 
     def _is_consequence(self, problem: Problem) -> bool:
-        """Whether a problem only follows from a time or a component list that was refused."""
+        """Return True if a problem with times only follows from an invalid start time, stop time or step size."""
         times = {"stop_time", "step_size", "start_time"} & self.root.invalid_keys
-        about_times = problem.subject[:1] in (("stop_time",), ("record",)) or problem.subject[-1:] in (("period",), ("time",))
-        return bool(times and about_times)
+        return bool(times) and (problem.subject[:1] in _TIMED_SETTINGS or problem.subject[-1:] == ("period",))
 
     def _with_location(self, problem: Problem) -> Problem:
-        """A problem of the system, with the place in the file of the setting it is about."""
+        """Return a problem of the system with the location of its subject in the scenario file."""
         if problem.where or not problem.subject:
             return problem
         for node in self.root.walk():
@@ -265,5 +274,5 @@ def _parallel_mode(spec: SystemSpec) -> Parallel:
 
 
 def _iteration_settings(spec: SystemSpec) -> Iteration | None:
-    found = spec.algorithm.iteration if spec.algorithm else None
-    return Iteration(found.tolerance, found.limit) if found else None
+    settings = spec.algorithm.iteration if spec.algorithm else None
+    return Iteration(settings.tolerance, settings.limit) if settings else None

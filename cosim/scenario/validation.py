@@ -1,4 +1,7 @@
-"""From JSON to a spec, collecting every problem: wrong parts are reported and cut out, and the rest is read on."""
+"""Validation of a JSON document against the schema, collecting all problems.
+
+Invalid parts are reported and removed, so that the rest can be read.
+"""
 
 from __future__ import annotations
 
@@ -17,45 +20,46 @@ from .schema import INVALID, SystemSpec
 
 S = TypeVar("S", bound=SystemSpec)
 
-#: what stands in for missing or wrong keys of the root, so that the rest can be read
+#: values that replace missing or invalid required keys of the root
 _PLACEHOLDERS: dict[str, Any] = {"name": "unnamed", "stop_time": 1, "step_size": 1, "components": {}}
 
 
 class Validated(NamedTuple, Generic[S]):
-    """The spec in a document without its wrong parts, what is wrong, and the root keys that were refused or are missing."""
+    """Specification without the invalid parts of its document, and the problems found."""
 
     spec: S
     problems: list[Problem]
+    #: keys of the root that are invalid or missing
     invalid_keys: set[str]
 
 
 def validate_document(document: Document, kind: type[S]) -> Validated[S]:
-    """Read a document as a spec, whatever is wrong with it."""
+    """Convert a document to a specification of the class `kind`; parts that are invalid are reported and removed."""
     value = copy.deepcopy(document.value)
     problems = list(document.problems)
-    refused: set[str] = set()
+    invalid_keys: set[str] = set()
     if not isinstance(value, dict):
         problems.append(Problem(f"expected an object, found {_shorten_json(value)}", document.where(())))
         value = {}
-    first = True
+    is_first_pass = True
     while True:
         try:
-            return Validated(kind.model_validate(value), problems, refused)
+            return Validated(kind.model_validate(value), problems, invalid_keys)
         except ValidationError as error:
-            if first:  # later ones are consequences of cutting
+            if is_first_pass:  # errors of later passes are consequences of the removals
                 problems += schema_problems(kind, document, error)
             for detail in error.errors(include_url=False):
                 path = _error_path(detail)
-                refused |= {str(key) for key in path[:1] if len(path) == 1}
+                invalid_keys |= {str(key) for key in path[:1] if len(path) == 1}
                 if detail["type"] == "extra_forbidden":
                     _remove_key(value, path)
                 else:
                     _replace_invalid(kind, value, path[:-1] if detail["type"] == "missing" and len(path) > 1 else path)
-            first = False
+            is_first_pass = False
 
 
 def schema_problems(kind: type[BaseModel], document: Document, error: ValidationError) -> list[Problem]:
-    """What a schema has found wrong in a document, each with its place there."""
+    """Return a problem with its location in the document for every error that pydantic found."""
     details = [(_error_path(detail), detail) for detail in error.errors(include_url=False)]
     return [Problem(_error_message(kind, path, detail), document.where(path)) for path, detail in details]
 
@@ -84,7 +88,7 @@ def _shorten_json(value: Any) -> str:
 
 
 def _remove_key(value: Any, path: Sequence[str | int]) -> None:
-    """Remove a key that should not be there, unless what it was in has been removed already."""
+    """Remove an unknown key, unless the object that contained it has already been removed."""
     for key in path[:-1]:
         if value is INVALID or not (key in value if isinstance(value, dict) else key in range(len(value))):
             return
@@ -94,7 +98,7 @@ def _remove_key(value: Any, path: Sequence[str | int]) -> None:
 
 
 def _replace_invalid(kind: Any, value: Any, path: Sequence[str | int]) -> None:
-    """Remove the element at `path`; what must be there gets a stand-in."""
+    """Remove the element at `path`; required keys of the root and elements of lists get a placeholder."""
     root = value
     for key in path[:-1]:
         if value is INVALID or not (key in value if isinstance(value, dict) else key in range(len(value))):
@@ -113,7 +117,7 @@ def _replace_invalid(kind: Any, value: Any, path: Sequence[str | int]) -> None:
 
 
 def _known_keys(kind: Any, path: Sequence[str | int]) -> list[str]:
-    """The keys that the schema knows at a path."""
+    """Return the keys that the schema allows at a path."""
     for key in path:
         kind = _child_type(kind, key)
     kind = _model_type(kind)
@@ -121,6 +125,7 @@ def _known_keys(kind: Any, path: Sequence[str | int]) -> list[str]:
 
 
 def _child_type(kind: Any, key: str | int) -> Any:
+    """Return the annotation of what a key or index of a value of type `kind` holds, or None if it is unknown."""
     if model := _model_type(kind):
         return next((f.annotation for n, f in model.model_fields.items() if key in (n, f.alias)), None)
     for option in _union_members(kind):
@@ -130,11 +135,12 @@ def _child_type(kind: Any, key: str | int) -> Any:
 
 
 def _model_type(kind: Any) -> type[BaseModel] | None:
+    """Return the pydantic model in an annotation, if there is one."""
     return next((o for o in _union_members(kind) if isinstance(o, type) and issubclass(o, BaseModel)), None)
 
 
 def _union_members(kind: Any) -> list[Any]:
-    """The members of a union, annotations removed."""
+    """Return the members of a union without `Annotated`."""
     if typing.get_origin(kind) is typing.Annotated:
         return _union_members(typing.get_args(kind)[0])
     if typing.get_origin(kind) in (typing.Union, types.UnionType):

@@ -1,4 +1,4 @@
-"""Connections of a scenario, written with names and prefixes, become connections of single variables."""
+"""Expansion of the connections of a scenario, which may use prefixes, to connections of scalars."""
 
 from __future__ import annotations
 
@@ -8,24 +8,30 @@ from typing import NamedTuple
 from ..core.component import Component
 from ..core.errors import Problem, did_you_mean
 from ..core.system import Connection, Endpoint
-from .name_resolution import SlotIndex, Target, UnknownName, resolve_name
+from .name_resolution import SlotIndex, Target, UnknownNameError, resolve_name
 from .nested_systems import Node
 from .schema import ConnectionSpec, accepted
 
 
 class _Candidate(NamedTuple):
+    """Connection to an input, and whether the scenario names its two variables instead of prefixes."""
+
     connection: Connection
     is_variable: bool
 
 
 class Wiring:
-    """Expands the connections of a scenario and its nested systems; `problems` holds what could not be wired.
+    """Expander of the connections of a scenario and its nested systems; `problems` collects those that are invalid.
 
     A prefix connects every input below it to the output with the same rest of the name. An input without such an output is
-    a problem unless something else sets it (`set_inputs`) or feeds it. A connection of single variables beats a prefix.
+    a problem unless it has a value or another connection. A connection of single variables overrides one of prefixes.
+
+    Args:
+        components: The components by full name.
+        inputs_with_values: Scalar inputs that the scenario sets to a value.
     """
 
-    def __init__(self, components: Mapping[str, Component], inputs_with_values: set[Endpoint]):
+    def __init__(self, components: Mapping[str, Component], inputs_with_values: set[Endpoint]) -> None:
         self._components = components
         self._inputs_with_values = inputs_with_values
         self._slots: dict[tuple[str, str], SlotIndex] = {}
@@ -34,17 +40,17 @@ class Wiring:
         self.problems: list[Problem] = []
 
     def connect(self, node: Node) -> None:
-        """Expand the connections of one system (not of those nested in it)."""
+        """Expand the connections of one system, without those of its nested systems."""
         for i, spec in accepted(node.spec.connections):
             self._expand(node, i, spec)
 
     def connect_output(self, node: Node, output: Endpoint, name: str, where: str) -> None:
-        """Connect one output to the input(s) that a name means."""
+        """Connect one output to the inputs that a name refers to; `where` is its location in the scenario file."""
         for target in self._resolve(node, name, "inputs", where):
             self._add(_Candidate(Connection(output, Endpoint(*target), 0, where), True))
 
     def connections(self) -> Iterator[Connection]:
-        """All connections; inputs that stayed without an output are added to the problems."""
+        """Return all connections, and add the inputs that have no output to the problems."""
         self.problems += [problem for end, problem in self._unmatched_inputs.items() if end not in self._by_input]
         return (candidate.connection for candidate in self._by_input.values())
 
@@ -67,15 +73,16 @@ class Wiring:
         delay: int,
         where: str,
     ) -> None:
+        """Connect every input to the output with the same rest of the name."""
         for rest, slot in inputs.items():
             end = Endpoint(target.component, slot)
             if rest in outputs:
                 connection = Connection(Endpoint(source.component, outputs[rest]), end, delay, where)
                 self._add(_Candidate(connection, is_variable=rest == ""))
             elif end not in self._inputs_with_values:
-                wanted = f"{source.component}.{source.prefix}{rest}".replace("..", ".")
-                hint = did_you_mean(wanted, (f"{source.component}.{name}" for name in outputs.values()))
-                self._unmatched_inputs[end] = Problem(f"input {end} has no matching output {wanted}{hint}", where)
+                expected = f"{source.component}.{source.prefix}{rest}".replace("..", ".")
+                hint = did_you_mean(expected, (f"{source.component}.{name}" for name in outputs.values()))
+                self._unmatched_inputs[end] = Problem(f"input {end} has no matching output {expected}{hint}", where)
 
     def _add(self, new: _Candidate) -> None:
         end = new.connection.target
@@ -89,17 +96,17 @@ class Wiring:
     def _resolve(self, node: Node, name: str, kind: str, where: str) -> list[Target]:
         try:
             return [t for t in resolve_name(node, name, (kind,)) if t.component in self._components]
-        except UnknownName as error:
+        except UnknownNameError as error:
             if str(error):
                 self.problems.append(Problem(str(error), where))
             return []
 
     def _slots_of_targets(self, targets: Sequence[Target], causality: str, where: str) -> list[tuple[Target, dict[str, str]]]:
-        """Slots of the wanted causality below each prefix; a problem if there are none at all."""
-        found = [(target, self._slots_of_target(target, causality)) for target in targets]
-        if targets and not any(slots for _, slots in found):
+        """Return the scalars of a causality below each prefix; add a problem if there are none at all."""
+        slots_by_target = [(target, self._slots_of_target(target, causality)) for target in targets]
+        if targets and not any(slots for _, slots in slots_by_target):
             self.problems.append(Problem(self._no_slots_message(targets[0], causality), where))
-        return [(target, slots) for target, slots in found if slots]
+        return [(target, slots) for target, slots in slots_by_target if slots]
 
     def _slots_of_target(self, target: Target, causality: str) -> dict[str, str]:
         key = target.component, causality

@@ -1,6 +1,6 @@
-"""The engine of a Dask cluster (extra `cluster`): the same jobs, run by the workers of a scheduler.
+"""Runner of jobs on a Dask cluster (extra `cluster`).
 
-No file system is shared: a worker that lacks files is sent them by content hash. Workers may come, go and be killed.
+No shared file system is needed: files are sent to the workers that lack them. Workers may join, leave and be killed.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from .execution.job import Job, Record
 from .execution.worker_pool import MAX_ATTEMPTS
 from .study import Study
 
-#: a scheduler must answer and show a worker within (s)
+#: time limit for the scheduler to answer and to have a worker (s)
 _CONNECT_TIMEOUT = 15.0
-#: jobs in advance for each thread of the cluster
+#: jobs submitted in advance per thread of the cluster
 _JOBS_PER_THREAD = 3
 
 
 class ClusterError(CosimError):
-    """The cluster failed; what was finished is kept."""
+    """Failure of the cluster; finished runs are kept."""
 
     exit_code = 1
 
 
 def require_cluster() -> None:
-    """Raises InputError when the package that speaks to a cluster is not installed."""
+    """Raise InputError if the package `distributed` is not installed."""
     try:
         import distributed  # noqa: F401
     except ImportError:
@@ -39,12 +39,19 @@ def require_cluster() -> None:
 
 
 class ClusterRunner:
-    """Submits jobs to a scheduler such as "tcp://host:8786"; a context.
-
-    Raises InputError when nothing answers there, when files cannot be shipped, or when a worker has another cosim.
-    """
+    """Runner that submits jobs to a Dask scheduler; use it as a context manager."""
 
     def __init__(self, study: Study, scheduler: str):
+        """Connect to a scheduler.
+
+        Args:
+            study: the study whose jobs are run.
+            scheduler: its address, such as "tcp://host:8786".
+
+        Raises:
+            InputError: if no scheduler answers or if files cannot be shipped; on entering the context, if a worker has
+                another cosim.
+        """
         require_cluster()
         _refuse_absolute_paths(study)
         self._bundle, self._scheduler = study.bundle, scheduler
@@ -70,12 +77,12 @@ class ClusterRunner:
         self._client.close()
 
     def check(self, job: Job) -> list[Problem]:
-        """What keeps a job from being run."""
+        """Return the problems for which a job cannot be run."""
         answer = next(self._submit_all([job], check=True))
         return [Problem(message, where) for message, where in answer["problems"]]
 
     def run_jobs(self, jobs: Iterable[Job]) -> Iterator[Record]:
-        """Records in the order in which runs end; only a few jobs are submitted in advance."""
+        """Run the jobs and yield their records in the order in which the runs end; few jobs are submitted in advance."""
         return (Record.from_json(answer["record"]) for answer in self._submit_all(jobs, check=False))
 
     def _submit_all(self, jobs: Iterable[Job], check: bool) -> Iterator[dict[str, Any]]:
@@ -89,7 +96,7 @@ class ClusterRunner:
                     yield from self._next_answers(check, waiting, kills)
             while waiting:
                 yield from self._next_answers(check, waiting, kills)
-        except OSError:  # those of distributed's connections
+        except OSError:  # connection errors of distributed
             raise self._connection_lost() from None
 
     def _submit(self, job: Job, check: bool, waiting: dict[str, Job]) -> None:
@@ -98,7 +105,7 @@ class ClusterRunner:
         future.add_done_callback(self._finished.put)
 
     def _next_answers(self, check: bool, waiting: dict[str, Job], kills: Counter[str]) -> Iterator[dict[str, Any]]:
-        """The answer of a job that has ended, unless it must be submitted again."""
+        """Wait for a job to end, and yield its answer unless it must be submitted again."""
         future = self._wait_for_future()
         job = waiting.pop(future.key)
         answer = self._future_answer(future)
@@ -115,7 +122,7 @@ class ClusterRunner:
             yield answer
 
     def _wait_for_future(self) -> Any:
-        """The next future that has ended. Raises ClusterError when the scheduler is gone."""
+        """Return the next future that has ended; raise ClusterError if the scheduler has gone."""
         while self._client.status == "running":
             try:
                 return self._finished.get(timeout=0.5)
@@ -135,18 +142,20 @@ class ClusterRunner:
         raise ClusterError(f"a worker failed: {type(error).__name__}: {error}") if error else self._connection_lost()
 
     def _connection_lost(self) -> ClusterError:
-        return ClusterError(f'the connection to the scheduler "{self._scheduler}" was lost; the same command goes on')
+        return ClusterError(f'the connection to the scheduler "{self._scheduler}" was lost; the same command continues the study')
 
-    def _check_versions(self, found: dict[str, str]) -> None:
+    def _check_versions(self, fingerprints: dict[str, str]) -> None:
         own = self._package.identity
-        if others := [f'worker "{address}" has cosim {it}, expected {own}' for address, it in found.items() if it != own]:
+        if others := [
+            f'worker "{address}" has cosim {other}, expected {own}' for address, other in fingerprints.items() if other != own
+        ]:
             raise InputError(others)
 
     def _send_files(self, address: str) -> None:
-        """Send a worker what it lacks. One that ends meanwhile is none of our concern."""
+        """Send a worker the files that it lacks; errors of a worker that has left the cluster are ignored."""
         try:
-            lacking = self._client.run(cluster_worker.missing_hashes, self._package.files, workers=[address])
-            for hashes in lacking.values():
+            missing = self._client.run(cluster_worker.missing_hashes, self._package.files, workers=[address])
+            for hashes in missing.values():
                 self._client.run(cluster_worker.store_contents, self._bundle.read_contents(hashes), workers=[address])
         except (OSError, ValueError, KeyError) as error:
             if address in self._client.scheduler_info(n_workers=-1)["workers"]:
@@ -154,9 +163,11 @@ class ClusterRunner:
 
 
 def _refuse_absolute_paths(study: Study) -> None:
-    scenario, read = study.study_file.scenario, study.study_file
+    study_file = study.study_file
     if problems := [
-        found for each in study.all_setting_variants for found in read.locate_problems(absolute_paths(scenario, each), each)
+        problem
+        for settings in study.all_setting_variants
+        for problem in study_file.locate_problems(absolute_paths(study_file.scenario, settings), settings)
     ]:
         raise InputError(dict.fromkeys(problems))
 
@@ -167,12 +178,13 @@ def _killed_answer(job: Job, check: bool) -> dict[str, Any]:
 
 
 def _connect_client(scheduler: str) -> Any:
-    """A client of a scheduler that has workers."""
+    """Connect to a scheduler that has workers; raise InputError if there is none."""
     import distributed
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in our own words
+    connect: Any = distributed.Client
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # this module reports the errors that matter
     try:
-        client = distributed.Client(scheduler, timeout=_CONNECT_TIMEOUT, set_as_default=False)
+        client = connect(scheduler, timeout=_CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(f'no Dask scheduler answers at "{scheduler}": {error}') from None
     try:

@@ -1,7 +1,7 @@
-"""From factors to points: which levels are run together.
+"""Designs of sweeps: the points that result from factors and seeds.
 
-Sampled designs are drawn by `scipy.stats.qmc` in the unit cube; every factor turns a number of [0, 1) into one of its levels by
-its inverse distribution function.
+Samples are drawn by `scipy.stats.qmc` in the unit cube. Every factor maps a coordinate in [0, 1) to a level, by the inverse of
+its distribution function.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _LARGEST_BELOW_ONE = float(np.nextafter(1.0, 0.0))
 
 
 class Level(NamedTuple):
-    """What a factor is called in the table, and the settings that it makes."""
+    """Level of a factor: its label in the table, and its settings."""
 
     label: Any
     settings: Mapping[str, Any]
@@ -28,38 +28,41 @@ class Level(NamedTuple):
 
 @dataclass(frozen=True)
 class Factor:
-    """A factor with its levels; those of a continuous one are made from `quantile` (number of [0, 1) -> value)."""
+    """Factor with its levels; `quantile` maps [0, 1) to the values of a continuous factor."""
 
     name: str
     paths: Sequence[str] = ()
     listed_levels: Sequence[Level] = ()
     quantile: Callable[[float], Any] | None = None
-    #: levels in a full factorial design
+    #: levels of a full factorial design
     grid_levels: Sequence[Level] = ()
 
-    def level_at(self, place: float) -> Level:
-        """The level at a place of [0, 1)."""
+    def level_at(self, coordinate: float) -> Level:
+        """Return the level at a coordinate in [0, 1)."""
         if self.quantile is None:
-            return self.listed_levels[int(place * len(self.listed_levels))]
-        return level_of_value(self.paths, self.quantile(place))
+            return self.listed_levels[int(coordinate * len(self.listed_levels))]
+        return level_of_value(self.paths, self.quantile(coordinate))
 
 
 def level_of_value(paths: Sequence[str], value: Any) -> Level:
-    """All paths set to one value."""
+    """Return the level that sets all paths to one value."""
     return Level(value, dict.fromkeys(paths, value))
 
 
 def build_factor(spec: FactorSpec) -> Factor:
-    """A factor as its file describes it."""
+    """Return the factor that a sweep file describes."""
     if spec.levels is not None:
         return _listed_factor(spec.name, [Level(label, settings) for label, settings in spec.levels.items()])
     paths = spec.set or []
     if spec.values is not None:
         return _listed_factor(spec.name, [level_of_value(paths, value) for value in spec.values])
-    part = spec.range or spec.distribution
-    assert part is not None
-    quantile = _rounded_quantile(_range_quantile(spec.range) if spec.range else _distribution_quantile(part), spec.integer)  # type: ignore[arg-type]
-    grid = [level_of_value(paths, quantile(place)) for place in _grid_positions(part)]
+    if spec.range is not None:
+        exact, coordinates = _range_quantile(spec.range), _range_coordinates(spec.range.count or 0)
+    else:
+        assert spec.distribution is not None
+        exact, coordinates = _distribution_quantile(spec.distribution), _median_coordinates(spec.distribution.count or 0)
+    quantile = _rounded_quantile(exact, spec.integer)
+    grid = [level_of_value(paths, quantile(coordinate)) for coordinate in coordinates]
     return Factor(spec.name, paths, quantile=quantile, grid_levels=grid)
 
 
@@ -67,33 +70,35 @@ def _listed_factor(name: str, levels: Sequence[Level]) -> Factor:
     return Factor(name, listed_levels=levels, grid_levels=levels)
 
 
-def _grid_positions(part: RangeSpec | DistributionSpec) -> list[float]:
-    """Where the levels of a full factorial design lie: a range's ends belong to it, a distribution's are improbable."""
-    count = part.count or 0
-    if isinstance(part, RangeSpec):
-        return [i / (count - 1) for i in range(count)]
+def _range_coordinates(count: int) -> list[float]:
+    """Return coordinates of the grid levels of a range, both ends included."""
+    return [i / (count - 1) for i in range(count)]
+
+
+def _median_coordinates(count: int) -> list[float]:
+    """Return coordinates of the grid levels of a distribution: the medians of `count` equally likely parts."""
     return [(i + 0.5) / count for i in range(count)]
 
 
 def _rounded_quantile(quantile: Callable[[float], float], integer: bool) -> Callable[[float], float]:
-    return (lambda place: round(quantile(place))) if integer else quantile
+    return (lambda coordinate: round(quantile(coordinate))) if integer else quantile
 
 
 def _range_quantile(spec: RangeSpec) -> Callable[[float], float]:
-    return lambda place: interpolate(place, spec.min, spec.max, spec.scale == "log")
+    return lambda coordinate: interpolate(coordinate, spec.min, spec.max, spec.scale == "log")
 
 
 def interpolate(position: float, low: float, high: float, logarithmic: bool) -> float:
-    """The number at a place of [0, 1] between two bounds, which are met exactly."""
-    found = low * math.exp(position * math.log(high / low)) if logarithmic else low + position * (high - low)
-    return low if position == 0 else high if position == 1 else min(max(found, low), high)
+    """Interpolate between two bounds at a position in [0, 1]; 0 and 1 give the bounds exactly."""
+    value = low * math.exp(position * math.log(high / low)) if logarithmic else low + position * (high - low)
+    return low if position == 0 else high if position == 1 else min(max(value, low), high)
 
 
 def _distribution_quantile(spec: DistributionSpec) -> Callable[[float], float]:
     from scipy import stats
 
     distribution = _DISTRIBUTIONS[spec.kind](stats, **spec.arguments)
-    return lambda place: float(distribution.ppf(min(max(place, 1 - _LARGEST_BELOW_ONE), _LARGEST_BELOW_ONE)))
+    return lambda coordinate: float(distribution.ppf(min(max(coordinate, 1 - _LARGEST_BELOW_ONE), _LARGEST_BELOW_ONE)))
 
 
 def _truncated_normal(stats: Any, mean: float, std: float, min: float = -math.inf, max: float = math.inf) -> Any:
@@ -113,7 +118,7 @@ _DISTRIBUTIONS: Mapping[str, Callable[..., Any]] = {
 
 @dataclass(frozen=True)
 class Point:
-    """One run: the labels of its levels by column of the table, and all its settings."""
+    """Point of a design: the labels of its levels by column of the table, and all its settings."""
 
     labels: Mapping[str, Any]
     settings: Mapping[str, Any]
@@ -121,16 +126,16 @@ class Point:
 
 @dataclass(frozen=True)
 class Design:
-    """All points of a sweep, made one by one; seeds vary fastest, then the last factor."""
+    """All points of a sweep, computed on demand; seeds vary fastest, then the last factor."""
 
     factors: Sequence[Factor]
     seeds: Sequence[Level] = ()
-    #: places in the unit cube, shape (points, factors); None: all combinations
+    #: coordinates in the unit cube, shape (points, factors); None: all combinations of levels
     unit_samples: np.ndarray | None = field(default=None, repr=False)
 
     @property
     def columns(self) -> list[str]:
-        """Names of the factors, then the seed's."""
+        """Names of the factors, followed by "seed" if there are seeds."""
         return [*(factor.name for factor in self.factors), *(["seed"] if self.seeds else [])]
 
     def __len__(self) -> int:
@@ -152,25 +157,25 @@ class Design:
 
     def _levels(self, index: int) -> list[Level]:
         if self.unit_samples is not None:
-            return [factor.level_at(place) for factor, place in zip(self.factors, self.unit_samples[index].tolist(), strict=True)]
-        found = []
+            return [factor.level_at(x) for factor, x in zip(self.factors, self.unit_samples[index].tolist(), strict=True)]
+        levels = []
         for factor in reversed(self.factors):
-            index, place = divmod(index, len(factor.grid_levels))
-            found.append(factor.grid_levels[place])
-        return found[::-1]
+            index, level = divmod(index, len(factor.grid_levels))
+            levels.append(factor.grid_levels[level])
+        return levels[::-1]
 
     def labels(self, name: str) -> list[Any]:
-        """Labels of all levels of a factor that has some, or of the seeds."""
+        """Return the labels of all grid levels of a factor, or of the seeds."""
         levels = self.seeds if name == "seed" else next(factor.grid_levels for factor in self.factors if factor.name == name)
         return [level.label for level in levels]
 
     def level_settings(self) -> Iterator[Mapping[str, Any]]:
-        """Settings of every listed level alone: a text among them may name a file."""
+        """Yield the settings of each listed level; strings among them may name files."""
         return (level.settings for factor in self.factors for level in factor.listed_levels)
 
 
 def build_design(spec: SweepSpec) -> Design:
-    """The points of a sweep; the same file gives the same points."""
+    """Build the design of a sweep; equal files give equal points."""
     factors = [build_factor(each) for each in spec.factors]
     seeds = spec.seeds
     replications = [level_of_value(seeds.set, seeds.first + i) for i in range(seeds.count)] if seeds else []
@@ -184,4 +189,6 @@ def _draw_samples(spec: DesignSpec, dimensions: int) -> np.ndarray | None:
 
     generator = np.random.default_rng(spec.seed)
     kind = {"latin_hypercube": qmc.LatinHypercube, "sobol": qmc.Sobol}[spec.kind]
-    return np.minimum(kind(dimensions, rng=generator).random(spec.runs), _LARGEST_BELOW_ONE)
+    samples: np.ndarray = kind(dimensions, rng=generator).random(spec.runs)
+    np.minimum(samples, _LARGEST_BELOW_ONE, out=samples)
+    return samples

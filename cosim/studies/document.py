@@ -1,4 +1,4 @@
-"""Reading the files of `cosim sweep` and `cosim tune`."""
+"""Reader of sweep and tuning files."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ _SHIPPED_FOLDER = Path("scenarios") / "sweeps"
 
 @dataclass(frozen=True)
 class StudyFile(Generic[S]):
-    """A sweep or tuning file and what it says."""
+    """Sweep or tuning file: its validated content and its JSON document with positions."""
 
     spec: S
     document: Document
 
     @property
     def scenario(self) -> Path:
-        """The scenario's file."""
+        """Path of the scenario's file."""
         near = self.document.file.parent / self.spec.scenario
         return near if paths.is_file(near) else find_scenario(self.spec.scenario)
 
     def locate_problems(self, problems: Iterable[Problem], settings: Mapping[str, Any]) -> list[Problem]:
-        """Problems of a run with these settings, at the places in this file that make them, as far as a setting does."""
+        """Return the problems of a run with these settings; those caused by a setting get its position in this file."""
         return list(dict.fromkeys(replace(problem, where=self._locate(problem.where, settings)) for problem in problems))
 
     def _locate(self, where: str, settings: Mapping[str, Any]) -> str:
@@ -51,31 +51,31 @@ class StudyFile(Generic[S]):
             nearest = max(above, key=lambda each: len(pointers[each]))
             return self._setting_location(nearest, settings, path.removeprefix(pointers[nearest])) or where
         below = [
-            place
+            location
             for each, start in pointers.items()
-            if _is_within(start, path) and (place := self._setting_location(each, settings))
+            if _is_within(start, path) and (location := self._setting_location(each, settings))
         ]
         return f"{below[0]}, in {where}" if len(below) == 1 else where
 
     def _setting_location(self, name: str, settings: Mapping[str, Any], part: str = "") -> str:
-        """Where this file makes a setting, or a part of it; "" where it does not."""
-        found = [path for path in self._setting_paths() if self._is_setting(path, name, settings)]
-        return self.document.where(found[-1]) + (part if found[-1][-1] == name else "") if found else ""
+        """Return the position of a setting in this file, or of a part of its value; "" if it is not in this file."""
+        paths = [path for path in self._setting_paths() if self._is_setting(path, name, settings)]
+        return self.document.where(paths[-1]) + (part if paths[-1][-1] == name else "") if paths else ""
 
     def _is_setting(self, path: tuple[str | int, ...], name: str, settings: Mapping[str, Any]) -> bool:
-        """Whether a place in this file is where a setting is made: a key with its value, or a text of "set"."""
+        """Return whether a path in this file makes a setting: as a key with its value, or as a string of "set"."""
         value = _value_at(self.document.value, path)
         return value == name or (path[-1] == name and value == settings.get(name))
 
     def _setting_paths(self) -> Iterable[tuple[str | int, ...]]:
-        """Paths in the file that may name settings, in their order."""
+        """Yield the paths in this file that may make settings, in file order."""
         for path in sorted(self.document.offsets, key=lambda path: self.document.offsets[path]):
             if path and ("set" in path or "settings" in path or "levels" in path or "cases" in path):
                 yield path
 
 
 def _json_path(pointer: str) -> str:
-    """A JSON pointer as places are written, without "$"."""
+    """Return a JSON pointer in the notation of locations, without "$"."""
     return json_path([int(key) if key.isdigit() else key for key in pointer_keys(pointer)])[1:]
 
 
@@ -83,14 +83,22 @@ def _is_within(path: str, start: str) -> bool:
     return path == start or path.startswith((f"{start}.", f"{start}["))
 
 
-def _value_at(value: object, path: tuple[str | int, ...]) -> object:
+def _value_at(value: Any, path: tuple[str | int, ...]) -> object:
     for key in path:
-        value = value[key]  # type: ignore[index]
+        value = value[key]
     return value
 
 
 def read_study(file: str | Path, kind: type[S]) -> StudyFile[S]:
-    """A sweep or tuning from a file, or a shipped one by its name. Raises InputError with everything that is wrong."""
+    """Read a sweep or tuning from a file, or a shipped one by its name.
+
+    Args:
+        file: path of the file, or name of a shipped study.
+        kind: schema of the file: SweepSpec or TuneSpec.
+
+    Raises:
+        InputError: with all problems of the file.
+    """
     document = read_document(_find_study(file))
     try:
         spec = kind.model_validate(document.value)
@@ -98,12 +106,12 @@ def read_study(file: str | Path, kind: type[S]) -> StudyFile[S]:
         raise InputError([*document.problems, *schema_problems(kind, document, error)]) from None
     if document.problems:
         raise InputError(document.problems)
-    found = StudyFile(spec, document)
+    study_file = StudyFile(spec, document)
     try:
-        found.scenario  # noqa: B018
+        study_file.scenario  # noqa: B018  (raises InputError if there is no such scenario)
     except InputError as error:
         raise InputError([replace(problem, where=document.where(("scenario",))) for problem in error.problems]) from None
-    return found
+    return study_file
 
 
 def _find_study(file: str | Path) -> Path:

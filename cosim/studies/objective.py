@@ -1,6 +1,7 @@
-"""Arithmetic over KPIs, as text: `landing.lateral_error + 0.1 * max(motors.max_speed - 400, 0)`.
+"""Arithmetic expressions of KPIs, such as `landing.lateral_error + 0.1 * max(motors.max_speed - 400, 0)`.
 
-Only numbers, names, `+ - * / **`, comparisons, brackets and a few functions mean anything; nothing is ever evaluated by Python.
+They consist of numbers, names, `+ - * / **`, parentheses and a few functions; constraints also compare with `<=` or `>=`.
+Python's `eval` is never used.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any, NamedTuple
 
 from ..core.errors import did_you_mean
 
-#: characters
+#: longest expression (characters)
 _MAX_LENGTH = 1000
 _BINARY_OPERATORS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
@@ -27,7 +28,7 @@ _UNARY_OPERATORS: Mapping[type[ast.unaryop], Callable[[Any], Any]] = {ast.USub: 
 
 
 class AllowedFunction(NamedTuple):
-    """What can be called, with how many arguments, and that in words."""
+    """Function of an expression: the numbers of arguments it takes, and those in words."""
 
     call: Callable[..., float]
     counts: range = range(1, 2)
@@ -48,23 +49,23 @@ _GRAMMAR_HINT = f"numbers, KPIs, + - * / ** and {', '.join(FUNCTIONS)}"
 
 @dataclass(frozen=True)
 class Expression:
-    """A checked expression."""
+    """Valid arithmetic expression; calling it with KPIs returns its value."""
 
     text: str
     tree: ast.expr
 
     @property
     def names(self) -> list[str]:
-        """The KPIs and parameters that it needs."""
+        """Names of the KPIs and parameters in the expression."""
         return list(dict.fromkeys(_kpi_names(self.tree)))
 
     def unknown_name_problem(self, known: Mapping[str, Any]) -> str:
-        """Why it cannot be evaluated with these names; "" when it can."""
+        """Return a message about the first name that is not `known`; "" if all are."""
         missing = [name for name in self.names if name not in known]
         return f'no KPI or parameter "{missing[0]}"{did_you_mean(missing[0], known)}' if missing else ""
 
     def __call__(self, values: Mapping[str, float]) -> float:
-        """Its value; NaN where it or a part of it has none, as at a division by zero or of a KPI that is NaN or missing."""
+        """Return the value; NaN if any part is undefined, as after a division by zero or with a KPI that is NaN or missing."""
         try:
             return _evaluate(self.tree, values)
         except (ArithmeticError, ValueError):
@@ -73,30 +74,31 @@ class Expression:
 
 @dataclass(frozen=True)
 class Constraint:
-    """`left <= right`."""
+    """Constraint `left <= right`."""
 
     left: Expression
     right: Expression
 
     @property
     def names(self) -> list[str]:
+        """Names of the KPIs and parameters on both sides."""
         return [*self.left.names, *self.right.names]
 
     def violation(self, values: Mapping[str, float]) -> float:
-        """By how much it is not met, 0 where it is; infinite where a side has no value."""
+        """Return by how much the constraint is violated: 0 if it is met, infinity if a side is NaN."""
         excess = self.left(values) - self.right(values)
         return math.inf if math.isnan(excess) else max(0.0, excess)
 
 
 def parse_expression(text: str) -> Expression:
-    """Read arithmetic. Raises ValueError that says what is wrong with it."""
+    """Parse an arithmetic expression; raise ValueError if it is invalid."""
     tree = _parse(text)
     _check_node(tree)
     return Expression(text, tree)
 
 
 def parse_constraint(text: str) -> Constraint:
-    """Read `a <= b` or `a >= b`. Raises ValueError that says what is wrong with it."""
+    """Parse `a <= b` or `a >= b`; raise ValueError if it is invalid."""
     tree = _parse(text)
     if not (isinstance(tree, ast.Compare) and len(tree.ops) == 1 and isinstance(tree.ops[0], ast.LtE | ast.GtE)):
         raise ValueError(f'expected a comparison with <= or >=, found "{text}"')
@@ -113,11 +115,11 @@ def _parse(text: str) -> ast.expr:
     try:
         return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise ValueError(f'"{text}" is no expression: {getattr(error, "msg", error)}') from None
+        raise ValueError(f'"{text}" is not an expression: {getattr(error, "msg", error)}') from None
 
 
 def _check_node(node: ast.AST) -> None:
-    """Raises ValueError at the first part that means nothing here."""
+    """Raise ValueError for the first part that is not allowed in an expression."""
     match node:
         case ast.Constant(value=value) if isinstance(value, int | float) and not isinstance(value, bool):
             return
@@ -136,11 +138,11 @@ def _check_node(node: ast.AST) -> None:
         case _ if _kpi_name(node):
             return
         case _:
-            raise ValueError(f'"{ast.unparse(node)}" means nothing here; expected {_GRAMMAR_HINT}')
+            raise ValueError(f'"{ast.unparse(node)}" is not allowed here; expected {_GRAMMAR_HINT}')
 
 
 def _kpi_name(node: ast.AST) -> str:
-    """ "landing.time[2]" as the name of a KPI; "" for what is none."""
+    """Return the KPI name that a node spells, such as "landing.time[2]"; "" for any other node."""
     match node:
         case ast.Name(id=name):
             return name
@@ -161,7 +163,7 @@ def _kpi_names(node: ast.AST) -> Iterator[str]:
 
 
 def _evaluate(node: ast.AST, values: Mapping[str, float]) -> float:
-    """Raises ArithmeticError or ValueError without one: `min`, `max` and `**` by themselves would drop some NaN."""
+    """Return the value of a node; raise ArithmeticError for NaN, which `min`, `max` and `**` would sometimes drop."""
     value = float(_evaluate_node(node, values))
     if math.isnan(value):
         raise ArithmeticError

@@ -1,4 +1,4 @@
-"""One scenario of `cosim regress`: its run, and what is to be said about it."""
+"""Regression test of one scenario: its run, its checks, and the comparison with its reference."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from ..results.comparison import Comparison, Tolerance
 
 
-#: what a scenario expects of its run
+#: keys of a scenario that state expectations of its results
 EXPECTATION_KEYS = ("checks", "reference")
 
 
 def has_keys(file: Path, *groups: Sequence[str]) -> bool:
-    """Whether a JSON file has one key at least of each group; yes when it cannot be read: running it says why."""
+    """Return whether a JSON file has at least one key of each group; an unreadable file counts, since its run reports why."""
     try:
         with open_text(file, encoding="utf-8") as stream:
             content = json.load(stream)
@@ -37,7 +37,15 @@ def has_keys(file: Path, *groups: Sequence[str]) -> bool:
 
 @dataclass(frozen=True)
 class RegressionOutcome:
-    """What became of one scenario: `code` as of `cosim run`, what was done, what is wrong, and `seconds` of wall time."""
+    """Outcome of one regression test.
+
+    Attributes:
+        name: name of the scenario's file without its suffix.
+        code: exit code of the test.
+        summary: what was checked or written.
+        details: problems, one line each.
+        seconds: wall time (s).
+    """
 
     name: str
     code: int
@@ -48,14 +56,14 @@ class RegressionOutcome:
 
 @dataclass(frozen=True)
 class Regression:
-    """A scenario file, the folder that its results go to, and whether its reference is to be written from them."""
+    """Regression test of a scenario file with an output directory; with `update`, its reference is written anew."""
 
     file: Path
     directory: Path
     update: bool
 
     def run(self) -> RegressionOutcome:
-        """Run the scenario in a process of its own, as anybody would, and look at what it wrote."""
+        """Run the scenario by `cosim run` in a process of its own and check its results, or update the reference."""
         began = time.perf_counter()
         return replace(self._run(), seconds=time.perf_counter() - began)
 
@@ -101,7 +109,7 @@ class Regression:
 
 @dataclass(frozen=True)
 class _FinishedRun:
-    """A result, the scenario that it came from (as it was run), and the folder of that scenario's file."""
+    """Result of a run, its scenario as it was run, and the folder of the scenario's file."""
 
     result: Result
     scenario: Mapping[str, Any]
@@ -116,7 +124,8 @@ class _FinishedRun:
 
     @property
     def checks(self) -> list[dict[str, Any]]:
-        return self.scenario.get("checks", [])
+        checks: list[dict[str, Any]] = self.scenario.get("checks", [])
+        return checks
 
     def failed_checks(self) -> list[str]:
         from ..results.checks import evaluate_checks
@@ -126,7 +135,7 @@ class _FinishedRun:
 
     @property
     def reference_path(self) -> Path:
-        return self.folder / self.scenario["reference"]["file"]
+        return self.folder / str(self.scenario["reference"]["file"])
 
     @cached_property
     def tolerances(self) -> dict[str, Tolerance]:
@@ -148,18 +157,18 @@ class _FinishedRun:
         return compare(self.result, self.reference, self.tolerances)
 
     def reference_changes(self) -> Iterator[str]:
-        """What is no longer as it was when the reference was made."""
+        """Yield one line that lists what has changed since the reference was made."""
         from ..results.comparison.reference import describe_provenance_changes
 
         try:
             made_by = json.loads(self.reference_path.with_suffix(".json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return
-        if found := describe_provenance_changes(made_by, self.result.metadata):
-            yield f"changed since the reference was made: {', '.join(found)}"
+        if changes := describe_provenance_changes(made_by, self.result.metadata):
+            yield f"changed since the reference was made: {', '.join(changes)}"
 
     def draw_tubes(self, comparison: Comparison, directory: Path) -> Path:
-        """The worst signals in their tubes, as a file in `directory`."""
+        """Draw the worst signals in their tubes to a file in `directory` and return its path."""
         from ..report.comparison_figure import draw_tubes
         from ..report.figures import draw_figure, save_figure
 

@@ -1,4 +1,4 @@
-"""The formats of `cosim sweep` and `cosim tune`; `cosim schema --sweep` and `--tune` print them as JSON Schema."""
+"""Schemas of sweep and tuning files; `cosim schema --sweep` and `--tune` print them as JSON Schema."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..core.errors import did_you_mean
 from ..scenario.schema import CheckSpec, NameList, Spec
 from .setting_conflicts import check_conflicts
 
-#: distribution -> its arguments; `min` and `max` of truncated_normal may be left out
+#: arguments of each distribution; `min` and `max` of truncated_normal are optional
 DISTRIBUTIONS = {
     "uniform": ("min", "max"),
     "normal": ("mean", "std"),
@@ -24,11 +24,11 @@ DISTRIBUTIONS = {
 }
 _OPTIONAL_ARGUMENTS = {"truncated_normal": {"min", "max"}}
 _POSITIVE_ARGUMENTS = ("std", "sigma", "median", "shape", "scale")
-#: what makes the levels of a factor
+#: keys of a factor that define its levels
 _LEVEL_SOURCES = ("values", "range", "distribution", "levels")
-#: quantiles in the aggregates
+#: quantiles in aggregates.csv
 QUANTILES = {"min": 0.0, "q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95, "max": 1.0}
-#: columns that stand beside factors, and beside the parameters of a tuning, in some file
+#: columns of the output files beside those of factors or parameters
 TABLE_COLUMNS = ("run", "seed", "status", "passed", "failure", "output", "command")
 AGGREGATE_COLUMNS = ("kpi", "count", "mean", "std", *QUANTILES)
 SUCCESS_COLUMNS = ("runs", "distinct", "failed", "passed", "rate", "low", "high")
@@ -64,7 +64,7 @@ def _check_log_scale(scale: Scale, low: float) -> None:
 
 
 class RangeSpec(Spec):
-    """Evenly spread values from `min` to `max`; `count` of them in a full factorial design."""
+    """Evenly spaced values from `min` to `max`; `count` of them in a full factorial design."""
 
     min: float
     max: float
@@ -79,7 +79,7 @@ class RangeSpec(Spec):
 
 
 class DistributionSpec(Spec):
-    """A distribution of values; in a full factorial design the medians of `count` equally likely parts."""
+    """A probability distribution; a full factorial design takes the medians of `count` equally likely parts."""
 
     kind: Literal["uniform", "normal", "truncated_normal", "lognormal", "triangular", "exponential", "weibull"]
     min: float | None = None
@@ -111,12 +111,12 @@ class DistributionSpec(Spec):
 
     @property
     def arguments(self) -> dict[str, float]:
-        """What was given of the distribution's own numbers."""
+        """Arguments of the distribution that the file gives."""
         return {name: value for name, value in self.model_dump(exclude={"kind", "count"}).items() if value is not None}
 
 
 class FactorSpec(Spec):
-    """What varies: paths as of `--set` and the values that they take, or named levels that set several things at once."""
+    """A factor that varies: variables or JSON pointers with their values, or named levels with several settings each."""
 
     name: FactorName
     set: SettingPaths | None = Field(None, description="variable or JSON pointer; of several, all get the same value")
@@ -132,18 +132,18 @@ class FactorSpec(Spec):
         if len(given) != 1:
             raise ValueError(f"expected exactly one of {', '.join(_LEVEL_SOURCES)}; found {' and '.join(given) or 'none'}")
         if (self.levels is None) == (self.set is None):
-            raise ValueError('expected "set" beside values, range or distribution, and not beside levels')
+            raise ValueError('expected "set" together with values, range or distribution, and not together with levels')
         return self
 
     def settings(self) -> Iterator[tuple[str, Any]]:
-        """What it may set, with the values that are known; without any the value None."""
+        """Yield each path that the factor sets with its listed values, or with None if it has none."""
         for level in (self.levels or {}).values():
             yield from level.items()
         yield from ((path, value) for path in self.set or () for value in self.values or (None,))
 
 
 class SeedsSpec(Spec):
-    """Replications: every point is run with each of `count` seeds, the same ones for all points."""
+    """Replications: every point is run with the same `count` seeds."""
 
     set: SettingPaths
     first: int = 1
@@ -151,17 +151,17 @@ class SeedsSpec(Spec):
 
 
 class MapSpec(Spec):
-    """A map of success over two factors; panels side by side (`columns`) and below each other (`rows`) are for further ones."""
+    """A map of the success rate over two factors; two more factors may select the columns and rows of panels."""
 
     x: str
     y: str
     columns: str | None = None
     rows: str | None = None
-    titles: dict[str, str] = Field({}, description='factor -> how readers call it, such as "wind (m/s)"; empty: nothing is said')
+    titles: dict[str, str] = Field({}, description='factor -> title, such as "wind (m/s)"; empty: no title')
 
     @property
     def factors(self) -> list[str]:
-        """Names of the factors that tell cells apart, panels first."""
+        """Names of the factors of the map: rows, columns, y and x."""
         return [name for name in (self.rows, self.columns, self.y, self.x) if name is not None]
 
     @model_validator(mode="after")
@@ -171,7 +171,7 @@ class MapSpec(Spec):
 
 
 class DesignSpec(Spec):
-    """How points are chosen: all combinations, or `runs` samples."""
+    """Choice of the points: all combinations of levels, or `runs` samples."""
 
     kind: Literal["full_factorial", "latin_hypercube", "sobol"] = "full_factorial"
     runs: int | None = Field(None, ge=1)
@@ -183,30 +183,32 @@ class DesignSpec(Spec):
             raise ValueError('expected "runs" with latin_hypercube and sobol, and not with full_factorial')
         if self.kind == "sobol" and self.runs and self.runs & (self.runs - 1):
             near = 2 ** round(math.log2(self.runs))
-            raise ValueError(f'a Sobol sequence is balanced for powers of two only, expected for example "runs": {near}')
+            raise ValueError(f'a Sobol sequence is balanced only for powers of two; expected for example "runs": {near}')
         return self
 
 
 class StudySpec(Spec):
-    """What sweeps and tunings have in common: a scenario, changes to it that all runs share, and a run's deadline."""
+    """Common part of sweeps and tunings: a scenario, settings that all runs share, and the deadline of a run."""
 
     schema_: str | None = Field(None, alias="$schema")
     name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$")]
     description: str = ""
     scenario: str = Field(description="path relative to this file, or the name of a shipped scenario")
-    settings: dict[str, Any] = Field({}, description="changes to the scenario as of `--set`")
-    deadline: float | None = Field(None, gt=0, description="wall time a run may take (s)")
+    settings: dict[str, Any] = Field({}, description="settings of all runs, as of `--set`")
+    deadline: float | None = Field(None, gt=0, description="wall time that a run may take (s)")
 
 
 class SweepSpec(StudySpec):
-    """A sweep: factors, a design, seeds, and what counts as success."""
+    """A sweep: factors, a design, seeds and criteria of success."""
 
     factors: list[FactorSpec] = []
     design: DesignSpec = DesignSpec(kind="full_factorial", runs=None, seed=1)
     seeds: SeedsSpec | None = None
     success: list[CheckSpec] | None = Field(None, description="limits on KPIs; default: the checks of the scenario")
-    by: list[NameList] = Field([], description="factors, or lists of factors, whose levels are told apart in the aggregates")
-    maps: list[MapSpec] = Field([], description="maps of success, as figures and in sweep.html")
+    by: list[NameList] = Field(
+        [], description="factors, or lists of factors, by whose levels the runs are grouped in the aggregates"
+    )
+    maps: list[MapSpec] = Field([], description="maps of the success rate, as figures and in sweep.html")
 
     @model_validator(mode="after")
     def _consistent(self) -> SweepSpec:
@@ -230,7 +232,7 @@ class SweepSpec(StudySpec):
 
 
 class ParameterSpec(Spec):
-    """What a tuning may change, and within which bounds."""
+    """A parameter of a tuning, with its bounds."""
 
     name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$"), _reject_column_names(*TRIAL_COLUMNS)]
     set: SettingPaths
@@ -249,7 +251,7 @@ class ParameterSpec(Spec):
 
 
 class MethodSpec(Spec):
-    """The optimizer and what it may cost."""
+    """An optimization method and its limits."""
 
     kind: Literal["differential_evolution", "nelder_mead", "powell"] = "differential_evolution"
     population: int = Field(16, ge=5, description="points per generation (differential_evolution)")
@@ -259,7 +261,7 @@ class MethodSpec(Spec):
 
 
 class TuneSpec(StudySpec):
-    """A tuning: the expression of KPIs that shall become small, the parameters, and what must hold."""
+    """A tuning: the expression of KPIs to be minimised, the parameters and the constraints."""
 
     parameters: list[ParameterSpec] = Field(min_length=1)
     minimize: str = Field(description='arithmetic over KPIs and parameters, such as "landing.lateral_error + 0.1 * gain"')
@@ -279,12 +281,12 @@ class TuneSpec(StudySpec):
 
 def _check_unique(what: str, names: Iterable[str]) -> None:
     names = list(names)
-    if twice := [name for i, name in enumerate(names) if name in names[:i]]:
-        raise ValueError(f'two {what} are called "{twice[0]}"')
+    if repeated := [name for i, name in enumerate(names) if name in names[:i]]:
+        raise ValueError(f'two {what} are called "{repeated[0]}"')
 
 
 def _check_map(map_: MapSpec, sweep: SweepSpec) -> None:
-    """Raises ValueError when a factor of a map does not exist or has no levels."""
+    """Raise ValueError if a factor of a map does not exist or has no levels."""
     known = [each.name for each in sweep.factors if _has_labels(each, sweep.design.kind != "full_factorial")]
     known += ["seed"] if sweep.seeds else []
     for name in map_.factors:
@@ -293,12 +295,12 @@ def _check_map(map_: MapSpec, sweep: SweepSpec) -> None:
 
 
 def _has_labels(factor: FactorSpec, sampled: bool) -> bool:
-    """Whether a factor has levels that can stand at an axis."""
+    """Return whether a factor has levels that can be shown along an axis."""
     if factor.values is not None:
         return not any(isinstance(value, list | dict) for value in factor.values)
     return factor.levels is not None or not sampled
 
 
 def study_json_schema(kind: type[BaseModel]) -> dict[str, Any]:
-    """JSON Schema (2020-12) of a sweep or tuning file."""
+    """Return the JSON Schema (2020-12) of a sweep or tuning file."""
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **kind.model_json_schema(by_alias=True)}

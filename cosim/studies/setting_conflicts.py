@@ -1,4 +1,4 @@
-"""Settings of which one would have no effect, because another one sets the same place of the scenario."""
+"""Detection of settings without effect, because another setting changes the same part of the scenario."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..scenario.nested_systems import pointer_keys
 
 
 class _Setting(NamedTuple):
-    """Whose setting it is, how it is written, and the keys that lead to its place in the scenario."""
+    """Setting of a factor, parameter or case: its owner, its name, and its path of keys in the scenario."""
 
     owner: str
     name: str
@@ -17,65 +17,66 @@ class _Setting(NamedTuple):
 
     @property
     def is_pointer(self) -> bool:
-        """Whether it changes the scenario's JSON; variables are set after all that."""
+        """True if the setting changes the scenario's JSON; variables are set after all JSON changes."""
         return self.name.startswith("/")
 
     @property
     def is_nested(self) -> bool:
-        """Whether it is within an object that is set."""
+        """True if the setting is part of an object that is set."""
         return self.path != _setting_path(self.name)
 
     def conflict_message(self, other: _Setting) -> str:
+        """Return the message about an `other` setting of the same path."""
         if self.name == other.name:
             return f'both {other.owner} and {self.owner} set "{self.name}"'
-        return f'both {other.owner} and {self.owner} set the same thing, as "{other.name}" and as "{self.name}"'
+        return f'both {other.owner} and {self.owner} set the same value, as "{other.name}" and as "{self.name}"'
 
 
 def _expand_settings(owner: str, pairs: Iterable[tuple[str, Any]]) -> list[_Setting]:
-    """What is set, also within objects."""
+    """Return the settings, including one for each part of an object."""
     return list(
-        dict.fromkeys(
-            _Setting(owner, text, place) for text, value in pairs for place in _nested_paths(_setting_path(text), value)
-        )
+        dict.fromkeys(_Setting(owner, text, path) for text, value in pairs for path in _nested_paths(_setting_path(text), value))
     )
 
 
 def _setting_path(text: str) -> tuple[str, ...]:
-    """A variable is a parameter of the component that its name begins with."""
+    """Return the path of keys that a setting changes; a variable is a parameter of its component."""
     if text.startswith("/"):
         return (*pointer_keys(text),)
     component, dot, variable = text.partition(".")
     return ("components", component, "parameters", variable) if dot else (text,)
 
 
-def _nested_paths(place: tuple[str, ...], value: Any) -> Iterator[tuple[str, ...]]:
-    yield place
+def _nested_paths(path: tuple[str, ...], value: Any) -> Iterator[tuple[str, ...]]:
+    yield path
     for key, inner in value.items() if isinstance(value, dict) else ():
-        yield from _nested_paths((*place, key), inner)
+        yield from _nested_paths((*path, key), inner)
 
 
 def check_conflicts(common: Mapping[str, Any], setters: Iterable[tuple[str, Iterable[tuple[str, Any]]]]) -> None:
-    """Raises ValueError where one of two settings would have no effect.
+    """Raise ValueError if one of two settings would have no effect.
 
-    `setters` are (name, settings) in the order in which they are applied. They may change what is `common` to all runs, and
-    variables that are common to all runs may change parts of objects that they set.
+    Args:
+        common: settings of all runs. Setters may override them; variables among them may change parts of objects that setters
+            set.
+        setters: (name, settings) of factors, seeds, cases or parameters, in the order in which they are applied.
     """
     defaults = _expand_settings("the settings", common.items())
     known = {each.path: each for each in defaults if not each.is_pointer}
-    beneath = _pointers_by_ancestor(defaults)
+    pointers_by_path = _pointers_by_ancestor(defaults)
     for name, pairs in setters:
-        own = _expand_settings(f'"{name}"', pairs)
-        for each in own:
+        settings = _expand_settings(f'"{name}"', pairs)
+        for each in settings:
             other = known.get(each.path)
             if other and (other not in defaults or not (each.is_nested or each.name == other.name)):
                 raise ValueError(each.conflict_message(other))
-            if each.is_pointer and (other := beneath.get(each.path)):
+            if each.is_pointer and (other := pointers_by_path.get(each.path)):
                 raise ValueError(f'"{each.name}" of {each.owner} replaces "{other.name}" of {other.owner}')
-        known |= {each.path: each for each in own}
-        beneath |= _pointers_by_ancestor(own)
+        known |= {each.path: each for each in settings}
+        pointers_by_path |= _pointers_by_ancestor(settings)
 
 
 def _pointers_by_ancestor(settings: Iterable[_Setting]) -> dict[tuple[str, ...], _Setting]:
-    """For every place that something is set within: one such setting."""
+    """Return, for every path within which a JSON pointer sets a value, one such setting."""
     pointers = [each for each in settings if each.is_pointer and not each.is_nested]
     return {each.path[:depth]: each for each in pointers for depth in range(1, len(each.path))}

@@ -1,4 +1,4 @@
-"""A study: the runs of one scenario under many settings, each of them made once."""
+"""Study of a scenario: its runs with many settings, each of them made once."""
 
 from __future__ import annotations
 
@@ -17,81 +17,87 @@ from .execution.job import Job, Record, Runner, StudyContext, run_key
 from .execution.run_store import RunStore
 from .schema import StudySpec
 
-#: called after every run with its record
+#: callback after every run
 RecordObserver = Callable[[Record], None]
 
-#: so many runs without a KPI are taken to mean that there is none of that name
+#: after this many runs without a KPI, its name is reported as unknown
 _ENOUGH_RUNS = 10
 
 
 @dataclass(frozen=True)
 class Study:
-    """A scenario with the changes that all runs share; `variants` are settings that may name further files."""
+    """Scenario with settings that all runs share; `setting_variants` are further settings whose strings may name files."""
 
     study_file: StudyFile[Any]
     setting_variants: tuple[Mapping[str, Any], ...] = ()
 
     @property
     def spec(self) -> StudySpec:
+        """The content of the study's file."""
         spec: StudySpec = self.study_file.spec
         return spec
 
     @cached_property
     def all_setting_variants(self) -> list[dict[str, Any]]:
+        """The common settings, alone and with each of the variants."""
         return [{**self.spec.settings, **variant} for variant in ({}, *self.setting_variants)]
 
     @cached_property
     def bundle(self) -> Bundle:
-        """Everything that the runs need."""
+        """All files that the runs need."""
         return collect_bundle(self.study_file.scenario, self.all_setting_variants)
 
     @property
     def context(self) -> StudyContext:
+        """Properties that all runs share, as a runner needs them."""
         return StudyContext(self.study_file.scenario, self.bundle.root, self.spec.deadline, fmu_paths(self.bundle.files))
 
     def job(self, settings: Mapping[str, Any]) -> Job:
-        """The run with these settings beside the common ones."""
-        together = {**self.spec.settings, **settings}
-        return Job(run_key(self.bundle.digest, together), together)
+        """Return the run with these settings in addition to the common ones."""
+        combined = {**self.spec.settings, **settings}
+        return Job(run_key(self.bundle.digest, combined), combined)
 
     @cached_property
     def checks(self) -> list[dict[str, Any]]:
-        """The checks of the scenario."""
+        """Checks of the scenario with the common settings."""
         spec = load_scenario(self.study_file.scenario, {k: v for k, v in self.spec.settings.items() if k.startswith("/")}).spec
         return [check.model_dump(exclude_none=True) for check in spec.checks]
 
-    def check_jobs(self, engine: CheckingRunner, jobs: Iterable[Job]) -> None:
-        """Raises InputError, with places in the study's own file, when some of these jobs cannot be run."""
-        if problems := [found for job in jobs for found in self.study_file.locate_problems(engine.check(job), job.settings)]:
+    def check_jobs(self, runner: CheckingRunner, jobs: Iterable[Job]) -> None:
+        """Raise InputError with positions in the study's file if one of these jobs cannot be run."""
+        if problems := [problem for job in jobs for problem in self.study_file.locate_problems(runner.check(job), job.settings)]:
             raise InputError(dict.fromkeys(problems))
 
 
 @dataclass
 class ObservedKpis:
-    """The KPIs of successful runs so far: which there are is not known before, and one run may have fewer than another."""
+    """KPIs of the successful runs so far; their names are unknown before a run, and runs may differ in them."""
 
     runs: int = 0
     kpis: dict[str, Number] = field(default_factory=dict)
 
     def add(self, record: Record) -> None:
+        """Add the KPIs of a finished run unless it failed."""
         if not record.failure:
             self.runs += 1
             self.kpis |= record.kpis
 
     @property
     def has_enough_runs(self) -> bool:
-        """Whether names that are not among them may be called wrong before all runs are made."""
+        """True if a name that is not among the KPIs may be reported as unknown before all runs have finished."""
         return self.runs >= _ENOUGH_RUNS
 
 
 class CheckingRunner(Runner, AbstractContextManager["CheckingRunner"], Protocol):
-    """An engine that is a context and can check jobs."""
+    """Runner that is a context manager and can check jobs without running them."""
 
-    def check(self, job: Job) -> list[Problem]: ...
+    def check(self, job: Job) -> list[Problem]:
+        """Return the problems for which a job cannot be run."""
+        ...
 
 
-def run_pending(jobs: Iterable[Job], ledger: RunStore, engine: Runner, observe: RecordObserver) -> None:
-    """Run what is not done; every record is kept as soon as it is there."""
-    for record in engine.run_jobs(ledger.claim_jobs(jobs)):
-        ledger.add(record)
+def run_pending(jobs: Iterable[Job], run_store: RunStore, runner: Runner, observe: RecordObserver) -> None:
+    """Run the jobs that are not finished; store each record and call `observe` with it as soon as its run has ended."""
+    for record in runner.run_jobs(run_store.claim_jobs(jobs)):
+        run_store.add(record)
         observe(record)

@@ -1,4 +1,4 @@
-"""A sweep: all points of a design."""
+"""Sweep: the runs of a scenario at all points of a design."""
 
 from __future__ import annotations
 
@@ -14,20 +14,25 @@ from ..core.errors import InputError, Problem
 from ..results.checks import Number, evaluate_checks
 from .design import Design, Point, build_design
 from .document import StudyFile, read_study
-from .execution.job import Job, Record
+from .execution.job import Job, Record, RunKey
 from .execution.run_store import RunStore
 from .schema import SweepSpec
 from .study import CheckingRunner, ObservedKpis, RecordObserver, Study, run_pending
 
-#: so many points are tried at most before anything runs
+#: number of points that are checked before the first run
 _MAX_CHECKED_POINTS = 20
 
 
 @dataclass(frozen=True)
 class SweepRow:
-    """A finished run of a sweep: its number, its point, what became of it, and whether that was a success.
+    """Finished run of a sweep.
 
-    `shared` says that other points have the very same run.
+    Attributes:
+        run: number of the point in the design.
+        point: labels and settings.
+        record: outcome of the run.
+        passed: whether the run meets the criteria of success.
+        shared: whether other points have the same run.
     """
 
     run: int
@@ -39,109 +44,126 @@ class SweepRow:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep as its file describes it."""
+    """Sweep as its file describes it."""
 
     study_file: StudyFile[SweepSpec]
     design: Design
 
     @classmethod
     def from_file(cls, file: str | Path) -> Sweep:
-        """Read a sweep file, or a shipped one by its name. Raises InputError with everything that is wrong in it."""
-        found = read_study(file, SweepSpec)
-        return cls(found, build_design(found.spec))
+        """Read a sweep file, or a shipped sweep by its name.
+
+        Raises:
+            InputError: with all problems of the file.
+        """
+        study_file = read_study(file, SweepSpec)
+        return cls(study_file, build_design(study_file.spec))
 
     @cached_property
     def study(self) -> Study:
+        """Study that makes the runs."""
         return Study(self.study_file, tuple(self.design.level_settings()))
 
     def __len__(self) -> int:
         return len(self.design)
 
     def jobs(self) -> Iterator[Job]:
+        """Yield the jobs of all points in the order of the design."""
         return (self.study.job(point.settings) for point in self.design)
 
     @cached_property
-    def keys(self) -> list[str]:
-        """Keys of all runs."""
+    def keys(self) -> list[RunKey]:
+        """Keys of the runs of all points."""
         return [job.key for job in self.jobs()]
 
     @cached_property
-    def shared_keys(self) -> frozenset[str]:
-        """Keys of runs that several points have."""
+    def shared_keys(self) -> frozenset[RunKey]:
+        """Keys of the runs that several points have in common."""
         return frozenset(key for key, count in Counter(self.keys).items() if count > 1)
 
     @cached_property
     def criteria(self) -> list[dict[str, Any]]:
-        """What a run must meet to count as a success."""
-        own = self.study_file.spec.success
-        return self.study.checks if own is None else [check.model_dump(exclude_none=True) for check in own]
+        """Checks that a run must meet to be a success."""
+        success = self.study_file.spec.success
+        return self.study.checks if success is None else [check.model_dump(exclude_none=True) for check in success]
 
     def passed(self, kpis: Mapping[str, Number]) -> bool:
-        """Whether these KPIs are a success; without one that the criteria are about they are none."""
+        """Return whether these KPIs meet all criteria; a missing KPI does not."""
         known = all(check["kpi"] in kpis for check in self.criteria)
         return known and all(outcome.passed for outcome in evaluate_checks(kpis, self.criteria))
 
-    def check(self, engine: CheckingRunner) -> None:
-        """Raises InputError with everything that keeps a level of a factor from being run."""
+    def check(self, runner: CheckingRunner) -> None:
+        """Raise InputError with all problems of the levels of the factors."""
         points = islice(self._representatives(), _MAX_CHECKED_POINTS)
-        self.study.check_jobs(engine, (self.study.job(point.settings) for point in points))
+        self.study.check_jobs(runner, (self.study.job(point.settings) for point in points))
 
     def _representatives(self) -> Iterator[Point]:
-        """The first point, and the first with each further listed level of a factor."""
+        """Yield the first point, and the first point with each further listed level of a factor."""
         seen: set[tuple[str, str]] = set()
         listed = {factor.name for factor in self.design.factors if factor.listed_levels}
-        wanted = 1 + sum(len(factor.listed_levels) for factor in self.design.factors)
+        complete = 1 + sum(len(factor.listed_levels) for factor in self.design.factors)
         for point in self.design:
             new = {(name, repr(label)) for name, label in point.labels.items() if name in listed} - seen
             if new or not seen:
                 seen |= new | {("", "")}
                 yield point
-            if len(seen) == wanted:
+            if len(seen) == complete:
                 return
 
-    def run(self, ledger: RunStore, engine: CheckingRunner, observe: RecordObserver) -> None:
-        """Run what is not done. Raises InputError before anything runs, and when the first runs show criteria to be wrong."""
-        seen = ObservedKpis()
+    def run(self, run_store: RunStore, runner: CheckingRunner, observe: RecordObserver) -> None:
+        """Run the points that are not finished.
 
-        def look(record: Record) -> None:
-            seen.add(record)
+        Args:
+            run_store: store of finished runs.
+            runner: runs the jobs.
+            observe: called after every run.
+
+        Raises:
+            InputError: before the first run for a level that cannot be set; after the first runs for unknown KPIs in criteria.
+        """
+        observed_kpis = ObservedKpis()
+
+        def check_and_observe(record: Record) -> None:
+            observed_kpis.add(record)
             self._check_factor_names(record.kpis)
-            if seen.has_enough_runs:
-                self._check_criteria(seen)
+            if observed_kpis.has_enough_runs:
+                self._check_criteria(observed_kpis)
             observe(record)
 
-        self.check(engine)
-        run_pending(self.jobs(), ledger, engine, look)
+        self.check(runner)
+        run_pending(self.jobs(), run_store, runner, check_and_observe)
 
-    def check_names(self, ledger: RunStore) -> None:
-        """Raises InputError for criteria about KPIs that no run has, and for factors that are called like a KPI."""
-        seen = ObservedKpis()
-        for row in self.rows(ledger):
-            seen.add(row.record)
-        self._check_factor_names(seen.kpis)
-        self._check_criteria(seen)
+    def check_names(self, run_store: RunStore) -> None:
+        """Raise InputError for criteria with KPIs that no run has, and for factors named like a KPI."""
+        observed_kpis = ObservedKpis()
+        for row in self.rows(run_store):
+            observed_kpis.add(row.record)
+        self._check_factor_names(observed_kpis.kpis)
+        self._check_criteria(observed_kpis)
 
     def _check_factor_names(self, kpis: Mapping[str, Number]) -> None:
         names = [factor.name for factor in self.study_file.spec.factors]
-        places = {name: self.study_file.document.where(("factors", i, "name")) for i, name in enumerate(names) if name in kpis}
-        if places:
-            raise InputError(
-                [Problem(f'expected a name other than that of the KPI "{each}"', where) for each, where in places.items()]
-            )
+        where = self.study_file.document.where
+        if problems := [
+            Problem(f'expected a name other than that of the KPI "{name}"', where(("factors", i, "name")))
+            for i, name in enumerate(names)
+            if name in kpis
+        ]:
+            raise InputError(problems)
 
-    def _check_criteria(self, seen: ObservedKpis) -> None:
-        if seen.runs:
-            evaluate_checks(seen.kpis, self.criteria)
+    def _check_criteria(self, observed_kpis: ObservedKpis) -> None:
+        if observed_kpis.runs:
+            evaluate_checks(observed_kpis.kpis, self.criteria)
 
-    def rows(self, ledger: RunStore) -> Iterator[SweepRow]:
-        """Finished runs in the order of the design."""
+    def rows(self, run_store: RunStore) -> Iterator[SweepRow]:
+        """Yield the finished runs in the order of the design."""
         for run, key in enumerate(self.keys):
-            if key in ledger:
-                record = ledger[key]
+            if key in run_store:
+                record = run_store[key]
                 passed = not record.failure and self.passed(record.kpis)
                 yield SweepRow(run, self.design[run], record, passed, key in self.shared_keys)
 
 
 def kpi_names(rows: Iterable[SweepRow]) -> list[str]:
-    """Names of all KPIs, in the order in which runs show them."""
+    """Return the names of all KPIs in order of appearance."""
     return list(dict.fromkeys(name for row in rows for name in row.record.kpis))

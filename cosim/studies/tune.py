@@ -1,9 +1,14 @@
-"""A tuning: the parameters within bounds that make an expression of KPIs small and keep the constraints.
+"""Tuning: search for parameters within bounds that minimise an expression of KPIs under constraints.
 
-Optimizers see a point as a place in the unit cube. Points are compared as by K. Deb (Comput. Methods Appl. Mech. Engrg. 186
-(2000), 311-338): one that meets the constraints is better than one that does not, of those the smaller value, of these the
-smaller violation; then come points without a value, and last those where a run failed. Every run is kept in the ledger, so a
-tuning that was killed and is called again repeats its way without running anything twice.
+Optimizers work in the unit cube. Points are ranked by the rules of K. Deb (Comput. Methods Appl. Mech. Engrg. 186 (2000),
+311-338), from best to worst:
+
+1. points that meet all constraints, by their value;
+2. points that violate a constraint, by the sum of violations;
+3. points without a value;
+4. points with a failed run.
+
+Finished runs are stored, so a tuning that was interrupted repeats its search without making a run twice.
 """
 
 from __future__ import annotations
@@ -27,15 +32,22 @@ from .objective import Constraint, Expression, parse_constraint, parse_expressio
 from .schema import MethodSpec, ParameterSpec, TuneSpec
 from .study import CheckingRunner, ObservedKpis, RecordObserver, Study, run_pending
 
-#: ranks of what is worse than any value: violations, no value, a failure; optimizers can still square and add them
+#: ranks of points worse than any value; small enough for optimizers to square and add them
 _MAX_VALUE, _INFEASIBLE_RANK, _NO_VALUE_RANK, _FAILED_RANK = 1e99, 1e100, 1e149, 1e150
-#: differential evolution has converged when values differ by so much of their mean
+#: differential evolution has converged when the standard deviation of the values is this fraction of their mean
 _CONVERGENCE_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A point that was tried: its parameters, the value to be minimised, the sum of violations, and the cause of a failure."""
+    """Evaluated point of a tuning.
+
+    Attributes:
+        parameters: parameter values by name.
+        value: value of the objective; NaN: undefined.
+        violation: sum of the violations of constraints; 0: all are met.
+        failure: cause of the first failed run; empty: none failed.
+    """
 
     parameters: Mapping[str, float]
     value: float
@@ -44,7 +56,7 @@ class Trial:
 
     @property
     def rank(self) -> float:
-        """Smaller is better."""
+        """Number by which optimizers compare points; lower is better."""
         if self.failure:
             return _FAILED_RANK
         if not self.value < math.inf:
@@ -53,124 +65,147 @@ class Trial:
 
     @property
     def feasible(self) -> bool:
+        """True if the point has a value and meets all constraints."""
         return self.rank < _INFEASIBLE_RANK
 
 
 @dataclass
 class Tuning:
-    """A tuning as its file describes it, and its trials so far."""
+    """Tuning as its file describes it, and its trials so far."""
 
     study_file: StudyFile[TuneSpec]
     objective: Expression
     constraints: Sequence[Constraint]
     trials: list[Trial] = field(default_factory=list)
-    #: the KPIs of runs so far
+    #: KPIs of the runs so far
     observed_kpis: ObservedKpis = field(default_factory=ObservedKpis)
 
     @classmethod
     def from_file(cls, file: str | Path) -> Tuning:
-        """Read a tuning file, or a shipped one by its name. Raises InputError with everything that is wrong in it."""
-        found = read_study(file, TuneSpec)
+        """Read a tuning file, or a shipped tuning by its name.
+
+        Raises:
+            InputError: with all problems of the file.
+        """
+        study_file = read_study(file, TuneSpec)
         problems: list[Problem] = []
 
-        def parsed(kind: Callable[[str], Any], text: str, *path: str | int) -> Any:
+        def parse(parser: Callable[[str], Any], text: str, *path: str | int) -> Any:
             try:
-                return kind(text)
+                return parser(text)
             except ValueError as error:
-                problems.append(Problem(str(error), found.document.where(path)))
+                problems.append(Problem(str(error), study_file.document.where(path)))
+                return None
 
-        objective = parsed(parse_expression, found.spec.minimize, "minimize")
-        constraints = [parsed(parse_constraint, text, "constraints", i) for i, text in enumerate(found.spec.constraints)]
+        objective = parse(parse_expression, study_file.spec.minimize, "minimize")
+        constraints = [parse(parse_constraint, text, "constraints", i) for i, text in enumerate(study_file.spec.constraints)]
         if problems:
             raise InputError(problems)
-        return cls(found, objective, constraints)
+        return cls(study_file, objective, constraints)
 
     @property
     def spec(self) -> TuneSpec:
+        """Content of the tuning's file."""
         return self.study_file.spec
 
     @cached_property
     def study(self) -> Study:
+        """Study that makes the runs."""
         return Study(self.study_file, tuple(self.spec.cases))
 
-    def run(self, ledger: RunStore, engine: CheckingRunner, observe: RecordObserver) -> Trial:
-        """The best trial. Raises InputError before anything runs when a parameter or case cannot be set."""
-        self.study.check_jobs(engine, self._jobs([_start_parameters(self.spec)]))
+    def run(self, run_store: RunStore, runner: CheckingRunner, observe: RecordObserver) -> Trial:
+        """Search for the best parameters and return the best trial.
 
-        def evaluate(places: Sequence[Sequence[float]]) -> list[float]:
-            parameters = [self._parameters(place) for place in places]
-            run_pending((job for each in parameters for job in self._jobs([each])), ledger, engine, observe)
-            found = [self._trial(each, ledger) for each in parameters]
-            self.trials += found
+        Args:
+            run_store: store of finished runs.
+            runner: runs the jobs.
+            observe: called after every run.
+
+        Raises:
+            InputError: before the first run for a parameter or case that cannot be set; after the first runs for unknown names
+                in the objective or a constraint.
+        """
+        self.study.check_jobs(runner, self._jobs([_start_parameters(self.spec)]))
+
+        def evaluate(points: Sequence[Sequence[float]]) -> list[float]:
+            parameters = [self._parameters(point) for point in points]
+            run_pending((job for each in parameters for job in self._jobs([each])), run_store, runner, observe)
+            trials = [self._trial(each, run_store) for each in parameters]
+            self.trials += trials
             if self.observed_kpis.has_enough_runs:
                 self._check_names()
-            return [trial.rank for trial in found]
+            return [trial.rank for trial in trials]
 
-        METHODS[self.spec.method.kind](evaluate, _start_positions(self.spec), self.spec.method)
+        METHODS[self.spec.method.kind](evaluate, _start_coordinates(self.spec), self.spec.method)
         self._check_names()
         return min(self.trials, key=lambda trial: trial.rank)
 
     def settings(self, parameters: Mapping[str, float]) -> dict[str, float]:
-        """Parameters as changes to the scenario."""
+        """Return the settings of the scenario for these parameters."""
         return {path: parameters[each.name] for each in self.spec.parameters for path in each.set}
 
     def _jobs(self, points: Iterable[Mapping[str, float]]) -> list[Job]:
         return [self.study.job({**case, **self.settings(point)}) for point in points for case in self.spec.cases]
 
-    def _parameters(self, place: Sequence[float]) -> dict[str, float]:
-        return {spec.name: _parameter_value(spec, float(at)) for spec, at in zip(self.spec.parameters, place, strict=True)}
+    def _parameters(self, point: Sequence[float]) -> dict[str, float]:
+        return {spec.name: _parameter_value(spec, float(x)) for spec, x in zip(self.spec.parameters, point, strict=True)}
 
-    def _trial(self, parameters: Mapping[str, float], ledger: RunStore) -> Trial:
-        records = [ledger[job.key] for job in self._jobs([parameters])]
+    def _trial(self, parameters: Mapping[str, float], run_store: RunStore) -> Trial:
+        records = [run_store[job.key] for job in self._jobs([parameters])]
         for record in records:
             self.observed_kpis.add(record)
         if failures := [record.failure for record in records if record.failure]:
             return Trial(parameters, math.nan, math.inf, failures[0])
-        names = [{**record.kpis, **parameters} for record in records]
-        values = [self.objective(each) for each in names]
-        violation = sum(each.violation(known) for each in self.constraints for known in names)
+        operands = [{**record.kpis, **parameters} for record in records]
+        values = [self.objective(each) for each in operands]
+        violation = sum(constraint.violation(each) for constraint in self.constraints for each in operands)
         return Trial(parameters, float(np.max(values)) if self.spec.over_cases == "max" else fmean(values), violation)
 
     def _check_names(self) -> None:
-        """Raises InputError for names that no run has a KPI for, if any run says which there are."""
+        """Raise InputError for names that are neither a parameter nor a KPI of any run; pass if no run has succeeded."""
         known = {**self.observed_kpis.kpis, **dict.fromkeys(each.name for each in self.spec.parameters)}
-        found = [(self.objective, ("minimize",))]
-        found += [(side, ("constraints", i)) for i, each in enumerate(self.constraints) for side in (each.left, each.right)]  # type: ignore[misc]
+        expressions: list[tuple[Expression, tuple[str | int, ...]]] = [(self.objective, ("minimize",))]
+        for i, constraint in enumerate(self.constraints):
+            expressions += [(constraint.left, ("constraints", i)), (constraint.right, ("constraints", i))]
         problems = [
             Problem(text, self.study_file.document.where(path))
-            for each, path in found
-            if (text := each.unknown_name_problem(known))
+            for expression, path in expressions
+            if (text := expression.unknown_name_problem(known))
         ]
         if problems and self.observed_kpis.runs:
             raise InputError(problems)
 
 
-def _parameter_value(spec: ParameterSpec, place: float) -> float:
-    """Twelve digits are enough, and the same on every machine; bounds are kept."""
-    rounded = float(f"{interpolate(place, spec.min, spec.max, spec.scale == 'log'):.12g}")
+def _parameter_value(spec: ParameterSpec, coordinate: float) -> float:
+    """Return the parameter at a coordinate in [0, 1], within its bounds and rounded to 12 digits, equal on all machines."""
+    rounded = float(f"{interpolate(coordinate, spec.min, spec.max, spec.scale == 'log'):.12g}")
     return min(max(rounded, spec.min), spec.max)
 
 
 def _start_parameters(spec: TuneSpec) -> dict[str, float]:
-    return {each.name: _parameter_value(each, place) for each, place in zip(spec.parameters, _start_positions(spec), strict=True)}
+    return {each.name: _parameter_value(each, x) for each, x in zip(spec.parameters, _start_coordinates(spec), strict=True)}
 
 
-def _start_positions(spec: TuneSpec) -> list[float]:
-    """Where the search begins: the start values, else the middle."""
-    return [0.5 if each.start is None else _unit_position(each, each.start) for each in spec.parameters]
+def _start_coordinates(spec: TuneSpec) -> list[float]:
+    """Return the start of the search in the unit cube; a parameter without a start value begins in the middle."""
+    return [0.5 if each.start is None else _unit_coordinate(each, each.start) for each in spec.parameters]
 
 
-def _unit_position(spec: ParameterSpec, value: float) -> float:
+def _unit_coordinate(spec: ParameterSpec, value: float) -> float:
     if spec.scale == "log":
         return math.log(value / spec.min) / math.log(spec.max / spec.min)
     return (value - spec.min) / (spec.max - spec.min)
 
 
+#: returns the ranks of points in the unit cube
 Evaluator = Callable[[Sequence[Sequence[float]]], list[float]]
 
 
 def _differential_evolution(evaluate: Evaluator, start: Sequence[float], spec: MethodSpec) -> None:
-    """R. Storn, K. Price, J. Global Optim. 11 (1997), 341-359: a whole generation side by side; the start is in the first one."""
+    """Search by differential evolution (R. Storn, K. Price, J. Global Optim. 11 (1997), 341-359).
+
+    A whole generation is evaluated in parallel; the first one contains the start.
+    """
     from scipy.optimize import differential_evolution
     from scipy.stats import qmc
 
@@ -179,12 +214,12 @@ def _differential_evolution(evaluate: Evaluator, start: Sequence[float], spec: M
     population[0] = start
 
     def converged(intermediate_result: Any) -> bool:
-        """As SciPy has it, but not as long as points differ only in how bad they are."""
+        """Return whether SciPy's criterion of convergence is met and all points are feasible."""
         ranks = intermediate_result.population_energies
         return bool(ranks.max() < _INFEASIBLE_RANK and np.std(ranks) <= _CONVERGENCE_TOLERANCE * abs(np.mean(ranks)))
 
     differential_evolution(
-        lambda places: np.array(evaluate(places.T.tolist())),
+        lambda points: np.array(evaluate(points.T.tolist())),
         [(0.0, 1.0)] * len(start),
         maxiter=spec.generations,
         init=population,
@@ -194,7 +229,7 @@ def _differential_evolution(evaluate: Evaluator, start: Sequence[float], spec: M
         updating="deferred",
         callback=converged,
         tol=0.0,
-        atol=-1.0,  # never by SciPy's own measure
+        atol=-1.0,  # disables SciPy's own criterion
     )
 
 
@@ -204,12 +239,12 @@ def _scipy_minimizer(method: str) -> Callable[[Evaluator, Sequence[float], Metho
 
         options = {"maxfev": spec.evaluations}
         bounds = [(0.0, 1.0)] * len(start)
-        minimize(lambda place: evaluate([place.tolist()])[0], start, method=method, bounds=bounds, options=options)
+        minimize(lambda point: evaluate([point.tolist()])[0], start, method=method, bounds=bounds, options=options)
 
     return search
 
 
-#: how to search, from a start, within the unit cube
+#: optimization methods: search from a start within the unit cube
 METHODS: Mapping[str, Callable[[Evaluator, Sequence[float], MethodSpec], None]] = {
     "differential_evolution": _differential_evolution,
     "nelder_mead": _scipy_minimizer("Nelder-Mead"),

@@ -22,6 +22,7 @@ from cosim.components.fmi import FmuFile, Isolation, create_component
 from cosim.core.system import Endpoint, System
 from cosim.core.time_grid import TimeGrid
 from cosim.engine import ExecutorKind, Recorder, compile_plan, executor_class
+from cosim.engine.initialization import instantiate_components
 from cosim.engine.run_loop import SimulationOutcome, simulate
 from cosim.engine.settings import Settings
 
@@ -66,7 +67,7 @@ def per_step(fmu: Path, isolation: Isolation | None, kind: ExecutorKind) -> floa
     plan = compile_plan(system, TimeGrid.from_times(Fraction(0), STEPS * STEP, STEP), [Endpoint("s0", "y1")])
     executor = executor_class(kind)(plan, Recorder(plan, {"y": Endpoint("s0", "y1")}))
     try:
-        executor.instantiate()
+        instantiate_components(plan)
         executor.initialize()
         return microseconds(executor.run)
     finally:

@@ -1,4 +1,4 @@
-"""`cosim bench-controller`: controllers in the place of the Strider's autopilot, and of others."""
+"""`cosim bench-controller`: candidates that replace the autopilot of the Strider and other controllers."""
 
 from __future__ import annotations
 
@@ -87,12 +87,12 @@ def bench(folder, controller, *arguments, role="usv_autopilot"):
 
 
 def words(done, name):
-    """The words of a KPI's line in the table."""
+    """Return the words of a KPI's line in the table."""
     return next(line.split() for line in done.stdout.splitlines() if line.startswith(name))
 
 
 def lazy(folder):
-    """The autopilot as a nested system whose rudder hardly moves."""
+    """Write the autopilot as a nested system with a very small rudder gain."""
     system = json.loads((ROOT / "scenarios/systems/strider_autopilot.json").read_text())
     for component in system["components"].values():
         component["fmu"] = str((ROOT / "scenarios/systems" / component["fmu"]).resolve())
@@ -106,16 +106,18 @@ def test_another_build_of_the_shipped_controller_is_neither_better_nor_worse(fol
     done = bench(folder, ROOT / "fmus/python/strider_autopilot.fmu", "--json")
     assert done.returncode == 0, done.stdout + done.stderr
     (sail,) = json.loads(done.stdout)["scenarios"]
-    assert len(sail["kpis"]) == 5 and all(kpi["against_shipped"] == "" for kpi in sail["kpis"])
+    assert len(sail["kpis"]) == 5
+    assert all(kpi["against_shipped"] == "" for kpi in sail["kpis"])
     assert [kpi["candidate"] for kpi in sail["kpis"]] == pytest.approx([kpi["shipped"] for kpi in sail["kpis"]], rel=1e-9)
     assert {kpi["name"]: kpi["unit"] for kpi in sail["kpis"]}["away.value"] == "m"
 
 
-def test_a_worse_controller_is_told_so_and_a_better_one_too(folder):
+def test_worse_and_better_controllers_are_marked(folder):
     path = lazy(folder)
     worse = bench(folder, path)
     assert worse.returncode == 3
-    assert "FAILED  sail" in worse.stdout and "waypoints.all_reached is false, expected equals true" in worse.stdout
+    assert "FAILED  sail" in worse.stdout
+    assert "waypoints.all_reached is false, expected equals true" in worse.stdout
     assert words(worse, "waypoints.reached")[1:] == ["1", "2", "worse"]
     assert words(worse, "waypoints.time[2]")[1:] == ["s", "-", words(worse, "waypoints.time[2]")[3], "worse"]
     assert "last run" not in worse.stdout
@@ -128,7 +130,7 @@ def test_a_worse_controller_is_told_so_and_a_better_one_too(folder):
     assert "last run" in better.stdout
 
 
-def test_what_does_not_fit_is_said_at_once(folder):
+def test_all_problems_of_an_unsuitable_controller_are_reported(folder):
     source = keeper(
         folder,
         ["vehicle.position.x", "vehicle.postion.y", "wind"],
@@ -139,35 +141,36 @@ def test_what_does_not_fit_is_said_at_once(folder):
     assert done.returncode == 2
     assert done.stderr.splitlines() == [
         f'{source}: the output "rudder_angle" (rad) is missing; did you mean "rudder_angel"?',
-        f'{source}: nothing feeds the input "vehicle.postion.y" in this role; did you mean "vehicle.position.y"?',
-        f'{source}: nothing feeds the input "wind" in this role',
-        f'{source}: "thrust" has the unit "m", expected "N" or what converts to it',
+        f'{source}: the role has no signal for the input "vehicle.postion.y"; did you mean "vehicle.position.y"?',
+        f'{source}: the role has no signal for the input "wind"',
+        f'{source}: "thrust" has the unit "m", expected "N" or a unit that converts to it',
     ]
     assert not (folder / "runs/bench/shipped").exists()
 
 
-def test_what_is_no_controller_is_named_as_it_was_given(folder):
+def test_an_invalid_source_is_reported_as_the_user_wrote_it(folder):
     source = keeper(folder).replace("Keeper", "Kepeer")
     done = bench(folder, source)
     message = f'{source}: "{folder / "keeper.py"}" defines no "Kepeer"; did you mean "Keeper"?\n'
     assert (done.returncode, done.stderr) == (2, message)
 
 
-def test_what_is_wrong_inside_a_nested_system_keeps_its_place(folder):
+def test_a_problem_inside_a_nested_system_keeps_its_position(folder):
     path = folder / "lost.json"
     path.write_text('{"components": {"a": {"python": "lost.py:A"}}, "ports": {}}')
     done = bench(folder, path)
     assert (done.returncode, done.stderr) == (2, f'{path}:1:17: $.components.a: file "lost.py" does not exist\n')
 
 
-def test_what_the_scenario_says_about_missing_variables_is_left_out_and_noted(folder):
+def test_entries_about_missing_variables_are_removed_and_noted(folder):
     done = bench(folder, keeper(folder))
     assert done.returncode == 3
     assert 'note: sail: kpi "away" is left out: the candidate has no "usv.distance"' in done.stdout
-    assert 'note: sail: "usv.waypoint_count" is left out: the candidate has nothing of that name' in done.stdout
+    assert 'note: sail: "usv.waypoint_count" is left out: the candidate has no such variable' in done.stdout
     written = json.loads((folder / "runs/bench/usv_autopilot/Keeper/scenarios/sail.json").read_text())
     assert written["components"]["usv"] == {"parameters": {}, "python": f"{folder / 'keeper.py'}:Keeper"}
-    assert [kpi["name"] for kpi in written["kpis"]] == ["waypoints"] and "reference" not in written
+    assert [kpi["name"] for kpi in written["kpis"]] == ["waypoints"]
+    assert "reference" not in written
 
 
 @pytest.fixture(scope="module")
@@ -176,8 +179,8 @@ def fault_libraries(tmp_path_factory):
     return {2: build_library(2, library)}
 
 
-def test_an_fmu_that_crashes_in_flight_fails_its_scenario_alone(tmp_path, fault_libraries):
-    """A role of one's own: a lag."""
+def test_an_fmu_that_crashes_fails_only_its_scenario(tmp_path, fault_libraries):
+    """The role of a user's project: a lag."""
     shipped = FaultFmus(fault_libraries, tmp_path)(2, name="shipped")
     role = {"description": "A lag.", "controllers": ["shipped.fmu"], "inputs": {"u": ""}, "outputs": {"y": ""}}
     (tmp_path / "lag.json").write_text(json.dumps(role))
@@ -189,12 +192,14 @@ def test_an_fmu_that_crashes_in_flight_fails_its_scenario_alone(tmp_path, fault_
     crashing = FaultFmus(fault_libraries, tmp_path)(2, "DoStep 6 segv", name="crashing")
     done = bench(tmp_path, crashing, role="lag.json")
     assert done.returncode == 1, done.stdout + done.stderr
-    assert "passed  short" in done.stdout and "FAILED  long" in done.stdout
-    assert "lag: fmi2DoStep failed at t = 0.05 s" in done.stdout and "SIGSEGV" in done.stdout, done.stdout
+    assert "passed  short" in done.stdout
+    assert "FAILED  long" in done.stdout
+    assert "lag: fmi2DoStep failed at t = 0.05 s" in done.stdout, done.stdout
+    assert "SIGSEGV" in done.stdout
 
 
-def test_a_part_of_a_controller_is_replaced_inside_it(folder):
-    """The shipped autopilot stands in a scenario as one FMU; its nested twin takes a heading controller from elsewhere."""
+def test_a_part_of_a_shipped_controller_is_replaced(folder):
+    """The scenario contains the autopilot as one FMU; it is replaced by the nested system with the new heading controller."""
     shutil.copy(ROOT / "fmus/fmi3/heading_controller.fmu", folder / "heading.fmu")
     done = bench(folder, "heading.fmu", "--json", role="usv_heading")
     assert done.returncode == 0, done.stdout + done.stderr
@@ -205,7 +210,7 @@ def test_a_part_of_a_controller_is_replaced_inside_it(folder):
     assert "worse" in [kpi["against_shipped"] for kpi in json.loads(lame.stdout)["scenarios"][0]["kpis"]]
 
 
-def test_scenarios_of_one_name_are_refused(folder):
+def test_scenarios_with_equal_names_are_refused(folder):
     shutil.copytree(folder / "scenarios", folder / "more")
     done = bench(folder, lazy(folder), "--scenarios", "scenarios", "--scenarios", "more")
     assert (done.returncode, done.stderr) == (2, '2 scenarios are called "sail.json": their results would go to one folder\n')

@@ -1,4 +1,4 @@
-"""`cosim compare`, as a user meets it."""
+"""`cosim compare` in a real process."""
 
 import json
 
@@ -15,7 +15,7 @@ def cosim(*arguments):
 
 
 def csv(path, offset=0.0, delay=0.0):
-    """At rest for a second, then a sine."""
+    """Write a signal that is constant for 1 s and then a sine."""
     rows = (f"{t:.17g},{np.sin(max(t - delay - 1, 0)) + offset:.17g}" for t in np.arange(0, 601) / 100)
     path.parent.mkdir(exist_ok=True)
     path.write_text("\n".join(['"time","plant.x"', *rows]) + "\n")
@@ -32,7 +32,7 @@ def test_a_folder_of_a_run_is_a_result(tmp_path):
     assert cosim("compare", tmp_path / "run", csv(tmp_path / "b.csv")).returncode == 0
 
 
-def test_leaving_the_tube_ends_with_three_and_says_where(tmp_path):
+def test_a_signal_outside_its_tube_gives_exit_code_3_and_the_time(tmp_path):
     done = cosim("compare", csv(tmp_path / "a.csv", offset=0.2), csv(tmp_path / "b.csv"), "--absolute", "0.1")
     assert done.returncode == 3
     assert done.stderr.splitlines()[0] == "1 of 1 signals fail"
@@ -40,12 +40,12 @@ def test_leaving_the_tube_ends_with_three_and_says_where(tmp_path):
 
 
 @pytest.mark.parametrize(("time", "code"), [("0.2", 0), ("0.05", 3)])
-def test_a_shift_is_forgiven_within_the_tolerance_in_time(tmp_path, time, code):
+def test_a_shift_within_the_tolerance_of_time_is_accepted(tmp_path, time, code):
     shifted, reference = csv(tmp_path / "a.csv", delay=0.1), csv(tmp_path / "b.csv")
     assert cosim("compare", shifted, reference, "--time", time, "--relative", "0.01").returncode == code
 
 
-def test_a_scenario_brings_reference_and_tolerances(tmp_path):
+def test_a_scenario_provides_reference_and_tolerances(tmp_path):
     csv(tmp_path / "reference.csv")
     components = {"a": {"fmu": "a.fmu"}}
     tolerances = {"plant.*": {"absolute": 0.3}}
@@ -56,20 +56,21 @@ def test_a_scenario_brings_reference_and_tolerances(tmp_path):
     assert cosim("compare", csv(tmp_path / "a.csv", offset=0.4), path).returncode == 3
     path.write_text(json.dumps(scenario))
     refused = cosim("compare", tmp_path / "a.csv", path)
-    assert (refused.returncode, refused.stderr) == (2, f'{path} names no "reference"\n')
+    assert (refused.returncode, refused.stderr) == (2, f'{path} has no "reference"\n')
 
 
-def test_the_scenario_may_be_a_shipped_one_by_its_name(tmp_path):
+def test_a_shipped_scenario_is_found_by_name():
     shipped = resources.root() / "scenarios/references/free_flight.csv"
     by_name = cosim("compare", shipped, "free_flight")
     assert (by_name.returncode, by_name.stdout) == (0, "all 10 signals stay in their tubes\n"), by_name.stderr
     misspelt = cosim("compare", shipped, "free_fligt")
-    assert misspelt.returncode == 2 and misspelt.stderr.endswith('did you mean "free_flight"?\n')
+    assert misspelt.returncode == 2
+    assert misspelt.stderr.endswith('did you mean "free_flight"?\n')
     missing = cosim("compare", shipped, "runs/free_fligt")
     assert (missing.returncode, missing.stderr) == (2, "cannot read runs/free_fligt: No such file or directory\n")
 
 
-def test_the_picture_shows_the_tube_and_what_is_outside(tmp_path):
+def test_the_figure_shows_the_tube_and_the_violations(tmp_path):
     picture = tmp_path / "tubes.png"
     outside = csv(tmp_path / "a.csv", offset=0.2)
     assert cosim("compare", outside, csv(tmp_path / "b.csv"), "--absolute", "0.1", "--plot", picture).returncode == 3
@@ -78,7 +79,7 @@ def test_the_picture_shows_the_tube_and_what_is_outside(tmp_path):
         assert np.abs(pixels - colour).max(axis=1).min() < 2
 
 
-def test_a_picture_is_drawn_of_what_is_not_finite_or_missing_too(tmp_path):
+def test_the_figure_shows_missing_and_non_finite_signals(tmp_path):
     text = csv(tmp_path / "a.csv").read_text().replace("\n1,", "\n1,NaN #", 1)
     broken = tmp_path / "broken.csv"
     broken.write_text("\n".join(line.split(" #")[0] for line in text.splitlines()))
@@ -91,14 +92,14 @@ def test_a_picture_is_drawn_of_what_is_not_finite_or_missing_too(tmp_path):
     assert (tmp_path / "none.svg").exists()
 
 
-def test_what_cannot_be_read_is_refused(tmp_path):
+def test_an_unreadable_file_is_refused(tmp_path):
     missing = cosim("compare", tmp_path / "none.csv", csv(tmp_path / "b.csv"))
     assert (missing.returncode, "none.csv" in missing.stderr) == (2, True)
     assert cosim("compare", tmp_path / "b.csv", tmp_path / "b.csv", "--plot", "x.pdf").returncode == 2
 
 
 @pytest.mark.parametrize(("option", "value"), [("absolute", "nan"), ("relative", "inf"), ("time", "nan"), ("time", "-1.0")])
-def test_a_tolerance_that_says_nothing_is_refused(tmp_path, option, value):
+def test_an_invalid_tolerance_is_refused(tmp_path, option, value):
     done = cosim("compare", csv(tmp_path / "a.csv", offset=0.2), csv(tmp_path / "b.csv"), f"--{option}", value)
     message = f'tolerance of "*": "{option}" is {value}, expected a finite number of at least 0\n'
     assert (done.returncode, done.stderr) == (2, message)

@@ -1,4 +1,4 @@
-"""`cosim doctor` against machines that lack something: other search paths, other metadata, another PATH."""
+"""`cosim doctor` on incomplete machines, simulated by search paths, metadata and PATH."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ def doctor(*options, **environment):
 
 
 def findings(**environment):
-    """(exit code, name -> finding)."""
+    """Return the exit code and the findings by name."""
     done = doctor("--json", **environment)
     return done.returncode, {finding["name"]: finding for finding in json.loads(done.stdout)}
 
 
 @pytest.fixture
 def requiring(tmp_path):
-    """An environment in which the distribution requires something else."""
+    """Function that returns an environment in which the distribution has other requirements."""
 
     def make(required):
         folder = tmp_path / "fmi_cosim-0.2.0.dist-info"
@@ -46,7 +46,7 @@ def requiring(tmp_path):
     return make
 
 
-def test_it_finds_what_is_here():
+def test_this_environment_has_no_broken_parts():
     code, found = findings()
     assert code == 0
     assert found["Python"]["found"].startswith(platform.python_version())
@@ -55,23 +55,23 @@ def test_it_finds_what_is_here():
     assert str(os.cpu_count()) in found["processors"]["found"]
 
 
-def test_text_and_json_tell_the_same():
+def test_text_and_json_agree():
     text = doctor().stdout
     assert all(finding["found"] in text for finding in findings()[1].values())
 
 
 @pytest.mark.parametrize(
     ("required", "words"),
-    [("no-such-package>=1", "not installed"), ("numpy>=1000", f"{metadata.version('numpy')}, needed is >=1000")],
+    [("no-such-package>=1", "not installed"), ("numpy>=1000", f"{metadata.version('numpy')}, required is >=1000")],
 )
-def test_a_required_package_that_is_not_there_or_too_old_is_broken(requiring, required, words):
+def test_a_required_package_that_is_missing_or_too_old_is_broken(requiring, required, words):
     environment = requiring(required)
     done = doctor(**environment)
     assert done.returncode == 1
     assert f"BROKEN: {words}" in done.stdout
 
 
-def test_an_extra_that_is_not_there_hurts_nobody(requiring):
+def test_a_missing_extra_does_not_fail(requiring):
     code, found = findings(**requiring("numpy>=1"))
     assert (code, found["wings"]["state"]) == (0, "missing")
     assert found["wings"]["found"] == "no-such-feathers: not installed (pip install 'fmi-cosim[wings]')"
@@ -83,7 +83,7 @@ def test_tools_are_looked_for_on_the_path(tmp_path):
     assert [found[name]["state"] for name in ("C compiler", "OpenModelica", "bubblewrap")] == ["missing"] * 3
 
 
-def test_a_program_is_believed_only_when_it_works(tmp_path):
+def test_a_program_that_does_not_work_is_missing(tmp_path):
     for name, text in {"omc": "echo OpenModelica 1.26.0", "bwrap": "exit 1", "cc": "exit 0"}.items():
         (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
         (tmp_path / name).chmod(0o755)
@@ -92,13 +92,13 @@ def test_a_program_is_believed_only_when_it_works(tmp_path):
     assert found["bubblewrap"]["state"] == "missing"
 
 
-def test_the_cache_is_where_the_environment_puts_it(tmp_path):
+def test_the_cache_folder_follows_the_environment(tmp_path):
     _, found = findings(XDG_CACHE_HOME=str(tmp_path))
     assert found["cache"]["found"] == str(tmp_path / "cosim")
 
 
-def test_in_a_sandbox_it_says_so():
-    """What holds for the process is tried out in a process for which it holds."""
+def test_restrictions_of_a_sandbox_are_reported():
+    """The restrictions are probed in a process inside the sandbox."""
     imports = "from cosim.process.sandbox import *; from cosim.cli import main"
     enter = "enter_sandbox(SandboxSettings(readable=interpreter_folders(), open_files=77))"
     words = [sys.executable, "-c", f"{imports}; {enter}; main(['doctor', '--json'])"]

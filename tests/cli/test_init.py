@@ -1,4 +1,4 @@
-"""`cosim init`: the project that it makes passes at once, and notices when its controller changes."""
+"""`cosim init`: a new project passes its tests, and detects changes of its controller."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cosim.cli.commands.init import pip_origin, pip_requirement
 
 
 def run(*command, cwd):
-    """A command of this environment, as from a user's shell."""
+    """Run a command of this environment as from a user's shell."""
     environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}", "PYTEST_ADDOPTS": ""}
     return subprocess.run([*map(str, command)], cwd=cwd, capture_output=True, text=True, check=False, env=environment)
 
@@ -38,20 +38,24 @@ def project(folder, made):
     listed = {Path(line).relative_to("my controllers").as_posix() for line in made.stdout.splitlines() if line.startswith("my ")}
     root = folder / "my controllers"
     files = {path.relative_to(root).as_posix() for path in root.rglob("*") if path.is_file() and "runs" not in path.parts}
-    assert files - listed <= {"scenarios/references/course.json"} and "__pycache__" not in str(files)
+    assert files - listed <= {"scenarios/references/course.json"}
+    assert "__pycache__" not in str(files)
     return root
 
 
-def test_the_commands_of_its_workflow_pass(project):
+def test_the_commands_of_the_ci_workflow_pass(project):
     commands = re.findall(r"- run: (.*)", (project / ".github/workflows/ci.yml").read_text())
-    assert commands[0] == "pip install -r requirements.txt" and len(commands) == 3
+    assert commands[0] == "pip install -r requirements.txt"
+    assert len(commands) == 3
     regressed, tested = (run(*shlex.split(command), cwd=project) for command in commands[1:])
-    assert regressed.returncode == 0 and "1 scenarios, all well" in regressed.stdout, regressed.stdout + regressed.stderr
-    assert tested.returncode == 0 and "4 passed" in tested.stdout, tested.stdout + tested.stderr
+    assert regressed.returncode == 0, regressed.stdout + regressed.stderr
+    assert "1 scenario, all passed" in regressed.stdout
+    assert tested.returncode == 0, tested.stdout + tested.stderr
+    assert "4 passed" in tested.stdout
     assert (project / "junit.xml").is_file()
 
 
-def test_a_changed_controller_is_noticed(project, tmp_path):
+def test_a_changed_controller_fails_the_regression(project, tmp_path):
     own = tmp_path / "copy"
     for folder in ("scenarios", "controllers", "fmus"):
         shutil.copytree(project / folder, own / folder)
@@ -64,9 +68,10 @@ def test_a_changed_controller_is_noticed(project, tmp_path):
     assert "vessel.attitude.yaw leaves its tube at t = " in done.stdout
 
 
-def test_a_run_leaves_the_figure_and_the_replay_that_the_readme_promises(project):
+def test_a_run_writes_the_figure_and_the_replay_of_the_readme(project):
     done = run("cosim", "run", "scenarios/course.json", cwd=project)
-    assert done.returncode == 0 and "course.png, report.html in runs/course" in done.stdout
+    assert done.returncode == 0
+    assert "course.png, report.html in runs/course" in done.stdout
     replayed = run("cosim", "replay", "runs/course", cwd=project)
     assert (replayed.returncode, replayed.stderr) == (0, "")
 
@@ -84,20 +89,21 @@ def test_a_run_leaves_the_figure_and_the_replay_that_the_readme_promises(project
         ({"url": "https://host/fmi_cosim.whl", "archive_info": {}}, "fmi-cosim @ https://host/fmi_cosim.whl"),
     ],
 )
-def test_the_requirements_name_where_pip_got_this_cosim_from(source, line):
-    """On no index is a package of this name, so that its version alone could not be installed."""
+def test_the_requirements_name_the_origin_of_cosim(source, line):
+    """No package index has this package, so that its version alone could not be installed."""
     assert pip_requirement(source) == line
 
 
-def test_the_requirements_are_installed_first_and_the_name_stands_in_the_readme(made, project):
+def test_the_requirements_are_installed_first_and_the_readme_has_the_projects_name(made, project):
     commands = [line.strip() for line in made.stdout.partition("Next:\n")[2].splitlines()]
-    assert commands[1] == "pip install -r requirements.txt" and commands[-1] == "python -m pytest"
+    assert commands[1] == "pip install -r requirements.txt"
+    assert commands[-1] == "python -m pytest"
     named = [line for line in (project / "requirements.txt").read_text().splitlines() if not line.startswith("#")]
     assert named == [pip_requirement(pip_origin()), "pytest"]
     assert (project / "README.md").read_text().startswith("# my controllers\n")
 
 
-def test_files_are_overwritten_only_by_force(project):
+def test_files_are_overwritten_only_with_force(project):
     readme = project / "README.md"
     readme.write_text("mine")
     refused = run("cosim", "init", project, cwd=project)

@@ -1,4 +1,4 @@
-"""`cosim new controller`: what it makes runs at once, in every language."""
+"""`cosim new controller`: a new controller runs without changes, in every language."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def cosim(*arguments, cwd):
 
 
 def new(folder, name, language, *more):
-    """The same in this process, which is quicker."""
+    """Run `cosim new controller` in this process, which is faster."""
     out, err = StringIO(), StringIO()
     with chdir(folder), redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as end:
         main(["new", "controller", name, "--language", language, *more])
@@ -45,7 +45,7 @@ def next_commands(done):
 
 @pytest.fixture(scope="module")
 def sailed(tmp_path_factory):
-    """`sailed(language)` is a folder in which a controller was made and everything was run that the command proposes."""
+    """Function that creates a controller in a language, runs all proposed commands and returns the folder."""
 
     @cache
     def sail(language):
@@ -62,22 +62,22 @@ def sailed(tmp_path_factory):
 
 
 @pytest.mark.parametrize("language", MADE)
-def test_it_keeps_speed_and_course_at_once(sailed, language):
+def test_a_new_controller_holds_speed_and_course(sailed, language):
     result = Result.from_csv(sailed(language) / "runs/my_keeper/result.csv")
     assert result["vessel.velocity_body.u"][-1] == pytest.approx(1.0, abs=1e-3)
     assert result["vessel.attitude.yaw"][-1] == pytest.approx(1.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("language", ["modelica", "c"])
-def test_all_languages_sail_the_same_course(sailed, language):
+def test_all_languages_give_the_same_trajectory(sailed, language):
     ours, theirs = (Result.from_csv(sailed(one) / "runs/my_keeper/result.csv") for one in (language, "python"))
     for name in ("vessel.position.x", "vessel.position.y", "vessel.attitude.yaw", "vessel.velocity_body.u"):
         assert np.abs(ours[name] - theirs[name]).max() < 1e-12, name
 
 
 @pytest.mark.parametrize("language", MADE)
-def test_the_exported_fmu_sails_the_same_course(sailed, language):
-    """`cosim new` proposes how to export it; here the FMU takes the source's place."""
+def test_the_exported_fmu_gives_the_same_trajectory(sailed, language):
+    """The FMU exported by the proposed command replaces the source in the scenario."""
     folder = sailed(language)
     scenario = json.loads((folder / "my_keeper/my_keeper.json").read_text())
     scenario["components"]["usv"] = {"fmu": "my_keeper.fmu", "parameters": scenario["components"]["usv"]["parameters"]}
@@ -92,17 +92,18 @@ def test_names_take_the_form_of_the_language(tmp_path, name, expected):
     assert new(tmp_path, name, "modelica", "--directory", "mine").returncode == 0
     text = (tmp_path / "mine" / expected).read_text()
     model = Path(expected).stem
-    assert text.startswith(f"block {model} ") and text.endswith(f"end {model};\n")
+    assert text.startswith(f"block {model} ")
+    assert text.endswith(f"end {model};\n")
 
 
 @pytest.mark.parametrize("language", MADE)
-def test_nothing_of_the_templates_name_remains(sailed, language):
+def test_the_templates_name_is_replaced_everywhere(sailed, language):
     texts = [(sailed(language) / "my_keeper" / name).read_text() for name in MADE[language]]
     assert not [text for text in texts if "speed_keeper" in text or "SpeedKeeper" in text]
 
 
-def test_two_controllers_in_c_do_not_take_each_others_binary(tmp_path):
-    """The GUID holds the name, so that a description and another controller's binary do not fit."""
+def test_a_binary_of_another_c_controller_is_refused(tmp_path):
+    """The GUID contains the controller's name, so that the binary of another controller does not match."""
     for name in ("one", "two"):
         assert new(tmp_path, name, "c").returncode == 0
     shutil.copy(tmp_path / "one/one.c", tmp_path / "two/two.c")
@@ -112,8 +113,8 @@ def test_two_controllers_in_c_do_not_take_each_others_binary(tmp_path):
     assert "expected type Co-Simulation and GUID" in done.stderr
 
 
-def test_the_folder_can_be_given_to_somebody_else(tmp_path):
-    """Nothing in it names a place outside, so it runs wherever it lies."""
+def test_the_folder_can_be_moved(tmp_path):
+    """No file contains an absolute path, so the scenario runs in any folder."""
     assert new(tmp_path, "keeper", "python").returncode == 0
     given = (tmp_path / "keeper").rename(tmp_path / "given")
     texts = [path.read_text() for path in given.iterdir() if path.is_file()]
@@ -122,7 +123,7 @@ def test_the_folder_can_be_given_to_somebody_else(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-def test_a_run_leaves_a_figure_and_a_replay(sailed):
+def test_a_run_writes_a_figure_and_a_replay(sailed):
     runs = sailed("python") / "runs/my_keeper"
     assert (runs / "course.png").is_file()
     assert build_scene(json.loads((runs / "run.json").read_text()))["bodies"][0]["name"] == "vessel"
@@ -130,7 +131,7 @@ def test_a_run_leaves_a_figure_and_a_replay(sailed):
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_files_are_overwritten_only_by_force(tmp_path):
+def test_files_are_overwritten_only_with_force(tmp_path):
     assert new(tmp_path, "keeper", "python").returncode == 0
     source = tmp_path / "keeper/keeper.py"
     template = source.read_text()
@@ -151,13 +152,17 @@ def test_files_are_overwritten_only_by_force(tmp_path):
     [
         ("keeper", "pyton", 'there is no language "pyton"; did you mean "python"?'),
         ("keeper", "ada", 'there is no language "ada"; valid: python, modelica, c'),
-        ("my-keeper", "c", '"my-keeper" is no name of a controller: expected a letter, then letters, digits and underscores'),
-        ("../keeper", "c", '"../keeper" is no name of a controller'),
-        ("2fast", "python", '"2fast" is no name of a controller'),
-        ("math", "python", '"math" means something else already; choose another name'),
-        ("pictures", "python", '"pictures" means something else already; choose another name'),
-        ("vehicle", "modelica", '"vehicle" means something else already; choose another name'),
-        ("Boolean", "modelica", '"Boolean" means something else already; choose another name'),
+        (
+            "my-keeper",
+            "c",
+            '"my-keeper" is not a valid name of a controller: expected a letter, then letters, digits and underscores',
+        ),
+        ("../keeper", "c", '"../keeper" is not a valid name of a controller'),
+        ("2fast", "python", '"2fast" is not a valid name of a controller'),
+        ("math", "python", '"math" is already used for something else; choose another name'),
+        ("pictures", "python", '"pictures" is already used for something else; choose another name'),
+        ("vehicle", "modelica", '"vehicle" is already used for something else; choose another name'),
+        ("Boolean", "modelica", '"Boolean" is already used for something else; choose another name'),
     ],
 )
 def test_unsuitable_names_and_languages_are_refused(tmp_path, name, language, message):

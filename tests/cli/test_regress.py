@@ -1,4 +1,4 @@
-"""`cosim regress` on small scenarios: a cooling body, held against its reference and its checks."""
+"""`cosim regress` on small scenarios with a cooling body, its reference and its checks."""
 
 import json
 
@@ -63,10 +63,10 @@ def test_a_reference_is_written_and_met(folder):
     assert "1 signals, " in updated.stdout
     assert json.loads((folder / "scenarios/references/cooling.json").read_text())["versions"]["numpy"]
     again = regress(folder)
-    assert (again.returncode, again.stdout.splitlines()[-1]) == (0, "1 scenarios, all well")
+    assert (again.returncode, again.stdout.splitlines()[-1]) == (0, "1 scenario, all passed")
 
 
-def test_a_changed_run_fails_and_says_what_and_since_when(folder):
+def test_a_changed_result_fails_with_signal_time_and_changes(folder):
     scenario(folder, reference=REFERENCE)
     assert regress(folder, "--update").returncode == 0
     scenario(folder, rate=0.55, reference=REFERENCE)
@@ -80,7 +80,7 @@ def test_a_changed_run_fails_and_says_what_and_since_when(folder):
     assert "leaves its tube" in suite.find("testcase[@name='cooling']/failure").text
 
 
-def test_every_scenario_of_a_folder_has_its_outcome(folder):
+def test_every_scenario_of_a_folder_is_reported(folder):
     scenario(folder, name="aimless")
     scenario(folder, name="crashing", rate=99, **CHECK)
     scenario(folder, name="good", rate=0.9, **CHECK)
@@ -103,28 +103,28 @@ def test_every_scenario_of_a_folder_has_its_outcome(folder):
     }
 
 
-def test_a_run_that_is_killed_is_no_success(folder):
+def test_a_killed_run_fails(folder):
     scenario(folder, name="good", rate=0.9, **CHECK)
     scenario(folder, name="killed", rate=1001, **CHECK)
     done = regress(folder)
     assert (done.returncode, "cosim run: ended by signal 9" in done.stdout) == (1, True)
 
 
-def test_a_failed_run_becomes_no_reference(folder):
+def test_a_failed_run_does_not_become_a_reference(folder):
     scenario(folder, rate=0.1, reference=REFERENCE, **CHECK)
     done = regress(folder, "--update")
     assert (done.returncode, "a failed run becomes no reference" in done.stdout) == (3, True)
     assert not (folder / "scenarios/references").exists()
 
 
-def test_a_missing_reference_is_refused_with_the_remedy(folder):
+def test_a_missing_reference_is_reported_with_a_hint(folder):
     scenario(folder, reference=REFERENCE)
     done = regress(folder, "scenarios/cooling.json")
     assert done.returncode == 2
     assert 'cooling.csv" does not exist: `cosim regress --update` writes it' in done.stdout
 
 
-def test_nothing_to_do_and_what_cannot_be_found_are_refused(folder):
+def test_missing_and_unreadable_scenarios_are_refused(folder):
     scenario(folder, name="aimless")
     assert regress(folder).returncode == 2
     assert 'no shipped scenario "colling"' in regress(folder, "colling").stderr

@@ -1,4 +1,4 @@
-"""`cosim run` as a process: real time, components that step on threads, results as Parquet."""
+"""`cosim run` in a real process: real time, parallel steps, Parquet."""
 
 import json
 import time
@@ -11,7 +11,7 @@ from cosim.results import Result
 
 
 def cosim_run(folder, fmus, *options, **algorithm):
-    """(exit code, standard output, standard error) of a run of one component per FMU: c0, c1, ... in one stage."""
+    """Run one component per FMU (c0, c1, ... in one stage); return exit code, standard output and standard error."""
     components = {f"c{i}": {"fmu": str(fmu)} for i, fmu in enumerate(fmus)}
     document = {"name": "busy", "stop_time": 0.5, "step_size": 0.01, "components": components}
     (folder / "busy.json").write_text(json.dumps(document | {"algorithm": {"stages": [list(components)], **algorithm}}))
@@ -30,11 +30,11 @@ def test_real_time_is_kept_and_reported(tmp_path, probes, isolation):
     assert (found["factor"], found["steps"]) == (0.5, 50)
 
 
-def test_the_factor_may_be_left_out(tmp_path, probes):
+def test_the_real_time_factor_defaults_to_one(tmp_path, probes):
     assert "paced to 1 times real time: " in cosim_run(tmp_path, [probes[2]], "--real-time")[1]
 
 
-def test_a_run_that_must_not_be_late_ends_with_what_it_has(tmp_path):
+def test_a_late_run_ends_and_keeps_its_rows_with_late_fail(tmp_path):
     slow = slow_fmu(tmp_path, "slow", 0.05, True)
     code, _, err = cosim_run(tmp_path, [slow], "--real-time", "--late", "fail")
     assert code == 1
@@ -42,8 +42,8 @@ def test_a_run_that_must_not_be_late_ends_with_what_it_has(tmp_path):
     assert "2 rows until t = 0.01 s kept in out" in err
 
 
-def test_a_crash_on_a_thread_names_the_suspects(tmp_path):
-    """On one thread the culprit itself is named, which is how to find it."""
+def test_a_crash_on_a_thread_names_all_components_of_the_stage(tmp_path):
+    """Without threads, the failing component itself is named."""
     fmus = [slow_fmu(tmp_path, "good", 2e-4, True), slow_fmu(tmp_path, "bad", 2e-4, True, "FATAL_TIME=0.105")]
     code, _, err = cosim_run(tmp_path, fmus, parallel=True)
     assert code == 1

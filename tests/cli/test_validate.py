@@ -1,4 +1,4 @@
-"""`cosim validate` as a user meets it."""
+"""`cosim validate` in a real process."""
 
 import json
 import subprocess
@@ -20,7 +20,7 @@ def validate(*arguments, cwd=None):
 
 @pytest.fixture
 def bad(probes, tmp_path):
-    """An FMU with one error and one warning."""
+    """Path of an FMU with one error and one warning."""
     changes = {b'<Real start="0"': b'<Real start="NaN"', b'stopTime="2"': b'stopTime="0"'}
     path = tmp_path / "bad.fmu"
     with ZipFile(probes[2]) as source, ZipFile(path, "w") as target:
@@ -37,13 +37,13 @@ def test_shipped_fmus_have_no_findings(path):
     assert list(map(str, examine(path))) == []
 
 
-def test_good_fmus_end_with_zero(probes):
+def test_the_exit_code_is_0_without_findings(probes):
     done = validate(probes[2], probes[3])
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.splitlines() == [f"{probes[2]}: no findings", f"{probes[3]}: no findings"]
 
 
-def test_each_finding_is_a_line_and_the_end_is_two(bad, probes):
+def test_each_finding_is_a_line_and_the_exit_code_is_2(bad, probes):
     done = validate(probes[2], bad)
     assert (done.returncode, done.stderr) == (2, "")
     good, first, second = done.stdout.splitlines()
@@ -88,18 +88,18 @@ def watched(*arguments):
 
 
 @pytest.mark.parametrize("command", ["validate", "simulate", "info"])
-def test_nothing_of_a_bad_fmu_runs(command, bad):
+def test_the_library_of_an_invalid_fmu_is_not_loaded(command, bad):
     done = watched(command, bad)
     assert done.returncode == 2
     assert "found start value NaN" in done.stdout + done.stderr
     assert "a library was loaded" not in done.stdout
 
 
-def test_validate_loads_no_library_of_a_good_fmu_either(probes):
+def test_validate_does_not_load_the_library_of_a_valid_fmu(probes):
     assert "a library was loaded" in watched("simulate", probes[2]).stdout
     assert "a library was loaded" not in watched("validate", probes[2]).stdout
 
 
-def test_usage_is_explained():
+def test_help_and_usage_errors():
     assert validate().returncode == 2
-    assert "without running anything" in validate("--help").stdout
+    assert "without running them" in validate("--help").stdout

@@ -150,7 +150,7 @@ def test_the_command_builds_a_source_in_any_folder(folder, tmp_path):
 @pytest.mark.parametrize(
     ("sources", "message"),
     [
-        ((), "--output needs one source, found 0"),
+        ((), "--output requires one source, found 0"),
         (("nothing.mo",), "nothing.mo: does not exist"),
         ((".",), ".: cannot be exported"),
     ],

@@ -1,4 +1,4 @@
-"""The numbers behind a figure are the ones that are drawn."""
+"""The data file of a figure contains its curves and bars."""
 
 import csv
 
@@ -28,7 +28,7 @@ def test_every_curve_of_every_panel_is_listed(tmp_path):
     ]
 
 
-def test_marks_and_limits_are_no_numbers_of_the_run(tmp_path):
+def test_unnamed_markers_and_limits_are_not_written(tmp_path):
     figure = Figure()
     axes = figure.add_subplot(xlabel="x / m", ylabel="y / m")
     axes.plot([1.0], [2.0], "o")
@@ -45,7 +45,7 @@ def test_bars_are_listed_by_their_names(tmp_path):
     assert table(figure, tmp_path)[1:] == [("factor", "cosim", "short run", "10.0"), ("factor", "cosim", "long", "20.5")]
 
 
-def test_a_figure_without_numbers_makes_no_file(tmp_path):
+def test_a_figure_without_data_writes_no_file(tmp_path):
     figure = Figure()
     figure.add_subplot().imshow([[0, 1]])
     assert not write_figure_data(figure, tmp_path / "numbers.csv")

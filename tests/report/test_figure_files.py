@@ -1,4 +1,4 @@
-"""Figures become files: the same bytes for the same result, in one style, and their failures are named."""
+"""Figure files: reproducible bytes, a common style, and errors that name the figure."""
 
 import hashlib
 import json
@@ -60,14 +60,14 @@ def test_another_process_with_other_settings_writes_the_same_bytes_without_pyplo
     assert pyplot == "False"
 
 
-def test_files_carry_neither_date_nor_version(tmp_path):
+def test_files_contain_neither_date_nor_version(tmp_path):
     png, svg = draw_figures(RESULT, [("curve", curve, {"signal": "x"})], tmp_path, BOTH)
     assert b"Software" not in png.read_bytes()
     assert "<dc:date>" not in svg.read_text()
     assert matplotlib.__version__ not in svg.read_text()
 
 
-def test_the_style_holds_while_drawing_and_is_gone_afterwards():
+def test_the_style_is_restored_after_drawing():
     before = dict(matplotlib.rcParams)
     figure = draw_figure(RESULT, "curve", curve, {"signal": "x"})
     assert figure.axes[0].xaxis.label.get_size() == STYLE["axes.labelsize"]
@@ -76,7 +76,7 @@ def test_the_style_holds_while_drawing_and_is_gone_afterwards():
 
 
 def test_a_failing_figure_is_named():
-    def broken(result):
+    def broken(_result):
         raise ValueError("no such thing")
 
     with pytest.raises(
@@ -90,9 +90,9 @@ def test_wrong_arguments_are_refused():
         draw_figure(RESULT, "curve", curve, {"signals": "x"})
 
 
-def test_something_that_is_no_figure_is_refused():
+def test_a_function_that_returns_no_figure_is_refused():
     with pytest.raises(ComponentError, match=r'figure "curve": .* returned NoneType, expected a matplotlib.figure.Figure'):
-        draw_figure(RESULT, "curve", lambda result: None, {})
+        draw_figure(RESULT, "curve", lambda _result: None, {})
 
 
 def test_a_failed_write_leaves_the_former_file(tmp_path):

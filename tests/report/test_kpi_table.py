@@ -1,4 +1,4 @@
-"""The table at the end of a run."""
+"""The table of KPIs and checks at the end of a run."""
 
 import io
 import math
@@ -24,7 +24,7 @@ def row(text, name):
     return line.split()[1:]
 
 
-def test_values_carry_their_units():
+def test_values_have_their_units():
     text = printed(KPIS, [], UNITS)
     assert row(text, "landing.lateral_error") == ["0.08684", "m"]
     assert row(text, "landing.landed_at_end") == ["yes"]
@@ -32,7 +32,7 @@ def test_values_carry_their_units():
     assert row(text, "landing.bounces") == ["2"]
 
 
-def test_checks_stand_beside_their_kpi():
+def test_checks_are_in_the_row_of_their_kpi():
     checks = [
         {"kpi": "landing.lateral_error", "max": 0.1},
         {"kpi": "landing.landed_at_end", "equals": False},
@@ -51,14 +51,14 @@ def test_two_checks_of_one_kpi_have_a_line_each():
     assert lines[place + 1].split() == ["min", "3", "✗", "failed"]
 
 
-def test_a_file_gets_no_colours_and_whole_names():
+def test_output_to_a_file_has_no_colours_and_complete_names():
     name = "landing." + "very_" * 30 + "long_name"
     text = printed({name: 1.0})
     assert name in text
     assert "\x1b" not in text
 
 
-def test_an_ascii_terminal_gets_words():
+def test_an_ascii_terminal_shows_words_instead_of_marks():
     text = printed(KPIS, evaluate_checks(KPIS, [{"kpi": "landing.bounces", "max": 3}]), encoding="ascii")
     assert text.isascii()
     assert "ok" in text
@@ -81,5 +81,5 @@ def test_without_kpis_there_is_no_table():
     ("value", "text"),
     [(0.1234567, "0.1235"), (12345.678, "1.235e+04"), (1e-9, "1e-09"), (False, "no"), (7, "7"), (math.inf, "inf")],
 )
-def test_numbers_are_short(value, text):
+def test_numbers_have_four_significant_digits(value, text):
     assert format_number(value) == text

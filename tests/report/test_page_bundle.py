@@ -1,4 +1,4 @@
-"""The built script that every page carries is the one that its sources say, with the licences of what it contains."""
+"""The committed script of the pages is built from its sources and contains the licences of its libraries."""
 
 import hashlib
 import re

@@ -1,4 +1,4 @@
-"""`cosim plot` as a user meets it."""
+"""The command `cosim plot`."""
 
 import csv
 import json
@@ -19,7 +19,7 @@ def names(folder):
     return sorted(path.name for path in Path(folder).iterdir())
 
 
-def test_figures_are_drawn_beside_the_result_with_their_numbers(tmp_path):
+def test_figures_are_written_beside_the_result_with_their_data(tmp_path):
     run = write(tmp_path)
     done = plot(run)
     assert done.exit_code == 0, done.output
@@ -32,8 +32,8 @@ def test_figures_are_drawn_beside_the_result_with_their_numbers(tmp_path):
 
 
 def test_format_and_folder_can_be_chosen(tmp_path):
-    plot(write(tmp_path), "--format", "svg", "--output-dir", tmp_path / "there")
-    assert names(tmp_path / "there") == ["curve.csv", "curve.svg"]
+    plot(write(tmp_path), "--format", "svg", "--output-dir", tmp_path / "plotted")
+    assert names(tmp_path / "plotted") == ["curve.csv", "curve.svg"]
 
 
 def test_several_runs_have_a_folder_each_and_one_comparison(tmp_path):
@@ -41,21 +41,21 @@ def test_several_runs_have_a_folder_each_and_one_comparison(tmp_path):
     for name in ("first", "second"):
         (tmp_path / name).mkdir()
         runs.append(write(tmp_path / name).rename(tmp_path / name / f"{name}_run"))
-    done = plot(*runs, "--timings", "--format", "png", "--output-dir", tmp_path / "there")
+    done = plot(*runs, "--timings", "--format", "png", "--output-dir", tmp_path / "plotted")
     assert done.exit_code == 0, done.output
-    assert names(tmp_path / "there") == ["first_run", "second_run", "timings.csv", "timings.png"]
-    heights = [row.rpartition(",")[2] for row in (tmp_path / "there/timings.csv").read_text().splitlines()[1:]]
+    assert names(tmp_path / "plotted") == ["first_run", "second_run", "timings.csv", "timings.png"]
+    heights = [row.rpartition(",")[2] for row in (tmp_path / "plotted/timings.csv").read_text().splitlines()[1:]]
     assert heights == ["4.0", "4.0"]
 
 
-def test_one_bad_run_stops_before_anything_is_drawn(tmp_path):
+def test_an_invalid_run_is_refused_before_any_figure_is_drawn(tmp_path):
     run = write(tmp_path)
     done = plot(run, tmp_path / "missing")
     assert isinstance(done.exception, InputError)
     assert "curve.png" not in names(run)
 
 
-def test_run_says_where_its_scenario_is(tmp_path):
+def test_run_json_contains_the_path_of_the_scenario(tmp_path):
     import cosim
     from cosim.results import write_run
 

@@ -18,7 +18,7 @@ def output(stderr):
     return subprocess.run([sys.executable, "-c", CODE], stdout=subprocess.PIPE, stderr=stderr, text=True, check=True).stdout
 
 
-def test_a_terminal_sees_name_and_share():
+def test_a_terminal_shows_name_and_percentage():
     ours, theirs = os.openpty()
     try:
         assert output(theirs) == "False\n"
@@ -30,7 +30,7 @@ def test_a_terminal_sees_name_and_share():
     assert "25%" in shown
 
 
-def test_a_file_sees_nothing(tmp_path):
+def test_nothing_is_written_to_a_file(tmp_path):
     with (tmp_path / "errors").open("w+") as errors:
         assert output(errors) == "True\n"
         assert errors.tell() == 0

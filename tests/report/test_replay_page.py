@@ -1,4 +1,4 @@
-"""The replay in a real browser. Every visit also proves that the page loads nothing and complains of nothing."""
+"""The replay page in a browser. Every test also checks that the page loads nothing and reports no errors."""
 
 from copy import deepcopy
 from dataclasses import replace
@@ -36,7 +36,7 @@ def column(result, name, time):
     return float(np.interp(time, result.time, result[name]))
 
 
-def test_bodies_are_where_they_were(opened, flight_result):
+def test_bodies_have_their_recorded_positions(opened, flight_result):
     for time in (0.0, 3.21, 9.999, 14.505, 16.0):
         opened.seek(time)
         for number, body in enumerate(BODIES):
@@ -46,7 +46,7 @@ def test_bodies_are_where_they_were(opened, flight_result):
             assert abs(np.dot(orientation, recorded)) == pytest.approx(1.0, abs=1e-5)
 
 
-def test_the_scrubber_the_keys_and_the_plots_move_time(opened, flight_result):
+def test_scrubber_keys_and_plots_change_the_time(opened, flight_result):
     box = opened.page.locator(".scrubber").bounding_box()
     opened.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     assert opened.time == pytest.approx(8.0, abs=0.1)
@@ -61,7 +61,7 @@ def test_the_scrubber_the_keys_and_the_plots_move_time(opened, flight_result):
     assert opened.page.locator(".plot b").first.inner_text() == f"{altitude:.4g} m"
 
 
-def test_it_plays_at_its_speed_to_the_end_and_begins_again(opened):
+def test_it_plays_at_its_speed_to_the_end_and_restarts(opened):
     opened.page.select_option(".speed", "8")
     opened.seek(12.0)
     opened.page.click(".play")
@@ -73,7 +73,7 @@ def test_it_plays_at_its_speed_to_the_end_and_begins_again(opened):
     assert opened("!cosimReplay.player.playing")
 
 
-def test_cameras_look_at_what_they_promise(opened):
+def test_cameras_show_their_targets(opened):
     camera = "cosimReplay.view.cameras.camera"
     opened.page.get_by_role("button", name="Chase", exact=True).click()
     distances = []
@@ -89,7 +89,7 @@ def test_cameras_look_at_what_they_promise(opened):
     assert opened(f"{camera}.getWorldDirection({camera}.position.clone()).z") < -0.999
 
 
-def test_trails_end_at_the_bodies_and_keep_to_their_paths(opened, flight_result):
+def test_trails_end_at_the_bodies_and_follow_their_paths(opened, flight_result):
     for number, body in enumerate(BODIES):
         trail = f"cosimReplay.view.actors[{number}].trail"
         drawn = np.array(opened(f"{trail}.points.map((point) => point.toArray())"))
@@ -115,7 +115,7 @@ def nearest(path, places):
     return feet[np.arange(len(places)), np.argmin(np.linalg.norm(feet - places[:, None], axis=2), axis=1)]
 
 
-def test_ghosts_appear_when_asked_for(opened):
+def test_ghosts_can_be_switched_on(opened):
     opened.seek(8.0)
     opened.page.get_by_role("button", name="Ghosts").click()
     assert opened("cosimReplay.view.actors[0].ghosts.mesh.visible")
@@ -155,7 +155,7 @@ def compared(open_page, flight_result, tmp_path_factory):
     return open_page(file)
 
 
-def test_a_second_run_is_laid_over_the_first(compared):
+def test_a_second_run_is_shown_with_the_first(compared):
     compared.seek(5.0)
     first, second = compared.body(0)[0], compared.body(2)[0]
     assert np.subtract(second, first) == pytest.approx([0, 0, 1], abs=1e-5)
@@ -179,7 +179,7 @@ NUMBERS = {
 }
 
 
-def test_numbers_at_an_axis_have_their_digits_and_room(open_page, tmp_path):
+def test_tick_labels_are_complete(open_page, tmp_path):
     time = np.linspace(0, 5, 101)
     columns = {name: low + (high - low) * np.sin(time) ** 2 for name, (low, high, _) in NUMBERS.items()}
     write_replay([Result(Recording(time, columns, {}), metadata={"name": "numbers"})], tmp_path / "numbers.html")
@@ -201,7 +201,7 @@ def test_the_diagram_of_one_component_is_as_large_as_its_texts(open_page, flight
     assert rectangle["width"] == pytest.approx(WIDTH, abs=2)
 
 
-def test_the_report_shows_what_a_stranger_wrote_as_text(open_page, flight_result, tmp_path):
+def test_the_report_escapes_texts_of_the_scenario(open_page, flight_result, tmp_path):
     evil = "</script><script>window.caught = true</script><img src=x onerror='window.caught = true'>"
     result = replace(flight_result, metadata={"scenario": {"description": evil}, "name": evil, "warnings": [evil]})
     write_report(result, [], {}, tmp_path / "report.html")
@@ -211,7 +211,7 @@ def test_the_report_shows_what_a_stranger_wrote_as_text(open_page, flight_result
     assert opened.page.locator(".warnings li").inner_text() == evil
 
 
-def test_a_result_without_a_scene_has_its_signals_still(open_page, flight_result, tmp_path):
+def test_a_result_without_a_scene_shows_its_signals(open_page, flight_result, tmp_path):
     write_replay([replace(flight_result, metadata={"name": "numbers"})], tmp_path / "numbers.html")
     opened = open_page(tmp_path / "numbers.html")
     assert opened.page.locator("canvas[aria-label='3-D replay']").count() == 0

@@ -1,4 +1,4 @@
-"""The replay stays smooth where the processor draws it, and its picture is fine where nothing moves."""
+"""Adaptive picture quality: smooth with software rendering, and fine when nothing moves."""
 
 import pytest
 
@@ -23,7 +23,7 @@ def rungs(opened, software, frames):
     )
 
 
-def test_slow_frames_lead_down_the_ladder_to_its_end(opened):
+def test_slow_frames_reduce_the_quality_to_the_lowest_level(opened):
     found = rungs(opened, "false", "Array(200).fill(90)")
     assert found[0] == 0
     assert found == sorted(found)
@@ -35,17 +35,17 @@ def test_smooth_frames_change_nothing(opened):
         assert set(rungs(opened, "false", f"Array(500).fill({elapsed})")) == {0}
 
 
-def test_a_single_hiccup_changes_nothing(opened):
+def test_a_single_slow_frame_changes_nothing(opened):
     assert set(rungs(opened, "false", "[...Array(20).fill(17), 900, ...Array(20).fill(17)]")) == {0}
 
 
-def test_without_a_graphics_card_it_begins_low_and_finds_its_way_up(opened):
+def test_without_a_graphics_card_it_starts_at_low_quality_and_increases_it(opened):
     found = rungs(opened, "true", "Array(1000).fill(17)")
     assert found[0] == 3
     assert found[-1] == 0
 
 
-def test_what_was_too_much_is_not_tried_again(opened):
+def test_a_level_that_was_too_slow_is_not_tried_again(opened):
     found = rungs(opened, "true", "[...Array(12).fill(60), ...Array(1000).fill(17)]")
     assert found[11] == 4
     assert set(found[12:]) == {4}
@@ -58,7 +58,7 @@ def drawn(opened):
     )
 
 
-def test_a_moving_picture_is_coarse_and_one_at_rest_fine(opened):
+def test_a_moving_picture_is_coarse_and_a_still_one_fine(opened):
     opened.seek(3.0)
     opened.page.click(".play")
     opened.until("cosimReplay.player.time > 4")

@@ -1,4 +1,4 @@
-"""What the page gets of a run: read back here by other means."""
+"""The packed run of the replay page, unpacked by independent code."""
 
 import base64
 import zlib
@@ -30,7 +30,7 @@ def unpacked(packed):
     return columns
 
 
-def test_columns_come_back_as_32_bit_floats():
+def test_columns_unpack_to_32_bit_floats():
     values = np.array([1.0, -2.5, np.nan, np.inf, 1e-30, -0.0, 1 / 3])
     columns = unpacked(samples.pack_run(result(values=values, flags=values > 0)))
     np.testing.assert_array_equal(columns["values"], values.astype(np.float32))
@@ -38,14 +38,14 @@ def test_columns_come_back_as_32_bit_floats():
     np.testing.assert_array_equal(columns["time"], (np.arange(7) / 100).astype(np.float32))
 
 
-def test_what_never_changes_is_one_number():
+def test_a_constant_signal_is_one_number():
     packed = samples.pack_run(result(still=[2.5, 2.5], never=[np.inf, np.inf], text=np.array(["a", "b"], object)))
     assert packed["constants"] == {"still": 2.5}
     assert packed["columns"] == ["time", "never"]
     assert packed["units"] == {"still": "m", "never": "m"}
 
 
-def test_a_long_run_is_thinned_and_keeps_its_peaks():
+def test_a_long_run_is_downsampled_and_keeps_its_peaks():
     rows = 100_003
     smooth, force = np.linspace(0, 7, rows), np.zeros(rows)
     force[[31_415, 77_777, rows - 2]] = 250.0, -80.0, 7.0
@@ -53,7 +53,9 @@ def test_a_long_run_is_thinned_and_keeps_its_peaks():
     packed = samples.pack_run(result(smooth=smooth, force=force, touching=touching))
     columns = unpacked(packed)
     assert packed["rows"] <= samples.MAX_ROWS + 3
-    assert columns["force"].max() == 250.0 and columns["force"].min() == -80.0 and columns["touching"].max() == 1.0
+    assert columns["force"].max() == 250.0
+    assert columns["force"].min() == -80.0
+    assert columns["touching"].max() == 1.0
     assert columns["force"][-5:].max() == 7.0
     assert columns["time"][-1] == pytest.approx((rows - 1) / 100)
     np.testing.assert_allclose(np.interp(columns["time"], np.arange(rows) / 100, smooth), columns["smooth"], atol=1e-5)
@@ -61,7 +63,7 @@ def test_a_long_run_is_thinned_and_keeps_its_peaks():
     assert at_peak == pytest.approx(314.15, abs=2 * rows / samples.MAX_ROWS / 100)
 
 
-def test_many_signals_make_do_with_fewer_rows(monkeypatch):
+def test_runs_of_many_signals_have_fewer_rows(monkeypatch):
     monkeypatch.setattr(samples, "MAX_VALUES", 1000)
     packed = samples.pack_run(result(**{f"s{i}": np.arange(400.0) + i for i in range(9)}))
     assert packed["rows"] * len(packed["columns"]) <= 1100

@@ -1,4 +1,4 @@
-"""`report.html`: what stands in it, and how the command line makes it."""
+"""The page `report.html`: its contents, and the commands that write it."""
 
 import json
 import re
@@ -55,7 +55,7 @@ def page(directory):
     return Reader((directory / "report.html").read_text())
 
 
-def test_kpis_stand_there_with_their_units_and_checks(page, directory):
+def test_the_page_has_the_kpis_with_units_and_checks(page, directory):
     kpis = json.loads((directory / "kpis.json").read_text())
     assert "✓ 5 of 5 checks passed" in page.texts
     assert {name.partition(".")[2] for name in kpis} <= set(page.texts)
@@ -63,7 +63,7 @@ def test_kpis_stand_there_with_their_units_and_checks(page, directory):
     assert page.texts[card + 1 : card + 4] == [f"{kpis['landing.lateral_error']:.4g}", "m", "✓ max 0.1"]
 
 
-def test_system_versions_timings_and_scenario_stand_there(page):
+def test_the_page_has_system_versions_timings_and_scenario(page):
     assert {"plant.uav.position.x", "uav.vtol.vehicle.position.x", "rad/s", "pybullet", "stepping loop"} <= set(page.texts)
     assert any('"stop_time": 40.0' in text for text in page.texts)
     assert page.tags.count("svg") >= 4  # two figures, the diagram, icons
@@ -74,7 +74,7 @@ def test_it_is_one_file_of_at_most_3_megabytes_that_loads_nothing(page, director
     assert [link for link in page.links if not link.startswith("data:")] == []
 
 
-def test_the_same_page_can_be_made_again(directory, tmp_path):
+def test_cosim_report_writes_the_same_page_again(directory, tmp_path):
     done = invoke(report, directory, "--output-file", tmp_path / "again.html")
     assert done.exit_code == 0, done.output
     first, again = ((directory / "report.html").read_text(), (tmp_path / "again.html").read_text())
@@ -86,14 +86,14 @@ def _without_data(text):
     return re.sub(r'"samples":"[^"]*"', "", text)
 
 
-def test_a_replay_of_two_runs_is_written_beside_the_first(directory):
+def test_the_replay_of_two_runs_is_written_beside_the_first(directory):
     done = invoke(replay, directory, directory)
     assert done.output.strip() == str(directory / "replay.html")
     data = re.search(r'id="replay-data">(.*?)</script>', (directory / "replay.html").read_text(), re.S).group(1)
     assert [one["name"] for one in json.loads(data)["runs"]] == ["demo1_box", "demo1_box"]
 
 
-def test_checks_that_are_not_met_are_said_first(flight_result, tmp_path):
+def test_failed_checks_are_at_the_top(flight_result, tmp_path):
     write_run(flight_result, tmp_path)
     assert invoke(report, tmp_path).exit_code == 0
     texts = Reader((tmp_path / "report.html").read_text()).texts
@@ -106,14 +106,14 @@ def short_run(folder):
     return invoke(run, "demo1_box", *words, "--output-dir", folder)
 
 
-def test_no_report_writes_no_page_and_removes_the_old_ones(tmp_path):
+def test_the_option_no_report_writes_no_page_and_removes_old_ones(tmp_path):
     for name in ("report.html", "replay.html"):
         (tmp_path / name).write_text("old")
     assert short_run(tmp_path).exception is None
     assert sorted(path.name for path in tmp_path.iterdir()) == ["kpis.json", "result.csv", "run.json"]
 
 
-def test_who_takes_the_folder_of_another_scenario_says_so(tmp_path):
+def test_replacing_the_results_of_another_scenario_causes_a_warning(tmp_path):
     """A copy, whose name is still that of the first one."""
     copy = tmp_path / "mine.json"
     shipped = resources.root() / "scenarios/free_flight.json"
@@ -121,7 +121,8 @@ def test_who_takes_the_folder_of_another_scenario_says_so(tmp_path):
     words = ("--stop-time", "0.1", "--isolation", "none", "--no-report", "--output-dir", tmp_path / "out")
     said = [invoke(run, file, *words).stderr for file in ("free_flight", "free_flight", copy)]
     text = f'replaces the results of {shipped} in {tmp_path / "out"}; another "name" in the scenario or --output-dir keeps both\n'
-    assert said[0] == said[1] == "" and said[2] == text
+    assert said[0] == said[1] == ""
+    assert said[2] == text
 
 
 def test_a_folder_without_a_run_is_refused(tmp_path):
@@ -129,13 +130,13 @@ def test_a_folder_without_a_run_is_refused(tmp_path):
         assert isinstance(invoke(command, tmp_path).exception, InputError)
 
 
-def test_data_in_a_page_cannot_end_its_element():
+def test_data_in_a_page_cannot_close_its_script_element():
     text = pages.embed_json({"name": "</script><!--<script>", "missing": float("nan")})
     assert "<" not in text
     assert json.loads(text) == {"name": "</script><!--<script>", "missing": None}
 
 
-def test_warnings_of_components_reach_the_page(tmp_path):
+def test_the_page_shows_warnings_of_components(tmp_path):
     (tmp_path / "loud.py").write_text(LOUD)
     components = {"loud": {"python": "loud.py:Loud"}}
     scenario = {"name": "loud", "stop_time": 0.02, "step_size": 0.01, "components": components}
@@ -146,13 +147,14 @@ def test_warnings_of_components_reach_the_page(tmp_path):
     assert "WARNING loud: rotor <3> hot" in texts
 
 
-def test_a_run_without_a_scene_shows_what_changes(tmp_path):
+def test_a_run_without_a_scene_shows_its_changing_signals(tmp_path):
     """Plots instead of an empty page, and the command says why there is nothing in 3-D."""
     columns = {"a.x": np.array([0.0, 1.0]), "a.still": np.zeros(2), "a.v": np.array([2.0, 1.0]), "b.x": np.array([3.0, 1.0])}
     units = {"a.x": "m", "a.still": "m", "a.v": "m/s", "b.x": "m"}
     write_run(Result(Recording(np.array([0.0, 1.0]), columns, units), metadata={"name": "numbers"}), tmp_path)
     done = invoke(replay, tmp_path)
-    assert done.exit_code == 0 and "nothing says what this run looks like" in done.stderr
+    assert done.exit_code == 0
+    assert "nothing says what this run looks like" in done.stderr
     data = re.search(r'id="replay-data">(.*?)</script>', (tmp_path / "replay.html").read_text(), re.S).group(1)
     assert json.loads(data)["scene"]["plots"] == [["a.x", "b.x"], ["a.v"]]
 
@@ -175,7 +177,7 @@ class Loud(Fmi2Slave):
 """
 
 
-def test_units_and_wiring_stand_in_run_json(directory):
+def test_run_json_contains_units_and_connections(directory):
     about = json.loads((directory / "run.json").read_text())
     assert about["units"]["plant.uav.velocity.x"] == "m/s"
     assembly = load("demo1_box")

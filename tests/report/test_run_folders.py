@@ -1,4 +1,4 @@
-"""A run's folder is read back: its result, and the figures its scenario asks for."""
+"""Reading a results folder: the result and the figures of its scenario."""
 
 import json
 
@@ -32,7 +32,7 @@ def write(folder, **metadata):
     return folder / "run"
 
 
-def test_what_was_written_is_read_back(tmp_path):
+def test_a_written_result_is_read_back(tmp_path):
     result = read_run(write(tmp_path))
     assert result["a.x"].tolist() == [0.0, 0.25, 1.0]
     assert result.kpis == {"end.x": 1.0}
@@ -40,7 +40,7 @@ def test_what_was_written_is_read_back(tmp_path):
     assert result.metadata["name"] == "small"
 
 
-def test_figures_are_found_beside_the_scenario(tmp_path):
+def test_figure_functions_are_found_relative_to_the_scenario(tmp_path):
     result = read_run(write(tmp_path))
     ((name, function, arguments),) = load_figures(result)
     assert name == "curve"
@@ -51,19 +51,19 @@ def test_a_run_without_figures_has_none(tmp_path):
     assert load_figures(read_run(write(tmp_path, scenario={}))) == []
 
 
-def test_a_folder_that_is_no_run_is_refused(tmp_path):
+def test_a_folder_without_a_run_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"run\.json: No such file.*expected a folder that `cosim run` wrote"):
         read_run(tmp_path)
 
 
-def test_a_spoiled_run_is_refused(tmp_path):
+def test_a_run_with_an_invalid_file_is_refused(tmp_path):
     run = write(tmp_path)
     (run / "run.json").write_text("{")
-    with pytest.raises(InputError, match=r"run\.json is no JSON"):
+    with pytest.raises(InputError, match=r"run\.json is not valid JSON"):
         read_run(run)
 
 
-def test_a_run_of_an_unknown_place_is_refused(tmp_path):
+def test_a_run_with_an_unknown_scenario_file_is_refused(tmp_path):
     run = write(tmp_path)
     about = json.loads((run / "run.json").read_text())
     del about["scenario_file"]
@@ -72,7 +72,7 @@ def test_a_run_of_an_unknown_place_is_refused(tmp_path):
         load_figures(read_run(run))
 
 
-def test_a_scenario_that_is_gone_is_refused(tmp_path):
+def test_a_run_with_a_missing_figure_file_is_refused(tmp_path):
     result = read_run(write(tmp_path))
     (tmp_path / "scenario/own_figures.py").unlink()
     with pytest.raises(InputError, match=r'"own_figures\.py" does not exist'):

@@ -1,4 +1,4 @@
-"""What components say they look like."""
+"""Scenes of components and scenarios."""
 
 import json
 import shutil
@@ -21,9 +21,11 @@ def scene(file):
 @pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
 def test_every_shipped_scenario_has_vehicles_to_show(file):
     found = scene(file)
-    assert found["bodies"] and found["plots"], 'scenarios on plant FMUs alone need a "scene"'
+    assert found["bodies"], 'scenarios on plant FMUs alone need a "scene"'
+    assert found["plots"]
     for body in found["bodies"]:
-        assert len(body["position"]) == 3 and body["parts"]
+        assert len(body["position"]) == 3
+        assert body["parts"]
     assert json.loads(json.dumps(found)) is not None
 
 
@@ -35,13 +37,14 @@ def test_signals_of_the_scene_are_recorded(flight_result):
     assert all(any(flight_result.signals(pattern) for pattern in patterns) for patterns in found["plots"])
 
 
-def test_waypoints_and_platforms_of_demo_1():
+def test_demo_1_has_its_waypoints_and_platforms():
     found = scene(root() / "scenarios/demo1_box.json")
     assert [marker["label"] for marker in found["markers"]] == ["1", "2", "3", "4", "5"]
     assert found["markers"][1] == {"position": (10 / 3, -10 / 3, 0.0), "radius": 0.5, "label": "2"}
     planks = [part for part in found["fixed"] if part["shape"] == "box"]
     lengths = [part["size"][0] for part in planks]
-    assert set(lengths) == {5.0} and {part["position"][2] for part in planks} == {0.45}
+    assert set(lengths) == {5.0}
+    assert {part["position"][2] for part in planks} == {0.45}
 
 
 def test_a_world_inside_a_nested_system_is_found_by_its_full_name():
@@ -50,7 +53,7 @@ def test_a_world_inside_a_nested_system_is_found_by_its_full_name():
     assert len(found["markers"]) == 5
 
 
-def test_angles_of_the_published_simulator_are_turned():
+def test_angles_of_the_published_simulator_are_converted():
     body = scene(root() / "scenarios/demo1_replica.json")["bodies"][0]
     assert body["attitude"] == ["plant.uav.attitude.phi", "-plant.uav.attitude.theta", "-plant.uav.attitude.psi"]
 
@@ -77,7 +80,7 @@ def lamp(folder, answer=LIT, **scenario):
     return {"scenario": {"components": components, **scenario}, "scenario_file": str(folder / "s.json")}
 
 
-def test_any_component_may_have_a_scene_and_the_scenario_one_more(tmp_path):
+def test_components_and_the_scenario_may_have_scenes(tmp_path):
     more = {
         "python": "lamp.py:night",
         "arguments": {"bodies": [{"name": "moon", "position": [0, 0, 9], "orientation": [1, 0, 0, 0]}]},
@@ -87,13 +90,13 @@ def test_any_component_may_have_a_scene_and_the_scenario_one_more(tmp_path):
     assert found[0]["parts"][0]["opacity"] == 1
 
 
-def test_a_method_that_happens_to_be_called_scene_is_left_alone(tmp_path):
+def test_a_method_scene_that_is_not_static_is_ignored(tmp_path):
     about = lamp(tmp_path)
     (tmp_path / "lamp.py").write_text("class Lamp:\n    def scene(self):\n        return 'backstage'\n")
     assert build_scene(about)["bodies"] == []
 
 
-def test_no_scene_and_no_scenario_are_nothing_to_draw(tmp_path):
+def test_without_scene_or_scenario_there_is_nothing_to_draw(tmp_path):
     shutil.copy(root() / "controllers/python/course_keeper.py", tmp_path)
     components = {"keeper": {"python": "course_keeper.py:CourseKeeper"}}
     assert build_scene({"scenario": {"components": components}, "scenario_file": str(tmp_path / "s.json")})["bodies"] == []
@@ -114,12 +117,12 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("answer", "message"), WRONG.items())
-def test_a_wrong_answer_names_the_component(tmp_path, answer, message):
+def test_an_invalid_scene_is_an_error_that_names_the_component(tmp_path, answer, message):
     with pytest.raises(ComponentError, match=message):
         build_scene(lamp(tmp_path, answer))
 
 
-def test_a_scene_that_cannot_be_asked_is_refused_before_the_run(tmp_path):
+def test_a_scene_function_with_a_mistake_is_refused_before_the_run(tmp_path):
     scenario = json.loads((root() / "scenarios/free_flight.json").read_text())
     scenario["scene"]["arguments"] = {"vehicle": {}}
     for component in scenario["components"].values():

@@ -1,4 +1,4 @@
-"""Where the diagram puts components and their connections."""
+"""Layout of components and connections in the system diagram."""
 
 import re
 from itertools import combinations
@@ -40,17 +40,18 @@ def test_no_boxes_overlap_and_all_lie_inside():
         assert abs(one.x - other.x) >= WIDTH or abs(one.y - other.y) >= HEIGHT
     for box in drawn.boxes:
         assert min(box.x, box.y) > 0
-        assert box.x + WIDTH < drawn.width and box.y + HEIGHT < drawn.height
+        assert box.x + WIDTH < drawn.width
+        assert box.y + HEIGHT < drawn.height
 
 
-def test_the_frame_of_a_nested_system_holds_its_components_and_no_other():
+def test_the_frame_of_a_nested_system_contains_only_its_components():
     drawn = build_diagram(SYSTEM)
     (frame,) = drawn.frames
     inside = {b.name for b in drawn.boxes if frame.x < b.x < frame.x + frame.width and frame.y < b.y < frame.y + frame.height}
     assert (frame.name, inside) == ("uav", {"uav.path", "uav.mixer"})
 
 
-def test_connections_of_a_pair_are_one_wire_that_lists_them():
+def test_all_connections_of_two_components_are_one_wire_with_a_list():
     wires = build_diagram(SYSTEM).wires
     assert sorted(wire.connections for wire in wires) == [1, 1, 1, 2]
     (feedback,) = (wire for wire in wires if wire.connections == 2)
@@ -69,7 +70,7 @@ def test_a_wire_begins_and_ends_at_its_boxes():
     assert numbers[-2:] == pytest.approx([box["plant"].x, box["plant"].y + HEIGHT / 2])
 
 
-def test_a_period_is_told():
+def test_the_tooltip_contains_the_period():
     system = {**SYSTEM, "components": [component("usv", 0.05)], "stages": [["usv"]], "connections": []}
     assert build_diagram(system).boxes[0].tooltip == "usv\n../fmus/usv.fmu\n2 inputs, 3 outputs, every 0.05 s"
 

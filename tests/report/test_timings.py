@@ -35,7 +35,7 @@ def test_the_published_band_is_drawn_and_within_the_axis():
 
 
 def test_a_result_without_wall_time_is_refused():
-    with pytest.raises(InputError, match=r"^foreign: no wall time"):
+    with pytest.raises(InputError, match=r"^foreign: the wall time of the stepping loop is missing"):
         draw_timings(run("foreign", 10.0, 0.0))
 
 

@@ -1,4 +1,4 @@
-"""Scenario files written on the fly beside the blocks they use."""
+"""Fixtures that write scenario files."""
 
 from __future__ import annotations
 

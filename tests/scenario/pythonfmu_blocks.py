@@ -1,4 +1,4 @@
-"""PythonFMU classes that the scenario tests use in process."""
+"""PythonFMU classes for scenario tests."""
 
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real, String
 
@@ -6,7 +6,7 @@ IN, OUT, PARAMETER = Fmi2Causality.input, Fmi2Causality.output, Fmi2Causality.pa
 
 
 class Block(Fmi2Slave):
-    """Registers reals by name; dots become attributes of this object with underscores."""
+    """Base that registers Real variables by name and keeps their values in a dictionary."""
 
     def __init__(self, **arguments):
         super().__init__(**arguments)
@@ -37,13 +37,13 @@ class Gain(Block):
         self.real("y", OUT)
         self.real("k", PARAMETER, 2.0)
 
-    def do_step(self, current_time, step_size):
+    def do_step(self, _current_time, _step_size):
         self.values["y"] = self.values["k"] * self.values["u"]
         return True
 
 
 class Plant(Block):
-    """One vehicle that counts: ship.position.x and .y grow by ship.speed each step."""
+    """Vehicle whose ship.position.x and .y grow by ship.motor[1] and ship.motor[2] in each step."""
 
     def __init__(self, vehicle="ship", **arguments):
         super().__init__(**arguments)
@@ -53,14 +53,14 @@ class Plant(Block):
         for i in (1, 2):
             self.real(f"{vehicle}.motor[{i}]", IN)
 
-    def do_step(self, current_time, step_size):
+    def do_step(self, _current_time, _step_size):
         for i, axis in enumerate("xy", 1):
             self.values[f"{self.vehicle}.position.{axis}"] += self.values[f"{self.vehicle}.motor[{i}]"]
         return True
 
 
 class Controller(Block):
-    """motor[i] = gain[i] + offset; reads only the x position of its vehicle."""
+    """Controller with motor[i] = gain[i] + offset, and an input for the x position of its vehicle."""
 
     def __init__(self, **arguments):
         super().__init__(**arguments)
@@ -70,14 +70,14 @@ class Controller(Block):
             self.real(f"gain[{i}]", PARAMETER, 0.0)
             self.real(f"motor[{i}]", OUT)
 
-    def do_step(self, current_time, step_size):
+    def do_step(self, _current_time, _step_size):
         for i in (1, 2):
             self.values[f"motor[{i}]"] = self.values[f"gain[{i}]"] + self.values["offset"]
         return True
 
 
 class Typed(Fmi2Slave):
-    """One variable of each type."""
+    """Block with one variable of each type."""
 
     def __init__(self, **arguments):
         super().__init__(**arguments)
@@ -88,18 +88,18 @@ class Typed(Fmi2Slave):
         self.register_variable(Boolean("out", causality=OUT))
         self.out = True
 
-    def do_step(self, current_time, step_size):
+    def do_step(self, _current_time, _step_size):
         return True
 
 
 class FailingBlock(Block):
-    """Fails in its third step, with a message of its own first."""
+    """Block that logs a message and fails in its third step."""
 
     def __init__(self, **arguments):
         super().__init__(**arguments)
         self.real("y", OUT)
 
-    def do_step(self, current_time, step_size):
+    def do_step(self, current_time, _step_size):
         if current_time > 1.5:
             self.log("about to fail")
             raise ValueError("tilt beyond limit")
@@ -108,7 +108,7 @@ class FailingBlock(Block):
 
 
 class BaseExceptionBlock(FailingBlock):
-    """Fails in its first step, as what libraries in Rust raise."""
+    """Block that raises a BaseException in its first step, as libraries in Rust do."""
 
-    def do_step(self, current_time, step_size):
+    def do_step(self, _current_time, _step_size):
         raise BaseException("index out of bounds")

@@ -17,36 +17,36 @@ def scenario(folder, probe, **algorithm):
 
 
 @pytest.mark.parametrize("parallel", ["auto", True, False])
-def test_a_scenario_says_whether_stages_run_on_threads(tmp_path, probe, parallel):
-    assembly = load(scenario(tmp_path, probe, parallel=parallel))
-    assert assembly.system.parallel is parallel or assembly.system.parallel == parallel == "auto"
-    assembly.free()
+def test_a_scenario_selects_whether_stages_run_in_threads(tmp_path, probe, parallel):
+    prepared = load(scenario(tmp_path, probe, parallel=parallel))
+    assert prepared.system.parallel is parallel or prepared.system.parallel == parallel == "auto"
+    prepared.free()
 
 
-def test_auto_is_what_is_meant_when_nothing_is_said(tmp_path, probe):
-    assembly = load(scenario(tmp_path, probe))
-    assert assembly.system.parallel == "auto"
-    assembly.free()
+def test_parallel_is_auto_by_default(tmp_path, probe):
+    prepared = load(scenario(tmp_path, probe))
+    assert prepared.system.parallel == "auto"
+    prepared.free()
 
 
-def test_a_setting_from_outside_turns_threads_off(tmp_path, probe):
-    assembly = load(scenario(tmp_path, probe), {"/algorithm/parallel": False})
-    assert assembly.system.parallel is False
-    assembly.free()
+def test_a_setting_of_the_caller_turns_threads_off(tmp_path, probe):
+    prepared = load(scenario(tmp_path, probe), {"/algorithm/parallel": False})
+    assert prepared.system.parallel is False
+    prepared.free()
 
 
-def test_nested_systems_say_it_for_their_own_stages(tmp_path, probe):
+def test_nested_systems_have_a_parallel_setting_of_their_own(tmp_path, probe):
     inner = {"components": {"a": {"fmu": str(probe)}}, "algorithm": {"stages": [["a"]], "parallel": False}}
     (tmp_path / "inner.json").write_text(json.dumps(inner))
     outer = {"name": "outer", "stop_time": 1, "step_size": 0.1, "components": {"n": {"system": "inner.json"}}}
     (tmp_path / "outer.json").write_text(json.dumps(outer))
-    assembly = load(tmp_path / "outer.json")
-    ((group,),) = assembly.system.stages
-    assert (assembly.system.parallel, group.parallel) == ("auto", False)
-    assembly.free()
+    prepared = load(tmp_path / "outer.json")
+    ((group,),) = prepared.system.stages
+    assert (prepared.system.parallel, group.parallel) == ("auto", False)
+    prepared.free()
 
 
-def test_anything_else_is_refused_in_one_line(tmp_path, probe):
+def test_any_other_value_of_parallel_is_an_error_of_one_line(tmp_path, probe):
     with pytest.raises(InputError) as refusal:
         load(scenario(tmp_path, probe, parallel="sometimes"))
     (problem,) = refusal.value.problems

@@ -1,4 +1,4 @@
-"""Bad scenarios: every problem at once, each with file, line and JSON path, before the first step."""
+"""Invalid scenarios: all problems are reported at once, each with file, line and JSON path, before the first step."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def refused(folder, components, connections=(), **more):
     return lines(folder.scenario(components, list(connections), **more))
 
 
-def test_everything_that_is_wrong_is_said_at_once(folder):
+def test_all_problems_are_reported_at_once(folder):
     gain = folder.block("Gain")["python"]
     file = folder.write(
         f"""{{"name": "bad", "stop_time": 3, "stop_time": 3.5, "step_size": 1, "colour": "red",
@@ -86,7 +86,7 @@ def test_everything_that_is_wrong_is_said_at_once(folder):
         ({"inputs": [{"file": "no.csv", "to": {"x": "a.u"}}]}, "cannot read profile"),
     ],
 )
-def test_one_wrong_thing_is_one_line(folder, change, line):
+def test_one_mistake_is_reported_in_one_line(folder, change, line):
     found = refused(folder, {"a": folder.block("Gain")}, **change)
     assert len(found) == 1
     assert found[0].startswith("scenario.json:1:")
@@ -106,7 +106,7 @@ def test_one_wrong_thing_is_one_line(folder, change, line):
         ({"modelica": "missing.mo:X"}, 'file "missing.mo" does not exist'),
     ],
 )
-def test_a_component_without_a_sound_source_is_one_line_and_nothing_else_is_said_about_it(folder, component, line):
+def test_a_component_with_an_invalid_source_is_reported_once_and_without_consequences(folder, component, line):
     found = refused(folder, {"a": component, "b": folder.block("Gain")}, [connection("a.y", "b.u"), connection("b.y", "a.u")])
     assert len(found) == 1
     assert line in found[0]
@@ -123,7 +123,7 @@ def test_a_component_without_a_sound_source_is_one_line_and_nothing_else_is_said
         ({"number": {"x": 1}}, "expected a number, true, false, a text, or a list of these"),
     ],
 )
-def test_values_must_suit_their_variables(folder, parameters, line):
+def test_values_must_have_the_type_of_their_variables(folder, parameters, line):
     found = refused(folder, {"a": folder.block("Typed", parameters=parameters)})
     assert len(found) == 1
     assert line in found[0]
@@ -148,18 +148,18 @@ def test_ranges_of_an_fmu_are_respected(folder, probes):
         ("e_in", "onn", '"e_in" is one of off (1), on (2), found "onn"; did you mean "on"?'),
     ],
 )
-def test_no_value_wraps_around(folder, probes, name, value, line):
+def test_values_outside_the_range_of_their_type_are_refused(folder, probes, name, value, line):
     assert line in refused(folder, {"a": {"fmu": str(probes[3]), "parameters": {name: value}}})[0]
 
 
 @pytest.mark.parametrize("value", [2, "on"])
-def test_items_of_enumerations_have_names(folder, probe, value):
+def test_enumeration_items_can_be_set_by_number_or_name(folder, probe, value):
     result = cosim.run(folder.scenario({"a": {"fmu": str(probe), "parameters": {"e_in": value}}}))
     assert result["a.e_out"][-1] == 2
 
 
-def test_an_event_sets_the_whole_of_an_array(folder, probes):
-    """What it left out would fall back to the start values."""
+def test_an_event_must_set_all_elements_of_an_array(folder, probes):
+    """The elements that are missing would get their start values again."""
     events = [{"time": 1, "set": {"a.v_in": [11.0]}}]
     assert "takes 3 values, found 1" in refused(folder, {"a": {"fmu": str(probes[3])}}, events=events)[0]
 
@@ -168,17 +168,18 @@ def test_a_port_does_not_hide_a_component_of_the_nested_system(folder):
     parts = {"left": folder.block("Gain"), "right": folder.block("Gain")}
     folder.write({"components": parts, "ports": {"outputs": {"right": "left"}}}, "inner.json")
     (line,) = refused(folder, {"u": {"system": "inner.json"}})
-    assert line.startswith("inner.json:") and '"right" is the name of a component here' in line
+    assert line.startswith("inner.json:")
+    assert '"right" is already the name of a component here' in line
 
 
-def test_a_list_that_is_too_long_says_how_long_it_may_be(folder):
+def test_a_list_that_is_too_long_is_reported_with_the_largest_length(folder):
     found = refused(folder, {"a": folder.block("Controller", parameters={"gain": [1, 2, 3]})})
     assert [line.split(": ", 1)[1] for line in found] == [
         '$.components.a.parameters.gain: "gain" takes at most 2 values, found 3'
     ]
 
 
-def test_periods_must_fit(folder):
+def test_periods_must_fit_step_size_and_duration(folder):
     found = refused(folder, {"a": folder.block("Gain", period=1.5), "b": folder.block("Gain", period=2)})
     assert [line.split(": $.")[1] for line in found] == [
         "components.a.period: period 1.5 s is no multiple of the step size 1.0 s",
@@ -202,16 +203,16 @@ def test_units_of_different_quantities_are_refused(folder):
     )
 
 
-def test_arguments_may_have_the_names_of_what_loads_them(folder):
+def test_arguments_may_have_the_parameter_names_of_the_loader(folder):
     cosim.load(folder.scenario({"a": folder.block("Gain", arguments={"kind": 1, "reference": "x"})})).free()
 
 
-def test_the_name_of_an_instance_is_no_argument(folder):
+def test_the_instance_name_cannot_be_an_argument(folder):
     (line,) = refused(folder, {"a": folder.block("Gain", arguments={"instance_name": "b"})})
     assert 'Gain gets its "instance_name" from the scenario' in line
 
 
-def test_problems_of_a_python_component_stand_at_its_arguments(folder):
+def test_problems_of_a_python_component_are_located_at_its_arguments(folder):
     world = str(resources.root() / "plant_src/world.py:World")
     vehicles = {"uav": {"model": "ar_dron", "position": [0, 0, 1]}, "usv": {"model": "strider", "position": [0]}}
     found = refused(folder, {"plant": {"python": world, "arguments": {"vehicles": vehicles}}})
@@ -245,7 +246,7 @@ def test_a_prefix_without_a_matching_output_names_the_input(folder):
     assert "input pilot.vehicle.position.x has no matching output plant.ship.position.position.x" in line
 
 
-def test_a_nested_file_is_named_in_its_own_problems(folder):
+def test_problems_in_a_nested_file_are_located_in_that_file(folder):
     folder.write({"components": {"g": folder.block("Gain", parameters={"kk": 1})}, "ports": {"outputs": {"y": "h.y"}}}, "n.json")
     found = refused(folder, {"a": {"system": "n.json"}})
     assert [line.split(":")[0] for line in found] == ["n.json", "n.json"]
@@ -259,7 +260,7 @@ def test_a_system_that_contains_itself_is_refused(folder):
     assert 'the nested system "n.json" contains itself' in line
 
 
-def test_a_port_that_does_not_exist_is_refused_with_the_nearest(folder):
+def test_an_unknown_port_is_reported_with_the_nearest_name(folder):
     folder.write({"components": {"g": folder.block("Gain")}, "ports": {"inputs": {"command": "g.u"}}}, "n.json")
     components = {"a": {"system": "n.json"}, "b": folder.block("Gain")}
     (line,) = refused(folder, components, [connection("b.y", "a.comand")])
@@ -278,20 +279,20 @@ def test_a_port_that_does_not_exist_is_refused_with_the_nearest(folder):
         ('{"name": "x', "Unterminated string"),
     ],
 )
-def test_what_is_no_json_says_where(folder, text, line):
+def test_text_that_is_not_json_is_reported_with_its_position(folder, text, line):
     (found,) = lines(folder.write(text))
     assert found.startswith("scenario.json:1:")
     assert line in found
 
 
-def test_a_nested_system_with_times_is_refused_and_not_read_for_ever(folder):
+def test_a_nested_system_with_times_is_refused(folder):
     folder.write({"components": {"g": folder.block("Gain")}, "stop_time": 3, "step_size": 1}, "n.json")
     found = refused(folder, {"a": {"system": "n.json"}})
     assert [line.split(";")[0].split(": ", 1)[1] for line in found] == ["$.stop_time: unknown key", "$.step_size: unknown key"]
 
 
 @pytest.mark.parametrize("components", [None, [], 3, {}])
-def test_without_components_nothing_else_is_said_about_them(folder, components):
+def test_without_components_there_are_no_further_problems_with_components(folder, components):
     content = {"name": "x", "stop_time": 1, "step_size": 1, "connections": [connection("a.y", "b.u")]}
     if components is not None:
         content["components"] = components
@@ -299,18 +300,18 @@ def test_without_components_nothing_else_is_said_about_them(folder, components):
     assert "$.components" in line
 
 
-def test_a_wrong_step_size_has_no_consequences(folder):
+def test_an_invalid_step_size_is_reported_without_consequences(folder):
     gain = folder.block("Gain", period=0.3)
     (line,) = refused(folder, {"a": gain}, step_size="fast", events=[{"time": 0.7, "set": {"a.u": 1}}])
     assert "$.step_size: expected seconds" in line
 
 
-def test_a_wrong_stop_time_hides_no_wrong_event(folder):
+def test_an_invalid_stop_time_does_not_hide_an_invalid_event(folder):
     found = refused(folder, {"a": folder.block("Gain")}, stop_time=2.5, events=[{"time": 0.7, "set": {"a.u": 1}}])
     assert [line.split(": ")[1] for line in found] == ["$.stop_time", "$.events[0]"]
 
 
-def test_a_name_is_the_name_of_a_folder(folder):
+def test_the_name_of_a_scenario_must_be_usable_as_a_folder_name(folder):
     (line,) = refused(folder, {"a": folder.block("Gain")}, name="../evil")
     assert "$.name: expected a name" in line
 
@@ -357,14 +358,14 @@ def test_arguments_of_kpis_are_checked_before_the_run(folder, arguments, line):
         ),
     ],
 )
-def test_signals_of_functions_are_known_before_the_run(folder, arguments, line):
+def test_signals_in_arguments_of_functions_are_checked_before_the_run(folder, arguments, line):
     (folder.path / "f.py").write_text(FUNCTIONS)
     kpi = {"name": "k", "python": "f.py:error", "arguments": arguments}
     (found,) = refused(folder, {"a": folder.block("Plant")}, kpis=[kpi])
     assert found.endswith(f"$.kpis[0].arguments.{line}")
 
 
-def test_missing_signals_of_a_refused_component_are_not_missed(folder):
+def test_missing_signals_of_an_invalid_component_are_not_reported(folder):
     kpi = {"name": "k", "python": "cosim.kpis:rms", "arguments": {"signal": "a.y"}}
     (found,) = refused(folder, {"a": {"python": "none.py:A"}, "b": folder.block("Gain")}, kpis=[kpi])
     assert 'file "none.py" does not exist' in found
@@ -378,7 +379,7 @@ def test_missing_signals_of_a_refused_component_are_not_missed(folder):
         ("eror.time[1]", 'no KPI "eror.time[1]"; did you mean "error"?'),
     ],
 )
-def test_checks_hold_numbers_that_a_kpi_has(folder, number, message):
+def test_checks_must_name_a_value_of_a_kpi(folder, number, message):
     """As far as the function writes them down; what it makes elsewhere may have any name."""
     (folder.path / "f.py").write_text(FUNCTIONS)
     known, unknown = ({"name": name, "python": f"f.py:{name}", "arguments": {"vehicle": "a"}} for name in ("error", "unsaid"))
@@ -387,18 +388,18 @@ def test_checks_hold_numbers_that_a_kpi_has(folder, number, message):
     assert found.endswith(f"$.checks[0].kpi: {message}")
 
 
-def test_swapped_letters_are_the_nearest_name():
+def test_a_name_with_swapped_letters_is_suggested():
     assert did_you_mean("plant.uva", ["plant.usv", "plant.uav"]) == '; did you mean "plant.uav"?'
 
 
-def test_two_kpis_do_not_share_a_name(folder):
+def test_two_kpis_cannot_have_the_same_name(folder):
     (folder.path / "f.py").write_text(FUNCTIONS)
     kpi = {"name": "k", "python": "f.py:good", "arguments": {"signal": "a.y"}}
     (found,) = refused(folder, {"a": folder.block("Gain")}, kpis=[kpi, kpi])
-    assert found.endswith('$.kpis[1].name: the name "k" stands twice')
+    assert found.endswith('$.kpis[1].name: the name "k" is used more than once')
 
 
-def test_settings_from_outside_may_be_arrays_and_must_be_finite(folder):
+def test_settings_of_the_caller_may_be_arrays_and_must_be_finite(folder):
     file = folder.scenario({"a": folder.block("Controller")})
     cosim.run(file, {"a.gain": np.array([1.0, 2.0])})
     assert lines(file, parameters={"a.gain": []}) == ['setting "a.gain": "gain" is a list of values, found []']
@@ -410,12 +411,12 @@ def test_numbers_beyond_a_double_are_refused(folder):
     assert "$.stop_time: 1e400 is not allowed, expected a finite number" in found[0]
 
 
-def test_unknown_scenarios_name_the_nearest_shipped_one():
+def test_for_an_unknown_scenario_the_nearest_shipped_one_is_suggested():
     with pytest.raises(cosim.InputError, match='no shipped scenario "demo1_bx"; did you mean "demo1_box"'):
         cosim.load("demo1_bx")
 
 
-def test_settings_from_outside_are_checked_too(folder):
+def test_settings_of_the_caller_are_checked(folder):
     file = folder.scenario({"a": folder.block("Gain")})
     assert lines(file, parameters={"a.kk": 1}) == ['setting "a.kk": component "a" has no variable "kk"; did you mean "k"?']
     assert lines(file, parameters={"/components/b/period": 1}) == [

@@ -1,4 +1,4 @@
-"""Many components: what is done once, and where the time went."""
+"""Systems of many components: work that is done only once, and the timing of a run."""
 
 import json
 
@@ -7,7 +7,7 @@ from cosim.components.fmi import file, instance
 
 
 def ring(folder, probe, size):
-    """`size` instances of one FMU, each reads the one before."""
+    """Write a scenario of `size` instances of one FMU in a ring, each connected to the one before."""
     names = [f"p{i}" for i in range(size)]
     scenario = folder / "ring.json"
     document = {
@@ -43,7 +43,7 @@ def test_instances_of_one_library_keep_their_names_and_values(tmp_path, probe):
     assert result["p1.y"][1] == 1.0 + 0.01 * (5.0 - 1.0) / 0.5
 
 
-def test_the_time_of_a_run_is_told_part_by_part(tmp_path, probe):
+def test_the_timing_of_a_run_has_all_its_parts(tmp_path, probe):
     timing = cosim.run(ring(tmp_path, probe, 2)).timing
     parts = {"parse_seconds", "instantiate_seconds", "wiring_seconds", "initialize_seconds", "loop_seconds"}
     assert set(timing) >= parts

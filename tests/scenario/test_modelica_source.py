@@ -1,4 +1,6 @@
-"""A controller named by its Modelica source is built when it is needed, and kept until the source changes."""
+"""A component with a Modelica source is built when it is needed, and kept until the source changes."""
+
+import pytest
 
 import cosim
 
@@ -15,7 +17,7 @@ end Doubler;
 """
 
 
-def test_a_modelica_source_flies_and_is_built_once(folder, tmp_path, monkeypatch):
+def test_a_modelica_source_runs_and_is_built_once(folder, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "models").mkdir()
     source = tmp_path / "models" / "Doubler.mo"
@@ -31,9 +33,7 @@ def test_a_modelica_source_flies_and_is_built_once(folder, tmp_path, monkeypatch
     assert cosim.run(file)["a.y"].tolist() == [0, 7, 7, 7]
 
 
-def test_a_model_that_cannot_be_built_says_where(folder, tmp_path):
-    import pytest
-
+def test_a_model_that_cannot_be_built_is_reported_with_its_line(folder, tmp_path):
     (tmp_path / "models").mkdir()
     (tmp_path / "models" / "Doubler.mo").write_text(GAIN.replace("k*u", "k*w"))
     file = folder.scenario({"a": {"modelica": "models/Doubler.mo:Doubler"}})

@@ -1,4 +1,4 @@
-"""What a PythonFMU class gives as an output has to be of the output's type, or become it without loss."""
+"""Outputs of a PythonFMU class must have the type of the variable, or convert to it without loss."""
 
 import numpy as np
 import pytest
@@ -12,17 +12,17 @@ START = {Real: 0.0, Integer: 0, Boolean: False, String: ""}
 
 
 def last(kind, value):
-    class Giver(Fmi2Slave):
+    class Constant(Fmi2Slave):
         def __init__(self, **arguments):
             super().__init__(**arguments)
             self.y = START[kind]
             self.register_variable(kind("y", causality=Fmi2Causality.output))
 
-        def do_step(self, t, h):
+        def do_step(self, _t, _h):
             self.y = value
             return True
 
-    return run_system(make_system({"a": PythonFmuComponent(Giver(instance_name="a"), "a")}), 1, 1, ["a.y"]).columns["a.y"][-1]
+    return run_system(make_system({"a": PythonFmuComponent(Constant(instance_name="a"), "a")}), 1, 1, ["a.y"]).columns["a.y"][-1]
 
 
 @pytest.mark.parametrize(
@@ -39,7 +39,7 @@ def last(kind, value):
         (String, "x", "x"),
     ],
 )
-def test_what_is_the_same_value_is_taken(kind, value, expected):
+def test_a_value_that_converts_without_loss_is_accepted(kind, value, expected):
     assert last(kind, value) == expected
 
 
@@ -57,6 +57,6 @@ def test_what_is_the_same_value_is_taken(kind, value, expected):
         (String, 5, "String"),
     ],
 )
-def test_what_is_not_is_named(kind, value, type_):
+def test_any_other_value_is_an_error_that_names_the_output(kind, value, type_):
     with pytest.raises(ComponentError, match=f'output "y" is .*, expected a value of type {type_}'):
         last(kind, value)

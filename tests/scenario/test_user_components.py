@@ -1,4 +1,4 @@
-"""A component of one's own is examined when it is loaded: what would fail later, or silently do nothing, is said at once."""
+"""Component classes of users are checked when they are loaded, so that mistakes are reported before the run."""
 
 import pytest
 from test_invalid_scenarios import refused
@@ -54,7 +54,7 @@ def own(folder):
     return write
 
 
-def test_a_sound_one_runs_with_what_it_does_not_need_left_out(folder, own):
+def test_a_valid_component_runs_without_the_optional_methods(folder, own):
     assert cosim.run(folder.scenario(own()))["a.y"].tolist() == [6.0] * 4
 
 
@@ -79,19 +79,20 @@ def test_a_sound_one_runs_with_what_it_does_not_need_left_out(folder, own):
         ),
     ],
 )
-def test_a_mistake_is_named(folder, own, before, after, line):
+def test_a_mistake_in_the_class_is_reported(folder, own, before, after, line):
     found = refused(folder, own(before, after))
     assert line in found[0]
-    assert found[0].startswith("scenario.json:1:") and "$.components.a: own.py:Own" in found[0]
+    assert found[0].startswith("scenario.json:1:")
+    assert "$.components.a: own.py:Own" in found[0]
 
 
-def test_all_mistakes_are_named_together(folder, own):
+def test_all_mistakes_in_the_class_are_reported_together(folder, own):
     own("def do_step", "def dostep")
     file = folder.path / "own.py"
     file.write_text(file.read_text().replace('"output", v', '"outptu", v'))
     assert len(refused(folder, {"a": {"python": "own.py:Own"}})) == 2
 
 
-def test_a_step_returns_nothing_or_how_it_ended(folder, own):
+def test_do_step_must_return_none_or_a_step_result(folder, own):
     with pytest.raises(ComponentError, match="a: do_step failed at t = 0 s: returned True, expected None or a StepResult"):
         cosim.run(folder.scenario(own("return None", "return True")))

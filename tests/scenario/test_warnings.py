@@ -1,4 +1,4 @@
-"""Scenarios that can run, though something in them is probably a mistake."""
+"""Warnings about scenarios that can run, although something in them is probably a mistake."""
 
 import pytest
 from systems import connection
@@ -11,17 +11,17 @@ SHIPPED = sorted((resources.root() / "scenarios").glob("*.json"))
 BOTH = [connection("plant.ship", "pilot.vehicle"), connection("pilot.motor", "plant.ship.motor")]
 
 
-def doubted(file):
-    assembly = cosim.load(file)
+def warnings_of(file):
+    prepared = cosim.load(file)
     try:
-        return [str(problem).partition(": $.")[2] for problem in find_warnings(assembly)]
+        return [str(problem).partition(": $.")[2] for problem in find_warnings(prepared)]
     finally:
-        assembly.free()
+        prepared.free()
 
 
 def ship(folder, connections, parameters=(), **more):
     components = {"plant": folder.block("Plant"), "pilot": folder.block("Controller", parameters=dict(parameters))}
-    return doubted(folder.scenario(components, connections, **more))
+    return warnings_of(folder.scenario(components, connections, **more))
 
 
 @pytest.mark.parametrize(
@@ -31,17 +31,17 @@ def ship(folder, connections, parameters=(), **more):
         (1, "nothing feeds or sets pilot.vehicle.position.x, but there is an output plant.ship.position.x"),
     ],
 )
-def test_a_forgotten_connection_shows_by_names_that_fit(folder, left, line):
+def test_a_missing_connection_is_recognized_by_matching_names(folder, left, line):
     assert ship(folder, [BOTH[left]]) == [f"connections: {line}: is a connection missing?"]
 
 
-def test_inputs_that_are_set_or_that_no_output_fits_are_no_mistake(folder):
+def test_inputs_with_a_value_or_without_a_matching_output_cause_no_warning(folder):
     assert ship(folder, BOTH) == []
     assert ship(folder, BOTH[1:], {"vehicle.position.x": 1.0}) == []
     assert ship(folder, BOTH[1:], events=[{"time": 1, "set": {"pilot.vehicle.position.x": 1.0}}]) == []
 
 
-def test_an_event_after_the_end_and_a_reference_that_is_not_there(folder):
+def test_late_events_and_missing_references_cause_warnings(folder):
     late = {"events": [{"time": 4, "set": {"pilot.offset": 1.0}}]}
     missing = {"reference": {"file": "run.csv", "tolerances": {"*": {"absolute": 0.1}}}}
     assert ship(folder, BOTH, **late, **missing) == [
@@ -51,5 +51,5 @@ def test_an_event_after_the_end_and_a_reference_that_is_not_there(folder):
 
 
 @pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
-def test_nothing_shipped_is_doubted(file):
-    assert doubted(file) == []
+def test_shipped_scenarios_cause_no_warnings(file):
+    assert warnings_of(file) == []

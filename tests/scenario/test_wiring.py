@@ -1,4 +1,4 @@
-"""Names, prefixes, ports: what a scenario's connections and parameters mean."""
+"""Names, prefixes and ports in connections and parameters of scenarios."""
 
 import pytest
 from systems import connection
@@ -28,22 +28,22 @@ def columns(file, **more):
     return {name: result[name].tolist() for name in result}
 
 
-def test_prefixes_connect_what_the_reader_declares(folder):
+def test_prefixes_connect_the_inputs_that_the_target_declares(folder):
     pilot = folder.block("Controller", parameters={"gain": [1.0, 10.0]})
     file = folder.scenario({"pilot": pilot, "plant": folder.block("Plant")}, PAIR)
-    assembly = cosim.load(file)
-    pairs = [f"{c.source} > {c.target}" for c in assembly.system.connections]
+    prepared = cosim.load(file)
+    pairs = [f"{c.source} > {c.target}" for c in prepared.system.connections]
     assert pairs == [
         "plant.ship.position.x > pilot.vehicle.position.x",
         "pilot.motor[1] > plant.ship.motor[1]",
         "pilot.motor[2] > plant.ship.motor[2]",
     ]
-    assembly.free()
+    prepared.free()
     assert columns(file)["plant.ship.position.x"] == [0, 1, 2, 3]
     assert columns(file)["plant.ship.position.y"] == [1, 11, 21, 31]
 
 
-def test_components_step_in_the_listed_order_unless_told_otherwise(folder):
+def test_components_step_in_the_listed_order_by_default(folder):
     gains = {"a": folder.block("Gain", parameters={"u": 1.0}), "b": folder.block("Gain")}
     listed = folder.scenario(gains, [connection("a.y", "b.u")], stop_time=1)
     assert columns(listed)["b.y"] == [0, 4]
@@ -53,12 +53,12 @@ def test_components_step_in_the_listed_order_unless_told_otherwise(folder):
     assert columns(together)["b.y"] == [0, 0]
 
 
-def test_a_connection_of_single_variables_beats_a_prefix(folder):
+def test_a_connection_of_single_variables_overrides_a_prefix(folder):
     components = {"pilot": folder.block("Controller"), "gain": folder.block("Gain"), "plant": folder.block("Plant")}
     file = folder.scenario(components, [*PAIR, connection("gain.y", "plant.ship.motor[2]")])
-    assembly = cosim.load(file)
-    fed = {str(c.target): str(c.source) for c in assembly.system.connections}
-    assembly.free()
+    prepared = cosim.load(file)
+    fed = {str(c.target): str(c.source) for c in prepared.system.connections}
+    prepared.free()
     assert fed["plant.ship.motor[1]"] == "pilot.motor[1]"
     assert fed["plant.ship.motor[2]"] == "gain.y"
 
@@ -73,23 +73,23 @@ def test_a_component_alone_is_a_prefix_too(folder):
     folder.write({"components": {"head": folder.block("Controller")}, "ports": {"inputs": {"vehicle": "head.vehicle"}}}, "n.json")
     (folder.path / "plant.py").write_text(WHOLE_PLANT)
     components = {"plant": {"python": "plant.py:Whole"}, "pilot": {"system": "n.json"}}
-    assembly = cosim.load(folder.scenario(components, [connection("plant", "pilot.vehicle")]))
-    assembly.free()
-    assert [f"{c.source} > {c.target}" for c in assembly.system.connections] == [
+    prepared = cosim.load(folder.scenario(components, [connection("plant", "pilot.vehicle")]))
+    prepared.free()
+    assert [f"{c.source} > {c.target}" for c in prepared.system.connections] == [
         "plant.position.x > pilot.head.vehicle.position.x"
     ]
 
 
-def test_a_port_may_mean_variables_that_only_some_of_its_readers_have(folder):
+def test_a_port_may_name_variables_that_only_some_inner_components_have(folder):
     components = {"head": folder.block("Controller"), "tail": folder.block("Controller")}
     folder.write({"components": components, "ports": {"inputs": {"vehicle": ["head.vehicle", "tail.gains"]}}}, "n.json")
     file = folder.scenario(
         {"plant": folder.block("Plant"), "pilot": {"system": "n.json"}},
         [connection("plant.ship.position.x", "pilot.vehicle.position.x")],
     )
-    assembly = cosim.load(file)
-    assembly.free()
-    assert [str(c.target) for c in assembly.system.connections] == ["pilot.head.vehicle.position.x"]
+    prepared = cosim.load(file)
+    prepared.free()
+    assert [str(c.target) for c in prepared.system.connections] == ["pilot.head.vehicle.position.x"]
 
 
 def nested(folder):
@@ -137,9 +137,9 @@ def test_two_levels_of_nesting(folder):
 def test_a_period_of_a_nested_system_holds_for_all_inside(folder):
     components = nested(folder)
     components["pilot"]["period"] = 3
-    assembly = cosim.load(folder.scenario(components, PAIR))
-    assembly.free()
-    assert {name: float(period) for name, period in assembly.system.periods.items()} == {"pilot.head": 3.0, "pilot.tail": 3.0}
+    prepared = cosim.load(folder.scenario(components, PAIR))
+    prepared.free()
+    assert {name: float(period) for name, period in prepared.system.periods.items()} == {"pilot.head": 3.0, "pilot.tail": 3.0}
 
 
 def test_input_profiles_feed_inputs_with_the_value_at_the_communication_point(folder):
@@ -152,7 +152,7 @@ def test_input_profiles_feed_inputs_with_the_value_at_the_communication_point(fo
     assert result["b.y"] == [0, 0, 4, 8]
 
 
-def test_a_held_profile_jumps_at_its_rows(folder):
+def test_a_profile_with_hold_jumps_at_its_rows(folder):
     (folder.path / "profile.csv").write_text("time,step\n0,1\n1.5,2\n2,3\n")
     inputs = [{"file": "profile.csv", "to": {"step": "a.u"}, "interpolation": "hold"}]
     result = columns(folder.scenario({"a": folder.block("Gain")}, inputs=inputs, stop_time=2, step_size=0.5))
@@ -160,7 +160,7 @@ def test_a_held_profile_jumps_at_its_rows(folder):
 
 
 @pytest.mark.parametrize(("step_size", "count"), [("1/10", 9), ("1/100", 90), ("1/1000", 900)])
-def test_a_held_profile_jumps_exactly_there_whatever_times_are_rounded_to(folder, step_size, count):
+def test_a_profile_with_hold_jumps_exactly_at_its_rows_despite_rounded_times(folder, step_size, count):
     """0.7 + 0.1 is less than 0.8."""
     step = exact_fraction(step_size)
     rows = "".join(f"{float(n * step)!r},{n}\n" for n in range(count + 1))
@@ -189,15 +189,13 @@ def test_recording_chooses_signals_by_pattern_and_interval(folder):
     assert list(result) == ["plant.ship.position.x", "plant.ship.position.y"]
 
 
-def test_json_pointers_change_anything(folder):
+def test_json_pointers_change_any_part_of_the_scenario(folder):
     file = folder.scenario({"plant": folder.block("Plant", arguments={"vehicle": "ship"})})
     result = cosim.run(file, {"/components/plant/arguments/vehicle": "boat"}, stop_time=1)
     assert "plant.boat.position.x" in result
 
 
 def test_a_component_that_fails_keeps_its_rows(folder):
-    import pytest
-
     file = folder.scenario({"a": folder.block("FailingBlock")})
     with pytest.raises(cosim.ComponentError) as failure:
         cosim.run(file)
@@ -205,8 +203,6 @@ def test_a_component_that_fails_keeps_its_rows(folder):
     assert failure.value.result["a.y"].tolist() == [0, 1, 2]
 
 
-def test_a_class_that_panics_has_failed(folder):
-    import pytest
-
+def test_a_base_exception_in_do_step_is_a_component_error(folder):
     with pytest.raises(cosim.ComponentError, match="a: do_step failed at t = 0 s: BaseException: index out of bounds"):
         cosim.run(folder.scenario({"a": folder.block("BaseExceptionBlock")}))

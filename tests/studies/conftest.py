@@ -1,4 +1,4 @@
-"""The lag that crashes on order, for sweeps."""
+"""Fixtures with a first-order lag FMU that has injectable faults."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from lag_project import LagProject, MakeLagProject
 
 @pytest.fixture(scope="session")
 def make_lag(tmp_path_factory: pytest.TempPathFactory) -> MakeLagProject:
-    """A new folder with the lag and its scenario."""
+    """Function that creates a folder with the lag and its scenario."""
     library: Path = build_library(2, tmp_path_factory.mktemp("library"))
 
     def make(**more: Any) -> LagProject:

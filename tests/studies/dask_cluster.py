@@ -1,4 +1,4 @@
-"""A real Dask cluster on loopback: a scheduler and its workers, each a process."""
+"""Dask cluster on loopback: a scheduler and its workers, each a process."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-#: a process may take so long to start on a busy machine (s)
+#: time limit for the start of a process on a busy machine (s)
 START_TIMEOUT = 60.0
 
 
 class DaskCluster:
-    """Processes and files of a cluster, in a folder."""
+    """Processes of a cluster, with their files in a folder."""
 
     def __init__(self, folder: Path, workers: int):
         self.folder = folder
@@ -27,7 +27,7 @@ class DaskCluster:
         self.workers = [self.start_worker() for _ in range(workers)]
 
     def start_worker(self, **environment: str) -> subprocess.Popen[bytes]:
-        """One more worker with one thread, and with a folder of its own for what it is sent."""
+        """Start another worker with one thread and its own folder for received files."""
         words = (self.address, "--no-nanny", "--nthreads", 1, "--host", "127.0.0.1", "--local-directory", self.folder / "scratch")
         return self._start("worker", *words, **environment)
 

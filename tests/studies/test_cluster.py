@@ -16,7 +16,7 @@ pytest.importorskip("distributed")
 
 LEVELS = {f"run {run}": {"lag.y_start": 1 + run / 100, "lag.fault": SEGV_ORDER if run == 3 else ""} for run in range(8)}
 FACTORS = [{"name": "level", "levels": LEVELS}]
-#: runs of about a tenth of a second
+#: a sweep of 30 runs of about 0.1 s each
 SLOW = {
     "factors": [{"name": "start", "set": "lag.y_start", "values": [1 + run / 10 for run in range(30)]}],
     "settings": {"/stop_time": 100, "/record/interval": 1},
@@ -29,7 +29,7 @@ def two_workers(tmp_path_factory):
         yield made
 
 
-def test_a_cluster_makes_the_same_bytes_from_files_that_it_was_sent(lag, two_workers):
+def test_a_cluster_writes_the_same_files_as_a_local_sweep(lag, two_workers):
     sweep = lag.write(factors=FACTORS)
     local = lag.run_command("sweep", sweep, "--output-dir", "local")
     away = lag.run_command("sweep", sweep, "--scheduler", two_workers.address, "--output-dir", "cluster")
@@ -40,7 +40,7 @@ def test_a_cluster_makes_the_same_bytes_from_files_that_it_was_sent(lag, two_wor
     assert {file.read_bytes() for file in shipped} == {(lag.folder / "lag.fmu").read_bytes()}
 
 
-def test_what_cannot_be_set_is_refused_before_anything_runs(lag, two_workers):
+def test_an_unknown_variable_is_refused_before_the_first_run(lag, two_workers):
     sweep = lag.write(factors=[{"name": "T", "set": "lag.Tau", "values": [1.0]}])
     done = lag.run_command("sweep", sweep, "--scheduler", two_workers.address)
     assert done.code == 2
@@ -58,7 +58,7 @@ def test_absolute_paths_are_refused(make_lag, two_workers):
     assert "cannot be shipped to a cluster" in done.err
 
 
-def test_where_no_scheduler_is_nothing_is_run(lag, monkeypatch):
+def test_a_sweep_is_refused_when_no_scheduler_answers(lag, monkeypatch):
     monkeypatch.setattr("cosim.studies.cluster._CONNECT_TIMEOUT", 1.0)
     done = lag.run_command("sweep", lag.write(factors=FACTORS), "--scheduler", "tcp://127.0.0.1:9")
     assert done.code == 2
@@ -78,12 +78,13 @@ def test_a_worker_with_another_cosim_is_refused(lag, tmp_path):
     assert f"expected {cosim.__version__} (" in done.err
 
 
-def begin(lag, made: DaskCluster):
-    """A sweep on a cluster, with some runs finished."""
+def start_sweep(lag, made: DaskCluster):
+    """Start a sweep on a cluster and wait until some runs have finished."""
     process = lag.start_command("sweep", lag.write(**SLOW), "--scheduler", made.address)
     end = time.monotonic() + 60
     while len(lag.records()) < 3:
-        assert process.poll() is None and time.monotonic() < end, (made.folder / "log").read_text()
+        assert process.poll() is None, (made.folder / "log").read_text()
+        assert time.monotonic() < end, (made.folder / "log").read_text()
         time.sleep(0.02)
     return process
 
@@ -91,7 +92,7 @@ def begin(lag, made: DaskCluster):
 @pytest.mark.long
 def test_killed_workers_are_replaced(lag, tmp_path):
     with running_cluster(tmp_path) as made:
-        process = begin(lag, made)
+        process = start_sweep(lag, made)
         victim, below = made.workers[0], descendants(made.workers[0].pid)
         victim.kill()
         victim.wait()
@@ -104,11 +105,11 @@ def test_killed_workers_are_replaced(lag, tmp_path):
 
 
 @pytest.mark.long
-def test_after_the_scheduler_was_killed_another_one_finishes_the_sweep(lag, tmp_path):
+def test_another_scheduler_continues_a_sweep_after_the_first_was_killed(lag, tmp_path):
     (tmp_path / "first").mkdir()
     (tmp_path / "second").mkdir()
     with running_cluster(tmp_path / "first") as made:
-        process = begin(lag, made)
+        process = start_sweep(lag, made)
         made.scheduler.kill()
         _, err = process.communicate(timeout=120)
         assert process.returncode == 1

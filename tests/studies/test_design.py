@@ -1,4 +1,4 @@
-"""From factors to points."""
+"""Designs: the points that result from factors and seeds."""
 
 import math
 
@@ -20,7 +20,7 @@ ARGUMENTS = {
     "shape": 1.8,
     "scale": 2.0,
 }
-#: the same distributions, by their textbook parameters
+#: the same distributions in the notation of SciPy
 TEXTBOOK = {
     "uniform": stats.uniform(1.0, 3.0),
     "normal": stats.norm(2.0, 0.5),
@@ -41,7 +41,7 @@ def sampled(kind, runs, *factors, seed=1):
     return made(*factors, design={"kind": kind, "runs": runs, "seed": seed})
 
 
-def test_all_combinations_and_seeds_vary_fastest():
+def test_a_full_factorial_design_has_all_combinations_and_seeds_vary_fastest():
     points = made(
         {"name": "a", "set": "x.a", "values": ["p", "q"]},
         {"name": "b", "set": ["y.b", "/b"], "values": [1, 2, 3]},
@@ -52,7 +52,7 @@ def test_all_combinations_and_seeds_vary_fastest():
     assert len(points) == 12
 
 
-def test_a_range_is_met_exactly_at_both_ends():
+def test_a_range_includes_both_ends_exactly():
     linear = made(RANGE | {"range": {"min": 0.1, "max": 0.7, "count": 4}})
     assert [p.labels["r"] for p in linear] == pytest.approx([0.1, 0.3, 0.5, 0.7])
     logarithmic = made(RANGE | {"range": {"min": 2.0, "max": 32.0, "count": 5, "scale": "log"}})
@@ -78,7 +78,7 @@ def test_the_same_seed_gives_the_same_points(kind):
 
 
 @pytest.mark.parametrize("kind", DISTRIBUTIONS)
-def test_a_distribution_is_the_one_it_says(kind):
+def test_samples_follow_their_distribution(kind):
     """A Latin hypercube has one value in each of its equally likely parts."""
     given = {name: ARGUMENTS[name] for name in DISTRIBUTIONS[kind]}
     points = sampled("latin_hypercube", 200, {"name": "d", "set": "a.d", "distribution": {"kind": kind, **given}})
@@ -97,7 +97,7 @@ def test_integers_are_rounded():
     assert all(type(p.labels["r"]) is int for p in points)
 
 
-def test_a_million_points_are_not_made_in_advance():
+def test_points_are_computed_on_demand():
     values = list(range(100))
     points = made(*({"name": name, "set": f"a.{name}", "values": values} for name in "xyz"))
     assert len(points) == 10**6

@@ -1,4 +1,4 @@
-"""Sweeps and tunings that cannot be: every problem at once, with its place and the nearest name."""
+"""Invalid sweeps and tunings: all problems are reported at once, with position and nearest name."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PARAMETER = {"name": "p", "set": "a.b", "min": 0.0, "max": 1.0}
 
 
 def problems(folder, kind, content):
-    """What is said about a file whose scenario is a shipped one."""
+    """Return the problems of a study file with a shipped scenario."""
     file = folder / "study.json"
     file.write_text(json.dumps({"name": "s", "scenario": "demo1_box", **content}))
     with pytest.raises(InputError) as refusal:
@@ -59,7 +59,7 @@ def problems(folder, kind, content):
         ({"factors": [FACTOR], "deadline": -1}, ["$.deadline", "found -1"]),
     ],
 )
-def test_a_sweep_is_refused_with_its_place(tmp_path, content, words):
+def test_an_invalid_sweep_is_refused_with_the_position(tmp_path, content, words):
     (line,) = problems(tmp_path, SweepSpec, content)
     assert all(word in line for word in words), line
 
@@ -70,15 +70,15 @@ B = "/components/a/parameters/b"
 @pytest.mark.parametrize(
     ("factors", "common", "words"),
     [
-        ({"f": "a.b", "g": B}, {}, 'both "f" and "g" set the same thing, as "a.b" and as "/components/a/parameters/b"'),
-        ({"f": "stop_time", "g": "/stop_time"}, {}, 'both "f" and "g" set the same thing'),
-        ({"f": B}, {"a.b": 7}, 'both the settings and "f" set the same thing'),
-        ({"f": "a.b", "g": {"/components/a": {"parameters": {"b": 1}}}}, {}, 'both "f" and "g" set the same thing'),
+        ({"f": "a.b", "g": B}, {}, 'both "f" and "g" set the same value, as "a.b" and as "/components/a/parameters/b"'),
+        ({"f": "stop_time", "g": "/stop_time"}, {}, 'both "f" and "g" set the same value'),
+        ({"f": B}, {"a.b": 7}, 'both the settings and "f" set the same value'),
+        ({"f": "a.b", "g": {"/components/a": {"parameters": {"b": 1}}}}, {}, 'both "f" and "g" set the same value'),
         ({"f": B, "g": "/components/a"}, {}, '"/components/a" of "g" replaces "/components/a/parameters/b" of "f"'),
         ({"f": "/components/a"}, {B: 7}, '"/components/a" of "f" replaces "/components/a/parameters/b" of the settings'),
     ],
 )
-def test_what_would_have_no_effect_is_refused(tmp_path, factors, common, words):
+def test_settings_without_effect_are_refused(tmp_path, factors, common, words):
     (line,) = problems(tmp_path, SweepSpec, {"factors": varied(factors), "settings": common})
     assert words in line
 
@@ -95,7 +95,7 @@ def test_what_would_have_no_effect_is_refused(tmp_path, factors, common, words):
         ({"f": "a.b", "g": "a.c.b", "h": "/components/a/arguments/b"}, {}),
     ],
 )
-def test_what_is_changed_further_is_not(tmp_path, factors, common):
+def test_settings_that_refine_others_are_accepted(tmp_path, factors, common):
     (tmp_path / "s.json").write_text(
         json.dumps({"name": "s", "scenario": "demo1_box", "factors": varied(factors), "settings": common})
     )
@@ -103,14 +103,14 @@ def test_what_is_changed_further_is_not(tmp_path, factors, common):
 
 
 def varied(factors):
-    """Factors that set a path, or that have a level with settings."""
+    """Return factors that set a path, or that have a level with settings."""
     return [
         FACTOR | {"name": name, "set": what} if isinstance(what, str) else {"name": name, "levels": {"x": what}}
         for name, what in factors.items()
     ]
 
 
-def test_everything_that_is_wrong_is_said_at_once(tmp_path):
+def test_all_problems_are_reported_at_once(tmp_path):
     found = problems(
         tmp_path, SweepSpec, {"factors": [{"name": "f"}, FACTOR | {"values": []}], "dedline": 1, "design": {"kind": "grid"}}
     )
@@ -120,7 +120,7 @@ def test_everything_that_is_wrong_is_said_at_once(tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ({"minimize": "1 +", "parameters": [PARAMETER]}, ["$.minimize", "is no expression"]),
+        ({"minimize": "1 +", "parameters": [PARAMETER]}, ["$.minimize", "is not an expression"]),
         ({"minimize": "k", "parameters": [PARAMETER], "constraints": ["k < 1"]}, ["$.constraints[0]", "<= or >="]),
         ({"minimize": "k", "parameters": [PARAMETER | {"start": 2.0}]}, ["$.parameters[0]", 'expected "start" between']),
         ({"minimize": "k", "parameters": []}, ["$.parameters"]),
@@ -129,13 +129,13 @@ def test_everything_that_is_wrong_is_said_at_once(tmp_path):
         ({"minimize": "k", "parameters": [PARAMETER], "method": {"kind": "magic"}}, ["$.method.kind", "magic"]),
     ],
 )
-def test_a_tuning_is_refused_with_its_place(tmp_path, content, words):
+def test_an_invalid_tuning_is_refused_with_the_position(tmp_path, content, words):
     (line,) = problems(tmp_path, TuneSpec, content)
     assert all(word in line for word in words), line
 
 
-def test_what_cannot_be_set_is_found_before_anything_runs(lag):
-    """Three levels are wrong in three ways."""
+def test_invalid_settings_are_found_before_the_first_run(lag):
+    """Three levels are invalid in three ways."""
     wrong = [{"name": "T", "set": "lag.Tau", "values": [1.0]}, {"name": "y", "set": "lag.y_start", "values": [1.0, "high"]}]
     levels = {"one": {"/components/lga/fmu": "x.fmu"}, "two": {}}
     done = lag.run_command("sweep", lag.write(factors=[*wrong, {"name": "l", "levels": levels}]))
@@ -150,8 +150,8 @@ def test_what_cannot_be_set_is_found_before_anything_runs(lag):
     assert lag.records() == []
 
 
-def test_what_a_pointer_sets_wrongly_has_its_place_in_the_sweep_file(lag):
-    """Of two levels the second is wrong, of a setting that is an object a part."""
+def test_an_invalid_value_of_a_pointer_is_located_in_the_sweep_file(lag):
+    """The second of two levels, and a part of a setting that is an object, are invalid."""
     levels = {"good": {"/components/lag/fmu": "lag.fmu"}, "bad": {"/components/lag/fmu": "lga.fmu"}}
     factors = [{"name": "fmu", "levels": levels}, {"name": "step", "set": "/step_size", "values": [0.01, -1]}]
     common = {"/record": {"signals": ["lag.y", "lag.yy"]}}
@@ -165,7 +165,7 @@ def test_what_a_pointer_sets_wrongly_has_its_place_in_the_sweep_file(lag):
     }
 
 
-def test_criteria_about_kpis_that_do_not_exist_end_the_sweep_at_its_first_runs(lag):
+def test_criteria_with_unknown_kpis_end_the_sweep_after_the_first_runs(lag):
     factors = [{"name": "y", "set": "lag.y_start", "values": list(range(50))}]
     done = lag.run_command("sweep", lag.write(factors=factors, success=[{"kpi": "end.valeu", "max": 1.0}]))
     assert done.code == 2
@@ -173,14 +173,14 @@ def test_criteria_about_kpis_that_do_not_exist_end_the_sweep_at_its_first_runs(l
     assert len(lag.records()) < 50
 
 
-def test_a_factor_is_not_called_like_a_kpi(lag):
-    """Which KPIs there are is known after a run."""
+def test_a_factor_with_the_name_of_a_kpi_is_refused(lag):
+    """KPIs are unknown before the first run."""
     done = lag.run_command("sweep", lag.write(factors=[{"name": "end.value", "set": "lag.y_start", "values": [1, 2]}]))
     assert done.code == 2
     assert '$.factors[0].name: expected a name other than that of the KPI "end.value"' in done.err
 
 
-def test_so_they_do_when_all_runs_are_there(lag):
+def test_criteria_with_unknown_kpis_are_refused_when_all_runs_are_finished(lag):
     factors = [{"name": "y", "set": "lag.y_start", "values": [1, 2]}]
     for _ in range(2):
         assert lag.run_command("sweep", lag.write(factors=factors, success=[{"kpi": "end.valeu", "max": 1.0}])).code == 2
@@ -195,8 +195,8 @@ def test_a_file_that_cannot_be_imported_is_named(lag):
     assert "No module named 'no_such_module'" in lag.table()[0]["failure"]
 
 
-def test_a_component_that_ends_the_process_as_it_is_imported_fails_its_own_runs(lag):
-    """The template, which imports in advance what the scenario names, does without."""
+def test_a_component_that_exits_on_import_fails_only_its_own_runs(lag):
+    """The fork server, which preloads the components of the scenario, is restarted without preloading."""
     (lag.folder / "deadly.py").write_text("import os\nos.abort()\n")
     content = json.loads((lag.folder / "lag.json").read_text())
     content["components"]["deadly"] = {"python": "deadly.py:Component"}

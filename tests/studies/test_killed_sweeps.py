@@ -1,4 +1,4 @@
-"""Whatever is killed: finished runs are kept, nothing is run twice, nothing is left behind."""
+"""Killed sweeps and workers: finished runs are kept, no run is made twice, no process is left behind."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ SWEEP = {
 
 
 @pytest.fixture
-def going(lag):
-    """The sweep, going on, with a run finished."""
+def sweep_process(lag):
+    """Process of a running sweep that has finished a run."""
     process = lag.start_command("sweep", lag.write(**SWEEP), "--workers", 2)
     wait_until(lambda: lag.records())
     yield process
@@ -39,53 +39,53 @@ def wait_until(condition, seconds=60.0):
 
 
 def assert_completed(lag):
-    """Go on with a sweep that was ended: it is whole, and nothing was made twice."""
+    """Continue a sweep that was ended, and assert that it is complete and that no run was made twice."""
     done = lag.run_command("sweep", "sweep.json", "--workers", 2)
     keys = [record["key"] for record in lag.records()]
     assert (done.code, len(keys), len(set(keys))) == (0, RUNS, RUNS), done.err
     assert len({row["end.value"] for row in lag.table()}) == RUNS
 
 
-def test_a_killed_sweep_goes_on_where_it_was(lag, going):
-    below = descendants(going.pid)
-    going.kill()
-    going.wait()
+def test_a_killed_sweep_is_continued_by_the_next_call(lag, sweep_process):
+    processes = descendants(sweep_process.pid)
+    sweep_process.kill()
+    sweep_process.wait()
     before = lag.records()
     assert 1 <= len(before) < RUNS
-    wait_until(lambda: not any(map(is_alive, below)))
+    wait_until(lambda: not any(map(is_alive, processes)))
     assert_completed(lag)
     assert lag.records()[: len(before)] == before
 
 
 @pytest.mark.long
-def test_processes_of_a_sweep_are_replaced_when_they_are_killed(lag, going):
-    template = descendants(going.pid)[0]
-    lane = descendants(template)[0]
-    for victim in (lane, template):
+def test_killed_workers_and_fork_servers_are_replaced(lag, sweep_process):
+    fork_server = descendants(sweep_process.pid)[0]
+    worker = descendants(fork_server)[0]
+    for victim in (worker, fork_server):
         made = len(lag.records())
         os.kill(victim, signal.SIGKILL)
         wait_until(lambda made=made: len(lag.records()) > made)
-    _, err = going.communicate(timeout=60)
-    assert (going.returncode, len(lag.records())) == (0, RUNS), err
+    _, err = sweep_process.communicate(timeout=60)
+    assert (sweep_process.returncode, len(lag.records())) == (0, RUNS), err
     assert not any("failure" in record for record in lag.records())
 
 
 @pytest.mark.long
-def test_an_interrupt_keeps_what_is_finished(lag, going):
-    below = descendants(going.pid)
-    going.send_signal(signal.SIGINT)
-    out, err = going.communicate(timeout=60)
-    assert going.returncode == 130, err
+def test_an_interrupted_sweep_keeps_its_finished_runs(lag, sweep_process):
+    processes = descendants(sweep_process.pid)
+    sweep_process.send_signal(signal.SIGINT)
+    out, err = sweep_process.communicate(timeout=60)
+    assert sweep_process.returncode == 130, err
     assert len(lag.table()) == len(lag.records())
     assert f"{len(lag.records())} of {RUNS} runs" in out
-    wait_until(lambda: not any(map(is_alive, below)), 10)
+    wait_until(lambda: not any(map(is_alive, processes)), 10)
     assert_completed(lag)
 
 
 @pytest.mark.parametrize(
-    "request_", [b"", json.dumps({"scenario": "", "root": "", "fmus": [], "deadline": None, "cold": True}).encode()]
+    "request_", [b"", json.dumps({"scenario": "", "root": "", "fmus": [], "deadline": None, "preload": False}).encode()]
 )
-def test_a_template_whose_sweep_was_interrupted_ends_quietly(request_):
+def test_a_fork_server_ends_without_output_when_its_sweep_was_interrupted(request_):
     own, other = socket.socketpair()
     with own, other:
         command = [sys.executable, "-m", "cosim.studies.execution.fork_server", str(other.fileno())]

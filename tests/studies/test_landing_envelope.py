@@ -1,4 +1,4 @@
-"""The shipped landing envelope, cut down to two by two landings."""
+"""Shipped sweep of the landing envelope, reduced to two by two landings."""
 
 import json
 
@@ -13,8 +13,8 @@ RIPPLES = {f"{SEA}/significant_height": 0.05, f"{SEA}/peak_period": 1.27}
 SWEEPS = resources.root() / "scenarios" / "sweeps"
 
 
-def small(folder):
-    """Two controllers in little and in too much wind; the mission is a short one."""
+def write_small_sweep(folder):
+    """Write the sweep with two controllers in light and in strong wind and with a short mission."""
     content = json.loads((SWEEPS / "landing_envelope.json").read_text())
     controller, speed, wind, _ = content["factors"]
     controllers = {name: controller["levels"][name] for name in ("cascaded", "geometric")}
@@ -29,12 +29,14 @@ def small(folder):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("envelope")
-    done = CliRunner().invoke(command, [str(small(folder)), "--output-dir", str(folder), "--workers", "1", "--replays"])
+    done = CliRunner().invoke(
+        command, [str(write_small_sweep(folder)), "--output-dir", str(folder), "--workers", "1", "--replays"]
+    )
     assert done.exit_code == 0, done.output
     return folder
 
 
-def test_both_controllers_land_in_little_wind_and_none_in_too_much(folder):
+def test_both_controllers_land_in_light_wind_and_none_in_strong_wind(folder):
     table = [line.split(",") for line in (folder / "table.csv").read_text().splitlines()]
     passed = table[0].index("passed")
     assert [row[passed] for row in table[1:]] == ["1", "0", "1", "0"]

@@ -1,4 +1,4 @@
-"""Arithmetic over KPIs."""
+"""Arithmetic expressions of KPIs."""
 
 import math
 import re
@@ -26,43 +26,43 @@ def test_arithmetic(text, value):
 
 
 @pytest.mark.parametrize("text", ["1 / (gain - 3)", "sqrt(-gain)", "log(0)", "1e300 ** 2", "(-8) ** 0.5", "missing + 1"])
-def test_what_has_no_value_is_nan(text):
+def test_an_undefined_expression_is_nan(text):
     assert math.isnan(parse_expression(text)(VALUES))
 
 
 @pytest.mark.parametrize("text", ["max(0, lost)", "min(lost, 1)", "lost ** 0", "1 ** lost", "min(1, max(lost, 2))"])
-def test_a_part_without_a_value_leaves_the_whole_without(text):
-    """Python's own functions lose sight of NaN, some depending on the order."""
+def test_nan_in_any_part_makes_the_expression_nan(text):
+    """Python's `min`, `max` and `**` drop some NaN, depending on the order of arguments."""
     assert math.isnan(parse_expression(text)(VALUES))
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("__import__('os').system('true')", "means nothing here"),
-        ("().__class__", "means nothing here"),
-        ("gain if gain else 1", "means nothing here"),
-        ("[gain]", "means nothing here"),
-        ("'text'", "means nothing here"),
-        ("True", "means nothing here"),
-        ("lambda: 1", "means nothing here"),
-        ("gain // 2", "means nothing here"),
+        ("__import__('os').system('true')", "is not allowed here"),
+        ("().__class__", "is not allowed here"),
+        ("gain if gain else 1", "is not allowed here"),
+        ("[gain]", "is not allowed here"),
+        ("'text'", "is not allowed here"),
+        ("True", "is not allowed here"),
+        ("lambda: 1", "is not allowed here"),
+        ("gain // 2", "is not allowed here"),
         ("maxi(gain, 1)", 'unknown function "maxi"; did you mean "max"?'),
-        ("max(*gain)", "means nothing here"),
+        ("max(*gain)", "is not allowed here"),
         ("abs(gain, 2)", '"abs" takes 1 argument, found 2'),
         ("min(gain)", '"min" takes 2 arguments or more, found 1'),
         ("log(gain, 2, 3)", '"log" takes 1 or 2 arguments, found 3'),
-        ("gain +", "is no expression"),
-        ("(" * 300 + "1" + ")" * 300, "is no expression"),
+        ("gain +", "is not an expression"),
+        ("(" * 300 + "1" + ")" * 300, "is not an expression"),
         ("1 + " * 400 + "1", "at most 1000 characters"),
     ],
 )
-def test_anything_else_is_refused(text, message):
+def test_other_syntax_is_refused(text, message):
     with pytest.raises(ValueError, match=re.escape(message)):
         parse_expression(text)
 
 
-def test_unknown_names_come_with_the_nearest():
+def test_an_unknown_name_is_reported_with_the_nearest_one():
     assert parse_expression("gian + 1").unknown_name_problem(VALUES) == 'no KPI or parameter "gian"; did you mean "gain"?'
     assert parse_expression("gain + landing.error").unknown_name_problem(VALUES) == ""
 
@@ -70,12 +70,12 @@ def test_unknown_names_come_with_the_nearest():
 @pytest.mark.parametrize(
     ("text", "violation"), [("gain <= 3", 0.0), ("gain <= 2.5", 0.5), ("gain >= 5 * landing.error", 0.0), ("gain + 1 >= 6", 2.0)]
 )
-def test_constraints_say_by_how_much_they_are_not_met(text, violation):
+def test_the_violation_of_a_constraint_is_its_excess(text, violation):
     assert parse_constraint(text).violation(VALUES) == violation
 
 
 @pytest.mark.parametrize("text", ["log(0) <= 1", "min(1, lost) <= 1"])
-def test_a_side_without_a_value_violates_without_limit(text):
+def test_the_violation_is_infinite_when_a_side_is_nan(text):
     assert parse_constraint(text).violation(VALUES) == math.inf
 
 

@@ -1,4 +1,4 @@
-"""Every shipped sweep and tuning can be run: it is read, and its first run assembled."""
+"""Shipped sweeps and tunings: each is read and its first run is prepared."""
 
 import json
 
@@ -25,10 +25,10 @@ def test_a_shipped_file_can_be_run(file):
         study, settings = sweep.study, next(iter(sweep.design)).settings
         assert sweep.criteria
     assert str(study.bundle.scenario) in study.bundle.files
-    assembly = prepare(study.study_file.scenario, study.job(settings).settings)
-    assert assembly.kpis()
-    assembly.free()
+    prepared = prepare(study.study_file.scenario, study.job(settings).settings)
+    assert prepared.kpis()
+    prepared.free()
 
 
-def test_there_are_some():
+def test_sweeps_are_shipped():
     assert {file.stem for file in FILES} >= {"demo1_landing", "strider_heading_gains"}

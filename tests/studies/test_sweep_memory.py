@@ -1,4 +1,4 @@
-"""The memory of a sweep does not grow with its runs."""
+"""Memory of a sweep, which must not grow with the number of runs."""
 
 from __future__ import annotations
 
@@ -17,35 +17,35 @@ RUNS, LAST = 100_000, 100
 
 
 def proportional_kilobytes(processes):
-    """Memory of processes, where what several share counts once."""
+    """Return the memory (kB) of processes; pages shared by several count once."""
     total = 0
     for process in processes:
         try:
             lines = Path(f"/proc/{process}/smaps_rollup").read_text().splitlines()
-        except OSError:  # it has just ended
+        except OSError:  # the process has just ended
             continue
         total += sum(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
     return total
 
 
 def test_100_000_runs_take_less_than_300_megabytes(lag):
-    """Of all runs the last 100 are made; the records of the others, as long as real ones, are there already."""
+    """Only the last 100 runs are made; records of the others, of realistic length, exist already."""
     half = {"range": {"min": 1.0, "max": 2.0, "count": RUNS // 2}}
     sweep = lag.write(factors=[{"name": "y", "set": "lag.y_start", **half}, {"name": "T", "set": "lag.T", "values": [0.5, 1.0]}])
     folder = lag.folder / "runs/sweep"
     folder.mkdir(parents=True)
-    with RunStore(folder) as ledger:
+    with RunStore(folder) as run_store:
         for number, job in enumerate(Sweep.from_file(sweep).jobs()):
             if number < RUNS - LAST:
-                ledger.add(Record(job.key, {"end.value": 0.8 + 1e-6 * number}, seconds=0.0123))
+                run_store.add(Record(job.key, {"end.value": 0.8 + 1e-6 * number}, seconds=0.0123))
     process = lag.start_command("sweep", sweep, "--workers", 2)
-    most = 0
+    peak = 0
     while process.poll() is None:
-        most = max(most, proportional_kilobytes([process.pid, *descendants(process.pid)]))
+        peak = max(peak, proportional_kilobytes([process.pid, *descendants(process.pid)]))
         time.sleep(0.5)
     out, err = process.communicate()
     assert process.returncode == 0, err
     assert f"{RUNS} of {RUNS} runs, {LAST} made now" in out
-    print(f"\n{most / 1000:.0f} MB at most")
-    assert 0 < most < 300_000
+    print(f"\n{peak / 1000:.0f} MB at most")
+    assert 0 < peak < 300_000
     assert len(list(folder.iterdir())) == 6

@@ -1,4 +1,4 @@
-"""What `cosim sweep` runs and keeps."""
+"""`cosim sweep`: runs, tables and stored records."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def level(run):
 
 @pytest.fixture(scope="module")
 def crashing(make_lag):
-    """A sweep of which every twentieth run crashes, made by two workers."""
+    """Project after a sweep with two workers in which every twentieth run crashes."""
     lag = make_lag()
     levels = {f"run {run}": level(run) for run in range(RUNS)}
     sweep = lag.write(factors=[{"name": "level", "levels": levels}], success=[{"kpi": "end.value", "min": 1.0}])
@@ -28,12 +28,12 @@ def crashing(make_lag):
     return lag
 
 
-def test_exactly_the_crashing_runs_are_lost(crashing):
+def test_only_the_crashing_runs_fail(crashing):
     failed = [int(row["run"]) for row in crashing.table() if row["status"] == "failed"]
     assert (crashing.last_result.code, failed) == (1, sorted(CRASHES)), crashing.last_result.err
 
 
-def test_every_other_run_has_its_own_result(crashing):
+def test_the_other_runs_have_their_results(crashing):
     ends = {int(row["run"]): float(row["end.value"]) for row in crashing.table() if row["status"] == "ok"}
     assert ends == {run: lag_output(10, STARTS[run]) for run in range(RUNS) if run not in CRASHES}
 
@@ -41,17 +41,17 @@ def test_every_other_run_has_its_own_result(crashing):
 def test_the_signal_is_named_in_the_table_and_on_the_terminal(crashing):
     cause = "lag: fmi2DoStep failed at t = 0.05 s: the process was ended by signal 6 (SIGABRT, aborted)"
     assert crashing.table()[23]["failure"] == cause
-    assert f"1 failed, the first is run 23: {cause}" in crashing.last_result.err
+    assert f"1 failed, first run 23: {cause}" in crashing.last_result.err
 
 
-def test_a_failure_comes_with_the_command_that_shows_it_again(crashing):
+def test_a_failure_is_listed_with_the_command_that_repeats_it(crashing):
     failure = crashing.table(file="failures.csv")[1]
     scenario = crashing.folder / "lag.json"
     assert failure["command"] == f"cosim run {scenario} --set lag.y_start=1.23 --set 'lag.fault=DoStep 6 abort'"
 
 
-def test_runs_that_fail_are_no_success(crashing):
-    """y_start = 1.22 is the first that ends above 1."""
+def test_failed_runs_count_as_unsuccessful(crashing):
+    """The first run that ends above 1 has y_start = 1.22."""
     good = [run for run in range(RUNS) if run not in CRASHES and lag_output(10, STARTS[run]) >= 1.0]
     overall = crashing.table(file="success.csv")[0]
     assert (overall["runs"], overall["failed"], overall["passed"]) == ("40", "2", str(len(good)))
@@ -66,13 +66,13 @@ def test_parquet_holds_the_same_table(crashing):
     assert columns["passed"] == [row["passed"] == "1" for row in table]
 
 
-def test_one_worker_makes_the_same_bytes(crashing):
+def test_the_files_do_not_depend_on_the_number_of_workers(crashing):
     crashing.run_command("sweep", "sweep.json", "--workers", 1, "--output-dir", "serial")
     for name in ("table.csv", "aggregates.csv", "success.csv"):
         assert (crashing.folder / "serial" / name).read_bytes() == (crashing.folder / "runs/sweep" / name).read_bytes(), name
 
 
-def test_what_is_done_is_not_done_again_and_what_is_new_is_added(lag):
+def test_only_new_points_run_in_a_second_call(lag):
     few = {"name": "T", "set": "lag.T", "values": [0.5, 1.0]}
     lag.run_command("sweep", lag.write(factors=[few]))
     before = lag.records()
@@ -82,18 +82,18 @@ def test_what_is_done_is_not_done_again_and_what_is_new_is_added(lag):
     assert "3 of 3 runs, 1 made now" in done.out
 
 
-def test_a_run_that_several_points_have_is_said_to_be_one(lag):
+def test_shared_runs_are_reported(lag):
     factors = [{"name": "y", "set": "lag.y_start", "range": {"min": 1, "max": 2}, "integer": True}]
     content = {"factors": factors, "design": {"kind": "sobol", "runs": 8}, "success": [{"kpi": "end.value", "max": 1.5}]}
     done = lag.run_command("sweep", lag.write(**content))
-    assert "2 of 8 runs are distinct; intervals are those of so many" in done.out
+    assert "2 of 8 runs are distinct; only these count in the intervals" in done.out
     assert "2 of the 8 runs are distinct" in (lag.folder / "runs/sweep/sweep.html").read_text()
     overall = lag.table(file="success.csv")[0]
     assert (overall["runs"], overall["distinct"], overall["rate"]) == ("8", "2", "0.5")
 
 
-def test_a_run_without_a_kpi_of_the_criteria_is_no_success(lag):
-    """Runs that end above 1 have another KPI, the first one too."""
+def test_a_run_without_a_kpi_of_the_criteria_is_unsuccessful(lag):
+    """Runs that end above 1, as does the first one, have another KPI."""
     (lag.folder / "own.py").write_text(
         "def own(result):\n    y = result['lag.y'][-1]\n    return {'low' if y < 1 else 'high': y}\n"
     )
@@ -103,7 +103,7 @@ def test_a_run_without_a_kpi_of_the_criteria_is_no_success(lag):
     assert [(row["passed"], bool(row["own.low"])) for row in lag.table()] == [("0", False), ("1", True), ("0", False)]
 
 
-def test_tables_and_maps_of_an_earlier_call_do_not_stay(lag):
+def test_tables_and_maps_of_an_earlier_call_are_removed(lag):
     pytest.importorskip("pyarrow")
     factors = [{"name": name, "set": f"lag.{name}", "values": [1, 2]} for name in ("T", "y_start")]
     maps = [{"x": "T", "y": "y_start"}, {"x": "y_start", "y": "T"}]
@@ -115,19 +115,19 @@ def test_tables_and_maps_of_an_earlier_call_do_not_stay(lag):
     assert found == {"success_map.png", "success_map.svg", "success_map_of_mine.png"}
 
 
-def test_damaged_records_are_counted_and_made_again(lag):
+def test_damaged_records_are_counted_and_their_runs_repeated(lag):
     file = lag.write(factors=[{"name": "y", "set": "lag.y_start", "values": [1, 2, 3]}])
     lag.run_command("sweep", file)
     journal = lag.folder / "runs/sweep/journal.jsonl"
     lines = journal.read_bytes().splitlines(keepends=True)
     journal.write_bytes(lines[0] + b"\0" * 10 + lines[1][10:] + lines[2])
     done = lag.run_command("sweep", file)
-    assert "unreadable lines in runs/sweep/journal.jsonl, whose runs are made again: 1" in done.err
+    assert "runs/sweep/journal.jsonl: 1 unreadable line; the missing runs are repeated" in done.err
     assert "3 of 3 runs, 1 made now" in done.out
 
 
 @pytest.mark.long
-def test_another_scenario_makes_other_runs(lag):
+def test_a_changed_scenario_is_run_again(lag):
     sweep = lag.write(factors=[{"name": "T", "set": "lag.T", "values": [0.5]}])
     lag.run_command("sweep", sweep)
     content = json.loads((lag.folder / "lag.json").read_text())
@@ -137,20 +137,20 @@ def test_another_scenario_makes_other_runs(lag):
 
 
 @pytest.mark.long
-def test_failures_are_kept_until_they_are_to_be_tried_again(lag):
+def test_failed_runs_are_repeated_only_with_retry_failed(lag):
     sweep = lag.write(factors=[{"name": "fault", "set": "lag.fault", "values": ["", SEGV_ORDER]}])
     for words, made in (((), 2), ((), 2), (("--retry-failed",), 3)):
         assert lag.run_command("sweep", sweep, *words).code == 1
         assert len(lag.records()) == made
 
 
-def test_a_run_that_takes_too_long_is_ended_and_the_others_are_not(lag):
+def test_only_a_run_that_exceeds_its_deadline_is_ended(lag):
     levels = {"good": {}, "slow": {"lag.fault": "DoStep 6 sleep"}, "well": {"lag.T": 1.0}}
     lag.run_command("sweep", lag.write(factors=[{"name": "level", "levels": levels}], deadline=1.0))
     assert [row["failure"] for row in lag.table()] == ["", "the run did not end within 1 s", ""]
 
 
-def test_statistics_are_told_apart_by_the_levels_of_each_factor(lag):
+def test_statistics_are_grouped_by_the_levels_of_each_factor(lag):
     """y ends at 0.8^10 y_start for T = 0.05: below 0.2 for a start of 1 only."""
     starts = {"name": "start", "set": "lag.y_start", "values": [1.0, 3.0]}
     times = {"name": "T", "set": "lag.T", "range": {"min": 0.05, "max": 0.5, "count": 2, "scale": "log"}}
@@ -161,6 +161,6 @@ def test_statistics_are_told_apart_by_the_levels_of_each_factor(lag):
     assert math.isclose(means["3.0", ""], (lag_output(10, 3.0, 0.05) + lag_output(10, 3.0, 0.5)) / 2)
 
 
-def test_a_pointer_changes_what_is_run(lag):
+def test_a_json_pointer_changes_the_scenario(lag):
     lag.run_command("sweep", lag.write(factors=[{"name": "stop", "set": "/stop_time", "values": [0.1, 0.3]}]))
     assert [float(row["end.value"]) for row in lag.table()] == [lag_output(10), lag_output(30)]

@@ -1,4 +1,4 @@
-"""Sweeps over a lag that crashes on order."""
+"""Projects with sweeps over a first-order lag FMU with injectable faults."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import Any
 
 from fault_fmu import FaultFmus
 
-from cosim.cli import cli, run_guarded
+from cosim.cli import CommandLine, cli, run_guarded
 
 KPIS = [{"name": "end", "python": "cosim.kpis:final", "arguments": {"signal": "lag.y"}}]
 SEGV_ORDER = "DoStep 6 segv"
@@ -33,14 +33,14 @@ class CommandResult:
 
 @dataclass
 class LagProject:
-    """A folder with a scenario around the FMU, and commands in it; `done` is what came of the last one."""
+    """Folder with a scenario around the lag FMU; runs commands in this folder."""
 
     folder: Path
     last_result: CommandResult | None = None
 
     @classmethod
     def create(cls, folder: Path, library: Path, **more: Any) -> LagProject:
-        """`more` replaces keys of the scenario."""
+        """Create the FMU and its scenario in `folder`; `more` replaces keys of the scenario."""
         FaultFmus({2: library}, folder)(2)
         content = {"name": "lag", "stop_time": 0.1, "step_size": 0.01, "components": {"lag": {"fmu": "lag.fmu"}}}
         content |= {"record": {"signals": ["lag.y"]}, "kpis": KPIS, **more}
@@ -48,30 +48,31 @@ class LagProject:
         return cls(folder)
 
     def write(self, name: str = "sweep", **content: Any) -> Path:
-        """A sweep or tuning file of the scenario."""
+        """Write a sweep or tuning file of the scenario and return its path."""
         file = self.folder / f"{name}.json"
         file.write_text(json.dumps({"name": name, "scenario": "lag.json", **content}))
         return file
 
     def run_command(self, *words: object) -> CommandResult:
-        """A command in this process: the imports are done."""
+        """Run a command in this process, where all modules are imported already."""
         out, err = StringIO(), StringIO()
         with chdir(self.folder), redirect_stdout(out), redirect_stderr(err):
-            code = run_guarded(lambda: cli.main([*map(str, words)], standalone_mode=False))
+            code = run_guarded(lambda: cli.main([*map(str, words)], standalone_mode=False), CommandLine())
         self.last_result = CommandResult(code, out.getvalue(), err.getvalue())
         return self.last_result
 
     def start_command(self, *words: object) -> subprocess.Popen[str]:
-        """A command that goes on in a process of its own while the test does something to it."""
+        """Start a command in a process of its own."""
         command = [sys.executable, "-m", "cosim", *map(str, words)]
         return subprocess.Popen(command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
     def table(self, folder: str = "runs/sweep", file: str = "table.csv") -> list[dict[str, str]]:
+        """Read a CSV file of the results as one dictionary per row."""
         with (self.folder / folder / file).open(newline="") as text:
             return list(csv.DictReader(text))
 
     def records(self, folder: str = "runs/sweep") -> list[dict[str, Any]]:
-        """What the ledger holds; none while there is none."""
+        """Read the finished runs of a study; empty before the first one."""
         file = self.folder / folder / "journal.jsonl"
         lines = file.read_bytes().split(b"\n")[:-1] if file.exists() else []
         return [json.loads(line) for line in lines]
@@ -81,7 +82,7 @@ MakeLagProject = Callable[..., LagProject]
 
 
 def descendants(process: int) -> list[int]:
-    """Ids of all processes below one, the nearest first."""
+    """Return the ids of all descendants of a process, parents before children."""
     found = []
     for path in Path(f"/proc/{process}/task").glob("*/children"):
         for child in map(int, path.read_text().split()):
@@ -90,6 +91,7 @@ def descendants(process: int) -> list[int]:
 
 
 def is_alive(process: int) -> bool:
+    """Return whether a process exists and is not a zombie."""
     try:
         os.kill(process, 0)
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"

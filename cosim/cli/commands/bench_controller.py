@@ -1,4 +1,4 @@
-"""`cosim bench-controller`: does a controller fit, does it fly, and is it better than the shipped one?"""
+"""`cosim bench-controller`: benchmark of a controller against the shipped one."""
 
 from __future__ import annotations
 
@@ -12,35 +12,36 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...core.errors import InputError, Problem
+from ...core.processors import available_processors
 from .. import supervision
 from ..bench_trial import ControllerTrial, TrialResult, run_trials
-from .regress import EXIT_CODE_SEVERITY, available_processors, check_unique_names, default_folder, find_scenario_files
+from .regress import EXIT_CODE_SEVERITY, check_unique_names, default_folder, find_scenario_files
 
 if TYPE_CHECKING:
     from ...studies.controller_bench.score import KpiComparison
 
-#: what the child process that looks at the candidate hands over to its parent
+#: file in which the child process that examines the candidate returns its results
 _PREPARED_FILE = "bench.json"
 
 
 @click.command()
 @click.argument("controller")
 @click.option(
-    "--role", required=True, help="Which place it takes: usv_autopilot, uav_position, ...; or the path of a role's JSON."
+    "--role", required=True, help="Role of the controller: usv_autopilot, uav_position, ..., or the path of a role's JSON file."
 )
-@click.option("--set", "settings", multiple=True, metavar="NAME=value", help="A parameter of the controller.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=value", help="Set a parameter of the controller.")
 @click.option(
     "--scenarios",
     multiple=True,
     metavar="DIR|SCENARIO",
     type=click.Path(path_type=Path),
-    help="Where it is tried; default: the folder scenarios/ here, else the shipped one.",
+    help="Scenarios to run; default: the folder scenarios/ here, else the shipped ones.",
 )
 @click.option(
-    "--output-dir", type=click.Path(path_type=Path), default=Path("runs/bench"), show_default=True, help="Where results go."
+    "--output-dir", type=click.Path(path_type=Path), default=Path("runs/bench"), show_default=True, help="Folder for the results."
 )
-@click.option("--jobs", type=click.IntRange(min=1), help="How many scenarios run at a time; default: one per processor.")
-@click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
+@click.option("--jobs", type=click.IntRange(min=1), help="Number of scenarios at a time; default: one per processor.")
+@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON.")
 def command(
     controller: str,
     role: str,
@@ -50,11 +51,11 @@ def command(
     jobs: int | None,
     as_json: bool,
 ) -> int:
-    """Put CONTROLLER in the place of the shipped one in every scenario that has such a place, and fly them all.
+    """Benchmark CONTROLLER in every scenario with its role.
 
-    CONTROLLER is an FMU, my.py:Class, my.mo:Model or a nested system's JSON. Its variables are examined first. The table shows
-    its KPIs beside those of the shipped controller and of its last run here. Ends with 3 when a check was not met, 1 when a
-    component failed, 2 when the controller does not fit.
+    CONTROLLER is an FMU, my.py:Class, my.mo:Model or the JSON file of a nested system. It replaces the shipped controller. The
+    tables compare its KPIs with those of the shipped controller and of its last run here. Exit code 0: all checks passed; 1: a
+    component failed; 2: the controller's variables do not fit the role; 3: a check failed.
     """
     from ...scenario.nested_systems import parse_settings
     from ...studies.controller_bench.candidate import parse_source
@@ -62,27 +63,29 @@ def command(
     candidate = parse_source(controller)
     files = list(find_scenario_files(scenarios or [default_folder()]))
     check_unique_names(files)
-    own = output_dir / Path(role).stem / candidate.name
+    candidate_folder = output_dir / Path(role).stem / candidate.name
     code = supervision.run_supervised_command(
-        lambda: _write_scenarios(controller, role, files, own, parse_settings(settings)), "run", lambda outcome: None
+        lambda: _write_scenarios(controller, role, files, candidate_folder, parse_settings(settings)),
+        "run",
+        lambda _outcome: None,
     )
     if code:
         return code
-    trials, notes = _read_trials(own, output_dir / "shipped")
-    flown = []
-    for flight in run_trials(trials, jobs or available_processors()):
-        flown.append(flight)
+    trials, notes = _read_trials(candidate_folder, output_dir / "shipped")
+    results = []
+    for result in run_trials(trials, jobs or available_processors()):
+        results.append(result)
         if not as_json:
-            _print_trial(flight, candidate.name)
+            _print_trial(result, candidate.name)
     if as_json:
-        _print_json(candidate.name, role, flown, notes)
+        _print_json(candidate.name, role, results, notes)
     else:
-        _print_summary(flown, notes)
-    return min((flight.outcome.code for flight in flown), key=EXIT_CODE_SEVERITY.index)
+        _print_summary(results, notes)
+    return min((result.outcome.code for result in results), key=EXIT_CODE_SEVERITY.index)
 
 
-def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], own: Path, settings: Mapping[str, Any]) -> int:
-    """Examine the candidate and write the scenarios with it; in a child process, since its code is run."""
+def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], folder: Path, settings: Mapping[str, Any]) -> int:
+    """Examine the candidate and write the scenarios with it; called in a child process, since it runs the candidate's code."""
     from ...results.files import write_json
     from ...studies.controller_bench.candidate import interface_problems, parse_source, read_interface
     from ...studies.controller_bench.role import read_role
@@ -90,65 +93,65 @@ def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], own
 
     role, candidate = read_role(role_name), parse_source(controller)
     variables = read_interface(candidate)
-    if misfits := interface_problems(role, variables, settings):
-        raise InputError([Problem(problem.message, controller) for problem in misfits])
-    rmtree(own / "scenarios", ignore_errors=True)
+    if problems := interface_problems(role, variables, settings):
+        raise InputError([Problem(problem.message, controller) for problem in problems])
+    rmtree(folder / "scenarios", ignore_errors=True)
     written, notes = [], []
     for file in files:
-        transplant = ControllerSubstitution(role, candidate, variables, file, settings)
-        if path := transplant.write((own / "scenarios").absolute()):
+        substitution = ControllerSubstitution(role, candidate, variables, file, settings)
+        if path := substitution.write((folder / "scenarios").absolute()):
             written.append({"file": path, "original": file})
-            notes += [f"{file.stem}: {note}" for note in dict.fromkeys(transplant.notes)]
+            notes += [f"{file.stem}: {note}" for note in dict.fromkeys(substitution.notes)]
     if not written:
-        raise InputError(f'no scenario has a place for the role "{role.name}": {role.description}')
-    write_json({"scenarios": written, "notes": notes}, own / _PREPARED_FILE)
+        raise InputError(f'no scenario has a component with the role "{role.name}": {role.description}')
+    write_json({"scenarios": written, "notes": notes}, folder / _PREPARED_FILE)
     return 0
 
 
-def _read_trials(own: Path, shipped: Path) -> tuple[list[ControllerTrial], list[str]]:
-    """The scenarios that were written, and the notes on what was left out of them."""
-    prepared = json.loads((own / _PREPARED_FILE).read_text(encoding="utf-8"))
+def _read_trials(folder: Path, shipped: Path) -> tuple[list[ControllerTrial], list[str]]:
+    """Return the trials of the written scenarios, and the notes on entries removed from these."""
+    prepared = json.loads((folder / _PREPARED_FILE).read_text(encoding="utf-8"))
     trials = [
         ControllerTrial(
-            Path(each["file"]), Path(each["original"]), own / Path(each["file"]).stem, shipped / Path(each["file"]).stem
+            Path(each["file"]), Path(each["original"]), folder / Path(each["file"]).stem, shipped / Path(each["file"]).stem
         )
         for each in prepared["scenarios"]
     ]
     return trials, prepared["notes"]
 
 
-def _print_trial(flight: TrialResult, candidate: str) -> None:
+def _print_trial(result: TrialResult, candidate: str) -> None:
     from ..bench_table import print_comparison
 
-    word = click.style("passed", fg="green") if flight.outcome.code == 0 else click.style("FAILED", fg="red", bold=True)
-    click.echo(f"\n{word}  {flight.name}  {flight.outcome.seconds:.1f} s")
-    for line in flight.outcome.details:
+    word = click.style("passed", fg="green") if result.outcome.code == 0 else click.style("FAILED", fg="red", bold=True)
+    click.echo(f"\n{word}  {result.name}  {result.outcome.seconds:.1f} s")
+    for line in result.outcome.details:
         click.echo(f"        {line}")
-    print_comparison(flight.rows(), candidate)
+    print_comparison(result.rows(), candidate)
 
 
-def _print_summary(flown: Sequence[TrialResult], notes: Sequence[str]) -> None:
+def _print_summary(results: Sequence[TrialResult], notes: Sequence[str]) -> None:
     for note in notes:
         click.echo(f"note: {note}")
-    better, worse = (sum(row.against_shipped == word for each in flown for row in each.rows()) for word in ("better", "worse"))
-    failed = sum(flight.outcome.code != 0 for flight in flown)
+    better, worse = (sum(row.against_shipped == word for each in results for row in each.rows()) for word in ("better", "worse"))
+    failed = sum(result.outcome.code != 0 for result in results)
     click.echo(
-        f"\n{len(flown)} scenarios, {failed} failed; {better} KPIs better and {worse} worse than with the shipped controller"
+        f"\n{len(results)} scenarios, {failed} failed; {better} KPIs better and {worse} worse than with the shipped controller"
     )
 
 
-def _print_json(candidate: str, role: str, flown: Sequence[TrialResult], notes: Sequence[str]) -> None:
+def _print_json(candidate: str, role: str, results: Sequence[TrialResult], notes: Sequence[str]) -> None:
     from ...results.files import to_json_types
 
     scenarios = [
         {
-            "name": flight.name,
-            "code": flight.outcome.code,
-            "seconds": flight.outcome.seconds,
-            "problems": flight.outcome.details,
-            "kpis": [_row_as_json(row) for row in flight.rows()],
+            "name": result.name,
+            "code": result.outcome.code,
+            "seconds": result.outcome.seconds,
+            "problems": result.outcome.details,
+            "kpis": [_row_as_json(row) for row in result.rows()],
         }
-        for flight in flown
+        for result in results
     ]
     content = {"candidate": candidate, "role": role, "scenarios": scenarios, "notes": notes}
     click.echo(json.dumps(to_json_types(content), indent=2))

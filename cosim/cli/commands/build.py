@@ -1,4 +1,4 @@
-"""`cosim build`."""
+"""`cosim build`: export of controllers and plants as FMUs."""
 
 from __future__ import annotations
 
@@ -15,35 +15,39 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("sources", nargs=-1, type=click.Path(path_type=Path))
-@click.option("--check", is_flag=True, help="Build nothing; fail when fmus/ is not what its sources say.")
-@click.option("--output", type=click.Path(path_type=Path), help="Export one source, which may lie anywhere, to this FMI 2.0 FMU.")
+@click.option("--check", is_flag=True, help="Build nothing; check that fmus/ is up to date with its sources.")
+@click.option("--output", type=click.Path(path_type=Path), help="Export a single source, in any folder, to this FMI 2.0 FMU.")
 @click.option(
-    "--modelica-compiler", type=click.Choice(["cosim", "omc"]), default="cosim", help="For --output: our own, or OpenModelica."
+    "--modelica-compiler",
+    type=click.Choice(["cosim", "omc"]),
+    default="cosim",
+    help="Compiler of Modelica for --output: that of cosim, or OpenModelica.",
 )
 def command(sources: tuple[Path, ...], check: bool, output: Path | None, modelica_compiler: str) -> int:
-    """Export SOURCES (default: all controllers and plants) to fmus/ and fmus/fmi3/, and write fmus/manifest.json.
+    """Export controllers and plants to fmus/.
 
-    A source is a .mo or .py file, or the folder of a controller in C. With --output it may be one of your own; then
-    --modelica-compiler omc exports a model that needs the Modelica Standard Library or more than our own compiler knows
-    with OpenModelica (which must be installed; written from its documentation, not tried with it).
+    SOURCES are .mo or .py files, or folders of controllers in C; default: all controllers and plants. The FMUs are written to
+    fmus/ (FMI 2.0) and fmus/fmi3/, and their hashes to fmus/manifest.json. --output exports a single source of your own. There,
+    --modelica-compiler omc exports models that need the Modelica Standard Library or features that cosim's own compiler lacks;
+    OpenModelica must be installed (this was written from its documentation and not tried with it).
 
-    Needs a C compiler and the extra "build". --check compares the hashes of all sources with the manifest and the behaviour
-    of freshly built FMUs with those in fmus/ (exit code 3 when they differ).
+    Requires a C compiler and the extra "build". --check compares the hashes of all sources with the manifest, and the behaviour
+    of newly built FMUs with those in fmus/ (exit code 3 if they differ).
     """
     from ...core import resources
     from ...export.build import build
-    from ...export.build_check import check_fmus as check_fmus
+    from ...export.build_check import check_fmus
 
     root = resources.root()
     if check:
         if problems := check_fmus(root):
             raise CheckError("\n".join(map(str, problems)))
-        click.echo("every FMU is what its source says")
+        click.echo("every FMU is up to date with its source")
         return 0
     if output is not None:
         _build_one(sources, output, modelica_compiler)
     elif modelica_compiler != "cosim":
-        raise InputError("--modelica-compiler omc needs --output: fmus/ holds what our own compiler makes")
+        raise InputError("--modelica-compiler omc requires --output: the FMUs in fmus/ are built by the compiler of cosim")
     else:
         build(list(sources) or None, root, _print_built)
     return 0
@@ -54,7 +58,7 @@ def _build_one(sources: tuple[Path, ...], output: Path, modelica_compiler: str) 
     from ...export.modelica.frontend.openmodelica import export_with_omc
 
     if len(sources) != 1:
-        raise InputError(f"--output needs one source, found {len(sources)}")
+        raise InputError(f"--output requires one source, found {len(sources)}")
     if not sources[0].exists():
         raise InputError(Problem("does not exist", str(sources[0])))
     if modelica_compiler == "omc":
@@ -70,5 +74,5 @@ def _print_built(built: BuildResult) -> None:
 
 
 def _relative_to_cwd(source: Path) -> Path:
-    """A path as the user would write it, where that is shorter."""
+    """Return a path relative to the working directory if it is inside it."""
     return source.relative_to(Path.cwd()) if source.is_relative_to(Path.cwd()) else source

@@ -1,4 +1,4 @@
-"""`cosim doctor`: what is installed and active here; it says nothing that it did not look up or try."""
+"""`cosim doctor`: report on packages, tools and sandboxes; everything reported has been looked up or tried."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from ...core.processors import available_processors
+
 if TYPE_CHECKING:
     from packaging.requirements import Requirement
 
@@ -22,7 +24,7 @@ DISTRIBUTION = "fmi-cosim"
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing: where it belongs, its name and what was found; "missing" hurts only who needs it, "broken" everybody."""
+    """Finding about one item; "missing" affects optional features, "broken" affects all commands."""
 
     section: str
     name: str
@@ -31,11 +33,11 @@ class Finding:
 
 
 @click.command()
-@click.option("--json", "as_json", is_flag=True, help="A JSON list of findings instead of text.")
+@click.option("--json", "as_json", is_flag=True, help="Print a JSON list of findings.")
 def command(as_json: bool) -> int:
-    """Print what is installed, what can be used and what holds for this process.
+    """Print which packages, tools and sandboxes are available on this machine.
 
-    Exit code 0, or 1 when something that is required is broken.
+    Exit code 0: all required parts work; 1: a required part is broken.
     """
     findings = [*_host_findings(), *_package_findings(), *_tool_findings(), *_sandbox_findings()]
     if as_json:
@@ -64,13 +66,9 @@ def _host_findings() -> Iterator[Finding]:
     yield Finding("cosim", "processors", f"{available_processors()} of {os.cpu_count()} may be used")
     yield _executor_finding()
     cache = cache_directory()
-    there = next(path for path in (cache, *cache.parents) if path.exists())
-    usable = os.access(there, os.W_OK)
-    yield Finding("cosim", "cache", f"{cache}{'' if usable else ' cannot be written'}", "ok" if usable else "missing")
-
-
-def available_processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    existing = next(path for path in (cache, *cache.parents) if path.exists())
+    writable = os.access(existing, os.W_OK)
+    yield Finding("cosim", "cache", f"{cache}{'' if writable else ' cannot be written'}", "ok" if writable else "missing")
 
 
 def _executor_finding() -> Finding:
@@ -84,42 +82,42 @@ def _executor_finding() -> Finding:
 
 
 def _package_findings() -> Iterator[Finding]:
-    """Requirements as the installed distribution states them, and which extras are complete."""
+    """Yield findings about the requirements of the installed distribution and about its extras."""
     from packaging.requirements import Requirement
 
     try:
-        own = metadata.distribution(DISTRIBUTION)
+        distribution = metadata.distribution(DISTRIBUTION)
     except metadata.PackageNotFoundError:
         yield Finding("required packages", DISTRIBUTION, "not installed, so its requirements are unknown", "broken")
         return
-    requirements = [Requirement(text) for text in own.requires or ()]
+    requirements = [Requirement(text) for text in distribution.requires or ()]
     for requirement in requirements:
         if requirement.marker is None or requirement.marker.evaluate({"extra": ""}):
-            found, fits = _installed_version(requirement)
-            yield Finding("required packages", requirement.name, found, "ok" if fits else "broken")
-    for extra in own.metadata.get_all("Provides-Extra") or ():
+            version, fits = _installed_version(requirement)
+            yield Finding("required packages", requirement.name, version, "ok" if fits else "broken")
+    for extra in distribution.metadata.get_all("Provides-Extra") or ():
         yield _extra_finding(extra, requirements)
 
 
 def _extra_finding(extra: str, requirements: Iterable[Requirement]) -> Finding:
-    """Other extras that this one names are listed on their own."""
-    only = [r for r in requirements if r.marker and r.marker.evaluate({"extra": extra}) and not r.marker.evaluate({"extra": ""})]
-    named = [r for r in only if r.name != DISTRIBUTION]
-    lacking = [f"{r.name}: {_installed_version(r)[0]}" for r in named if not _installed_version(r)[1]]
-    if lacking:
-        return Finding("extras", extra, f"{'; '.join(lacking)} (pip install '{DISTRIBUTION}[{extra}]')", "missing")
-    return Finding("extras", extra, ", ".join(f"{r.name} {_installed_version(r)[0]}" for r in named))
+    """Return the finding about an extra; other extras that it includes have their own findings."""
+    own = [r for r in requirements if r.marker and r.marker.evaluate({"extra": extra}) and not r.marker.evaluate({"extra": ""})]
+    packages = [r for r in own if r.name != DISTRIBUTION]
+    missing = [f"{r.name}: {_installed_version(r)[0]}" for r in packages if not _installed_version(r)[1]]
+    if missing:
+        return Finding("extras", extra, f"{'; '.join(missing)} (pip install '{DISTRIBUTION}[{extra}]')", "missing")
+    return Finding("extras", extra, ", ".join(f"{r.name} {_installed_version(r)[0]}" for r in packages))
 
 
 def _installed_version(requirement: Requirement) -> tuple[str, bool]:
-    """The version that is installed, and whether it is one that is asked for."""
+    """Return the installed version, and whether it satisfies the requirement."""
     try:
         version = metadata.version(requirement.name)
     except metadata.PackageNotFoundError:
         return "not installed", False
     if requirement.specifier.contains(version, prereleases=True):
         return version, True
-    return f"{version}, needed is {requirement.specifier}", False
+    return f"{version}, required is {requirement.specifier}", False
 
 
 def _tool_findings() -> Iterator[Finding]:
@@ -134,30 +132,30 @@ def _tool_findings() -> Iterator[Finding]:
 
 
 def _program_finding(name: str, program: str, option: str) -> Finding:
-    """A program that says its version."""
+    """Return the finding about a program: the first line of what it prints about its version."""
     path = shutil.which(program)
     if path is None:
         return Finding("tools", name, f"no program {program}", "missing")
     try:
-        said = subprocess.run([path, option], capture_output=True, text=True, check=True, timeout=5)  # noqa: S603
+        done = subprocess.run([path, option], capture_output=True, text=True, check=True, timeout=5)  # noqa: S603
     except (OSError, subprocess.SubprocessError) as error:
         return Finding("tools", name, f"{path} does not work: {error}", "missing")
-    return Finding("tools", name, said.stdout.partition("\n")[0].strip())
+    return Finding("tools", name, done.stdout.partition("\n")[0].strip())
 
 
 def _sandbox_findings() -> Iterator[Finding]:
     from ...process.sandbox import find_available_sandboxes, landlock, probe_restrictions
 
-    offered = find_available_sandboxes()
-    if offered.landlock:
-        kinds = ["files", *(["TCP"] if offered.landlock >= landlock.NETWORK_ABI else [])]
-        yield Finding("sandbox", "Landlock", f"version {offered.landlock}: can confine {', '.join(kinds)}; not UDP")
+    available = find_available_sandboxes()
+    if available.landlock:
+        kinds = ["files", *(["TCP"] if available.landlock >= landlock.NETWORK_ABI else [])]
+        yield Finding("sandbox", "Landlock", f"version {available.landlock}: can confine {', '.join(kinds)}; not UDP")
     else:
         yield Finding("sandbox", "Landlock", "not in this kernel (Linux 5.13 or newer)", "missing")
-    if offered.bubblewrap:
-        yield Finding("sandbox", "bubblewrap", f"{offered.bubblewrap} works: --sandbox strict can be used")
+    if available.bubblewrap:
+        yield Finding("sandbox", "bubblewrap", f"{available.bubblewrap} works: --sandbox strict can be used")
     else:
-        yield Finding("sandbox", "bubblewrap", "no program bwrap that works here, so no --sandbox strict", "missing")
+        yield Finding("sandbox", "bubblewrap", "no working program bwrap; --sandbox strict cannot be used", "missing")
     yield from (
         Finding("this process", name.replace("_", " "), _yes_or_no(value)) for name, value in asdict(probe_restrictions()).items()
     )

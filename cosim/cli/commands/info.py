@@ -1,4 +1,4 @@
-"""`cosim info`."""
+"""`cosim info`: properties and variables of an FMU."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from ...core.component import Variable
 
 @click.command()
 @click.argument("fmu", type=click.Path(path_type=Path))
-@click.option("--locals", "with_locals", is_flag=True, help="List local variables too.")
+@click.option("--locals", "with_locals", is_flag=True, help="Also list local variables.")
 def command(fmu: Path, with_locals: bool) -> None:
-    """Print what FMU says about itself: version, capabilities, platforms and variables."""
+    """Print the properties and variables of FMU: version, capabilities, platforms, inputs, outputs and parameters."""
     from ...components.fmi import FmuFile
 
     file = FmuFile(fmu)
     about = file.description
     experiment = about.default_experiment
-    abilities = {
+    capabilities = {
         "state can be saved and restored": about.has_state,
         "one instance per process": about.once_per_process,
         "needs an external tool": about.needs_execution_tool,
@@ -32,7 +32,7 @@ def command(fmu: Path, with_locals: bool) -> None:
         "platforms": ", ".join(about.platforms),
         "step size": f"{float(experiment.step_size):g} s" if experiment.step_size else "",
         "stop time": f"{float(experiment.stop_time):g} s" if experiment.stop_time else "",
-        "capabilities": ", ".join(name for name, has in abilities.items() if has),
+        "capabilities": ", ".join(name for name, has in capabilities.items() if has),
         "sha256": file.sha256,
     }
     for name, value in rows.items():

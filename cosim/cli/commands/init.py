@@ -1,4 +1,4 @@
-"""`cosim init`: a project of one's own, with everything that keeps a controller good."""
+"""`cosim init`: a new project with a controller, a scenario, its reference, tests and CI."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ...core.version import __version__
 from ...studies.regression import Regression
 
 _TEMPLATES = Path(__file__).parents[1] / "templates"
-#: file of a new project -> what it is made from
+#: template of each file of a new project
 _PROJECT_FILES = {
     "README.md": _TEMPLATES / "project/README.md",
     "requirements.txt": _TEMPLATES / "project/requirements.txt",
@@ -35,11 +35,11 @@ _PLANT = "fmus/strider.fmu"
 
 @click.command()
 @click.argument("directory", type=click.Path(path_type=Path))
-@click.option("--force", is_flag=True, help="Overwrite files.")
+@click.option("--force", is_flag=True, help="Overwrite existing files.")
 def command(directory: Path, force: bool) -> int:
-    """Make a project in DIRECTORY that passes at once: a controller, a scenario, its reference, tests, a CI workflow.
+    """Create a project in DIRECTORY with a controller, a scenario, its reference, tests and CI.
 
-    The reference is made by flying the scenario.
+    Runs the scenario to write the reference. The new project passes its tests.
     """
     present = [directory / name for name in (*_PROJECT_FILES, _PLANT) if (directory / name).exists()]
     if present and not force:
@@ -56,12 +56,12 @@ def command(directory: Path, force: bool) -> int:
 
 
 def _write_project(directory: Path) -> None:
-    marks = {"README.md": ("NAME", directory.resolve().name), "requirements.txt": ("COSIM", pip_requirement(pip_origin()))}
+    placeholders = {"README.md": ("NAME", directory.resolve().name), "requirements.txt": ("COSIM", pip_requirement(pip_origin()))}
     for file, template in _PROJECT_FILES.items():
         path = directory / file
         text = template.read_text(encoding="utf-8")
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text.replace(*marks[file]) if file in marks else text, encoding="utf-8")
+        path.write_text(text.replace(*placeholders[file]) if file in placeholders else text, encoding="utf-8")
         click.echo(path)
     plant = directory / _PLANT
     plant.parent.mkdir(exist_ok=True)
@@ -70,13 +70,13 @@ def _write_project(directory: Path) -> None:
 
 
 def pip_origin() -> Mapping[str, Any] | None:
-    """Where pip got this cosim from, as its direct_url.json says (PEP 610); None when from an index, or not by pip."""
-    found = (made.read_text("direct_url.json") for made in distributions(name="fmi-cosim"))  # a clone has a record of its own
-    return next((json.loads(text) for text in found if text), None)
+    """Return the origin of the installed cosim from its direct_url.json (PEP 610); None if it is from an index."""
+    texts = (distribution.read_text("direct_url.json") for distribution in distributions(name="fmi-cosim"))
+    return next((json.loads(text) for text in texts if text), None)  # a checkout is a second distribution, without origin
 
 
 def pip_requirement(source: Mapping[str, Any] | None) -> str:
-    """The line by which pip gets the same cosim again."""
+    """Return the line of requirements.txt by which pip installs the same cosim again."""
     if source is None:
         return f"fmi-cosim=={__version__}"
     url = source["url"]

@@ -1,4 +1,4 @@
-"""`cosim new`: a controller of one's own that runs at once, to be changed from there."""
+"""`cosim new`: a new controller with a scenario in which it runs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
-#: what the templates are called: they are valid programs, in which a new controller's name replaces this one
+#: name of the controller in the templates, as a file and as a class; the new controller's name replaces it
 _SNAKE, _CAMEL = "speed_keeper", "SpeedKeeper"
 _MODELICA_TYPES = ("Real", "Integer", "Boolean", "String")
 _FIGURES_FILE, _PLANT = "pictures.py", "fmus/strider.fmu"
@@ -25,7 +25,14 @@ _FIGURES_FILE, _PLANT = "pictures.py", "fmus/strider.fmu"
 
 @dataclass(frozen=True, slots=True)
 class Language:
-    """Where a language's template lies, and what in it a scenario (`key`: `component`) and `cosim build` have to name."""
+    """Template of a controller in one language.
+
+    Attributes:
+        folder: folder of the template.
+        key: key of the component's source in a scenario.
+        component: value of that key.
+        source: source for `cosim build`.
+    """
 
     folder: Path
     key: str
@@ -42,18 +49,23 @@ LANGUAGES = {
 
 @click.group()
 def command() -> None:
-    """Begin something of your own."""
+    """Create a controller with a scenario in which it runs."""
 
 
 @command.command()
 @click.argument("name")
-@click.option("--language", required=True, help=f"{', '.join(LANGUAGES)}.")
-@click.option("--directory", type=click.Path(path_type=Path), default=Path(), help="Where the folder NAME goes; default: here.")
-@click.option("--force", is_flag=True, help="Overwrite files.")
+@click.option("--language", required=True, help=f"Language of the controller: {', '.join(LANGUAGES)}.")
+@click.option(
+    "--directory",
+    type=click.Path(path_type=Path),
+    default=Path(),
+    help="Parent of the folder NAME; default: the working directory.",
+)
+@click.option("--force", is_flag=True, help="Overwrite existing files.")
 def controller(name: str, language: str, directory: Path, force: bool) -> None:
-    """Make the folder NAME with a vessel autopilot and a scenario in which it keeps a speed and a course.
+    """Create the folder NAME with a vessel autopilot and a scenario in which it keeps a speed and a course.
 
-    The scenario checks that it does. Change the controller from there, and run the scenario again.
+    The scenario checks both. Change the controller and run the scenario again.
     """
     if language not in LANGUAGES:
         raise InputError(f'there is no language "{language}"{did_you_mean(language, LANGUAGES)}')
@@ -69,22 +81,22 @@ def controller(name: str, language: str, directory: Path, force: bool) -> None:
 
 
 def _read_template(language: Language) -> dict[str, str]:
-    """The files of a template: name -> text."""
+    """Return the texts of a template's files by file name."""
     return {path.name: path.read_text() for path in sorted(language.folder.iterdir()) if path.is_file()}
 
 
 def _template_names(name: str, texts: Iterable[str]) -> dict[str, str]:
-    """The template's names -> the controller's, as a file and as a class. Refuses names that some language cannot take."""
+    """Return the controller's names by those of the template; raise InputError if a language does not allow the name."""
     from ...export.sources import snake_case
 
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
-        raise InputError(f'"{name}" is no name of a controller: expected a letter, then letters, digits and underscores')
+        raise InputError(f'"{name}" is not a valid name of a controller: expected a letter, then letters, digits and underscores')
     snake = snake_case(name)
     camel = "".join(word[:1].upper() + word[1:] for word in snake.split("_"))
     taken = {*_MODELICA_TYPES, *(word for text in texts for word in re.findall(r"\w+", text))} - {_CAMEL}
     modules = {*sys.stdlib_module_names, "pythonfmu", Path(_FIGURES_FILE).stem}
     if camel in taken or snake in modules or keyword.iskeyword(snake) or keyword.iskeyword(camel):
-        raise InputError(f'"{name}" means something else already; choose another name')
+        raise InputError(f'"{name}" is already used for something else; choose another name')
     return {_SNAKE: snake, _CAMEL: camel}
 
 
@@ -93,8 +105,8 @@ def _substitute_names(text: str, names: Mapping[str, str]) -> str:
 
 
 def _scenario_text(language: Language, names: Mapping[str, str]) -> str:
-    marks = {"SOURCE": language.key, "FILE": _substitute_names(language.component, names)}
-    return _substitute_names((TEMPLATES / "scenario.json").read_text(), {**names, **marks})
+    placeholders = {"SOURCE": language.key, "FILE": _substitute_names(language.component, names)}
+    return _substitute_names((TEMPLATES / "scenario.json").read_text(), {**names, **placeholders})
 
 
 def _write_files(files: Mapping[Path, str], plant: Path, force: bool) -> None:

@@ -1,4 +1,4 @@
-"""`cosim plot`: pictures of finished runs."""
+"""`cosim plot`: figures and videos of finished runs."""
 
 from __future__ import annotations
 
@@ -13,22 +13,29 @@ FORMATS = ("png", "svg")
 
 @click.command()
 @click.argument("results", nargs=-1, required=True, metavar="RESULT...", type=click.Path(path_type=Path))
-@click.option("--output-dir", type=click.Path(path_type=Path), help="Where pictures go; default: beside the result.")
-@click.option("--format", "formats", multiple=True, type=click.Choice(FORMATS), default=FORMATS, help="Default: both.")
-@click.option("--timings", is_flag=True, help="Also draw the real-time factors of all RESULTs side by side.")
+@click.option("--output-dir", type=click.Path(path_type=Path), help="Folder for the figures; default: that of the result.")
+@click.option(
+    "--format",
+    "formats",
+    multiple=True,
+    type=click.Choice(FORMATS),
+    default=FORMATS,
+    help="File format of the figures; default: both.",
+)
+@click.option("--timings", is_flag=True, help="Also draw a comparison of the real-time factors of all RESULTs.")
 @click.option("--video", is_flag=True, help='Also render a video of each run, CAMERA.mp4 (extra "video").')
-@click.option("--camera", default="chase", help="Where the video is seen from: overview, chase (default), deck or landing.")
+@click.option("--camera", default="chase", help="Camera of the video: overview, chase (default), deck or landing.")
 def command(
     results: tuple[Path, ...], output_dir: Path | None, formats: tuple[str, ...], timings: bool, video: bool, camera: str
 ) -> None:
-    """Draw the figures of RESULTs again: folders that `cosim run` wrote.
+    """Draw the figures of finished runs again; RESULT is a folder written by `cosim run`.
 
-    Each figure of the scenario becomes NAME.png and NAME.svg, with the numbers behind it in NAME.csv. With several RESULTs,
-    each has a folder of its own in the output directory; the figure of --timings stands beside these folders.
+    Each figure of the scenario is written to NAME.png and NAME.svg, with its data in NAME.csv. Several RESULTs have separate
+    folders in the output directory; the figure of --timings is written next to these.
     """
     from ...report.figures import draw_figures
     from ...report.runs import load_figures, read_run
-    from ...report.timings import draw_timings as draw_timings
+    from ...report.timings import draw_timings
     from ...report.video import write_video
 
     suffixes = [f".{name}" for name in formats]

@@ -1,8 +1,7 @@
-"""`cosim regress`: do all scenarios still do what their checks and references say?"""
+"""`cosim regress`: regression test of all scenarios against their checks and references."""
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ import click
 
 from ...core import resources
 from ...core.errors import InputError
+from ...core.processors import available_processors
 from ...studies.regression import EXPECTATION_KEYS, Regression, RegressionOutcome, has_keys
 
 if TYPE_CHECKING:
@@ -19,28 +19,30 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: of several exit codes the first one counts
+#: exit codes from the most to the least severe; the most severe one is returned
 EXIT_CODE_SEVERITY = (130, 70, 2, 1, 3, 0)
 
 
 @click.command()
 @click.argument("scenarios", nargs=-1, metavar="[DIR|SCENARIO...]", type=click.Path(path_type=Path))
-@click.option("--update", is_flag=True, help="Write the references anew from these runs.")
-@click.option("--junit", type=click.Path(path_type=Path), metavar="FILE.xml", help="Write the outcomes as JUnit XML too.")
-@click.option("--output-dir", type=click.Path(path_type=Path), default=Path("runs"), show_default=True, help="Where results go.")
-@click.option("--jobs", type=click.IntRange(min=1), help="How many scenarios run at a time; default: one per processor.")
+@click.option("--update", is_flag=True, help="Write new references from these runs.")
+@click.option("--junit", type=click.Path(path_type=Path), metavar="FILE.xml", help="Also write the outcomes as JUnit XML.")
+@click.option(
+    "--output-dir", type=click.Path(path_type=Path), default=Path("runs"), show_default=True, help="Folder for the results."
+)
+@click.option("--jobs", type=click.IntRange(min=1), help="Number of scenarios at a time; default: one per processor.")
 def command(scenarios: tuple[Path, ...], update: bool, junit: Path | None, output_dir: Path, jobs: int | None) -> int:
-    """Run every scenario that has checks or a reference, and hold it against them.
+    """Run all scenarios that have checks or a reference, and compare their results with these.
 
-    SCENARIO is a file or the name of a shipped scenario; of a DIR its *.json count, without any the folder scenarios/. Each runs
-    as by `cosim run`. With --update the references are written: the signals that the patterns of their tolerances name, as
-    few rows as describe them, and beside them what made them; a run that fails its checks becomes no reference. Ends with 3 when
-    a check or comparison was not met, 1 when a component failed, 2 when a scenario was refused.
+    SCENARIO is a file or the name of a shipped scenario; DIR stands for its files *.json; default: the folder scenarios/. Each
+    scenario runs as by `cosim run`. --update writes the references: the signals matched by the patterns of their tolerances,
+    with as few rows as necessary, and a JSON file with their origin. A run that fails its checks does not become a reference.
+    Exit code 0: all passed; 1: a component failed; 2: a scenario was refused; 3: a check or comparison failed.
     """
     expected = ("reference",) if update else EXPECTATION_KEYS
     files = [file for file in find_scenario_files(scenarios or [default_folder()]) if has_keys(file, expected)]
     if not files:
-        raise InputError('there is no scenario with a "reference" (or, without --update, "checks")')
+        raise InputError('found no scenario with a "reference" (or, without --update, with "checks")')
     check_unique_names(files)
     work = [Regression(file, output_dir / file.stem, update) for file in files]
     outcomes = []
@@ -52,18 +54,23 @@ def command(scenarios: tuple[Path, ...], update: bool, junit: Path | None, outpu
 
         write_junit("cosim regress", [_junit_case(outcome) for outcome in outcomes], junit)
     failed = sum(outcome.code != 0 for outcome in outcomes)
-    click.echo(f"{len(outcomes)} scenarios, {failed} failed" if failed else f"{len(outcomes)} scenarios, all well")
+    count = "1 scenario" if len(outcomes) == 1 else f"{len(outcomes)} scenarios"
+    click.echo(f"{count}, {failed} failed" if failed else f"{count}, all passed")
     return min((outcome.code for outcome in outcomes), key=EXIT_CODE_SEVERITY.index)
 
 
 def default_folder() -> Path:
-    """The folder scenarios/ here, else that of the shipped ones."""
-    own = Path("scenarios")
-    return own if own.is_dir() else resources.root() / own
+    """Return the folder scenarios/ of the working directory if it exists, else that of the shipped scenarios."""
+    folder = Path("scenarios")
+    return folder if folder.is_dir() else resources.root() / folder
 
 
 def find_scenario_files(paths: Iterable[Path]) -> Iterator[Path]:
-    """The scenario files that are meant by files, names of shipped scenarios and folders. Raises InputError."""
+    """Yield the scenario files for files, names of shipped scenarios and folders.
+
+    Raises:
+        InputError: if a file does not exist or a folder has no scenarios.
+    """
     from ...scenario.nested_systems import find_scenario
 
     for path in paths:
@@ -72,27 +79,22 @@ def find_scenario_files(paths: Iterable[Path]) -> Iterator[Path]:
         elif files := sorted(path.glob("*.json")):
             yield from files
         else:
-            raise InputError(f'the folder "{path}" holds no scenario (*.json)')
+            raise InputError(f'the folder "{path}" contains no scenario (*.json)')
 
 
 def check_unique_names(files: Iterable[Path]) -> None:
-    """Each has a folder of its own for results. Raises InputError."""
+    """Raise InputError if two files have the same name: the results of both would have the same folder."""
     counts = Counter(file.stem for file in files)
-    if several := [name for name, count in counts.items() if count > 1]:
+    if repeated := [name for name, count in counts.items() if count > 1]:
         raise InputError(
-            [f'{counts[name]} scenarios are called "{name}.json": their results would go to one folder' for name in several]
+            [f'{counts[name]} scenarios are called "{name}.json": their results would go to one folder' for name in repeated]
         )
 
 
-def available_processors() -> int:
-    """How many this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def run_in_parallel(work: Sequence[Callable[[], T]], jobs: int) -> Iterator[T]:
-    """What all functions return, in order; each is called on a thread that mostly waits for a child process.
+    """Call functions on `jobs` threads and yield what they return, in order; each mostly waits for a child process.
 
-    When the caller is interrupted, those that wait for their turn are not called any more.
+    After an interrupt, functions that have not started are not called.
     """
     from concurrent.futures import ThreadPoolExecutor
 

@@ -1,4 +1,4 @@
-"""`cosim replay`: runs in three dimensions."""
+"""`cosim replay`: page with the 3-D replay of runs."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ import click
 @click.command()
 @click.argument("result", type=click.Path(path_type=Path))
 @click.argument("other", required=False, type=click.Path(path_type=Path))
-@click.option("--output-file", type=click.Path(path_type=Path), help="Default: replay.html in the folder of RESULT.")
-@click.option("--open", "shall_open", is_flag=True, help="Show the page in the browser.")
-def command(result: Path, other: Path | None, output_file: Path | None, shall_open: bool) -> None:
-    """Make a page with the 3-D replay of RESULT, a folder that `cosim run` wrote.
+@click.option(
+    "--output-file", type=click.Path(path_type=Path), help="File of the page; default: replay.html in the folder of RESULT."
+)
+@click.option("--open", "open_page", is_flag=True, help="Open the page in the browser.")
+def command(result: Path, other: Path | None, output_file: Path | None, open_page: bool) -> None:
+    """Write a page with the 3-D replay of one run, or of two runs to compare.
 
-    The page is one file and needs no network. With OTHER, a second run is laid over the first one.
+    RESULT and OTHER are folders written by `cosim run`; the bodies of both are shown in the same scene. The page is a single
+    file and needs no network.
     """
     from ...report.replay import write_replay
     from ...report.runs import read_run
@@ -25,8 +28,8 @@ def command(result: Path, other: Path | None, output_file: Path | None, shall_op
     runs = [read_run(directory) for directory in (result, *([other] if other else []))]
     write_replay(runs, target)
     if not build_scene(runs[0].metadata)["bodies"]:
-        text = 'nothing says what this run looks like (key "scene" of the scenario): the page shows signals, and nothing in 3-D'
+        text = 'the scenario has no "scene": the page shows only signals and no 3-D view'
         click.echo(f"{result}: {text}", err=True)
     click.echo(target)
-    if shall_open:
+    if open_page:
         click.launch(str(target.absolute()))

@@ -1,4 +1,4 @@
-"""`cosim report`: the page about a finished run, made again."""
+"""`cosim report`: report of a finished run."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ import click
 
 @click.command()
 @click.argument("result", type=click.Path(path_type=Path))
-@click.option("--output-file", type=click.Path(path_type=Path), help="Default: report.html in the folder of RESULT.")
-@click.option("--open", "shall_open", is_flag=True, help="Show the page in the browser.")
-def command(result: Path, output_file: Path | None, shall_open: bool) -> None:
-    """Make the page about RESULT again, a folder that `cosim run` wrote: KPIs, figures, system, 3-D replay.
+@click.option(
+    "--output-file", type=click.Path(path_type=Path), help="File of the page; default: report.html in the folder of RESULT."
+)
+@click.option("--open", "open_page", is_flag=True, help="Open the page in the browser.")
+def command(result: Path, output_file: Path | None, open_page: bool) -> None:
+    """Write the report of a finished run again: KPIs, figures, system and 3-D replay.
 
-    The page is one file and needs no network.
+    RESULT is a folder written by `cosim run`. The page is a single file and needs no network.
     """
     from ...report.figures import draw_figure, figure_to_svg
     from ...report.run_page import write_report
@@ -29,5 +31,5 @@ def command(result: Path, output_file: Path | None, shall_open: bool) -> None:
     }
     write_report(run, outcomes, pictures, target)
     click.echo(target)
-    if shall_open:
+    if open_page:
         click.launch(str(target.absolute()))

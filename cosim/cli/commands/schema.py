@@ -1,4 +1,4 @@
-"""`cosim schema`."""
+"""`cosim schema`: JSON Schema of scenarios, sweeps and tunings."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import click
 
 
 @click.command()
-@click.option("--nested", "kind", flag_value="nested", help="The schema of nested systems instead.")
-@click.option("--sweep", "kind", flag_value="sweep", help="The schema of sweeps instead.")
-@click.option("--tune", "kind", flag_value="tune", help="The schema of tunings instead.")
+@click.option("--nested", "kind", flag_value="nested", help="Print the schema of nested systems.")
+@click.option("--sweep", "kind", flag_value="sweep", help="Print the schema of sweeps.")
+@click.option("--tune", "kind", flag_value="tune", help="Print the schema of tunings.")
 def command(kind: str | None) -> None:
-    """Print the JSON Schema of scenario files.
+    """Print the JSON Schema of scenarios, sweeps or tunings.
 
-    Editors complete and check a scenario that names it: "$schema": "scenario.schema.json".
+    An editor completes and checks a file that names its schema: "$schema": "scenario.schema.json".
     """
     click.echo(json.dumps(_schema(kind), indent=2))
 

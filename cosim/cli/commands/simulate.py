@@ -1,4 +1,4 @@
-"""`cosim simulate`: one FMU alone."""
+"""`cosim simulate`: simulation of a single FMU."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...process.temporary_folders import temporary_run_folder
-from .. import report_error, strict_sandbox, supervision
+from .. import current_command_line, report_error, strict_sandbox, supervision
 
 if TYPE_CHECKING:
     from ...components.fmi import Isolation
@@ -23,14 +23,20 @@ FMU_NAME, PROFILE_NAME = "fmu", "profile"
 
 @click.command(cls=strict_sandbox.SandboxCommand)
 @click.argument("fmu", type=click.Path(path_type=Path))
-@click.option("--output-file", type=click.Path(path_type=Path), help="CSV file for the outputs; default: print final values.")
-@click.option("--stop-time", help="Stop time in s; default: the FMU's, else 1.")
-@click.option("--step-size", help="Communication step in s; default: the FMU's, else a hundredth of the duration.")
-@click.option("--start-value", "start_values", multiple=True, metavar="name=value", help="Set a parameter or start value.")
-@click.option("--input-file", type=click.Path(path_type=Path), help='CSV file with "time" and columns named as inputs.')
+@click.option(
+    "--output-file", type=click.Path(path_type=Path), help="CSV file for the outputs; default: print their final values."
+)
+@click.option("--stop-time", help="Stop time (s); default: the FMU's, else 1 s after the start.")
+@click.option("--step-size", help="Communication step size (s); default: the FMU's, else a hundredth of the duration.")
+@click.option(
+    "--start-value", "start_values", multiple=True, metavar="name=value", help="Set a parameter or the start value of a variable."
+)
+@click.option(
+    "--input-file", type=click.Path(path_type=Path), help='CSV file with the column "time" and columns named like inputs.'
+)
 @supervision.supervision_options
 def command(isolation: str, sandbox: str | None, output_file: Path | None, **options: Any) -> int:
-    """Simulate FMU (FMI 2.0 or 3.0 Co-Simulation) from its default start time."""
+    """Simulate a single FMU (FMI 2.0 or 3.0 Co-Simulation) from its default start time."""
     output = output_file.absolute() if output_file else None
     if strict_sandbox.must_rerun(sandbox):
         return strict_sandbox.rerun_in_bubblewrap(
@@ -49,7 +55,7 @@ def _simulate(
     folder: Path,
     output: Path | None,
     shown: Path | None,
-    apart: Isolation | None,
+    fmu_isolation: Isolation | None,
     fmu: Path,
     stop_time: str | None,
     step_size: str | None,
@@ -65,7 +71,7 @@ def _simulate(
     messages.print_log()
     if output:
         check_writable(output.parent)
-    system, settings = _build_system(fmu, apart, stop_time, step_size, parse_settings(start_values), input_file)
+    system, settings = _build_system(fmu, fmu_isolation, stop_time, step_size, parse_settings(start_values), input_file)
     if output:
         remove_files(output.parent, output.name)
     with keeping_run_files(folder, output), simulating(system, settings) as run:
@@ -73,7 +79,7 @@ def _simulate(
             _write_recording(run.recording, output, shown)
             remove_run_files()
         if run.failure:
-            return supervision.results_written(report_error(run.failure))
+            return supervision.results_written(report_error(run.failure, current_command_line()))
         if not output:
             _print_final_values(run.recording)
         return supervision.results_written(0)
@@ -101,13 +107,13 @@ def _isolation(isolation: str, sandbox: bool) -> Isolation | None:
 
 def _build_system(
     fmu: Path,
-    apart: Isolation | None,
+    fmu_isolation: Isolation | None,
     stop_time: str | None,
     step_size: str | None,
     start_values: dict[str, Any],
     input_file: Path | None,
 ) -> tuple[System, Settings]:
-    """The FMU, and the profile if there is one, as a system of their own."""
+    """Return a system of the FMU, and of the input file if there is one, with the settings of its simulation."""
     from ...components.fmi import FmuFile, create_component
     from ...core.system import Connection, Endpoint, System
     from ...engine.settings import Settings
@@ -117,7 +123,7 @@ def _build_system(
     start = experiment.start_time or Fraction(0)
     stop = _parse_seconds(stop_time) if stop_time else experiment.stop_time or start + 1
     step = _parse_seconds(step_size) if step_size else experiment.step_size or (stop - start) / 100
-    components: dict[str, Component] = {FMU_NAME: create_component(file, file.description.model_name, isolation=apart)}
+    components: dict[str, Component] = {FMU_NAME: create_component(file, file.description.model_name, isolation=fmu_isolation)}
     connections, stages = [], [(FMU_NAME,)]
     if input_file:
         components[PROFILE_NAME] = _read_profile(input_file, components[FMU_NAME])
@@ -152,7 +158,7 @@ def _read_profile(path: Path, component: Component) -> Component:
 
 def _check_start_values(component: Component, start_values: dict[str, Any]) -> dict[str, Any]:
     from ...core.errors import InputError, Problem
-    from ...scenario.name_resolution import UnknownName, check_assignment
+    from ...scenario.name_resolution import UnknownNameError, check_assignment
 
     variables = {variable.name: variable for variable in component.variables}
     values: dict[str, Any] = {}
@@ -160,7 +166,7 @@ def _check_start_values(component: Component, start_values: dict[str, Any]) -> d
     for name, value in start_values.items():
         try:
             values |= check_assignment(FMU_NAME, variables, name, value)
-        except (UnknownName, ValueError) as error:
+        except (UnknownNameError, ValueError) as error:
             problems.append(Problem(str(error), f"--start-value {name}"))
     if problems:
         raise InputError(problems)

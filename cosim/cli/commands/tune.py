@@ -1,4 +1,4 @@
-"""`cosim tune`: the parameters that make a KPI small."""
+"""`cosim tune`: search for parameters that minimise a KPI."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("tuning", metavar="TUNE")
-@click.option("--output-dir", type=click.Path(path_type=Path), help="Where results go; default: runs/NAME.")
+@click.option("--output-dir", type=click.Path(path_type=Path), help="Folder for the results; default: runs/NAME.")
 @study_options.study_options
-def command(tuning: str, output_dir: Path | None, **where: Any) -> int:
-    """Search as TUNE says, a JSON file or the name of a shipped one.
+def command(tuning: str, output_dir: Path | None, **study: Any) -> int:
+    """Find the parameters that minimise a KPI.
 
-    Writes trials.csv (every point that was tried) and best.json to the output directory. A tuning that was interrupted or killed
-    goes on where it was when it is called again. Exit code 0: a point was found; 1: a run failed at every point; 2: refused;
-    3: no point keeps the constraints, or none has a value; 130: interrupted.
+    TUNE is a JSON file or the name of a shipped tuning. Writes trials.csv (all evaluated points) and best.json to the output
+    directory. Called again, the command continues an interrupted tuning. Exit code 0: a point was found; 1: a run failed at
+    every point; 2: the tuning was refused; 3: no point meets the constraints, or none has a value; 130: interrupted.
     """
     from ...studies.tune import Tuning
 
-    read = Tuning.from_file(tuning)
-    folder = output_dir or Path("runs") / read.spec.name
-    with study_options.open_run_store(folder, where.pop("retry_failed")) as ledger:
-        return _run_tuning(read, ledger, folder, **where)
+    loaded = Tuning.from_file(tuning)
+    folder = output_dir or Path("runs") / loaded.spec.name
+    with study_options.open_run_store(folder, study.pop("retry_failed")) as run_store:
+        return _run_tuning(loaded, run_store, folder, **study)
 
 
-def _run_tuning(tuning: Tuning, ledger: RunStore, folder: Path, workers: int | None, scheduler: str | None) -> int:
+def _run_tuning(tuning: Tuning, run_store: RunStore, folder: Path, workers: int | None, scheduler: str | None) -> int:
     from ...process.supervisor import interrupt_on_termination
     from ...studies.summary.tuning_files import write_tuning_files
 
@@ -43,9 +43,9 @@ def _run_tuning(tuning: Tuning, ledger: RunStore, folder: Path, workers: int | N
         with (
             interrupt_on_termination(),
             study_options.show_progress(_max_runs(tuning)) as progress,
-            study_options.create_runner(tuning.study, workers, scheduler) as engine,
+            study_options.create_runner(tuning.study, workers, scheduler) as runner,
         ):
-            tuning.run(ledger, engine, progress)
+            tuning.run(run_store, runner, progress)
     except (CosimError, KeyboardInterrupt) as error:
         if tuning.trials and not isinstance(error, InputError):
             write_tuning_files(tuning, folder)
@@ -56,10 +56,10 @@ def _run_tuning(tuning: Tuning, ledger: RunStore, folder: Path, workers: int | N
 
 
 def _max_runs(tuning: Tuning) -> int:
-    """Runs at most."""
+    """Return the largest number of runs of a tuning."""
     method = tuning.spec.method
-    whole = method.population * (method.generations + 1) if method.kind == "differential_evolution" else method.evaluations
-    return whole * len(tuning.spec.cases)
+    points = method.population * (method.generations + 1) if method.kind == "differential_evolution" else method.evaluations
+    return points * len(tuning.spec.cases)
 
 
 def _print_best(tuning: Tuning, best: Trial, folder: Path) -> None:
@@ -72,14 +72,14 @@ def _print_best(tuning: Tuning, best: Trial, folder: Path) -> None:
     if not best.feasible:
         click.echo(_failure_text(tuning, best), err=True)
     settings = {**tuning.spec.settings, **tuning.spec.cases[0], **tuning.settings(best.parameters)}
-    click.echo(f"{len(tuning.trials)} points tried; trials.csv and best.json in {folder}")
+    click.echo(f"{len(tuning.trials)} points evaluated; trials.csv and best.json in {folder}")
     click.echo(format_run_command(tuning.study_file.scenario, settings))
 
 
 def _failure_text(tuning: Tuning, best: Trial) -> str:
-    """What is wrong with every point, the best one included."""
+    """Return why not even the best point is feasible."""
     if best.failure:
-        return f"a run failed at every point, the first time: {best.failure}"
+        return f"a run failed at every point; at the first one: {best.failure}"
     if not best.value < math.inf:
         return f"the value of {tuning.objective.text} is {best.value:g} at every point"
-    return f"no point keeps the constraints: the best violates them by {best.violation:.3g}"
+    return f"no point meets the constraints: the best one violates them by {best.violation:.3g}"

@@ -1,4 +1,4 @@
-"""`cosim validate`: is an FMU what the standard and caution ask for?"""
+"""`cosim validate`: validation of FMUs against the FMI standard and the importer's safety rules."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("fmus", metavar="FMU...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="Print a JSON array: one object per finding.")
+@click.option("--json", "as_json", is_flag=True, help="Print a JSON array with one object per finding.")
 def command(fmus: tuple[Path, ...], as_json: bool) -> int:
-    """Examine FMUs without running anything of them: archive, model description and binary for this machine.
+    """Validate FMUs against the FMI standard without running them.
 
-    Errors are what `cosim run` refuses; warnings break the FMI standard without harm to a run. Whether an FMU computes what
-    it should is not examined. Ends with 2 when there are findings.
+    Examines the archive, the model description and the binary for this machine. `cosim run` refuses FMUs with errors; warnings
+    are violations of the FMI standard that do not affect a run. Results of the FMU are not examined. Exit code 0: no findings;
+    2: findings.
     """
     findings = {path: _validate_fmu(path) for path in fmus}
     if as_json:

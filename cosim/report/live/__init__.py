@@ -1,5 +1,9 @@
-"""Looking at a run while it goes on, and steering it: a page served to this machine's browser only.
+"""Live view of a running simulation: a page in the browser of this machine that shows and steers the run.
 
-The simulation stays in its supervised process, where `control` obeys between macro steps. The supervising process serves the
-page (`server`), reads the rows as they are recorded (`feed`) and passes commands on through a pipe (`session`).
+Two processes take part:
+
+- The simulation process steps the components. `control.LiveControl` runs there, in the main thread, between macro steps.
+- The supervising process serves the page. `live_view.LiveView` owns the HTTP server (`server.LiveServer`, one thread per
+  request). `session.LiveSession` exchanges messages with the simulation process through a pipe, with a thread that receives
+  them. `feed.RowFeed` reads the recorded rows from the files of the run.
 """

@@ -1,4 +1,4 @@
-"""A run that can be looked at: the address of its page, and both ends of the pipe to it."""
+"""The live view of a run: the HTTP server of its page and the pipe to the simulation process."""
 
 from __future__ import annotations
 
@@ -20,17 +20,23 @@ from ...process.journal import Journal
 from .server import HOST, LiveServer
 from .session import LiveSession
 
-#: at the end a page that is open has so long to fetch the last rows (s)
+#: time that an open page has at the end to fetch the last rows (s)
 FINAL_FETCH_TIMEOUT = 2.0
 
 
 class LiveView:
-    """Listens on a port of this machine (0: any free one) before the run's process is born, so that its address is known.
+    """Live view, created before the simulation process is forked, so that both processes have their end of the pipe.
 
-    Raises InputError when the port cannot be had.
+    The main thread of the supervising process calls `serve`; the simulation process calls `open_in_child`.
+
+    Args:
+        port: The port of the server on this machine; 0 for any free one.
+
+    Raises:
+        InputError: The port is not available.
     """
 
-    def __init__(self, port: int):
+    def __init__(self, port: int) -> None:
         try:
             self._server = LiveServer(port, token_urlsafe(24))
         except OSError as error:
@@ -39,17 +45,24 @@ class LiveView:
 
     @property
     def url(self) -> str:
+        """Address of the page, including its secret token."""
         return self._server.url
 
     def open_in_child(self) -> Connection:
-        """In the run's process: its end of the pipe. It keeps nothing else of this."""
+        """Return the end of the pipe for the simulation process, and close what only the supervising process uses."""
         self._server.socket.close()
         self._parent_end.close()
         return self._child_end
 
     @contextmanager
     def serve(self, journal: Journal) -> Iterator[None]:
-        """In the supervising process: serve the page until the run has ended and who looks at it has seen the end."""
+        """Serve the page from threads of the supervising process during this block.
+
+        At the end of the block an open page gets time to fetch the last rows.
+
+        Args:
+            journal: The journal that the simulation process shares with the supervising process.
+        """
         self._child_end.close()
         session = self._server.session = LiveSession(self._parent_end, journal)
         session.start()
@@ -71,13 +84,17 @@ def _wait_for_final_fetch(session: LiveSession) -> None:
 
 
 def has_display() -> bool:
-    """Whether somebody sits here who can be shown a page."""
+    """Return True if standard output is a terminal of a machine with a display."""
     return sys.stdout.isatty() and (sys.platform == "darwin" or bool({"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()))
 
 
 def open_browser(url: str, folder: Path) -> None:
-    """Show the page. Its address stands in a file in `folder` that only this user may read, and in no list of processes. The
-    browser is started by a process that ends at once: the children of a supervisor end with it."""
+    """Open the page in the browser.
+
+    The address is passed in a file in `folder` that only this user can read, because every user can read the arguments of a
+    process. The browser is started by an intermediate process that exits at once, because the children of a supervising process
+    are ended with it.
+    """
     file = folder / "open.html"
     with os.fdopen(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as target:
         target.write(f'<!doctype html><meta http-equiv="refresh" content="0; url={url}"><title>cosim</title>')

@@ -1,4 +1,4 @@
-"""What the supervising process knows of a run that is looked at, and how it passes commands on."""
+"""Session of a live view in the supervising process: state of the run, its rows, and commands to it."""
 
 from __future__ import annotations
 
@@ -14,20 +14,27 @@ from ...process.journal import ROW_COUNT, Journal
 from ...process.run_files.folder import read_header
 from .feed import RowFeed
 
-#: rows are looked for this often, and a request waits for news this long (s)
+#: interval at which a request checks for new rows, and the longest time that it waits for them (s)
 POLL_INTERVAL, LONG_POLL_TIMEOUT = 0.03, 10.0
 
-#: a command may wait this long for the end of the present step (s)
+#: longest time that a command waits for the end of the current step (s)
 COMMAND_TIMEOUT = 60.0
 
-#: rows given out at a time
+#: largest number of rows in a response
 MAX_ROWS = 2000
 
 
 class LiveSession:
-    """A run in the process at the other end of `link`. Safe to use from several threads."""
+    """State of a live run and channel for commands; used by the request threads of the supervising process.
 
-    def __init__(self, connection: Connection, journal: Journal):
+    A thread of its own receives the messages of the simulation process.
+
+    Args:
+        connection: The pipe to the simulation process.
+        journal: The journal that the simulation process shares, with the number of recorded rows.
+    """
+
+    def __init__(self, connection: Connection, journal: Journal) -> None:
         self._connection, self._journal = connection, journal
         self._replies: Queue[dict[str, Any]] = Queue()
         self._command_lock, self._changed = Lock(), Condition()
@@ -36,14 +43,16 @@ class LiveSession:
         self._run_info: dict[str, Any] = {}
         self._state: dict[str, Any] = {"version": 0, "paused": False, "speed": None, "time": 0.0, "ended": False}
         self.feed: RowFeed | None = None
-        #: until when somebody looks (s, monotonic), and whether everything was shown until the end
+        #: time until which a page is considered open (s, monotonic), and whether it has fetched all rows
         self.last_viewed, self.fully_viewed = 0.0, False
         self._listener = Thread(target=self._listen, daemon=True)
 
     def start(self) -> None:
+        """Start the thread that receives messages."""
         self._listener.start()
 
     def _listen(self) -> None:
+        """Receive messages until the simulation process closes the pipe; runs in a thread of its own."""
         try:
             while True:
                 self._handle_message(json.loads(self._connection.recv_bytes()))
@@ -55,7 +64,7 @@ class LiveSession:
         folder = self._journal.folder
         if "about" in message and folder and (header := read_header(folder)):
             self.feed = RowFeed(folder, header, message["about"]["rows"])
-            self._connection.send_bytes(b"{}")  # the first that the run hears; commands come after
+            self._connection.send_bytes(b"{}")  # completes the handshake; commands come later
         changes: dict[str, Any] = {key: message[key] for key in ("paused", "speed", "time", "ended") if key in message}
         with self._changed:
             self._run_info = message.get("about", self._run_info)
@@ -65,7 +74,7 @@ class LiveSession:
             self._replies.put(message)
 
     def mark_ended(self) -> None:
-        """Nothing more will come."""
+        """Record that the run has ended, and wake all waiting requests."""
         with self._changed:
             if not self._state["ended"]:
                 self._state = {**self._state, "ended": True, "version": self._state["version"] + 1}
@@ -73,7 +82,7 @@ class LiveSession:
         self._replies.put({"id": None})
 
     def page_data(self) -> dict[str, Any] | None:
-        """What a page has to know before the first row, as soon as the run has come that far; None when it has ended before."""
+        """Return the description of the run for the page; wait until there is one, and return None if the run ends before."""
         self._wait_until_started()
         if self.feed is None:
             return None
@@ -86,8 +95,10 @@ class LiveSession:
             self._changed.wait_for(lambda: self._run_info or self._state["ended"])
 
     def wait_for_rows(self, first: int, version: int) -> tuple[dict[str, Any], bytes]:
-        """The state of the run and the rows from `first` on, when there are any or the state is not that of `version`; else
-        after a while."""
+        """Return the state of the run and the rows from `first` on, as bytes (see `feed`).
+
+        Waits until there are such rows, the version of the state is not `version`, or LONG_POLL_TIMEOUT has passed.
+        """
         self.last_viewed = until = time.monotonic() + LONG_POLL_TIMEOUT
         while True:
             state, available = self._state, self._available()
@@ -105,7 +116,7 @@ class LiveSession:
         return self.feed.available(self._journal[ROW_COUNT]) if self.feed else 0
 
     def send_command(self, message: Mapping[str, Any]) -> dict[str, Any]:
-        """What the run answers to a command (see `control`)."""
+        """Send a command to the simulation process and return its reply (see `control`)."""
         self._wait_until_started()
         with self._command_lock:
             self._commands += 1
@@ -114,20 +125,20 @@ class LiveSession:
                     self._connection.send_bytes(json.dumps({**message, "id": self._commands}).encode())
             except OSError:
                 self.mark_ended()
-            answer = self._wait_for_reply(self._commands)
-        if message.get("command") == "set" and "error" not in answer:
+            reply = self._wait_for_reply(self._commands)
+        if message.get("command") == "set" and "error" not in reply:
             self._values[message["name"]] = message["value"]
-        return answer
+        return reply
 
     def _wait_for_reply(self, number: int) -> dict[str, Any]:
         until = time.monotonic() + COMMAND_TIMEOUT
         while time.monotonic() < until:
             try:
-                answer = self._replies.get(timeout=0.2)
+                reply = self._replies.get(timeout=0.2)
             except Empty:
                 if self._state["ended"]:
                     return {"error": "the run has ended"}
                 continue
-            if answer.pop("id") == number:
-                return answer
-        return {"error": f"no answer within {COMMAND_TIMEOUT:g} s"}
+            if reply.pop("id") == number:
+                return reply
+        return {"error": f"the simulation did not reply within {COMMAND_TIMEOUT:g} s"}

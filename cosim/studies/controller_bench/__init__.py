@@ -1,1 +1,1 @@
-"""The bench for controllers: a candidate takes the place of a shipped controller in every scenario that has its role."""
+"""Controller benchmark: a candidate replaces the shipped controller in every scenario with its role."""

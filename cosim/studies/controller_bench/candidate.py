@@ -1,4 +1,4 @@
-"""The controller that is put to the test, and whether it fits into its place."""
+"""Candidate controller of a benchmark: its source, its interface, and the check of the interface against a role."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import cast
 from ...core.component import Component, Variable
 from ...core.errors import InputError, Problem, did_you_mean
 from ...scenario import prepare
-from ...scenario.name_resolution import SlotIndex, Target, UnknownName, resolve_name
+from ...scenario.name_resolution import SlotIndex, Target, UnknownNameError, resolve_name
 from ...scenario.nested_systems import Node, load_scenario
 from ...scenario.schema import NestedSpec
 from .role import Role
@@ -26,7 +26,13 @@ _CAUSALITIES = {"inputs": ("input",), "outputs": ("output",), "parameters": ("pa
 
 @dataclass(frozen=True)
 class CandidateSource:
-    """Where a candidate comes from: its entry in a scenario ({"fmu": "/abs/my.fmu"}), its name ("my"), and the user's text."""
+    """Source of a candidate.
+
+    Attributes:
+        entry: its component in a scenario, such as {"fmu": "/abs/my.fmu"}.
+        name: its name, such as "my".
+        text: the argument of the command, such as "my.fmu".
+    """
 
     entry: Mapping[str, str]
     name: str
@@ -34,7 +40,11 @@ class CandidateSource:
 
 
 def parse_source(text: str) -> CandidateSource:
-    """`my.fmu`, `my.py:Class`, `my.mo:Model` or a nested system `my.json`. Raises InputError."""
+    """Parse `my.fmu`, `my.py:Class`, `my.mo:Model` or a nested system `my.json`.
+
+    Raises:
+        InputError: if the text has another form or the file does not exist.
+    """
     file, separator, member = text.partition(":")
     path = Path(file)
     kind = _SOURCE_KINDS.get(path.suffix)
@@ -47,8 +57,14 @@ def parse_source(text: str) -> CandidateSource:
 
 @dataclass(frozen=True)
 class CandidateInterface:
-    """The variables of a candidate as its place sees them, by the names of their slots; `inner` are those of a nested system's
-    own components, which scenarios may set and record too."""
+    """Variables of a candidate by the names of their scalars.
+
+    Attributes:
+        inputs: input variables.
+        outputs: output variables.
+        parameters: parameters, also structural ones.
+        inner_variables: variables of a nested system's own components, which scenarios may set and record, too.
+    """
 
     inputs: Mapping[str, Variable]
     outputs: Mapping[str, Variable]
@@ -57,39 +73,44 @@ class CandidateInterface:
 
     @property
     def names(self) -> set[str]:
+        """Names of all variables."""
         return {*self.inputs, *self.outputs, *self.parameters, *self.inner_variables}
 
     def has_variables(self, name: str) -> bool:
-        """Whether `name` is a variable, an array or a prefix of variables."""
-        return not name or any(own == name or own.startswith((f"{name}.", f"{name}[")) for own in self.names)
+        """Return whether `name` is a variable, an array, or a prefix of variables."""
+        return not name or any(each == name or each.startswith((f"{name}.", f"{name}[")) for each in self.names)
 
 
 def read_interface(candidate: CandidateSource) -> CandidateInterface:
-    """Load the candidate alone and look at its variables. Raises InputError as a scenario with it would."""
+    """Load the candidate alone and return its variables.
+
+    Raises:
+        InputError: if it cannot be loaded, with the problems of a scenario that contains it.
+    """
     scenario = {"name": _CANDIDATE, "stop_time": 1, "step_size": 1, "components": {_CANDIDATE: dict(candidate.entry)}}
     with TemporaryDirectory(prefix="cosim-") as folder:
         file = Path(folder) / f"{_CANDIDATE}.json"
         file.write_text(json.dumps(scenario), encoding="utf-8")
         try:
-            assembly = prepare(file, {"/step_size": _common_step(file)})
+            prepared = prepare(file, {"/step_size": _common_step(file)})
         except InputError as error:
             raise InputError([_with_user_location(problem, file, candidate) for problem in error.problems]) from None
     try:
-        root, components = assembly.root, assembly.system.components
+        root, components = prepared.root, prepared.system.components
         return (
             _system_interface(root, components) if _CANDIDATE in root.children else _component_interface(components[_CANDIDATE])
         )
     finally:
-        assembly.free()
+        prepared.free()
 
 
 def _with_user_location(problem: Problem, file: Path, candidate: CandidateSource) -> Problem:
-    """A problem whose place the user knows: not `file`, which is made up."""
+    """Replace the position of a problem in the temporary scenario `file` by the user's own text."""
     return replace(problem, where=candidate.text) if problem.where.startswith(str(file)) else problem
 
 
 def _common_step(file: Path) -> str:
-    """A step size that divides 1 s and the periods of all components."""
+    """Return the largest step size (s) that divides 1 s and the periods of all components."""
     specs = (spec for node in load_scenario(file).root.walk() for spec in node.spec.components.values())
     periods = [Fraction(1), *(spec.period for spec in specs if spec.period)]
     denominator = math.lcm(*(period.denominator for period in periods))
@@ -116,7 +137,7 @@ def _system_interface(root: Node, components: Mapping[str, Component]) -> Candid
 
 
 def _port_variables(root: Node, components: Mapping[str, Component], kind: str) -> Iterator[tuple[str, Variable]]:
-    """The variables behind the ports of one kind, by the names that they have outside."""
+    """Yield the variables behind the ports of one kind by their names outside the nested system."""
     nested = cast(NestedSpec, root.children[_CANDIDATE].spec)
     for port in getattr(nested.ports, kind):
         for target in _port_targets(root, port, kind):
@@ -130,42 +151,52 @@ def _port_variables(root: Node, components: Mapping[str, Component], kind: str) 
 def _port_targets(root: Node, port: str, kind: str) -> list[Target]:
     try:
         return resolve_name(root, f"{_CANDIDATE}.{port}", (kind,))
-    except UnknownName as error:
+    except UnknownNameError as error:
         raise InputError(str(error)) from None
 
 
-def interface_problems(role: Role, found: CandidateInterface, settings: Iterable[str] = ()) -> list[Problem]:
-    """Why a controller with this interface cannot take the role with these variables set, all at once."""
+def interface_problems(role: Role, interface: CandidateInterface, settings: Iterable[str] = ()) -> list[Problem]:
+    """Return all problems for which a controller cannot take a role.
+
+    Args:
+        role: the role.
+        interface: the controller's interface.
+        settings: names of the variables that are set.
+    """
     expected = {**role.inputs, **role.outputs, **role.parameters}
     return [
-        *(_missing_output(name, role, found) for name in role.outputs if name not in found.outputs),
-        *(_unexpected_input(name, role, found) for name in found.inputs if name not in role.inputs),
+        *(_missing_output(name, role, interface) for name in role.outputs if name not in interface.outputs),
+        *(_unexpected_input(name, role, interface) for name in interface.inputs if name not in role.inputs),
         *(
-            Problem(f'"{name}" has the unit "{variable.unit.name}", expected "{unit.name}" or what converts to it')
-            for variables in (found.inputs, found.outputs, found.parameters)
+            Problem(f'"{name}" has the unit "{variable.unit.name}", expected "{unit.name}" or a unit that converts to it')
+            for variables in (interface.inputs, interface.outputs, interface.parameters)
             for name, variable in variables.items()
             if (unit := expected.get(name) or role.parameters.get(name.partition("[")[0]))
             and variable.unit
             and not variable.unit.converts_to(unit)
         ),
-        *(Problem(f'it has no variable "{name}"{_name_hint(name, found)}') for name in settings if not found.has_variables(name)),
+        *(
+            Problem(f'the controller has no variable "{name}"{_name_hint(name, interface)}')
+            for name in settings
+            if not interface.has_variables(name)
+        ),
     ]
 
 
-def _name_hint(name: str, found: CandidateInterface) -> str:
-    return did_you_mean(name, {*found.parameters, *found.inner_variables, *found.inputs})
+def _name_hint(name: str, interface: CandidateInterface) -> str:
+    return did_you_mean(name, {*interface.parameters, *interface.inner_variables, *interface.inputs})
 
 
-def _missing_output(name: str, role: Role, found: CandidateInterface) -> Problem:
+def _missing_output(name: str, role: Role, interface: CandidateInterface) -> Problem:
     unit = role.outputs[name]
-    wanted = f'the output "{name}"' + (f" ({unit.name})" if unit else "")
-    if name in {*found.inputs, *found.parameters}:
-        causality = "an input" if name in found.inputs else "a parameter"
+    expected = f'the output "{name}"' + (f" ({unit.name})" if unit else "")
+    if name in {*interface.inputs, *interface.parameters}:
+        causality = "an input" if name in interface.inputs else "a parameter"
         return Problem(f'"{name}" is {causality}, expected an output')
-    others = [own for own in found.outputs if own not in role.outputs]
-    return Problem(f"{wanted} is missing{did_you_mean(name, others)}")
+    others = [output for output in interface.outputs if output not in role.outputs]
+    return Problem(f"{expected} is missing{did_you_mean(name, others)}")
 
 
-def _unexpected_input(name: str, role: Role, found: CandidateInterface) -> Problem:
-    free = [own for own in role.inputs if own not in found.inputs]
-    return Problem(f'nothing feeds the input "{name}" in this role{did_you_mean(name, free)}')
+def _unexpected_input(name: str, role: Role, interface: CandidateInterface) -> Problem:
+    unused = [each for each in role.inputs if each not in interface.inputs]
+    return Problem(f'the role has no signal for the input "{name}"{did_you_mean(name, unused)}')

@@ -1,19 +1,18 @@
-"""Roles of controllers: what a controller in that place receives and gives, and which shipped ones stand there.
+"""Roles of controllers: the signals that a controller in a role receives and returns, and the shipped controllers with it.
 
-One JSON file each, the shipped ones in scenarios/roles/; paths in it are relative to the file:
+Each role is a JSON file; the shipped ones are in scenarios/roles/. Paths in it are relative to the file:
 
     {"description": "...",
-     "controllers": ["../../fmus/strider_autopilot.fmu"],                       wherever a scenario names one of these is a place
-     "inputs": {"vehicle": {"outputs_of": "../../fmus/strider.fmu"},            all outputs of an FMU, below a name
+     "controllers": ["../../fmus/strider_autopilot.fmu"],                       components with one of these have the role
+     "inputs": {"vehicle": {"outputs_of": "../../fmus/strider.fmu"},            all outputs of an FMU, with this prefix
                 "target": {"outputs_of": "../../fmus/strider.fmu", "below": "deck"},
-                "altitude_command": "m"},                                       or one variable and its unit
+                "altitude_command": "m"},                                       a single variable and its unit
      "outputs": {"thrust": "N", "rotor_speed[1]": "rad/s"},
      "parameters": {"speed_command": "m/s"},
      "stand_ins": {"../../fmus/strider_autopilot.fmu": "../systems/strider_autopilot.json"}}
 
-A controller declares the inputs and parameters that it uses and has to have all outputs; a parameter without an index stands
-for an array. `stand_ins` names nested systems that
-do the same as a file, so that parts of them can be replaced.
+A controller declares the inputs and parameters that it uses; it must have all outputs. A parameter without an index stands for
+an array. `stand_ins` maps a file to an equivalent nested system, so that a part of it can be replaced.
 """
 
 from __future__ import annotations
@@ -32,14 +31,14 @@ from ...scenario.schema import Spec
 
 
 class OutputsSpec(Spec):
-    """Outputs of an FMU, those `below` a name of it or all."""
+    """Outputs of an FMU: all, or those below the prefix `below`."""
 
     outputs_of: str
     below: str = ""
 
 
 class RoleSpec(Spec):
-    """A role's file."""
+    """Schema of a role's file."""
 
     description: str
     controllers: list[str]
@@ -51,20 +50,24 @@ class RoleSpec(Spec):
 
 @dataclass(frozen=True)
 class Role:
-    """What a controller may and has to declare: units by variable name (None: any)."""
+    """Variables that a controller may or must declare, with their units (None: any unit)."""
 
     name: str
     description: str
     inputs: dict[str, Unit | None]
     outputs: dict[str, Unit | None]
     parameters: dict[str, Unit | None]
-    #: resolved paths of the shipped controllers, and of nested systems by that of the file they stand for
+    #: resolved paths of the shipped controllers, and of nested systems by the path of the file that they replace
     controllers: frozenset[Path]
     stand_ins: dict[Path, Path]
 
 
 def read_role(role: str) -> Role:
-    """A shipped role by its name, or one of the user's own by the path of its JSON file. Raises InputError."""
+    """Read a shipped role by its name, or a user's role by the path of its JSON file.
+
+    Raises:
+        InputError: with all problems of the file, or if there is no such role.
+    """
     file = _find_role(role)
     document = read_document(file)
     spec = _validate_role(document)
@@ -82,7 +85,7 @@ def read_role(role: str) -> Role:
 
 
 def role_names() -> list[str]:
-    """Names of the shipped roles."""
+    """Return the names of the shipped roles."""
     return sorted(path.stem for path in (resources.root() / "scenarios/roles").glob("*.json"))
 
 
@@ -109,12 +112,12 @@ def _input_units(name: str, source: str | OutputsSpec, folder: Path) -> list[tup
     if isinstance(source, str):
         return [(name, _parse_unit(source))]
     outputs = (v for v in FmuFile(folder / source.outputs_of).description.variables if v.causality == "output")
-    head = f"{source.below}." if source.below else ""
+    prefix = f"{source.below}." if source.below else ""
     return [
-        (f"{name}.{slot.removeprefix(head)}", variable.unit)
+        (f"{name}.{slot.removeprefix(prefix)}", variable.unit)
         for variable in outputs
         for slot in variable.scalar_names
-        if slot.startswith(head)
+        if slot.startswith(prefix)
     ]
 
 

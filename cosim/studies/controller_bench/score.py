@@ -1,4 +1,4 @@
-"""KPIs of a candidate beside those of others: which are better and which worse."""
+"""Comparison of a candidate's KPIs with those of other runs."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from typing import Any
 from ...core.version import __version__
 from ...results.checks import CheckOutcome, Number, evaluate_checks
 
-#: numbers that differ by less than this share are equal
+#: relative difference up to which two values are equal
 EQUALITY_TOLERANCE = 0.01
 
 
 @dataclass(frozen=True)
 class RunKpis:
-    """What a run left behind, as far as it counts here."""
+    """KPIs of a finished run, with their units and senses ("lower" or "higher" is better)."""
 
     kpis: Mapping[str, Number]
     units: Mapping[str, str]
@@ -27,7 +27,7 @@ class RunKpis:
 
     @classmethod
     def read(cls, directory: Path) -> RunKpis | None:
-        """Those of the folder that `cosim run` wrote, None where there is no run that came to its end."""
+        """Read the KPIs from a folder written by `cosim run`; None if there is no complete run."""
         try:
             kpis, about = (json.loads((directory / name).read_text(encoding="utf-8")) for name in ("kpis.json", "run.json"))
             numbers = {name: math.nan if value is None else value for name, value in kpis.items()}
@@ -37,7 +37,7 @@ class RunKpis:
 
 
 def is_current(directory: Path, scenario: Path) -> bool:
-    """Whether the run in `directory` is what `scenario` would give again: all its files and the version are the same."""
+    """Return whether the run in `directory` is up to date: the files of `scenario` and the version of cosim are unchanged."""
     try:
         about = json.loads((directory / "run.json").read_text(encoding="utf-8"))
         files = {scenario.parent.resolve() / name: digest for name, digest in about["sha256"].items()}
@@ -48,9 +48,14 @@ def is_current(directory: Path, scenario: Path) -> bool:
 
 
 def compare_values(value: Number | None, other: Number | None, sense: str | None) -> str:
-    """ "better" or "worse" than `other`, "" where they are the same, where one is missing or nothing says what is better.
+    """Return whether `value` is "better" or "worse" than `other`; "" if they are equal or not comparable.
 
-    `sense` is "lower" or "higher", what is better. A number is better than NaN, which did not happen.
+    Args:
+        value: value of a KPI; None: missing.
+        other: value to compare with; None: missing.
+        sense: "lower" or "higher", whichever is better; None: unknown.
+
+    NaN means that an event did not happen; any number is better.
     """
     if value is None or other is None or sense is None or (math.isnan(value) and math.isnan(other)):
         return ""
@@ -62,7 +67,7 @@ def compare_values(value: Number | None, other: Number | None, sense: str | None
 
 
 def merge_senses(declared: Mapping[str, str], checks: list[Mapping[str, Any]]) -> dict[str, str]:
-    """What is better for each KPI: as its function declares, else as its check has it ("max": the lower the better)."""
+    """Return which values of each KPI are better: as its function declares, else by its check ("max": lower is better)."""
     of_checks = {
         check["kpi"]: "lower" if "max" in check else "higher"
         for check in checks
@@ -73,7 +78,7 @@ def merge_senses(declared: Mapping[str, str], checks: list[Mapping[str, Any]]) -
 
 @dataclass(frozen=True)
 class KpiComparison:
-    """One KPI in one scenario: numbers of the candidate, the shipped controller and the candidate's last run (None: no such)."""
+    """KPI in one scenario: values of the candidate, the shipped controller and the candidate's last run (None: missing)."""
 
     name: str
     unit: str
@@ -88,14 +93,16 @@ class KpiComparison:
 def compare_kpis(
     candidate: RunKpis, shipped: RunKpis | None, last: RunKpis | None, checks: list[Mapping[str, Any]]
 ) -> list[KpiComparison]:
-    """The KPIs of the candidate in their order."""
+    """Compare each KPI of the candidate with those of the shipped controller and of the candidate's last run."""
     better = merge_senses(candidate.senses, checks)
     outcomes = evaluate_checks(candidate.kpis, checks)
 
     def row(name: str, value: Number) -> KpiComparison:
-        of_shipped, of_last = (scores.kpis.get(name) if scores else None for scores in (shipped, last))
+        of_shipped, of_last = (run.kpis.get(name) if run else None for run in (shipped, last))
         against_shipped, against_last = (compare_values(value, other, better.get(name)) for other in (of_shipped, of_last))
-        own = tuple(outcome for outcome in outcomes if outcome.check["kpi"] == name)
-        return KpiComparison(name, candidate.units.get(name, ""), value, of_shipped, of_last, against_shipped, against_last, own)
+        checked = tuple(outcome for outcome in outcomes if outcome.check["kpi"] == name)
+        return KpiComparison(
+            name, candidate.units.get(name, ""), value, of_shipped, of_last, against_shipped, against_last, checked
+        )
 
     return [row(name, value) for name, value in candidate.kpis.items()]

@@ -1,7 +1,7 @@
-"""Scenarios with a candidate in the place of the shipped controller.
+"""Scenarios in which a candidate replaces the shipped controller.
 
-What a scenario says about variables that the candidate does not have (parameters, connections to inputs, KPIs of its signals)
-is left out and noted. References are left out: another controller flies another way.
+Entries of a scenario that refer to variables which the candidate lacks (parameters, connections to inputs, KPIs of its signals)
+are removed and noted. References are removed, since another controller gives other trajectories.
 """
 
 from __future__ import annotations
@@ -20,16 +20,24 @@ from ...scenario.schema import SOURCES
 from .candidate import CandidateInterface, CandidateSource
 from .role import Role
 
-#: name of something in a system -> whether it is still there
+#: returns whether a name of a system still exists
 NameFilter = Callable[[str], bool]
-_FIRST_PART = re.compile(r"[^.\[]*")
+#: end of the first part of a name
+_SEPARATOR = re.compile(r"[.\[]")
 
 
 @dataclass
 class ControllerSubstitution:
-    """One scenario with the candidate in it, started with `parameters` of its own beside those of the scenario.
+    """Substitution of the candidate for the controllers of a role in one scenario.
 
-    `places` are its full names there, `notes` what was left out.
+    Attributes:
+        role: the role.
+        candidate: the candidate's source.
+        interface: the candidate's variables.
+        file: the scenario's file.
+        parameters: parameters of the candidate in addition to those of the scenario.
+        replaced_components: full names of the replaced components.
+        notes: messages about removed entries.
     """
 
     role: Role
@@ -42,9 +50,13 @@ class ControllerSubstitution:
     _folder: Path = field(init=False)
 
     def write(self, folder: Path) -> Path | None:
-        """Write the changed scenario, and what it consists of, to `folder`; None when it has no place of this role.
+        """Write the changed scenario and its nested systems to `folder` and return its path.
 
-        Raises InputError for a bad scenario; JSON without components is none at all.
+        Returns:
+            None if no component has the role, or if the file is not a scenario (has no components).
+
+        Raises:
+            InputError: if the scenario is invalid.
         """
         loaded = load_scenario(self.file)
         if "components" not in loaded.root.document.value:
@@ -62,18 +74,18 @@ class ControllerSubstitution:
     # -- systems -------------------------------------------------------------------------------------------------------
 
     def _substitute_system(self, value: Mapping[str, Any], folder: Path, prefix: str) -> tuple[dict[str, Any], NameFilter]:
-        """A system with the candidate in it, and what of its names still means something."""
-        inside: dict[str, NameFilter] = {}
+        """Return a system with the candidate in it, and a filter of the names that still exist."""
+        filters: dict[str, NameFilter] = {}
         components = {
-            name: self._substitute_component(spec, folder, f"{prefix}{name}", name, inside)
+            name: self._substitute_component(spec, folder, f"{prefix}{name}", name, filters)
             for name, spec in value["components"].items()
         }
 
         def known(name: str) -> bool:
             component, _, rest = name.partition(".")
-            return component not in inside or inside[component](rest)
+            return component not in filters or filters[component](rest)
 
-        for name in inside:
+        for name in filters:
             spec = components[name]
             parameters = {key: v for key, v in spec.get("parameters", {}).items() if self._is_kept(known, f"{name}.{key}")}
             components[name] = {**spec, "parameters": parameters}
@@ -81,24 +93,24 @@ class ControllerSubstitution:
         return {**value, "components": components, "connections": connections}, known
 
     def _substitute_component(
-        self, spec: Mapping[str, Any], folder: Path, full_name: str, name: str, inside: dict[str, NameFilter]
+        self, spec: Mapping[str, Any], folder: Path, full_name: str, name: str, filters: dict[str, NameFilter]
     ) -> dict[str, Any]:
         kind = next(source for source in SOURCES if source in spec)
         path = (folder / _reference_file(spec[kind])).resolve()
         if path in self.role.controllers:
             self.replaced_components.append(full_name)
-            inside[name] = self.interface.has_variables
+            filters[name] = self.interface.has_variables
             period = {key: value for key, value in spec.items() if key == "period"}
             return {**self.candidate.entry, **period, "parameters": {**spec.get("parameters", {}), **self.parameters}}
         system = self.role.stand_ins.get(path, path if kind == "system" else None)
         nested = self._substitute_nested(system, full_name) if system else None
         if nested is None:
             return {**spec, kind: absolute_reference(spec[kind], folder)}
-        changed, inside[name] = nested
+        changed, filters[name] = nested
         return {key: value for key, value in spec.items() if key not in (kind, "isolation")} | {"system": str(changed)}
 
     def _substitute_nested(self, file: Path, full_name: str) -> tuple[Path, NameFilter] | None:
-        """A nested system's changed file and what of its names is left, None when it has no place."""
+        """Write a changed nested system; return its path and the filter of its names, or None if no component has the role."""
         before = len(self.replaced_components)
         value, known = self._substitute_system(read_document(file).value, file.parent, f"{full_name}.")
         if len(self.replaced_components) == before:
@@ -109,23 +121,23 @@ class ControllerSubstitution:
         shown = {port for kind in ports.values() for port in kind}
 
         def known_outside(name: str) -> bool:
-            port = _FIRST_PART.match(name)[0]  # type: ignore[index]
+            port = _SEPARATOR.split(name, 1)[0]
             return port in shown or (port not in lost and known(name))
 
         return path, known_outside
 
     def _prune_ports(self, ports: Mapping[str, Any], known: NameFilter) -> tuple[dict[str, Any], set[str]]:
-        """Ports that lead somewhere, and the names of those that do not."""
-        kept: dict[str, dict[str, Any]] = {kind: {} for kind in ports}
+        """Return the ports that still lead to a variable, and the names of those that do not."""
+        remaining: dict[str, dict[str, Any]] = {kind: {} for kind in ports}
         lost = set()
         for kind, named in ports.items():
             for port, inner in named.items():
-                left = [name for name in ([inner] if isinstance(inner, str) else inner) if known(name)]
-                if left:
-                    kept[kind][port] = left[0] if isinstance(inner, str) else left
+                targets = [name for name in ([inner] if isinstance(inner, str) else inner) if known(name)]
+                if targets:
+                    remaining[kind][port] = targets[0] if isinstance(inner, str) else targets
                 else:
                     lost.add(port)
-        return kept, lost
+        return remaining, lost
 
     # -- the scenario's own keys ---------------------------------------------------------------------------------------
 
@@ -157,33 +169,33 @@ class ControllerSubstitution:
         return {name: value for name, value in settings.items() if self._is_kept(known, name)}
 
     def _all_known(self, known: NameFilter, arguments: Any, what: str) -> bool:
-        gone = [text for text in _strings(arguments) if not known(text)]
-        if gone:
-            self.notes.append(f'{what} is left out: the candidate has no "{gone[0]}"')
-        return not gone
+        missing = [text for text in _strings(arguments) if not known(text)]
+        if missing:
+            self.notes.append(f'{what} is left out: the candidate has no "{missing[0]}"')
+        return not missing
 
     def _is_kept(self, known: NameFilter, name: str) -> bool:
         if known(name):
             return True
         hint = did_you_mean(name.partition(".")[2], self.interface.names) if len(self.interface.names) > 8 else ""
-        self.notes.append(f'"{name}" is left out: the candidate has nothing of that name{hint}')
+        self.notes.append(f'"{name}" is left out: the candidate has no such variable{hint}')
         return False
 
 
 def absolute_reference(reference: str, folder: Path) -> str:
-    """A file, or something in a file, named from anywhere; modules of Python as they are."""
+    """Return a reference to a file, or to an object in a file, with an absolute path; Python modules stay as they are."""
     file = _reference_file(reference)
     is_module = file != reference and not file.endswith((".py", ".mo"))
     return reference if is_module else f"{(folder / file).resolve()}{reference.removeprefix(file)}"
 
 
 def _reference_file(reference: str) -> str:
-    """The file in "my.fmu" or "my.py:Class"."""
+    """Return the file of a reference such as "my.fmu" or "my.py:Class"."""
     return reference.rpartition(":")[0] or reference
 
 
 def _strings(value: Any) -> Iterator[str]:
-    """All texts in an argument of a KPI or figure."""
+    """Yield all strings in an argument of a KPI or figure."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, Mapping | list):

@@ -1,1 +1,1 @@
-"""Execution of the runs of a study: worker processes, run store, cluster workers."""
+"""Execution of the runs of a study: worker processes, the store of finished runs, cluster workers."""

@@ -1,4 +1,4 @@
-"""Everything that a scenario's runs need, by content hash, so that another machine can run them."""
+"""Files that the runs of a scenario need, by content hash, so that another machine can run them."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from ...scenario.schema import ComponentSpec
 
 
 def cosim_fingerprint() -> str:
-    """Version of cosim and a hash of its sources and of the FMUs it ships: what must be the same for results to be the same."""
+    """Return the version of cosim and a hash of its sources and shipped FMUs; equal results require equal fingerprints."""
     package = resources.package_folder()
-    own = sorted(path for path in package.rglob("*.py") if "_bundle" not in path.parts)
+    sources = sorted(path for path in package.rglob("*.py") if "_bundle" not in path.parts)
     digest = sha256()
-    for path in (*own, *resources.root().glob("fmus/manifest.json")):
+    for path in (*sources, *resources.root().glob("fmus/manifest.json")):
         digest.update(path.name.encode() + path.read_bytes())
     return f"{__version__} ({digest.hexdigest()[:12]})"
 
 
 @dataclass(frozen=True)
 class Bundle:
-    """Files of a scenario, by their path below the folder that holds them all, and where the scenario is among them."""
+    """Files of a scenario below their common folder `root`; `scenario` is the path of the scenario's sources file."""
 
     root: Path
     scenario: PurePosixPath
@@ -41,21 +41,25 @@ class Bundle:
 
     @cached_property
     def digest(self) -> str:
-        """What the files are, wherever they lie, and the cosim that runs them."""
+        """Hash of the files, independent of `root`, and of the cosim that runs them."""
         return sha256(json.dumps([cosim_fingerprint(), str(self.scenario), sorted(self.files.items())]).encode()).hexdigest()
 
     def read_contents(self, hashes: Iterable[str]) -> dict[str, bytes]:
-        """Contents by their hash. Raises InputError when a file has changed since."""
-        wanted = set(hashes)
-        found = {sha: (self.root / path).read_bytes() for path, sha in self.files.items() if sha in wanted}
-        if changed := [sha for sha, content in found.items() if sha256(content).hexdigest() != sha]:
+        """Read file contents by their hash.
+
+        Raises:
+            InputError: if a file has changed since its hash was computed.
+        """
+        requested = set(hashes)
+        contents = {sha: (self.root / path).read_bytes() for path, sha in self.files.items() if sha in requested}
+        if changed := [sha for sha, content in contents.items() if sha256(content).hexdigest() != sha]:
             names = [path for path, sha in self.files.items() if sha in changed]
             raise InputError(f'"{self.root / names[0]}" was changed while the sweep was running')
-        return found
+        return contents
 
 
 def collect_bundle(scenario: Path, variants: Iterable[Mapping[str, Any]] = ({},)) -> Bundle:
-    """The files of a scenario, also of those that it names with one of the `variants` of its settings."""
+    """Collect the files of a scenario, including those that it uses only with one of the `variants` of its settings."""
     used = {path for settings in variants for path in _scenario_files(scenario, settings)}
     root = Path(os.path.commonpath([path.parent for path in used]))
     files = {path.relative_to(root).as_posix(): sha256(path.read_bytes()).hexdigest() for path in sorted(used)}
@@ -63,14 +67,14 @@ def collect_bundle(scenario: Path, variants: Iterable[Mapping[str, Any]] = ({},)
 
 
 def fmu_paths(files: Iterable[str]) -> tuple[str, ...]:
-    """Those of some files that are FMUs."""
+    """Return the paths that are FMUs, sorted."""
     return tuple(sorted(path for path in files if path.endswith(".fmu")))
 
 
 def absolute_paths(scenario: Path, settings: Mapping[str, Any]) -> list[Problem]:
-    """Paths that mean nothing on another machine."""
+    """Return a problem for each absolute path in the scenario, which another machine would not have."""
     return [
-        Problem(f'absolute path "{path}" cannot be shipped to a cluster, expected one relative to this file', where)
+        Problem(f'absolute path "{path}" cannot be shipped to a cluster; expected a path relative to this file', where)
         for node in load_scenario(scenario, _pointer_settings(settings)).root.walk()
         for path, where in _named_files(node)
         if Path(path).is_absolute() and paths.is_file(Path(path))
@@ -87,19 +91,19 @@ def _scenario_files(scenario: Path, settings: Mapping[str, Any]) -> Iterator[Pat
 
 
 def _existing_files(folder: Path, names: Iterable[str]) -> Iterator[Path]:
-    """Those of some names that are files, Python ones with their packages."""
+    """Yield the names that are files; a Python file with all files of its package."""
     for path in (paths.resolve_path(folder / name) for name in names):
         if paths.is_file(path):
             yield from _package_files(path) if path.suffix == ".py" else [path]
 
 
 def _pointer_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Those that change the scenario's JSON."""
+    """Return the settings that change the scenario's JSON."""
     return {name: value for name, value in settings.items() if name.startswith("/")}
 
 
 def _named_files(node: Node) -> Iterator[tuple[str, str]]:
-    """(path, where it stands) of all files that a system names, and of texts in arguments and parameters that may be files."""
+    """Yield (path, location) of all files that a system names, and of strings in arguments and parameters that may be files."""
     for name, component in node.spec.components.items():
         where = node.where("components", name)
         yield from ((path, where) for path in _component_paths(component))
@@ -130,7 +134,7 @@ def _strings(value: Any) -> Iterator[str]:
 
 
 def _package_files(path: Path) -> Iterator[Path]:
-    """A Python file and, when it is in a package, everything in the outermost one, data too."""
+    """Yield a Python file, or all files of its outermost package including data files."""
     if package_files(path) == [path]:
         yield path
         return

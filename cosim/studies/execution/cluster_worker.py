@@ -1,4 +1,4 @@
-"""What happens on a worker of a cluster: files are kept by content hash, and jobs run as on any other machine."""
+"""Functions that run on a worker of a Dask cluster: storage of files by content hash, and execution of jobs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from .bundle import cosim_fingerprint, fmu_paths
-from .job import Job, StudyContext
+from .job import Job, RunKey, StudyContext
 from .worker_pool import WorkerPool
 
 _pools_lock = threading.Lock()
@@ -21,7 +21,15 @@ _worker_pools: dict[tuple[str, float | None], WorkerPool] = {}
 
 @dataclass(frozen=True)
 class StudyPackage:
-    """What a worker must have to run the jobs of a study: files by their path, and a run's deadline (s)."""
+    """Data that a worker needs to run the jobs of a study.
+
+    Attributes:
+        digest: hash of all files and of cosim.
+        identity: fingerprint of the cosim that the worker must have.
+        scenario: path of the scenario's file among `files`.
+        files: content hash (SHA-256) of each file by its path.
+        deadline: wall time that a run may take (s); None: any.
+    """
 
     digest: str
     identity: str
@@ -31,48 +39,60 @@ class StudyPackage:
 
 
 def fingerprint_probe() -> Callable[[], str]:
-    """A function that says which cosim a worker has, if any; it travels by value, so it needs none to run."""
+    """Return a function that returns the fingerprint of the worker's cosim.
 
-    def found() -> str:
+    Dask sends it by value, so that it also runs on a worker without cosim.
+    """
+
+    def fingerprint() -> str:
         try:
             from cosim.studies.execution.bundle import cosim_fingerprint
         except ImportError:
             return "no cosim, or one without sweeps"
         return cosim_fingerprint()
 
-    return found
+    return fingerprint
 
 
 def missing_hashes(files: Mapping[str, str], dask_worker: Any) -> list[str]:
-    """Hashes of contents that this worker does not have."""
+    """Return the content hashes of the files that this worker lacks."""
     contents = _contents_folder(dask_worker)
     return sorted({sha for sha in files.values() if not (contents / sha).is_file()})
 
 
 def store_contents(blobs: Mapping[str, bytes], dask_worker: Any) -> None:
-    """Keep contents under their hash. Raises ValueError when one is not what its hash says."""
+    """Store contents under their hash.
+
+    Raises:
+        ValueError: if a content does not match its hash.
+    """
     folder = _contents_folder(dask_worker)
     for sha, content in blobs.items():
         if sha256(content).hexdigest() != sha:
-            raise ValueError(f"the content {sha} was damaged on its way")
+            raise ValueError(f"the content {sha} was damaged during the transfer")
         part = folder / f"{sha}.{os.getpid()}.part"
         part.write_bytes(content)
         part.replace(folder / sha)
 
 
-def run_job(cargo: StudyPackage, key: str, settings: Mapping[str, Any], check: bool) -> dict[str, Any]:
-    """Run or check a job; the answer says instead what this worker lacks ("missing") or why it cannot ("refused")."""
+def run_job(package: StudyPackage, key: RunKey, settings: Mapping[str, Any], check: bool) -> dict[str, Any]:
+    """Run or check a job on this worker and return the answer.
+
+    Returns:
+        {"record": ...} after a run and {"problems": ...} after a check; {"refused": fingerprint} if the worker has another
+        cosim, and {"missing": True} if it lacks files.
+    """
     from distributed import get_worker
 
     worker = get_worker()
-    if _own_fingerprint() != cargo.identity:
+    if _own_fingerprint() != package.identity:
         return {"worker": worker.address, "refused": _own_fingerprint()}
-    if missing_hashes(cargo.files, worker):
+    if missing_hashes(package.files, worker):
         return {"worker": worker.address, "missing": True}
-    shop, job = _worker_pool(cargo, worker), Job(key, settings)
+    pool, job = _worker_pool(package, worker), Job(key, settings)
     if check:
-        return {"problems": [(problem.message, problem.where) for problem in shop.check(job)]}
-    return {"record": shop.run(job).to_json()}
+        return {"problems": [(problem.message, problem.where) for problem in pool.check(job)]}
+    return {"record": pool.run(job).to_json()}
 
 
 @cache
@@ -80,13 +100,14 @@ def _own_fingerprint() -> str:
     return cosim_fingerprint()
 
 
-def _worker_pool(cargo: StudyPackage, worker: Any) -> WorkerPool:
+def _worker_pool(package: StudyPackage, worker: Any) -> WorkerPool:
     with _pools_lock:
-        place = (cargo.digest, cargo.deadline)
-        if place not in _worker_pools:
-            root = _link_study_files(cargo, worker)
-            _worker_pools[place] = WorkerPool(StudyContext(root / cargo.scenario, root, cargo.deadline, fmu_paths(cargo.files)))
-        return _worker_pools[place]
+        study = (package.digest, package.deadline)
+        if study not in _worker_pools:
+            root = _link_study_files(package, worker)
+            context = StudyContext(root / package.scenario, root, package.deadline, fmu_paths(package.files))
+            _worker_pools[study] = WorkerPool(context)
+        return _worker_pools[study]
 
 
 def _contents_folder(worker: Any) -> Path:
@@ -99,10 +120,10 @@ def _worker_folder(worker: Any, name: str) -> Path:
     return folder
 
 
-def _link_study_files(cargo: StudyPackage, worker: Any) -> Path:
-    """The files of a study where its scenario looks for them."""
-    root = _worker_folder(worker, "trees") / cargo.digest
-    for path, sha in cargo.files.items():
+def _link_study_files(package: StudyPackage, worker: Any) -> Path:
+    """Link the stored files of a study into a folder, as its scenario expects them, and return the folder."""
+    root = _worker_folder(worker, "trees") / package.digest
+    for path, sha in package.files.items():
         file = root / path
         file.parent.mkdir(parents=True, exist_ok=True)
         if not file.exists():

@@ -1,8 +1,8 @@
-"""Warm process that forks all runs of a sweep on one machine: `python -m cosim.studies.execution.fork_server DESCRIPTOR`.
+"""Fork server for the runs of a study on one machine: `python -m cosim.studies.execution.fork_server DESCRIPTOR`.
 
-It has imported everything, read the scenario once, unpacked its FMUs and let classes of components prepare what they can (by a
-function `warm`, where they have one); it has never loaded a binary or started a thread. For every descriptor it is sent it forks
-a lane: a process that answers one job after the other, each with a child process of its own.
+It imports all modules that runs need, loads the scenario once, unpacks its FMUs and calls the function `warm` of component
+classes that have one. It never loads a library of an FMU and never starts a thread. For every file descriptor that it receives,
+it forks a worker process. A worker handles one job at a time, each in a child process of its own.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from ...process.temporary_folders import temporary_run_folder
 from ...scenario import load_scenario
 from ...scenario.named_functions import function_problem, load_function
 from ...scenario.nested_systems import Scenario
-from .job import Job, StudyContext
+from .job import READY, Job, StudyContext
 from .run import FmuFiles, ReplayRequest, supervised_check, supervised_run
 
-#: what a run imports on its way
+#: modules that a run imports lazily
 _PRELOADED_MODULES = (
     "fmpy.fmi1",
     "fmpy.fmi2",
@@ -43,40 +43,40 @@ _PRELOADED_MODULES = (
 
 
 def serve_forks(control: socket.socket) -> None:
-    """Fork lanes until whoever started this process is gone."""
+    """Receive the study context, preload it, and fork workers until the connection `control` is closed."""
     if not (message := control.recv(1 << 16)):
         return
     request = json.loads(message)
-    order = StudyContext(Path(request["scenario"]), Path(request["root"]), request["deadline"], tuple(request["fmus"]))
+    context = StudyContext(Path(request["scenario"]), Path(request["root"]), request["deadline"], tuple(request["fmus"]))
     with temporary_run_folder() as folder:
         tempfile.tempdir = os.environ["TMPDIR"] = folder
         for module in _PRELOADED_MODULES:
             import_module(module)
-        prepared = {} if request["cold"] else dict(_preload(order))
+        fmu_files = dict(_preload(context)) if request["preload"] else {}
         gc.freeze()
-        control.sendall(b"warm" if request["cold"] or thread_count() == 1 else b"cold")
-        lanes: list[int] = []
+        control.sendall(b"threads" if request["preload"] and thread_count() > 1 else READY)
+        workers: list[int] = []
         try:
             while descriptors := socket.recv_fds(control, 16, 1)[1]:
-                lanes.append(_fork_worker(control, descriptors[0], order, prepared))
+                workers.append(_fork_worker(control, descriptors[0], context, fmu_files))
                 os.close(descriptors[0])
         finally:
-            for lane in lanes:
+            for worker in workers:
                 with suppress(ProcessLookupError, ChildProcessError):
-                    os.kill(lane, SIGKILL)
-                    os.waitpid(lane, 0)
+                    os.kill(worker, SIGKILL)
+                    os.waitpid(worker, 0)
 
 
-def _preload(order: StudyContext) -> Iterator[tuple[Path, FmuFile]]:
-    """Import what the scenario uses as it stands in its file, unpack all FMUs; what is wrong with them, the runs will say."""
+def _preload(context: StudyContext) -> Iterator[tuple[Path, FmuFile]]:
+    """Import the code that the scenario uses and yield the unpacked FMUs by path; the runs report any problems."""
     with suppress(CosimError):
-        _preload_components(load_scenario(order.scenario))
-    for path in order.fmus:
+        _preload_components(load_scenario(context.scenario))
+    for path in context.fmus:
         with suppress(CosimError):
-            file = FmuFile(order.root / path)
+            file = FmuFile(context.root / path)
             if not file.description.once_per_process:
                 file.acquire()
-                yield (order.root / path).resolve(), file
+                yield (context.root / path).resolve(), file
 
 
 def _preload_components(scenario: Scenario) -> None:
@@ -90,45 +90,45 @@ def _preload_components(scenario: Scenario) -> None:
         load_function(kpi.python, scenario.root.folder)
 
 
-def _fork_worker(control: socket.socket, descriptor: int, order: StudyContext, prepared: FmuFiles) -> int:
-    template = os.getpid()
+def _fork_worker(control: socket.socket, descriptor: int, context: StudyContext, fmu_files: FmuFiles) -> int:
+    fork_server = os.getpid()
     child = os.fork()
     if child:
         return child
     try:
         control.close()
-        detach(template)
+        detach(fork_server)
         _redirect_output()
-        _serve_requests(socket.socket(fileno=descriptor), order, prepared)
+        _serve_requests(socket.socket(fileno=descriptor), context, fmu_files)
     finally:
         os._exit(0)
 
 
 def _redirect_output() -> None:
-    """What is printed here goes to a file without a name."""
+    """Redirect standard output and standard error of this process to an unnamed file."""
     with tempfile.TemporaryFile("ab") as file:
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
 
 
-def _serve_requests(client: socket.socket, order: StudyContext, prepared: FmuFiles) -> None:
+def _serve_requests(client: socket.socket, context: StudyContext, fmu_files: FmuFiles) -> None:
     with client.makefile("rb") as requests:
         for line in requests:
-            client.sendall((_handle_request(json.loads(line), order, prepared) + "\n").encode())
+            client.sendall((_handle_request(json.loads(line), context, fmu_files) + "\n").encode())
 
 
-def _handle_request(request: dict[str, Any], order: StudyContext, prepared: FmuFiles) -> str:
+def _handle_request(request: dict[str, Any], context: StudyContext, fmu_files: FmuFiles) -> str:
     job = Job(request["key"], request["settings"])
     if not request["check"]:
         replay = ReplayRequest(**request["replay"]) if "replay" in request else None
-        return supervised_run(order, job, prepared, replay).to_json()
+        return supervised_run(context, job, fmu_files, replay).to_json()
     try:
-        found = supervised_check(order, job, prepared)
+        problems = supervised_check(context, job, fmu_files)
     except CosimError as error:
         return json.dumps([(str(error), "")])
-    return json.dumps([(problem.message, problem.where) for problem in found])
+    return json.dumps([(problem.message, problem.where) for problem in problems])
 
 
 if __name__ == "__main__":
-    with suppress(ConnectionError):  # it was interrupted while this process warmed up
+    with suppress(ConnectionError):  # the pool was closed while this process was preloading
         serve_forks(socket.socket(fileno=int(sys.argv[1])))

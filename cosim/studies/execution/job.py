@@ -1,4 +1,4 @@
-"""What an engine is asked to do, and what it answers."""
+"""Runs of a study as data: jobs for a runner, and records of finished runs."""
 
 from __future__ import annotations
 
@@ -7,43 +7,62 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NewType, Protocol
 
 from ...results.checks import Number
+
+#: messages between the worker pool and its fork server
+READY, FORK_REQUEST = b"ready", b"fork"
+
+#: identifies a run by the content of its files and its settings; equal for equal runs
+RunKey = NewType("RunKey", str)
 
 
 @dataclass(frozen=True)
 class Job:
-    """One run: its settings, and a key that is the same exactly when the same run is meant."""
+    """A run to be made: its key and its settings, as of `--set`."""
 
-    key: str
+    key: RunKey
     settings: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class Record:
-    """What became of a run: its KPIs or the cause of its failure, the wall time (s), and what its components printed last."""
+    """Outcome of a run.
 
-    key: str
+    Attributes:
+        key: key of the run.
+        kpis: KPIs by name; empty after a failure.
+        failure: cause of a failure; empty: the run reached its end.
+        seconds: wall time (s).
+        output: end of the text that components printed, of a failed run.
+    """
+
+    key: RunKey
     kpis: Mapping[str, Number] = field(default_factory=dict)
     failure: str = ""
     seconds: float = 0.0
     output: str = ""
 
     def to_json(self) -> str:
-        """One line; what is empty is left out."""
+        """Return the record as one line of JSON without its empty fields."""
         return json.dumps({name: value for name, value in vars(self).items() if value or name == "key"})
 
     @classmethod
     def from_json(cls, text: str | bytes) -> Record:
+        """Read a record from a line of JSON."""
         return cls(**json.loads(text))
 
 
 @dataclass(frozen=True)
 class StudyContext:
-    """What all runs have in common: the scenario's file, the folder its messages are relative to, and a run's deadline (s).
+    """Properties that all runs of a study share.
 
-    `fmus` are the paths below that folder of all FMUs that some run uses.
+    Attributes:
+        scenario: the scenario's file.
+        root: folder of all files that the runs need; messages show paths relative to it.
+        deadline: wall time that a run may take (s); None: any.
+        fmus: paths below `root` of the FMUs that the runs use.
     """
 
     scenario: Path
@@ -53,11 +72,13 @@ class StudyContext:
 
 
 class Runner(Protocol):
-    """Runs jobs, several at a time, and answers in whatever order they end."""
+    """Executor of jobs, several at a time."""
 
-    def run_jobs(self, jobs: Iterable[Job]) -> Iterator[Record]: ...
+    def run_jobs(self, jobs: Iterable[Job]) -> Iterator[Record]:
+        """Run the jobs and yield their records in the order in which the runs end."""
+        ...
 
 
-def run_key(digest: str, settings: Mapping[str, Any]) -> str:
-    """The key of the run that scenario files of this digest make with these settings."""
-    return sha256(json.dumps([digest, settings], sort_keys=True).encode()).hexdigest()[:32]
+def run_key(digest: str, settings: Mapping[str, Any]) -> RunKey:
+    """Return the key of the run of a scenario, whose files have this digest, with these settings."""
+    return RunKey(sha256(json.dumps([digest, settings], sort_keys=True).encode()).hexdigest()[:32])

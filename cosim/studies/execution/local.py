@@ -1,4 +1,4 @@
-"""The engine of one machine: several lanes side by side."""
+"""Runner of jobs on this machine, by several worker processes."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from .worker_pool import WorkerPool
 
 
 class LocalRunner:
-    """Runs `workers` jobs at a time; a context, at whose end all runs are ended."""
+    """Runner of `workers` jobs at a time on this machine; leaving its context ends all runs."""
 
-    def __init__(self, order: StudyContext, workers: int):
-        self.worker_pool, self._workers = WorkerPool(order), workers
+    def __init__(self, context: StudyContext, workers: int):
+        self.worker_pool, self._workers = WorkerPool(context), workers
 
     def __enter__(self) -> LocalRunner:
         return self
@@ -23,11 +23,14 @@ class LocalRunner:
         self.worker_pool.close()
 
     def check(self, job: Job) -> list[Problem]:
-        """What keeps a job from being run."""
+        """Return the problems for which a job cannot be run."""
         return self.worker_pool.check(job)
 
     def run_jobs(self, jobs: Iterable[Job]) -> Iterator[Record]:
-        """Records in the order in which runs end; only a few jobs are made in advance. Each thread waits for a lane."""
+        """Run the jobs and yield their records in the order in which the runs end.
+
+        Only a few jobs are taken from the iterable in advance. Each thread waits for a worker process.
+        """
         pending: set[Future[Record]] = set()
         pool = ThreadPoolExecutor(self._workers)
         try:

@@ -1,4 +1,4 @@
-"""One run of a sweep, in a supervised child process of its own."""
+"""One run of a study in a supervised child process of its own."""
 
 from __future__ import annotations
 
@@ -24,38 +24,49 @@ from ...results.kpi import evaluate_kpis
 from ...scenario import PreparedRun, prepare
 from .job import Job, Record, StudyContext
 
-#: so much of what components printed is kept of a run that failed (bytes)
+#: length kept of the text that components printed in a failed run (bytes)
 _MAX_OUTPUT = 2000
 
+#: unpacked FMUs by path
 FmuFiles = Mapping[Path, FmuFile]
 
 
 class ReplayRequest(NamedTuple):
-    """The page that is to be made of a run."""
+    """Title and path of the replay page to be written of a run."""
 
     title: str
     page: str
 
 
-def supervised_run(order: StudyContext, job: Job, fmu_files: FmuFiles, replay: ReplayRequest | None = None) -> Record:
-    """Run a job in a child process; what it prints goes to this process's standard error, which is a file.
+def supervised_run(context: StudyContext, job: Job, fmu_files: FmuFiles, replay: ReplayRequest | None = None) -> Record:
+    """Run a job in a child process and return its record, whatever happens to the child.
 
-    Whatever the run does, a record comes of it. With `replay` its 3-D replay is written.
+    Args:
+        context: properties that all runs of the study share.
+        job: the run.
+        fmu_files: FMUs that are unpacked already.
+        replay: page to which the 3-D replay of the run is written; None: none.
+
+    The output of the child goes to this process's standard error, which must be a file.
     """
     work = _run_job if replay is None else partial(_run_with_replay, replay)
     began = time.monotonic()
     os.ftruncate(2, 0)
     with tempfile.TemporaryFile("w+") as reply:
-        outcome = run_supervised(lambda: _run_reporting_failure(reply, lambda: work(order, job, fmu_files, reply)))
-        record = _make_record(order, job, outcome, reply)
+        outcome = run_supervised(lambda: _run_reporting_failure(reply, lambda: work(context, job, fmu_files, reply)))
+        record = _make_record(context, job, outcome, reply)
     record = replace(record, seconds=round(time.monotonic() - began, 4))
     return replace(record, output=_last_output()) if record.failure else record
 
 
-def supervised_check(order: StudyContext, job: Job, fmu_files: FmuFiles) -> list[Problem]:
-    """What keeps a job from being run, without running it. Raises ComponentError when that ends the process."""
+def supervised_check(context: StudyContext, job: Job, fmu_files: FmuFiles) -> list[Problem]:
+    """Prepare a job in a child process and return the problems for which it cannot be run.
+
+    Raises:
+        ComponentError: if the child process crashes.
+    """
     with tempfile.TemporaryFile("w+") as reply:
-        outcome = run_supervised(lambda: _run_reporting_failure(reply, lambda: _check_job(order, job, fmu_files, reply)))
+        outcome = run_supervised(lambda: _run_reporting_failure(reply, lambda: _check_job(context, job, fmu_files, reply)))
         if outcome.failure:
             raise outcome.failure
         reply.seek(0)
@@ -66,7 +77,7 @@ def supervised_check(order: StudyContext, job: Job, fmu_files: FmuFiles) -> list
 
 
 def _run_reporting_failure(reply: IO[str], work: Callable[[], None]) -> int:
-    """Do the work; what it raises becomes the reply."""
+    """Call `work` and return an exit code; the reply to an exception is its text."""
     try:
         work()
         return 0
@@ -85,23 +96,23 @@ def _write_reply(reply: IO[str], value: Any) -> None:
     reply.flush()
 
 
-def _run_job(order: StudyContext, job: Job, prepared: FmuFiles, reply: IO[str]) -> None:
-    _set_deadline(order)
-    assembly = _prepare_job(order, job, prepared)
-    with keeping_run_files(Path(tempfile.gettempdir()) / "run"), simulating(assembly.system, assembly.settings) as outcome:
+def _run_job(context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[str]) -> None:
+    _set_deadline(context)
+    prepared = _prepare_job(context, job, fmu_files)
+    with keeping_run_files(Path(tempfile.gettempdir()) / "run"), simulating(prepared.system, prepared.settings) as outcome:
         if outcome.failure:
             raise outcome.failure
-        kpis = evaluate_kpis(Result(outcome.recording), assembly.kpis())
+        kpis = evaluate_kpis(Result(outcome.recording), prepared.kpis())
         _write_reply(reply, {"kpis": kpis})
         _results_written()
 
 
-def _run_with_replay(replay: ReplayRequest, order: StudyContext, job: Job, prepared: FmuFiles, reply: IO[str]) -> None:
+def _run_with_replay(replay: ReplayRequest, context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[str]) -> None:
     from ...api import executing
     from ...report.replay import write_replay
 
-    _set_deadline(order)
-    with keeping_run_files(Path(tempfile.gettempdir()) / "run"), executing(_prepare_job(order, job, prepared)) as execution:
+    _set_deadline(context)
+    with keeping_run_files(Path(tempfile.gettempdir()) / "run"), executing(_prepare_job(context, job, fmu_files)) as execution:
         result = execution.result
         write_replay([replace(result, metadata={**result.metadata, "name": replay.title})], Path(replay.page))
         if execution.failure:
@@ -110,57 +121,57 @@ def _run_with_replay(replay: ReplayRequest, order: StudyContext, job: Job, prepa
         _results_written()
 
 
-def _set_deadline(order: StudyContext) -> None:
-    if order.deadline:
+def _set_deadline(context: StudyContext) -> None:
+    if context.deadline:
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
-        signal.setitimer(signal.ITIMER_REAL, order.deadline)
+        signal.setitimer(signal.ITIMER_REAL, context.deadline)
 
 
-def _prepare_job(order: StudyContext, job: Job, prepared: FmuFiles) -> PreparedRun:
-    assembly = prepare(order.scenario, job.settings, loaded_fmus={path: file.share() for path, file in prepared.items()})
+def _prepare_job(context: StudyContext, job: Job, fmu_files: FmuFiles) -> PreparedRun:
+    prepared = prepare(context.scenario, job.settings, loaded_fmus={path: file.share() for path, file in fmu_files.items()})
     if journal := current_journal():
-        journal.deadlines = Deadlines(**assembly.spec.deadlines.model_dump())
-    return assembly
+        journal.deadlines = Deadlines(**prepared.spec.deadlines.model_dump())
+    return prepared
 
 
 def _results_written() -> None:
-    """All results are written: what components do from now on cannot change them."""
+    """Record in the journal that all results are written: later failures of components no longer count."""
     signal.setitimer(signal.ITIMER_REAL, 0)
     if journal := current_journal():
         journal[EXIT_CODE] = 0
         journal.enter_phase(Phase.RESULTS_WRITTEN)
 
 
-def _check_job(order: StudyContext, job: Job, prepared: FmuFiles, reply: IO[str]) -> None:
+def _check_job(context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[str]) -> None:
     problems: list[Problem] = []
     try:
-        _prepare_job(order, job, prepared).free()
+        _prepare_job(context, job, fmu_files).free()
     except InputError as error:
         problems = list(error.problems)
-    _write_reply(reply, [(problem.message, _without_root(order, problem.where)) for problem in problems])
+    _write_reply(reply, [(problem.message, _without_root(context, problem.where)) for problem in problems])
 
 
 # -- in the supervisor -------------------------------------------------------------------------------------------------------
 
 
-def _make_record(order: StudyContext, job: Job, outcome: SupervisedOutcome, reply: IO[str]) -> Record:
+def _make_record(context: StudyContext, job: Job, outcome: SupervisedOutcome, reply: IO[str]) -> Record:
     if outcome.failure:
-        return Record(job.key, failure=_without_root(order, _failure_cause(order, outcome.failure)))
+        return Record(job.key, failure=_without_root(context, _failure_cause(context, outcome.failure)))
     reply.seek(0)
     answer = json.load(reply)
-    return Record(job.key, answer.get("kpis", {}), _without_root(order, answer.get("failure", "")))
+    return Record(job.key, answer.get("kpis", {}), _without_root(context, answer.get("failure", "")))
 
 
-def _failure_cause(order: StudyContext, failure: ComponentError) -> str:
-    """How the child ended; that it was late does not depend on where it was then."""
-    if order.deadline and f"signal {signal.SIGALRM:d} " in failure.reason:
-        return f"the run did not end within {order.deadline:g} s"
+def _failure_cause(context: StudyContext, failure: ComponentError) -> str:
+    """Return the cause of a failure; a missed deadline has the same text wherever the run was then."""
+    if context.deadline and f"signal {signal.SIGALRM:d} " in failure.reason:
+        return f"the run did not end within {context.deadline:g} s"
     return str(failure)
 
 
-def _without_root(order: StudyContext, text: str) -> str:
-    """The same text on every machine."""
-    return text.replace(f"{order.root}/", "")
+def _without_root(context: StudyContext, text: str) -> str:
+    """Return a text with paths relative to the study's root, so that it is equal on all machines."""
+    return text.replace(f"{context.root}/", "")
 
 
 def _last_output() -> str:

@@ -1,7 +1,7 @@
-"""What is known about finished runs: a file with one line per record, so that nothing is run twice.
+"""Store of finished runs: a file with one line per record, so that no run is made twice.
 
-Lines are only ever appended. A kill at any moment costs at most the line that was being written; the file is forced to the disk
-every second. Lines that cannot be read are passed over.
+Lines are only appended. A kill at any moment loses at most the line that is being written; the file is synchronized with the
+disk every second. Unreadable lines are skipped.
 """
 
 from __future__ import annotations
@@ -13,48 +13,56 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from ...core.errors import InputError, OutputError
-from .job import Job, Record
+from .job import Job, Record, RunKey
 
 RUN_STORE_FILE = "journal.jsonl"
-#: s
+#: time between two synchronizations with the disk (s)
 _SYNC_INTERVAL = 1.0
-#: how every line begins
+#: start of every line
 _LINE_PREFIX = b'{"key": "'
-#: position of a record that is being made
+#: position in the file of a run that is not finished
 _PENDING = -1
 
 
 class RunStore:
-    """Records by key, in a folder that no other process may use meanwhile; in memory are only their positions in the file.
+    """Records of finished runs by key, in a folder locked against other processes.
 
-    With `retry` runs that failed count as not done. Raises InputError when the folder cannot be used, or holds another file of
-    that name.
+    Only the positions of the records in the file are kept in memory. Records can be read inside the store's context.
     """
 
     def __init__(self, folder: Path, retry_failed: bool = False):
+        """Open the store of a folder, or create it.
+
+        Args:
+            folder: an existing folder.
+            retry_failed: treat failed runs as not finished.
+
+        Raises:
+            InputError: if the folder cannot be written, is used by another process, or holds a foreign file of that name.
+        """
         self.path = folder / RUN_STORE_FILE
         try:
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise InputError(f'another sweep is writing to "{folder}"') from None
+            raise InputError(f'another sweep or tuning is writing to "{folder}"') from None
         except OSError as error:
             raise InputError(f'cannot write "{self.path}": {error.strerror}') from None
-        #: lines that are no records; their runs count as not done
+        #: number of lines that are not records; their runs are treated as not finished
         self.unreadable_lines = 0
         self._positions: dict[bytes, int] = {}
         self._end = self._synced = 0.0
         self._size = self._read(retry_failed)
 
     def _read(self, retry: bool) -> int:
-        """Index the file, and cut off what a kill or power cut has left of a last line; returns the size."""
+        """Index the file, cut off an incomplete last line, and return the size (bytes)."""
         size = 0
         with self.path.open("rb") as file:
             for line in file:
                 record = _parse_record(line)
                 if size == 0 and not record and not _LINE_PREFIX.startswith(line[: len(_LINE_PREFIX)]):
                     os.close(self._file)
-                    raise InputError(f'"{self.path}" is no file of finished runs, expected one or none')
+                    raise InputError(f'"{self.path}" is not a file of finished runs; expected one, or no such file')
                 if not line.endswith(b"\n"):
                     os.ftruncate(self._file, size)
                     break
@@ -71,14 +79,18 @@ class RunStore:
             self._positions[bytes.fromhex(record.key)] = position
 
     def claim_jobs(self, jobs: Iterable[Job]) -> Iterator[Job]:
-        """Those that are not done; of several with one key the first."""
+        """Yield the jobs that are not finished, each key only once."""
         for job in jobs:
             if bytes.fromhex(job.key) not in self._positions:
                 self._positions[bytes.fromhex(job.key)] = _PENDING
                 yield job
 
     def add(self, record: Record) -> None:
-        """Keep a record. Raises OutputError when the disk does not take it."""
+        """Append a record.
+
+        Raises:
+            OutputError: if it cannot be written, as on a full disk.
+        """
         line = record.to_json().encode() + b"\n"
         try:
             if os.write(self._file, line) != len(line):
@@ -95,11 +107,11 @@ class RunStore:
         os.fsync(self._file)
         self._synced = time.monotonic()
 
-    def __contains__(self, key: str) -> bool:
+    def __contains__(self, key: RunKey) -> bool:
         return self._positions.get(bytes.fromhex(key), _PENDING) != _PENDING
 
-    def __getitem__(self, key: str) -> Record:
-        """The record of a finished run."""
+    def __getitem__(self, key: RunKey) -> Record:
+        """Return the record of a finished run."""
         self._reader.seek(self._positions[bytes.fromhex(key)])
         return Record.from_json(self._reader.readline())
 
@@ -114,7 +126,7 @@ class RunStore:
 
 
 def _parse_record(line: bytes) -> Record | None:
-    """A line's record; None when it holds none."""
+    """Return the record of a line, or None if the line is not a complete record."""
     try:
         record = Record.from_json(line)
         bytes.fromhex(record.key)

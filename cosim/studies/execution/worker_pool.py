@@ -1,4 +1,4 @@
-"""Where jobs are run on this machine: a template process and its lanes, seen from outside."""
+"""Pool of worker processes that run jobs on this machine, forked by a fork server."""
 
 from __future__ import annotations
 
@@ -13,56 +13,62 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import ComponentError, CosimError, Problem
-from .job import Job, Record, StudyContext
+from .job import FORK_REQUEST, READY, Job, Record, StudyContext
 
-#: a run is begun so often when the process that watches over it is killed
+#: attempts at a run whose worker process is killed
 MAX_ATTEMPTS = 3
-#: imports may take so long, and the end of all runs (s)
+#: time limits for the start of the fork server and for its end (s)
 _STARTUP_TIMEOUT, _SHUTDOWN_TIMEOUT = 120.0, 5.0
-#: so many FMUs are unpacked in advance
+#: number of FMUs unpacked in advance
 _MAX_PRELOADED_FMUS = 100
-#: one thread per process: many processes share the machine, and a process with threads cannot be forked
+#: one thread per process: many processes share the machine, and a process with threads cannot be forked safely
 _SINGLE_THREAD_ENVIRONMENT = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-#: a forked process touches all its memory for the first time: with large pages (glibc, Linux) that costs half as much
+#: large pages (glibc on Linux) halve the cost of page faults in a forked process
 _LARGE_PAGES_ENVIRONMENT = {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
 
 
-class WorkerLost(CosimError):
-    """The process at the other end is gone."""
+class WorkerLostError(CosimError):
+    """A worker process that ended or was killed."""
 
 
 class Worker:
-    """A process that answers one job after the other."""
+    """Connection to a worker process, which handles one job at a time."""
 
     def __init__(self, connection: socket.socket):
         self._connection, self._answers = connection, connection.makefile("rb")
 
     def request(self, request: dict[str, Any]) -> bytes:
+        """Send a request and return the answer, a line of JSON.
+
+        Raises:
+            WorkerLostError: if the process ends before it has answered.
+        """
         try:
             self._connection.sendall(json.dumps(request).encode() + b"\n")
             answer = self._answers.readline()
         except OSError:
             answer = b""
         if not answer.endswith(b"\n"):
-            raise WorkerLost("a lane ended")
+            raise WorkerLostError("a worker process ended")
         return answer
 
     def close(self) -> None:
+        """Close the connection; the worker process then ends."""
         with suppress(OSError):
             self._connection.shutdown(socket.SHUT_RDWR)
         self._connection.close()
 
 
 class _ForkServer:
-    """The warm process. One that cannot be warmed up, or has threads then, is started again without."""
+    """Process that forks workers; if preloading fails or starts threads in it, it is restarted without preloading."""
 
-    def __init__(self, order: StudyContext):
-        if not self._start(order, preload=False):
+    def __init__(self, context: StudyContext):
+        if not self._start(context, preload=True):
             self.close()
-            if not self._start(order, preload=True):
-                raise ComponentError("cosim", "the template process", f"it ended with exit code {self._process.wait()}")
+            if not self._start(context, preload=False):
+                raise ComponentError("cosim", "the fork server", f"it ended with exit code {self._process.wait()}")
 
-    def _start(self, order: StudyContext, preload: bool) -> bool:
+    def _start(self, context: StudyContext, preload: bool) -> bool:
         self._control, other = socket.socketpair()
         with other:
             command = [sys.executable, "-m", "cosim.studies.execution.fork_server", str(other.fileno())]
@@ -74,27 +80,37 @@ class _ForkServer:
                 env={**_LARGE_PAGES_ENVIRONMENT, **os.environ, **_SINGLE_THREAD_ENVIRONMENT},
                 start_new_session=True,
             )
-        place = {"scenario": str(order.scenario.resolve()), "root": str(order.root), "fmus": order.fmus[:_MAX_PRELOADED_FMUS]}
-        request = {**place, "deadline": order.deadline, "cold": preload}
+        request = {
+            "scenario": str(context.scenario.resolve()),
+            "root": str(context.root),
+            "fmus": context.fmus[:_MAX_PRELOADED_FMUS],
+            "deadline": context.deadline,
+            "preload": preload,
+        }
         self._control.settimeout(_STARTUP_TIMEOUT)
         with suppress(OSError):
             self._control.sendall(json.dumps(request).encode())
-            return self._control.recv(16) == b"warm"
+            return self._control.recv(16) == READY
         return False
 
     def fork_worker(self) -> Worker:
-        """A new lane. Raises OSError when the template is gone."""
-        own, other = socket.socketpair()
+        """Fork a worker.
+
+        Raises:
+            OSError: if the fork server has ended.
+        """
+        connection, other = socket.socketpair()
         with other:
-            socket.send_fds(self._control, [b"lane"], [other.fileno()])
-        return Worker(own)
+            socket.send_fds(self._control, [FORK_REQUEST], [other.fileno()])
+        return Worker(connection)
 
     @property
     def pid(self) -> int:
+        """Process id of the fork server."""
         return self._process.pid
 
     def close(self) -> None:
-        """It ends itself, and its lanes, when nobody can ask any more."""
+        """Close the connection; the fork server then ends its workers and itself."""
         self._control.close()
         try:
             self._process.wait(_SHUTDOWN_TIMEOUT)
@@ -104,54 +120,62 @@ class _ForkServer:
 
 
 class WorkerPool:
-    """Runs jobs; several threads may ask at a time, each gets a lane of its own. Killed templates and lanes are replaced."""
+    """Pool of worker processes for the runs of a study.
 
-    def __init__(self, order: StudyContext):
-        self._context, self._lock, self._idle = order, threading.Lock(), list[Worker]()
+    Several threads may call it at a time; each of them gets a worker of its own. Killed workers and a killed fork server are
+    replaced.
+    """
+
+    def __init__(self, context: StudyContext):
+        self._context, self._lock, self._idle = context, threading.Lock(), list[Worker]()
         self._busy: set[Worker] = set()
         self._fork_server: _ForkServer | None = None
         self._closed = False
 
     def run(self, job: Job) -> Record:
-        """The record of a run. Raises Lost when the shop is closed meanwhile."""
+        """Run a job and return its record.
+
+        Raises:
+            WorkerLostError: if the pool is closed during the run.
+        """
         try:
             return Record.from_json(self._request(job, check=False))
-        except WorkerLost as error:
+        except WorkerLostError as error:
             if self._closed:
                 raise
             return Record(job.key, failure=str(error))
 
     def check(self, job: Job) -> list[Problem]:
-        """What keeps a job from being run."""
+        """Return the problems for which a job cannot be run."""
         return [Problem(message, where) for message, where in json.loads(self._request(job, check=True))]
 
     def replay(self, job: Job, title: str, page: Path) -> Record:
-        """Run a job once more and write its 3-D replay; of a run that fails, what was recorded until then."""
+        """Run a job again and write its 3-D replay to `page`; after a failure, the replay ends there."""
         return Record.from_json(self._request(job, check=False, replay={"title": title, "page": str(page.resolve())}))
 
     def _request(self, job: Job, check: bool, **more: Any) -> bytes:
         request = {"key": job.key, "settings": job.settings, "check": check, **more}
         for _ in range(MAX_ATTEMPTS):
-            lane = self._acquire_worker()
+            worker = self._acquire_worker()
             try:
-                answer = lane.request(request)
-            except WorkerLost:
-                self._busy.discard(lane)
-                lane.close()
+                answer = worker.request(request)
+            except WorkerLostError:
+                self._busy.discard(worker)
+                worker.close()
                 continue
             with self._lock:
-                self._busy.discard(lane)
-                self._idle.append(lane)
+                self._busy.discard(worker)
+                self._idle.append(worker)
             return answer
-        raise WorkerLost(f"the process that watches over the run was killed {MAX_ATTEMPTS} times")
+        raise WorkerLostError(f"the worker process of the run was killed {MAX_ATTEMPTS} times")
 
     def _acquire_worker(self) -> Worker:
         with self._lock:
             if self._closed:
-                raise WorkerLost("the sweep was ended")
-            lane = self._idle.pop() if self._idle else self._start_worker()
-            self._busy.add(lane)
-            return lane
+                raise WorkerLostError("the worker pool is closed")
+            worker = self._idle.pop() if self._idle else self._start_worker()
+            self._busy.add(worker)
+            return worker
 
     def _start_worker(self) -> Worker:
         if self._fork_server:
@@ -162,10 +186,10 @@ class WorkerPool:
         return self._fork_server.fork_worker()
 
     def close(self) -> None:
-        """End all runs."""
+        """End all runs and their processes."""
         self._closed = True
         with self._lock:
-            for lane in (*self._idle, *self._busy):
-                lane.close()
+            for worker in (*self._idle, *self._busy):
+                worker.close()
             if self._fork_server:
                 self._fork_server.close()

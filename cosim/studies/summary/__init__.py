@@ -1,1 +1,1 @@
-"""Tables, statistics, figures and pages about the runs of a study."""
+"""Tables, statistics, figures and pages of the runs of a study."""

@@ -1,4 +1,4 @@
-"""`sweep.html`: what a sweep comes to, on one page that needs no network and runs no script."""
+"""Page `sweep.html` with the results of a sweep; it needs neither network nor scripts."""
 
 from __future__ import annotations
 
@@ -21,15 +21,21 @@ from .sweep_files import SweepSummary, format_run_command
 
 PAGE_FILE = "sweep.html"
 _MAP_FILE = re.compile(rf"{MAP_NAME}(_\d+)?\.(png|svg)")
-#: so many different labels of a factor are listed
+#: largest number of levels of a factor that are listed
 _MAX_LISTED_LEVELS = 12
 
 
 def write_sweep_page(sweep: Sweep, summary: SweepSummary, maps: Sequence[SuccessMap], folder: Path) -> None:
-    """Write every map as NAME.png and NAME.svg, and sweep.html: maps, success by levels, KPIs, causes of failures, the design.
+    """Write every map as NAME.png and NAME.svg, and sweep.html with maps, success rates, KPIs, failures and the design.
 
-    A click on a cell of a map leads to the replay of one of its runs where there is one, else to the command that shows it. Maps
-    that an earlier call wrote and this one does not are removed.
+    Each cell of a map is a link to the replay of one of its runs if there is one, else to the command that repeats that run.
+    Maps of an earlier call are removed.
+
+    Args:
+        sweep: the sweep.
+        summary: its statistics.
+        maps: its success maps.
+        folder: the output directory.
     """
     overall = summary.groups[0] if summary.groups else None
     drawn = {f"{each.name}{suffix}" for each in maps for suffix in (".png", ".svg")}
@@ -57,7 +63,7 @@ def write_sweep_page(sweep: Sweep, summary: SweepSummary, maps: Sequence[Success
 
 
 def _criterion(check: Mapping[str, Any]) -> tuple[str, str]:
-    """A criterion as (KPI, limits)."""
+    """Return a criterion as (KPI, limits)."""
     (outcome,) = evaluate_checks({check["kpi"]: 0.0}, [check])
     return check["kpi"], outcome.limits
 
@@ -72,20 +78,20 @@ def _design_rows(sweep: Sweep) -> Iterator[tuple[str, str]]:
 
 
 def _level_summary(design: Design, number: int) -> str:
-    """All levels of a factor, of many the lowest and the highest."""
+    """Return the levels of a factor as text: all of them, or the lowest and the highest."""
     factor = design.factors[number]
     if factor.listed_levels or (design.unit_samples is None and len(factor.grid_levels) <= _MAX_LISTED_LEVELS):
         return ", ".join(str(level.label) for level in factor.grid_levels)
     if design.unit_samples is None:
         ends = factor.grid_levels[0], factor.grid_levels[-1]
     else:
-        places = design.unit_samples[:, number]
-        ends = factor.level_at(float(places.min())), factor.level_at(float(places.max()))
+        samples = design.unit_samples[:, number]
+        ends = factor.level_at(float(samples.min())), factor.level_at(float(samples.max()))
     return " ... ".join(f"{level.label:.4g}" for level in ends)
 
 
 def _write_map(sweep: Sweep, map_: SuccessMap, folder: Path) -> dict[str, Any]:
-    """A map in its files; as SVG whose cells are links, and the width (in) that it was drawn for."""
+    """Write a map to its files; return its SVG, whose cells are links, and its width (in)."""
     figure = draw_map(map_, lambda cell: _cell_link(sweep, cell, folder))
     save_figure(figure, folder / f"{map_.name}.png")
     text = figure_to_svg(figure).replace(' target="_blank"', "")
@@ -102,7 +108,7 @@ def _cell_link(sweep: Sweep, cell: MapCell, folder: Path) -> str:
 
 
 def _shown_cells(sweep: Sweep, maps: Iterable[SuccessMap], folder: Path) -> Iterator[dict[str, Any]]:
-    """The run that each cell shows, once."""
+    """Yield each run that represents a cell, once, with its command."""
     shown = {
         cell.representative_run.number: cell
         for map_ in maps

@@ -1,4 +1,4 @@
-"""Replays of single runs of a sweep: one page each, called after the key of its run, so that it is made once."""
+"""Replay pages of single runs of a sweep; each is named after the key of its run, so that it is written once."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ REPLAY_FOLDER = "replays"
 
 
 def replay_path(sweep: Sweep, run: int) -> str:
-    """Where the replay of a run is, in the folder of the sweep."""
+    """Return the path of a run's replay, relative to the folder of the sweep."""
     return f"{REPLAY_FOLDER}/{sweep.keys[run]}.html"
 
 
 def replay_settings(sweep: Sweep, run: int) -> dict[str, Any]:
-    """Settings that show a run: it records all that the scenario itself records, not only what the sweep needs."""
+    """Return the settings that repeat a run with all signals that the scenario records, not only those that the sweep needs."""
     settings = sweep.study.job(sweep.design[run].settings).settings
     return {name: value for name, value in settings.items() if not name.startswith("/record")}
 
 
 def write_replays(sweep: Sweep, runs: Iterable[int], folder: Path, workers: int) -> dict[int, str]:
-    """Run these runs again and write their replays where there is none; returns the cause for each that could not be written."""
+    """Repeat runs and write those of their replays that are missing; return the failure of each run whose replay is missing."""
     pages = {run: folder / replay_path(sweep, run) for run in dict.fromkeys(runs)}
     missing = {run: page for run, page in pages.items() if not page.exists()}
     (folder / REPLAY_FOLDER).mkdir(exist_ok=True)
-    with LocalRunner(sweep.study.context, workers) as engine, ThreadPoolExecutor(workers) as pool:
-        records = pool.map(partial(_write_replay, sweep, engine.worker_pool), missing, missing.values())
+    with LocalRunner(sweep.study.context, workers) as runner, ThreadPoolExecutor(workers) as pool:
+        records = pool.map(partial(_write_replay, sweep, runner.worker_pool), missing, missing.values())
         causes = {run: record.failure for run, record in zip(missing, records, strict=True)}
     return {run: causes[run] for run, page in missing.items() if not page.exists()}
 
 
-def _write_replay(sweep: Sweep, shop: WorkerPool, run: int, page: Path) -> Record:
+def _write_replay(sweep: Sweep, pool: WorkerPool, run: int, page: Path) -> Record:
     labels = ", ".join(f"{name} {label}" for name, label in sweep.design[run].labels.items())
     job = Job(sweep.keys[run], replay_settings(sweep, run))
-    return shop.replay(job, f"{sweep.study_file.spec.name} run {run}: {labels}", page)
+    return pool.replay(job, f"{sweep.study_file.spec.name} run {run}: {labels}", page)

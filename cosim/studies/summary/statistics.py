@@ -1,4 +1,4 @@
-"""What many runs say together: distributions of KPIs and rates of success, over all runs and by the levels of factors."""
+"""Statistics of many runs: distributions of KPIs and success rates, over all runs and by the levels of factors."""
 
 from __future__ import annotations
 
@@ -17,32 +17,38 @@ from ..schema import QUANTILES
 from ..sweep import SweepRow
 from .table import RowSource
 
-#: quantile of the normal distribution for intervals of 95 %
+#: quantile of the normal distribution for a confidence of 95 %
 _Z_95 = 1.959963984540054
 
 
 class ConfidenceInterval(NamedTuple):
-    """Of a share: both ends."""
+    """Confidence interval of a rate."""
 
     low: float
     high: float
 
 
 def wilson_interval(successes: float, count: int) -> ConfidenceInterval:
-    """Wilson's score interval (95 %) of a share (E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), 209-212)."""
+    """Return Wilson's score interval (95 %) of a rate (E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), 209-212)."""
     if count == 0:
         return ConfidenceInterval(0.0, 1.0)
-    share, z2 = successes / count, _Z_95 * _Z_95
-    center = (share + z2 / (2 * count)) / (1 + z2 / count)
-    half = _Z_95 / (1 + z2 / count) * math.sqrt(share * (1 - share) / count + z2 / (4 * count * count))
+    rate, z2 = successes / count, _Z_95 * _Z_95
+    center = (rate + z2 / (2 * count)) / (1 + z2 / count)
+    half = _Z_95 / (1 + z2 / count) * math.sqrt(rate * (1 - rate) / count + z2 / (4 * count * count))
     return ConfidenceInterval(0.0 if successes == 0 else center - half, 1.0 if successes == count else center + half)
 
 
 @dataclass
 class RunGroup:
-    """Runs that share the labels of some factors, and the finite values of their KPIs.
+    """Group of runs with equal labels of some factors.
 
-    `distinct` counts a run that several points have once: it says nothing new the second time.
+    Attributes:
+        labels: the common labels by factor.
+        runs: number of runs.
+        distinct: number of runs, where a run that several points share counts once.
+        failed: number of runs that failed.
+        passed: number of successes.
+        kpis: finite values of each KPI.
     """
 
     labels: Mapping[str, Any]
@@ -54,6 +60,7 @@ class RunGroup:
     _shared_keys: set[str] = field(default_factory=set)
 
     def add(self, row: SweepRow) -> None:
+        """Add a finished run."""
         self.runs += 1
         self.distinct += row.record.key not in self._shared_keys
         if row.shared:
@@ -67,16 +74,16 @@ class RunGroup:
 
     @property
     def success_rate(self) -> float:
-        """Share of successes in all runs; a run that failed is none."""
+        """Number of successes divided by the number of runs; a failed run is not a success."""
         return self.passed / self.runs
 
     @property
     def interval(self) -> ConfidenceInterval:
-        """Of the rate, as many runs as are distinct having been made."""
+        """Wilson interval of the success rate, counting each distinct run once."""
         return wilson_interval(self.passed * self.distinct / self.runs, self.distinct)
 
     def statistics(self) -> Iterator[tuple[str, dict[str, float]]]:
-        """(KPI, statistics) of each KPI: number of finite values, their mean, standard deviation (n - 1) and quantiles."""
+        """Yield (KPI, statistics): number of finite values, mean, standard deviation (n - 1) and quantiles."""
         for name, column in self.kpis.items():
             values = np.frombuffer(column, np.float64) if column else np.array([math.nan])
             quantiles = dict(zip(QUANTILES, np.quantile(values, list(QUANTILES.values())).tolist(), strict=True))
@@ -85,7 +92,7 @@ class RunGroup:
 
 
 def groupings(design: Design, by: Iterable[Sequence[str]]) -> list[tuple[str, ...]]:
-    """All runs together, every factor with levels alone, and what else was asked for."""
+    """Return the groupings of runs by factors: none, each factor that has levels, and those in `by`."""
     single = [
         (factor.name,)
         for factor in design.factors
@@ -95,16 +102,16 @@ def groupings(design: Design, by: Iterable[Sequence[str]]) -> list[tuple[str, ..
 
 
 def group_rows(rows: RowSource, names: Sequence[str]) -> list[RunGroup]:
-    """Runs grouped by the labels of these factors, in the order in which they appear."""
-    found: dict[str, RunGroup] = {}
+    """Group runs by their labels of these factors, in order of appearance."""
+    groups: dict[str, RunGroup] = {}
     for row in rows():
         labels = {name: row.point.labels[name] for name in names}
-        found.setdefault(json.dumps(labels), RunGroup(labels)).add(row)
-    return list(found.values())
+        groups.setdefault(json.dumps(labels), RunGroup(labels)).add(row)
+    return list(groups.values())
 
 
 def failure_causes(rows: Iterable[SweepRow]) -> list[tuple[str, int, int]]:
-    """(cause, number of runs, first run) of failures, the most frequent first."""
+    """Return (cause, number of runs, first run) of the failures, the most frequent first."""
     counts: Counter[str] = Counter()
     first: dict[str, int] = {}
     for row in rows:

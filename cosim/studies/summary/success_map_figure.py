@@ -1,31 +1,44 @@
-"""A map of success as a figure: colour is the share of successes, text says how sure it is."""
+"""Figure of a success map: colour shows the success rate, text its confidence interval."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from ...report.figures import figure_style
 from .success_map import MapCell, SuccessMap
-from .success_map_layout import AXIS_FONT_SIZE, PANEL_FONT_SIZE, TICK_FONT_SIZE, MapLayout
+from .success_map_layout import AXIS_FONT_SIZE, GAP, PANEL_FONT_SIZE, TICK_FONT_SIZE, MapLayout
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
+    from matplotlib.text import Text
 
-#: where a click on a cell leads; empty: nowhere
+#: returns the address that a click on a cell opens; empty: none
 CellLink = Callable[[MapCell], str]
 
-#: the same lightness for all kinds of colour vision (Nuñez, Anderton, Renslow 2018)
+#: perceptually uniform for all kinds of colour vision (Nuñez, Anderton, Renslow 2018)
 COLOUR_MAP = "cividis"
-#: a cell is as large as its share, or its interval too, can be read (in)
+#: smallest cells that show their success rate, and its interval too (width and height in inches)
 _MIN_CELL_FOR_RATE, _MIN_CELL_FOR_INTERVAL = (0.3, 0.17), (0.44, 0.34)
+#: longest colour bar (in)
+_MAX_COLOUR_BAR_LENGTH = 1.6
+#: room for labels before the first layout (in)
+_FIRST_MARGINS = 1.8, 1.5
+#: layouts until the panels have their size, and the tolerance of that size (in)
+_MAX_LAYOUTS, _SIZE_TOLERANCE = 4, 0.01
 
 
-def draw_map(map_: SuccessMap, link: CellLink = lambda cell: "") -> Figure:
-    """The map as a matplotlib figure; in SVG files its cells are links."""
+def draw_map(map_: SuccessMap, link: CellLink = lambda _cell: "") -> Figure:
+    """Draw a success map as a matplotlib figure.
+
+    Args:
+        map_: the map with its cells.
+        link: returns the address that a click on a cell opens in SVG files; empty: none.
+    """
     with figure_style():
         return _build_figure(map_, link)
 
@@ -35,13 +48,16 @@ def _build_figure(map_: SuccessMap, link: CellLink) -> Figure:
 
     layout = MapLayout(map_)
     rows, columns, _, _ = layout.levels
-    figure = Figure(figsize=layout.figure_size)
+    size = [panels + margin for panels, margin in zip(layout.panels_size, _FIRST_MARGINS, strict=True)]
+    figure = Figure(figsize=(size[0], size[1]), layout="constrained")
+    cast(Any, figure.get_layout_engine()).set(w_pad=GAP / 2, h_pad=GAP / 2, wspace=0, hspace=0)
     grid = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
-    figure.subplots_adjust(**layout.subplot_parameters)
     for (i, row), (j, column) in product(enumerate(rows), enumerate(columns)):
         _draw_panel(grid[i][j], layout, row, column, link)
-    _annotate(figure, grid, layout)
-    _draw_colour_bar(figure, layout)
+    x_title = _annotate(figure, grid, layout)
+    _draw_colour_bar(figure, grid, layout)
+    _resize_to_panels(figure, grid, layout)
+    x_title.set_x((grid[0, 0].get_position().x0 + grid[0, -1].get_position().x1) / 2)
     return figure
 
 
@@ -80,24 +96,40 @@ def _percent(share: float) -> str:
     return "" if math.isnan(share) else f"{100 * share:.0f} %"
 
 
-def _annotate(figure: Figure, grid: Any, layout: MapLayout) -> None:
-    """Names of the axes, once; labels of panels above and beside them."""
-    (x, y), centre = layout.titles, layout.centre
-    figure.supxlabel(x, fontsize=AXIS_FONT_SIZE, x=centre[0], y=0.06 / figure.get_figheight())
-    figure.supylabel(y, fontsize=AXIS_FONT_SIZE, x=0.06 / figure.get_figwidth(), y=centre[1])
+def _annotate(figure: Figure, grid: Any, layout: MapLayout) -> Text:
+    """Add the titles of both axes, once, and titles above and beside the panels; return the title of the x axis."""
     for axes, text in zip(grid[0], layout.column_titles, strict=False):
         axes.set_title(text, fontsize=PANEL_FONT_SIZE)
     for axes, text in zip(grid[:, -1], layout.row_titles, strict=False):
         beside = {"rotation": 270, "ha": "left", "va": "center", "weight": "bold", "fontsize": AXIS_FONT_SIZE}
         axes.text(1.02, 0.5, text, transform=axes.transAxes, **beside)
+    x, y = layout.titles
+    figure.supylabel(y, fontsize=AXIS_FONT_SIZE)
+    return figure.supxlabel(x, fontsize=AXIS_FONT_SIZE)
 
 
-def _draw_colour_bar(figure: Figure, layout: MapLayout) -> None:
-    """The colours of 0 to 100 %, at the right edge."""
+def _draw_colour_bar(figure: Figure, grid: Any, layout: MapLayout) -> None:
+    """Add the colours of 0 to 100 % at the right edge."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.ticker import PercentFormatter
 
-    axes = figure.add_axes(layout.colour_bar)
-    bar = figure.colorbar(ScalarMappable(cmap=COLOUR_MAP), cax=axes, format=PercentFormatter(1.0), ticks=[0, 0.5, 1])
-    bar.outline.set_visible(False)  # type: ignore[operator]
-    axes.tick_params(length=0, labelsize=6)
+    shrink = min(1.0, _MAX_COLOUR_BAR_LENGTH / layout.panels_size[1])
+    bar = figure.colorbar(
+        ScalarMappable(cmap=COLOUR_MAP), ax=grid, format=PercentFormatter(1.0), ticks=[0, 0.5, 1], shrink=shrink, pad=0.02
+    )
+    cast("Patch", bar.outline).set_visible(False)
+    bar.ax.tick_params(length=0, labelsize=6)
+
+
+def _resize_to_panels(figure: Figure, grid: Any, layout: MapLayout) -> None:
+    """Resize the figure until constrained layout gives each panel its size, then fix the layout."""
+    rows, columns = grid.shape
+    for _ in range(_MAX_LAYOUTS):
+        figure.draw_without_rendering()
+        width, height = figure.get_size_inches()
+        box = grid[0, 0].get_position()
+        missing = layout.panel[0] - box.width * width, layout.panel[1] - box.height * height
+        if max(map(abs, missing)) < _SIZE_TOLERANCE:
+            break
+        figure.set_size_inches(width + columns * missing[0], height + rows * missing[1])
+    figure.set_layout_engine("none")

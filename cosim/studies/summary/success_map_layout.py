@@ -1,213 +1,139 @@
-"""Where the parts of a map of success go, and its texts as they fit there; lengths in in, sizes of texts in pt."""
+"""Sizes of a success map's cells and panels, and its labels wrapped to fit; lengths in inches, font sizes in points."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+import textwrap
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 from .success_map import SuccessMap
 
-#: sizes of texts: levels along the axes, panels, names of the axes
+#: font sizes of tick labels, titles of panels and titles of axes
 TICK_FONT_SIZE, PANEL_FONT_SIZE, AXIS_FONT_SIZE = 7.0, 7.5, 8.0
-#: the panels together are at most so large: the page of a two-column paper
+#: distance between panels
+GAP = 0.12
+#: largest size of all panels together: the page of a two-column paper
 _MAX_SIZE = 6.3, 8.2
 _MAX_CELL_SIZE = 0.9, 0.46
-_GAP = 0.12
-#: between a text and the next thing; the colours' scale with its numbers
-_PAD, _COLOUR_BAR_WIDTH = 0.06, 0.46
-
-
-class Margins(NamedTuple):
-    """Around the panels."""
-
-    left: float
-    right: float
-    bottom: float
-    top: float
-
-
-_MIN_MARGINS = Margins(0.62, 0.78, 0.5, 0.42)
+#: smallest distance between two labels
+_PAD = 0.06
+#: length by which the titles of the axes x and y may exceed the panels; the margins have at least this size
+_TITLE_EXCESS = 0.6, 0.4
+#: safety factor of the number of characters per line estimated from their average width
+_WIDTH_VARIATION = 1.3
 
 
 @dataclass(frozen=True)
 class MapLayout:
-    """Sizes and texts of a map's figure."""
+    """Sizes and labels of a success map's figure; margins are left to matplotlib's constrained layout."""
 
     map_: SuccessMap
 
     @cached_property
     def levels(self) -> tuple[Sequence[Any], Sequence[Any], Sequence[Any], Sequence[Any]]:
-        """Of rows, columns, y and x."""
-        spec = self.map_.spec
-        return (
-            self.map_.axis_labels(spec.rows),
-            self.map_.axis_labels(spec.columns),
-            self.map_.axis_labels(spec.y),
-            self.map_.axis_labels(spec.x),
-        )
+        """Labels of the levels along the rows of panels, the columns of panels, y and x."""
+        spec, labels = self.map_.spec, self.map_.axis_labels
+        return labels(spec.rows), labels(spec.columns), labels(spec.y), labels(spec.x)
 
     @cached_property
     def cell(self) -> tuple[float, float]:
+        """Width and height of a cell."""
         rows, columns, ys, xs = map(len, self.levels)
         return min(_MAX_CELL_SIZE[0], _MAX_SIZE[0] / (columns * xs)), min(_MAX_CELL_SIZE[1], _MAX_SIZE[1] / (rows * ys))
 
     @cached_property
     def panel(self) -> tuple[float, float]:
+        """Width and height of a panel."""
         return len(self.levels[3]) * self.cell[0], len(self.levels[2]) * self.cell[1]
 
     @cached_property
     def panels_size(self) -> tuple[float, float]:
-        """All of them with the gaps between them."""
-        return len(self.levels[1]) * (self.panel[0] + _GAP), len(self.levels[0]) * (self.panel[1] + _GAP)
-
-    @cached_property
-    def figure_size(self) -> tuple[float, float]:
-        margins = self.margins
-        return self.panels_size[0] + margins.left + margins.right, self.panels_size[1] + margins.bottom + margins.top
-
-    @property
-    def subplot_parameters(self) -> dict[str, float]:
-        """Of the panels in the figure, as matplotlib wants them: shares of the figure, and of a panel."""
-        (width, height), margins = self.figure_size, self.margins
-        return {
-            "left": margins.left / width,
-            "right": 1 - margins.right / width,
-            "bottom": margins.bottom / height,
-            "top": 1 - margins.top / height,
-            "wspace": _GAP / self.panel[0],
-            "hspace": _GAP / self.panel[1],
-        }
-
-    @property
-    def centre(self) -> tuple[float, float]:
-        """Of the panels, as shares of the figure."""
-        (width, height), margins = self.figure_size, self.margins
-        return (margins.left + self.panels_size[0] / 2) / width, (margins.bottom + self.panels_size[1] / 2) / height
-
-    @property
-    def colour_bar(self) -> tuple[float, float, float, float]:
-        """Left, bottom, width and height of the colours' scale, as shares of the figure."""
-        width, height = self.figure_size
-        long = min(1.6, self.panels_size[1])
-        return 1 - _COLOUR_BAR_WIDTH / width, self.centre[1] - long / 2 / height, 0.08 / width, long / height
-
-    # -- texts ---------------------------------------------------------------------------------------------------------
+        """Width and height of all panels with the gaps between them."""
+        return len(self.levels[1]) * (self.panel[0] + GAP), len(self.levels[0]) * (self.panel[1] + GAP)
 
     @cached_property
     def titles(self) -> tuple[str, str]:
-        """Names of the axes x and y."""
-        spec, (width, height) = self.map_.spec, self.panels_size
-        x = _wrap_words(self.map_.title(spec.x), width + 2 * _MIN_MARGINS.left, AXIS_FONT_SIZE)
-        return x, _wrap_words(self.map_.title(spec.y), height + _MIN_MARGINS.bottom, AXIS_FONT_SIZE)
+        """Titles of the axes x and y."""
+        lengths = (size + excess for size, excess in zip(self.panels_size, _TITLE_EXCESS, strict=True))
+        factors = (self.map_.spec.x, self.map_.spec.y)
+        x, y = (_wrap(self.map_.title(factor), length, AXIS_FONT_SIZE) for factor, length in zip(factors, lengths, strict=True))
+        return x, y
 
     @cached_property
     def column_titles(self) -> list[str]:
-        """What stands above each column of panels."""
+        """Titles above the columns of panels."""
         columns = self.map_.spec.columns
         if columns is None:
             return []
         title = self.map_.title(columns)
         texts = (f"{title}: {_label_text(label)}" if title else _label_text(label) for label in self.levels[1])
-        return [_wrap_characters(text, self.panel[0] + _GAP - _PAD, PANEL_FONT_SIZE) for text in texts]
+        return [_wrap_and_break(text, self.panel[0] + GAP - _PAD, PANEL_FONT_SIZE) for text in texts]
 
     @cached_property
     def row_titles(self) -> list[str]:
-        """What stands beside each row of panels."""
+        """Titles beside the rows of panels."""
         if self.map_.spec.rows is None:
             return []
-        return [
-            _wrap_characters(_label_text(label), self.panel[1] + _GAP - _PAD, AXIS_FONT_SIZE, "bold") for label in self.levels[0]
-        ]
+        height = self.panel[1] + GAP - _PAD
+        return [_wrap_and_break(_label_text(label), height, AXIS_FONT_SIZE, "bold") for label in self.levels[0]]
 
     @cached_property
     def y_ticks(self) -> dict[int, str]:
-        """Levels along y by their number; only every second, third, ... where cells are lower than a line."""
+        """Tick labels along y by index; only every n-th where cells are lower than a line of text."""
         return _every_nth_label(list(map(_label_text, self.levels[2])), self.cell[1])
 
     @cached_property
     def x_ticks(self) -> dict[int, str]:
-        """Levels along x by their number, as y's; turned where they are wider than cells."""
-        texts = list(map(_label_text, self.levels[3]))
-        return _every_nth_label(texts, self.cell[0]) if self.rotate_x_labels else dict(enumerate(map(self._wrap_in_cell, texts)))
+        """Tick labels along x by index: wrapped to the width of a cell, or rotated and only every n-th."""
+        if self.rotate_x_labels:
+            return _every_nth_label(list(map(_label_text, self.levels[3])), self.cell[0])
+        return dict(enumerate(self._wrapped_x_labels))
 
     @cached_property
     def rotate_x_labels(self) -> bool:
-        """Whether levels along x are read from below: their words are wider than a cell."""
-        return _text_width(map(self._wrap_in_cell, map(_label_text, self.levels[3])), TICK_FONT_SIZE) > self.cell[0] - _PAD
-
-    def _wrap_in_cell(self, text: str) -> str:
-        return _wrap_words(text, self.cell[0] - _PAD, TICK_FONT_SIZE)
+        """True if a word of the tick labels along x is wider than a cell, so that they must be rotated."""
+        return _text_width("\n".join(self._wrapped_x_labels).split("\n"), TICK_FONT_SIZE) > self.cell[0] - _PAD
 
     @cached_property
-    def margins(self) -> Margins:
-        """As wide as the texts in them."""
-        x, y = self.titles
-        below = (
-            _text_width(self.x_ticks.values(), TICK_FONT_SIZE)
-            if self.rotate_x_labels
-            else _text_height(self.x_ticks.values(), TICK_FONT_SIZE)
-        )
-        needed = Margins(
-            left=_text_height([y], AXIS_FONT_SIZE) + _text_width(self.y_ticks.values(), TICK_FONT_SIZE) + 4 * _PAD,
-            right=_text_height(self.row_titles, AXIS_FONT_SIZE) + 0.02 * self.panel[0] + _COLOUR_BAR_WIDTH + _PAD,
-            bottom=_text_height([x], AXIS_FONT_SIZE) + below + 3 * _PAD,
-            top=_text_height(self.column_titles, PANEL_FONT_SIZE) + 3 * _PAD,
-        )
-        return Margins(*map(max, needed, _MIN_MARGINS))
+    def _wrapped_x_labels(self) -> list[str]:
+        return [_wrap(_label_text(label), self.cell[0] - _PAD, TICK_FONT_SIZE) for label in self.levels[3]]
 
 
 def _label_text(label: Any) -> str:
     return f"{label:g}" if isinstance(label, float) else str(label)
 
 
-def _text_width(texts: Iterable[str], size: float, weight: str = "normal") -> float:
-    """Of the widest line."""
+def _wrap(text: str, width: float, size: float, weight: str = "normal", break_words: bool = False) -> str:
+    """Break a text into lines of at most `width` between words, with `break_words` also between characters."""
+    average = _text_width([text], size, weight) / max(1, len(text))
+    longest = min(len(text), int(_WIDTH_VARIATION * width / average)) if average else 1
+    lines = [text]
+    for characters in range(longest, 0, -1):
+        lines = textwrap.wrap(text, characters, break_long_words=break_words, break_on_hyphens=False)
+        if _text_width(lines, size, weight) <= width:
+            break
+    return "\n".join(lines)
+
+
+def _wrap_and_break(text: str, width: float, size: float, weight: str = "normal") -> str:
+    """Break a text into lines between words, and then every line that is still too wide between characters."""
+    lines = _wrap(text, width, size, weight).split("\n")
+    return "\n".join(_wrap(line, width, size, weight, break_words=True) for line in lines)
+
+
+def _text_width(lines: Iterable[str], size: float, weight: str = "normal") -> float:
+    """Return the width of the widest line."""
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import TextPath
 
     font = FontProperties(size=size, weight=weight)
-    lines = (line for text in texts for line in text.split("\n") if line.strip())
-    return max((float(TextPath((0, 0), line, prop=font).get_extents().x1) / 72 for line in lines), default=0.0)
-
-
-def _text_height(texts: Iterable[str], size: float) -> float:
-    """Of the text with the most lines."""
-    return max((text.count("\n") + 1 for text in texts), default=0) * _line_height(size)
-
-
-def _line_height(size: float) -> float:
-    return 1.2 * size / 72
-
-
-def _wrap_words(text: str, width: float, size: float, weight: str = "normal") -> str:
-    """In lines of at most `width`, broken between words."""
-    lines: list[str] = []
-    for word in text.split():
-        longer = f"{lines[-1]} {word}" if lines else word
-        if lines and _text_width([longer], size, weight) <= width:
-            lines[-1] = longer
-        else:
-            lines.append(word)
-    return "\n".join(lines)
-
-
-def _wrap_characters(text: str, width: float, size: float, weight: str = "normal") -> str:
-    """As `_wrapped`, but words that are wider are broken too."""
-    lines = _wrap_words(text, width, size, weight).split("\n")
-    return "\n".join(piece for line in lines for piece in _split_word(line, width, size, weight))
-
-
-def _split_word(word: str, width: float, size: float, weight: str) -> Iterator[str]:
-    while word:
-        length = next((n for n in range(len(word), 1, -1) if _text_width([word[:n]], size, weight) <= width), 1)
-        yield word[:length]
-        word = word[length:]
+    return max((float(TextPath((0, 0), line, prop=font).get_extents().x1) / 72 for line in lines if line.strip()), default=0.0)
 
 
 def _every_nth_label(texts: Sequence[str], space: float) -> dict[int, str]:
-    """Every n-th text by its number, so that lines that are `space` apart do not touch."""
-    every = math.ceil(_line_height(TICK_FONT_SIZE) / space)
-    return {i: text for i, text in enumerate(texts) if i % every == 0}
+    """Return every n-th text by index, with the smallest n for which lines of text `space` apart do not touch."""
+    step = math.ceil(1.2 * TICK_FONT_SIZE / 72 / space)
+    return dict(list(enumerate(texts))[::step])

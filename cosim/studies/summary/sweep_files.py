@@ -1,4 +1,4 @@
-"""The files of a sweep: table, aggregates, rates of success, failures, and what made them."""
+"""Files of a sweep: table, aggregates, success rates, failures, and metadata."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .table import write_csv, write_csv_rows, write_parquet
 
 @dataclass(frozen=True)
 class SweepSummary:
-    """What a sweep comes to: groups of runs (the first holds all of them), and causes of failures."""
+    """Summary of a sweep: number of finished runs, groups of runs (the first holds all of them), and causes of failures."""
 
     finished: int
     groups: list[RunGroup]
@@ -29,31 +29,35 @@ class SweepSummary:
 
     @property
     def failed(self) -> int:
+        """Number of failed runs."""
         return self.groups[0].failed if self.groups else 0
 
 
-def write_sweep_files(sweep: Sweep, ledger: RunStore, folder: Path, parquet: bool) -> SweepSummary:
-    """Write table.csv, aggregates.csv, success.csv, failures.csv and sweep.json to a folder; no older table stays."""
-    factors, kpis = sweep.design.columns, kpi_names(sweep.rows(ledger))
+def write_sweep_files(sweep: Sweep, run_store: RunStore, folder: Path, parquet: bool) -> SweepSummary:
+    """Write table.csv, aggregates.csv, success.csv, failures.csv and sweep.json, and return the summary.
+
+    With `parquet`, table.parquet is written, too; else an older one is removed.
+    """
+    factors, kpis = sweep.design.columns, kpi_names(sweep.rows(run_store))
 
     def rows() -> Iterator[SweepRow]:
-        return sweep.rows(ledger)
+        return sweep.rows(run_store)
 
     write_csv(rows, factors, kpis, folder / "table.csv")
     if parquet:
         write_parquet(rows, factors, kpis, folder / "table.parquet")
     else:
         remove_files(folder, "table.parquet")
-    found, statistics = [], []
+    groups, statistics = [], []
     for names in groupings(sweep.design, sweep.study_file.spec.by):
         for group in group_rows(rows, names):
             statistics += [_statistics_row(group, factors, kpi, numbers) for kpi, numbers in group.statistics()]
             group.kpis = group.kpis if not names else {}
-            found.append(group)
+            groups.append(group)
     write_csv_rows([*factors, *AGGREGATE_COLUMNS], statistics, folder / "aggregates.csv")
-    write_csv_rows([*factors, *SUCCESS_COLUMNS], (_success_row(group, factors) for group in found), folder / "success.csv")
+    write_csv_rows([*factors, *SUCCESS_COLUMNS], (_success_row(group, factors) for group in groups), folder / "success.csv")
     write_csv_rows(["run", *factors, "failure", "output", "command"], _failure_rows(sweep, rows()), folder / "failures.csv")
-    summary = SweepSummary(found[0].runs if found else 0, found, failure_causes(rows()))
+    summary = SweepSummary(groups[0].runs if groups else 0, groups, failure_causes(rows()))
     write_json(_sweep_metadata(sweep, summary), folder / "sweep.json")
     return summary
 
@@ -75,13 +79,13 @@ def _failure_rows(sweep: Sweep, rows: Iterator[SweepRow]) -> Iterator[list[Any]]
 
 
 def format_run_command(scenario: Path, settings: Any) -> str:
-    """The command that makes this run alone."""
+    """Return the command line that makes this run alone."""
     words = [word for name, value in settings.items() for word in ("--set", f"{name}={_setting_text(value)}")]
     return shlex.join(["cosim", "run", normpath(scenario), *words])
 
 
 def _setting_text(value: Any) -> str:
-    """As `--set` takes it: JSON, or a text that is none."""
+    """Return a value as `--set` reads it: JSON, or a string that is not JSON."""
     try:
         json.loads(value)
     except (TypeError, ValueError):

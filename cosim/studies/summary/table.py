@@ -1,4 +1,4 @@
-"""The table of a sweep: one row per finished run, in the order of the design, the same however and wherever they were run."""
+"""Table of a sweep: one row per finished run in the order of the design, independent of how and where they were run."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from typing import Any
 from ...results.files import writing_atomically
 from ..sweep import SweepRow
 
-#: reads all rows anew: they are never all in memory
+#: returns an iterator over all rows, which are never all in memory
 RowSource = Callable[[], Iterable[SweepRow]]
 
+#: rows written to Parquet at a time
 _BATCH_SIZE = 10_000
 
 
 def table_header(factors: Sequence[str], kpis: Sequence[str]) -> list[str]:
-    """Names of the columns."""
+    """Return the names of the columns."""
     return ["run", *factors, "status", "passed", *kpis, "failure"]
 
 
 def row_values(row: SweepRow, factors: Sequence[str], kpis: Sequence[str]) -> list[Any]:
-    """The row's values by column; None where a run has none."""
+    """Return the values of a row by column; None for a KPI that the run lacks."""
     record = row.record
     return [
         row.run,
@@ -37,12 +38,17 @@ def row_values(row: SweepRow, factors: Sequence[str], kpis: Sequence[str]) -> li
 
 
 def write_csv(rows: RowSource, factors: Sequence[str], kpis: Sequence[str], path: Path) -> None:
-    """Booleans as 0 and 1, numbers that round-trip, nan and inf as such, nothing where a run has no value."""
+    """Write the table as CSV: booleans as 0 and 1, numbers that round-trip, nan and inf, and empty cells for missing values."""
     write_csv_rows(table_header(factors, kpis), (row_values(row, factors, kpis) for row in rows()), path)
 
 
 def write_csv_rows(names: Sequence[str], lines: Iterable[Sequence[Any]], path: Path) -> None:
-    """A CSV file, whole or not at all. Raises InputError or OutputError."""
+    """Write a CSV file atomically.
+
+    Raises:
+        InputError: if the folder cannot be written.
+        OutputError: if writing fails, as on a full disk.
+    """
     with writing_atomically(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(names)
@@ -50,14 +56,14 @@ def write_csv_rows(names: Sequence[str], lines: Iterable[Sequence[Any]], path: P
 
 
 def csv_value(value: Any) -> Any:
-    """A value as it stands in a CSV file."""
+    """Return a value as it is written to a CSV file."""
     if isinstance(value, bool):
         return int(value)
     return json.dumps(value) if isinstance(value, list | dict) else value
 
 
 def write_parquet(rows: RowSource, factors: Sequence[str], kpis: Sequence[str], path: Path) -> None:
-    """The same table as Parquet (extra `parquet`): KPIs as doubles, factors too where all their labels are numbers."""
+    """Write the table as Parquet (extra `parquet`): KPIs, and factors whose labels are all numbers, as doubles."""
     import pyarrow as pa
     from pyarrow.parquet import ParquetWriter
 

@@ -1,4 +1,4 @@
-"""The files of a tuning."""
+"""Files of a tuning."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .table import write_csv_rows
 
 
 def write_tuning_files(tuning: Tuning, folder: Path) -> Trial:
-    """Write trials.csv and best.json; returns the best trial. Something must have been tried."""
+    """Write trials.csv and best.json and return the best trial; there must be at least one trial."""
     names = [spec.name for spec in tuning.spec.parameters]
     lines = ([*trial.parameters.values(), trial.value, trial.violation, trial.failure] for trial in tuning.trials)
     write_csv_rows([*names, *TRIAL_COLUMNS], lines, folder / "trials.csv")

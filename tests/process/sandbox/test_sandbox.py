@@ -163,7 +163,9 @@ class TestLimits:
 
     def test_the_process_says_what_holds(self):
         """A confined process cannot list the root folder."""
-        said = worker("__import__('dataclasses').asdict(probe_restrictions())", memory=2 << 30, open_files=99, confine="available")
+        said = worker(
+            "__import__('dataclasses').asdict(probe_restrictions())", memory=2 << 30, open_files=99, confine="available"
+        )
         assert said["files_confined"] is (AVAILABLE.landlock > 0)
         assert said["tcp_closed"] is (AVAILABLE.landlock >= landlock.NETWORK_ABI)
         assert (said["own_session"], said["no_new_privileges"], said["open_files"]) == (True, True, 99)

@@ -1,4 +1,4 @@
-"""What steers a run between its macro steps, and what hands out its rows, each alone."""
+"""Unit tests of the control of a live run and of the feed of its rows."""
 
 import json
 from fractions import Fraction
@@ -28,14 +28,14 @@ class Steered:
 
     def __init__(self, commands, refuse=None, speed=None):
         self.commands, self.refuse = commands, refuse
-        self.here, there = Pipe()
+        self.connection, child_end = Pipe()
         gain = Variable("k", causality="parameter", variability="tunable", start=1.0, minimum=0.0, maximum=9.0)
         self.fake = FakeComponent([gain, *inputs("u"), *outputs("y")], self.step, start={"k": 1.0})
         self.fake.set = self.set
         self.system = make_system({"a": self.fake})
-        self.control = LiveControl(there, self.system, GRID, speed, {"rows": 61})
+        self.control = LiveControl(child_end, self.system, GRID, speed, {"rows": 61})
         self.count = 0
-        self.here.send_bytes(b"{}")
+        self.connection.send_bytes(b"{}")
         self.send()
 
     def set(self, name, value):
@@ -45,9 +45,9 @@ class Steered:
 
     def send(self):
         for message in self.commands.get(self.count, []):
-            self.here.send_bytes(json.dumps(message).encode())
+            self.connection.send_bytes(json.dumps(message).encode())
 
-    def step(self, values, time, step_size):
+    def step(self, values, _time, _step_size):
         values["y"] += values["k"]
         self.count += 1
         self.send()
@@ -59,8 +59,8 @@ class Steered:
 
     def said(self):
         messages = []
-        while self.here.poll():
-            messages.append(json.loads(self.here.recv_bytes()))
+        while self.connection.poll():
+            messages.append(json.loads(self.connection.recv_bytes()))
         return messages
 
 
@@ -69,14 +69,14 @@ def change(value, name="a.k"):
 
 
 @pytest.mark.usefixtures("executor")
-def test_a_value_acts_in_the_step_after_it_came():
+def test_a_value_takes_effect_in_the_next_step():
     run = Steered({0: [change(2.0)], 7: [change(5)]})
     values = run.run().recording.columns["y"]
     assert values[:10].tolist() == [0, 2, 4, 6, 8, 10, 12, 14, 19, 24]
 
 
 @pytest.mark.usefixtures("executor")
-def test_what_was_set_is_told_as_events_at_exactly_that_time():
+def test_values_that_were_set_are_returned_as_events_at_exact_times():
     """Seven sixtieths of a second have no decimal text."""
     run = Steered({0: [change(2.0)], 6: [change(4.0)], 7: [change(5)]})
     values = run.run().recording.columns["y"]
@@ -86,7 +86,7 @@ def test_what_was_set_is_told_as_events_at_exactly_that_time():
     assert Steered({}).run(repeated, control=False).recording.columns["y"].tolist() == values.tolist()
 
 
-def test_pausing_holds_the_run_until_it_may_step_or_go_on():
+def test_a_paused_run_waits_for_step_or_resume():
     run = Steered({3: [{"command": "pause"}, {"command": "step"}, {"command": "step"}], 5: [{"command": "resume"}]})
     assert run.run().macro_steps == 60
     _, pause, step, more, resume = run.said()
@@ -94,7 +94,7 @@ def test_pausing_holds_the_run_until_it_may_step_or_go_on():
     assert (resume["time"], pause["paused"], more["paused"], resume["paused"]) == (5 / 60, True, True, False)
 
 
-def test_the_beginning_says_what_can_be_set():
+def test_the_first_message_lists_the_variables_that_can_be_set():
     run = Steered({})
     run.run()
     about, *rest = run.said()
@@ -104,7 +104,7 @@ def test_the_beginning_says_what_can_be_set():
     assert free["name"] == "a.u"
 
 
-def test_a_component_that_refuses_a_value_ends_the_run_as_at_an_event():
+def test_an_error_of_a_component_while_a_value_is_set_ends_the_run():
     run = Steered({4: [change(3.0)]}, refuse=3.0)
     outcome = run.run()
     assert (str(outcome.failure), outcome.macro_steps) == ("a: set failed: it does not like it", 4)
@@ -113,7 +113,7 @@ def test_a_component_that_refuses_a_value_ends_the_run_as_at_an_event():
 
 
 @pytest.mark.parametrize("value", [9.5, -1, True, "2", [1.0], None, 10**400])
-def test_a_value_that_is_none_for_the_variable_changes_nothing(value):
+def test_an_invalid_value_changes_nothing(value):
     run = Steered({4: [change(value)]})
     assert run.run().recording.columns["y"][-1] == 60
     assert '"k"' in run.said()[-1]["error"]
@@ -130,7 +130,7 @@ def recorded(tmp_path):
     return tmp_path, RowsHeader(0, 1, 100, 2, dtype.itemsize, columns, [], [])
 
 
-def test_rows_come_as_columns_of_floats(recorded):
+def test_rows_are_columns_of_32_bit_floats(recorded):
     feed = RowFeed(*recorded, expected_rows=101)
     assert (feed.available(0), feed.available(101), feed.capacity) == (0, 101, 101)
     time, x, n, b = np.frombuffer(feed.read(10, 3), "<f4").reshape(4, 3)
@@ -138,7 +138,7 @@ def test_rows_come_as_columns_of_floats(recorded):
     assert (x.tolist(), n.tolist(), b.tolist()) == ([100, 121, 144], [10, 11, 12], [0, 1, 0])
 
 
-def test_rows_of_long_runs_are_thinned(recorded, monkeypatch):
+def test_rows_of_long_runs_are_downsampled(recorded, monkeypatch):
     monkeypatch.setattr(cosim.report.live.feed, "MAX_VALUES", 4 * 26)
     feed = RowFeed(*recorded, expected_rows=101)
     assert (feed.stride, feed.available(1), feed.available(9), feed.capacity) == (4, 1, 3, 26)

@@ -1,4 +1,4 @@
-"""The page of a run that goes on, in a real browser."""
+"""The live page in a browser."""
 
 import pytest
 from live_run import LiveRun, wait_until
@@ -9,7 +9,7 @@ from cosim.results import Result
 @pytest.fixture
 def run(tmp_path):
     run = LiveRun(tmp_path, "free_flight", "--stop-time", "6", "--real-time", "0.2")
-    run.command("pause")  # until the page is there
+    run.command("pause")  # until the page is open
     yield run
     run.process.kill()
     run.process.wait()
@@ -33,7 +33,7 @@ def waiting(page, condition):
     return wait_until(lambda: page.wait_for_timeout(30) or page.evaluate(condition))
 
 
-def test_a_run_is_watched_steered_and_replayed(run, page):
+def test_a_live_run_is_shown_steered_and_replayed(run, page):
     page.get_by_role("button", name="Resume", exact=True).click()
     waiting(page, "cosimReplay.player.time > cosimReplay.player.first && cosimReplay.live.run.rows > 20")
     page.get_by_role("button", name="Pause", exact=True).click()

@@ -1,4 +1,4 @@
-"""A run that is looked at and steered while it goes on: what its result says, and who is let in."""
+"""The live view of a run: its effect on the result, and access control."""
 
 import html
 import json
@@ -36,7 +36,7 @@ def paused(tmp_path_factory):
 
 @pytest.fixture
 def begun(tmp_path):
-    """A run at its beginning, slow enough to be caught there."""
+    """A run that has just started and is slow."""
     run = LiveRun(tmp_path, "free_flight", "--stop-time", str(STOP), "--real-time", "0.1")
     run.command("pause")
     yield run
@@ -55,16 +55,16 @@ def same(one, other):
 # -- what it does ------------------------------------------------------------------------------------------------------------
 
 
-def test_steps_are_single_ones_and_looking_changes_nothing(begun):
+def test_a_step_is_one_macro_step_and_viewing_does_not_change_the_result(begun):
     before = begun.count()
     for more in (1, 2, 3):
         assert begun.command("step")["paused"]
-        wait_until(lambda wanted=before + more: begun.count() == wanted)
+        wait_until(lambda expected=before + more: begun.count() == expected)
     assert begun.end() in (0, 3)
     assert same(Result.from_csv(begun.out / "result.csv"), cosim.run("free_flight", stop_time=STOP))
 
 
-def test_what_was_set_stands_in_the_result_as_events_that_repeat_it(begun):
+def test_values_that_were_set_are_events_that_reproduce_the_result(begun):
     assert begun.command("set", name="usv.speed_command", value=0.5)["time"] == begun.rows()[0]["time"]
     before = begun.count()
     for _ in range(7):
@@ -83,7 +83,7 @@ def test_what_was_set_stands_in_the_result_as_events_that_repeat_it(begun):
     assert not same(result, cosim.run("free_flight", stop_time=STOP))
 
 
-def test_the_page_gets_the_rows_that_the_result_has(begun):
+def test_the_page_receives_the_rows_of_the_result(begun):
     columns = begun.page()["columns"]
     begun.command("speed", factor=2.0)
     begun.command("resume")
@@ -98,7 +98,7 @@ def test_the_page_gets_the_rows_that_the_result_has(begun):
         assert np.array_equal(received, values(result)[column].astype(np.float32)), column
 
 
-def test_speed_is_that_of_the_clock(begun):
+def test_the_speed_is_relative_to_real_time(begun):
     """At a tenth of its speed a run is no further than a tenth of the time that has passed, on a busy machine not even there."""
     began = time.monotonic()
     before = begun.command("resume")["time"]
@@ -118,7 +118,7 @@ def test_an_interrupt_ends_a_run_that_is_paused(begun):
     assert (about["failure"], [event["set"] for event in about["live_events"]]) == ("interrupted", [{FORCE: 1.5}])
 
 
-def test_a_run_that_is_killed_leaves_what_was_set(begun):
+def test_the_values_that_were_set_survive_a_killed_run(begun):
     begun.command("set", name=FORCE, value=1.5)
     number = begun.process.pid
     os.kill(int(Path(f"/proc/{number}/task/{number}/children").read_text().split()[0]), signal.SIGKILL)
@@ -131,7 +131,7 @@ def test_a_run_that_is_killed_leaves_what_was_set(begun):
 
 
 @pytest.mark.parametrize("path", ["/", "/rows?first=0&version=-1", "/wrong/", "//", "/?token"])
-def test_without_the_token_nobody_gets_in(paused, path):
+def test_requests_without_the_token_are_refused(paused, path):
     reply = paused.request("GET", path)
     assert (reply.status, reply.body) == (403, b"Forbidden")
 
@@ -148,19 +148,19 @@ def test_another_host_is_refused(paused, method, host):
     )
 
 
-def test_localhost_is_this_machine(paused):
+def test_the_host_localhost_is_accepted(paused):
     name = paused.host.replace("127.0.0.1", "localhost")
     assert paused.get(Host=name).status == 200
     assert paused.post(b'{"command": "pause"}', Host=name, Origin=f"http://{name}").status == 200
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://{host}", "http://localhost:{port}", None])
-def test_commands_come_from_the_page_itself(paused, origin):
+def test_commands_of_other_pages_are_refused(paused, origin):
     origin = origin and origin.format(host=paused.host, port=paused.host.rpartition(":")[2])
     assert paused.post(b'{"command": "resume"}', Origin=origin).status == 403
 
 
-def test_rows_are_not_for_other_pages_either(paused):
+def test_requests_for_rows_by_other_pages_are_refused(paused):
     assert paused.get("rows?first=0&version=-1", Origin="http://evil.example").status == 403
 
 
@@ -177,7 +177,7 @@ def test_rows_are_not_for_other_pages_either(paused):
         (b"[" * 60_000, {}, 400),
     ],
 )
-def test_what_is_no_command_is_refused(paused, body, headers, status):
+def test_an_invalid_request_body_is_refused(paused, body, headers, status):
     assert paused.post(body, **headers).status == status
 
 
@@ -192,13 +192,13 @@ def test_what_is_no_command_is_refused(paused, body, headers, status):
         ({"command": "set", "name": "usv.speed_command", "value": "fast"}, 'is of type Float64, found "fast"'),
         ({"command": "set", "name": "usv.speed_command", "value": float("nan")}, "is of type Float64, found NaN"),
         ({"command": "set", "name": "usv.speed_command"}, "is of type Float64, found null"),
-        ({"command": "set", "name": "vessel.thrust", "value": 1.0}, '"vessel.thrust" is no tunable parameter and no unconnected'),
-        ({"command": "speed", "factor": 0}, "the speed must lie in 0.01 ... 1000, or be null, found 0"),
+        ({"command": "set", "name": "vessel.thrust", "value": 1.0}, '"vessel.thrust" is neither a tunable parameter nor an'),
+        ({"command": "speed", "factor": 0}, "the speed must lie in 0.01 ... 1000, or be null; found 0"),
         ({"command": "speed", "factor": True}, "found true"),
         ({"command": "speed", "factor": "1"}, 'found "1"'),
     ],
 )
-def test_a_command_that_cannot_be_obeyed_is_answered(paused, message, error):
+def test_a_command_that_cannot_be_carried_out_gets_an_error(paused, message, error):
     reply = paused.post(json.dumps(message).encode())
     assert reply.status == 400
     assert error in reply.json()["error"]
@@ -207,19 +207,21 @@ def test_a_command_that_cannot_be_obeyed_is_answered(paused, message, error):
 @pytest.mark.parametrize(
     ("resource", "status"), [("run.json", 404), ("../", 404), ("rows", 400), ("rows?first=-1&version=0", 400)]
 )
-def test_there_is_nothing_else_to_get(paused, resource, status):
+def test_unknown_resources_are_not_found(paused, resource, status):
     assert paused.get(resource).status == status
 
 
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS", "HEAD"])
-def test_there_is_nothing_else_to_do(paused, method):
+def test_other_methods_are_not_supported(paused, method):
     assert paused.request(method, paused.path).status == 501
 
 
-def test_the_page_may_ask_its_server_only_and_nobody_may_frame_it(paused):
+def test_the_page_may_connect_only_to_its_server_and_cannot_be_framed(paused):
     reply = paused.get()
     policy = reply.headers["Content-Security-Policy"]
-    assert "default-src 'none'" in policy and "connect-src 'self'" in policy and "frame-ancestors 'none'" in policy
+    assert "default-src 'none'" in policy
+    assert "connect-src 'self'" in policy
+    assert "frame-ancestors 'none'" in policy
     assert policy.startswith(re.search(r'-Policy" content="(.*?)">', html.unescape(reply.body.decode())).group(1))
     assert not [name for name in reply.headers if name.lower().startswith("access-control")]
 
@@ -234,12 +236,12 @@ def refused(*options):
 @pytest.mark.parametrize(
     ("options", "error"),
     [
-        (["--isolation", "none"], "--view shows a supervised run"),
-        (["--sandbox", "strict"], "--view needs the network of this machine"),
-        (["--late", "fail"], "--late fail does not go with --view"),
+        (["--isolation", "none"], "--view requires a supervised run"),
+        (["--sandbox", "strict"], "--view requires a network connection"),
+        (["--late", "fail"], "--view cannot be combined with --late fail"),
     ],
 )
-def test_conditions_under_which_nothing_can_be_shown_are_refused(options, error):
+def test_options_that_exclude_the_live_view_are_refused(options, error):
     code, said = refused(*options)
     assert code == 2
     assert error in said
@@ -250,7 +252,7 @@ def test_a_port_that_is_taken_is_refused(paused):
     assert refused("--view-port", port) == (2, f"--view cannot listen on 127.0.0.1:{port}: Address already in use\n")
 
 
-def test_the_browser_is_shown_the_page_without_its_address_in_any_list_of_processes(tmp_path, monkeypatch):
+def test_the_address_of_the_page_is_in_no_list_of_processes(tmp_path, monkeypatch):
     """And it is no child of ours, since those of a supervisor end with it."""
     seen = tmp_path / "seen"
     browser = tmp_path / "xdg-open"

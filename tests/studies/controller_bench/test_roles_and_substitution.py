@@ -1,4 +1,4 @@
-"""The shipped roles, and scenarios with controllers in other controllers' places."""
+"""Shipped roles, and scenarios in which a candidate replaces a controller."""
 
 import json
 from hashlib import sha256
@@ -41,24 +41,25 @@ def test_every_shipped_controller_of_a_role_fits_it(name):
 
 
 @pytest.mark.parametrize("name", role_names())
-def test_it_can_be_put_back_into_a_scenario(name, tmp_path):
-    """performance_5 holds its controllers inside a system inside a system."""
+def test_a_shipped_controller_can_replace_itself_in_a_scenario(name, tmp_path):
+    """The controllers of performance_5 are in nested systems of two levels."""
     role = read_role(name)
     candidate = parse_source(str(min(role.controllers)))
     scenario = ROOT / f"scenarios/{SCENARIOS.get(name, 'performance_5')}.json"
-    transplant = ControllerSubstitution(role, candidate, read_interface(candidate), scenario)
-    path = transplant.write(tmp_path)
-    assert path and len(transplant.replaced_components) == 1
-    assembly = prepare(path)
+    substitution = ControllerSubstitution(role, candidate, read_interface(candidate), scenario)
+    path = substitution.write(tmp_path)
+    assert path
+    assert len(substitution.replaced_components) == 1
+    prepared = prepare(path)
     try:
-        place = transplant.replaced_components[0]
-        assert any(component == place or component.startswith(f"{place}.") for component in assembly.system.components)
-        assert str(min(role.controllers)) in {str(file) for file in assembly.files().values()}
+        place = substitution.replaced_components[0]
+        assert any(component == place or component.startswith(f"{place}.") for component in prepared.system.components)
+        assert str(min(role.controllers)) in {str(file) for file in prepared.files().values()}
     finally:
-        assembly.free()
+        prepared.free()
 
 
-def test_a_scenario_without_the_role_is_left_alone(tmp_path):
+def test_a_scenario_without_the_role_is_not_written(tmp_path):
     role = read_role("usv_autopilot")
     candidate = parse_source(str(min(role.controllers)))
     scenario = ROOT / "scenarios/demo3_inverse_kinematics.json"
@@ -66,7 +67,7 @@ def test_a_scenario_without_the_role_is_left_alone(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_other_json_is_no_scenario_and_a_bad_one_is_refused(tmp_path):
+def test_other_json_is_skipped_and_an_invalid_scenario_is_refused(tmp_path):
     role = read_role("usv_autopilot")
     candidate = parse_source(str(min(role.controllers)))
     shape = read_interface(candidate)
@@ -77,8 +78,8 @@ def test_other_json_is_no_scenario_and_a_bad_one_is_refused(tmp_path):
         ControllerSubstitution(role, candidate, shape, tmp_path / "bad.json").write(tmp_path / "out")
 
 
-def test_ports_that_lead_nowhere_disappear_with_what_sets_them(tmp_path):
-    """The cascade as one FMU shows no port `landing_time`: it is a parameter of the nested system around it."""
+def test_ports_without_a_target_are_removed_with_their_settings(tmp_path):
+    """The candidate has no parameter `landing_time`, which is a port of the nested system around it."""
     keeper = tmp_path / "bare.py"
     keeper.write_text(BARE)
     candidate = parse_source(f"{keeper}:Bare")
@@ -96,8 +97,8 @@ def test_ports_that_lead_nowhere_disappear_with_what_sets_them(tmp_path):
     prepare(path).free()
 
 
-def test_scenarios_do_not_share_their_changed_systems(tmp_path):
-    """Both have a `uav` with a position controller in it, in systems with different parameters."""
+def test_changed_systems_of_different_scenarios_are_separate_files(tmp_path):
+    """Both have a position controller in a nested system `uav`, with different parameters."""
     candidate = parse_source(str(ROOT / "fmus/python/position_controller.fmu"))
     shape, role = read_interface(candidate), read_role("uav_position")
     systems = []
@@ -125,11 +126,11 @@ def test_scenarios_do_not_share_their_changed_systems(tmp_path):
         (0.0, 0.0, "lower", ""),
     ],
 )
-def test_verdicts(value, other, sense, expected):
+def test_a_value_is_better_worse_or_equal(value, other, sense, expected):
     assert compare_values(value, other, sense) == expected
 
 
-def test_checks_say_what_is_better_where_the_function_does_not():
+def test_checks_define_the_sense_of_a_kpi_that_its_function_does_not_declare():
     checks = [
         {"kpi": "a.v", "max": 1},
         {"kpi": "b.v", "min": 1},
@@ -139,7 +140,7 @@ def test_checks_say_what_is_better_where_the_function_does_not():
     assert merge_senses({"b.v": "lower"}, checks) == {"a.v": "lower", "b.v": "lower", "d.v": "higher"}
 
 
-def test_kpis_that_others_lack_are_shown_without_a_verdict():
+def test_a_kpi_that_other_runs_lack_has_no_verdict():
     candidate = RunKpis({"a.v": 1.0, "b.v": 2.0}, {"a.v": "m"}, {"a.v": "lower", "b.v": "lower"})
     first, second = compare_kpis(candidate, RunKpis({"a.v": 0.5}, {}, {}), None, [])
     assert (first.unit, first.shipped, first.against_shipped, first.last) == ("m", 0.5, "worse", None)
@@ -170,18 +171,18 @@ def candidate_of(inputs=(), outputs=(), parameters=()):
         (candidate_of(outputs=["thrust", "rudder"]), 'the output "rudder_angle" (rad) is missing; did you mean "rudder"?'),
         (
             candidate_of(outputs=["thrust", "rudder_angle"], inputs=["vehicle.yaw"]),
-            'nothing feeds the input "vehicle.yaw" in this role',
+            'the role has no signal for the input "vehicle.yaw"',
         ),
     ],
 )
-def test_misfits_are_named(found, message):
+def test_an_unsuitable_interface_is_refused(found, message):
     assert message in interface_problems(read_role("usv_autopilot"), found)[0].message
 
 
-def test_what_is_set_has_to_be_a_variable():
+def test_an_unknown_parameter_is_refused():
     found = candidate_of(outputs=["thrust", "rudder_angle"], parameters=["heading_P", "waypoint_x[1]"])
     (problem,) = interface_problems(read_role("usv_autopilot"), found, ["heading_p", "waypoint_x", "heading_P"])
-    assert problem.message == 'it has no variable "heading_p"; did you mean "heading_P"?'
+    assert problem.message == 'the controller has no variable "heading_p"; did you mean "heading_P"?'
 
 
 @pytest.mark.parametrize(
@@ -194,15 +195,16 @@ def test_what_is_set_has_to_be_a_variable():
         (parse_source, "lazy.py", "expected my.fmu, my.py:Class, my.mo:Model or a nested system my.json"),
     ],
 )
-def test_wrong_words_are_refused(function, text, message):
+def test_unknown_roles_and_sources_are_refused(function, text, message):
     with pytest.raises(InputError) as refusal:
         function(text)
     assert str(refusal.value).startswith(message)
 
 
-def test_a_role_of_ones_own_is_validated(tmp_path):
+def test_a_users_role_file_is_validated(tmp_path):
     (tmp_path / "bad.json").write_text('{"description": 5, "controllers": [], "inputs": {"u": 1}, "output": {}}')
     with pytest.raises(InputError) as refusal:
         read_role(str(tmp_path / "bad.json"))
     found = [str(problem).partition("bad.json:")[2].partition(" ")[0] for problem in refusal.value.problems]
-    assert len(found) >= 4 and {"1:2:", "1:50:", "1:59:"} <= set(found)
+    assert len(found) >= 4
+    assert {"1:2:", "1:50:", "1:59:"} <= set(found)

@@ -1,4 +1,4 @@
-"""Rates and statistics of many runs."""
+"""Success rates and statistics of many runs."""
 
 from dataclasses import replace
 
@@ -13,12 +13,12 @@ from cosim.studies.sweep import SweepRow
 
 
 @pytest.mark.parametrize(("successes", "count"), [(0, 10), (1, 10), (7, 9), (50, 1000), (10, 10)])
-def test_intervals_are_those_of_scipy(successes, count):
+def test_wilson_intervals_agree_with_scipy(successes, count):
     expected = stats.binomtest(successes, count).proportion_ci(0.95, method="wilson")
     assert wilson_interval(successes, count) == pytest.approx((expected.low, expected.high), abs=1e-12)
 
 
-def test_nothing_is_known_without_runs():
+def test_the_interval_without_runs_is_zero_to_one():
     assert wilson_interval(0, 0) == (0.0, 1.0)
 
 
@@ -28,7 +28,7 @@ def row(run, value, label="a", failure=""):
     )
 
 
-def test_statistics_are_those_of_the_finite_values():
+def test_statistics_use_only_finite_values():
     values = [3.0, 9.0, float("nan"), 4.0, float("inf"), 1.0]
     (group,) = group_rows(lambda: [row(run, value) for run, value in enumerate(values)], [])
     ((name, found),) = group.statistics()
@@ -39,7 +39,7 @@ def test_statistics_are_those_of_the_finite_values():
     assert found["q05"] == pytest.approx(np.quantile(finite, 0.05))
 
 
-def test_groups_come_in_the_order_of_the_runs_and_failures_count():
+def test_groups_are_in_order_of_appearance_and_count_failures():
     found = group_rows(lambda: [row(0, 1.0, "b"), row(1, 9.0, "a"), row(2, 0.0, "b", "broken")], ["f"])
     assert [(g.labels["f"], g.runs, g.failed, g.passed, g.success_rate) for g in found] == [
         ("b", 2, 1, 1, 0.5),
@@ -47,14 +47,14 @@ def test_groups_come_in_the_order_of_the_runs_and_failures_count():
     ]
 
 
-def test_a_run_that_several_points_have_counts_once_in_intervals():
-    """Eight points of each group, and two runs, the same in both: one of them is a success."""
+def test_a_shared_run_counts_once_in_intervals():
+    """Two groups of eight points share two runs, one of which is a success."""
     rows = [replace(row(run, 9 * (run % 2), "ab"[run // 8]), record=Record(str(run % 2), {}), shared=True) for run in range(16)]
     for group in group_rows(lambda: rows, ["f"]):
         assert (group.runs, group.distinct, group.success_rate, group.interval) == (8, 2, 0.5, wilson_interval(1, 2))
 
 
-def test_one_value_has_no_spread():
+def test_the_standard_deviation_of_one_value_is_nan():
     group = RunGroup({})
     group.add(row(0, 2.0))
     ((_, found),) = group.statistics()

@@ -1,4 +1,4 @@
-"""Maps of success: their cells from known runs, what is drawn of them, and what is refused."""
+"""Success maps: cells from known runs, figures, and invalid maps."""
 
 import json
 import math
@@ -34,13 +34,13 @@ def sweep_of(folder, **more):
 
 
 def rows(sweep, errors):
-    """Runs with these lateral errors; None is a run that crashed."""
+    """Yield runs with these lateral errors; None is a run that crashed."""
     for run, error in errors.items():
         record = Record(str(run), {} if error is None else {"landing.lateral_error": error}, "crashed" if error is None else "")
         yield SweepRow(run, sweep.design[run], record, error is not None and error <= 0.1)
 
 
-#: the runs of (old, 0.5), (old, 1.0) and (new, 0.5); those of (new, 1.0) are not made yet
+#: lateral errors of the runs of (old, 0.5), (old, 1.0) and (new, 0.5); those of (new, 1.0) are missing
 ERRORS = {0: 0.03, 1: 0.01, 2: 0.02, 3: 0.05, 4: 0.3, 5: None, 6: 0.2, 7: 0.2, 8: 0.4}
 
 
@@ -51,27 +51,27 @@ def success_map(tmp_path):
     return found
 
 
-def test_shares_are_those_of_the_runs_of_a_cell(success_map):
+def test_success_rates_are_those_of_the_runs_of_a_cell(success_map):
     shares = {(*cell.labels.values(),): (cell.passed, len(cell.runs)) for cell in success_map.cells.values()}
     assert shares == {("old", 0.5): (3, 3), ("old", 1.0): (1, 3), ("new", 0.5): (0, 3), ("new", 1.0): (0, 0)}
     assert math.isnan(success_map.cell(None, None, "new", 1.0).success_rate)
 
 
-def test_a_run_without_success_is_shown_before_all_others(success_map):
+def test_the_first_unsuccessful_run_represents_a_cell(success_map):
     cell = success_map.cell(None, None, "old", 1.0)
-    assert (cell.representative_run.number, cell.selection_reason) == (4, "the first that is no success")
+    assert (cell.representative_run.number, cell.selection_reason) == (4, "the first unsuccessful run")
 
 
-def test_of_successes_the_median_one_is_shown(success_map):
+def test_the_median_run_represents_a_cell_with_only_successes(success_map):
     cell = success_map.cell(None, None, "old", 0.5)
     assert (cell.representative_run.number, cell.selection_reason) == (2, "the median of landing.lateral_error")
 
 
-def test_nothing_is_shown_where_nothing_was_run(success_map):
+def test_a_cell_without_runs_has_no_representative_run(success_map):
     assert success_map.cell(None, None, "new", 1.0).representative_run is None
 
 
-def test_panels_tell_further_factors_apart(tmp_path):
+def test_panels_show_the_levels_of_further_factors(tmp_path):
     sweep = sweep_of(tmp_path, maps=[{"x": "speed", "y": "seed", "columns": "controller"}, {"x": "seed", "y": "speed"}])
     panels, flat = success_maps(sweep, rows(sweep, ERRORS))
     assert [each.name for each in (panels, flat)] == ["success_map_1", "success_map_2"]
@@ -80,7 +80,7 @@ def test_panels_tell_further_factors_apart(tmp_path):
     assert [run.number for run in flat.cell(None, None, 0.5, 3).runs] == [2, 8]
 
 
-def test_a_run_that_several_points_have_counts_once_in_intervals(tmp_path):
+def test_a_shared_run_counts_once_in_intervals(tmp_path):
     twice = {"one": {"uav.vtol.landing_time": 8.0}, "other": {"uav.vtol.landing_time": 8.0}}
     more = {"name": "more", "levels": twice}
     factors = [SPEED, CONTROLLER | {"levels": {"old": {}}}, more]
@@ -90,7 +90,7 @@ def test_a_run_that_several_points_have_counts_once_in_intervals(tmp_path):
     assert (cell.success_rate, cell.interval) == (1.0, wilson_interval(1, 1))
 
 
-def test_levels_that_are_nothing_or_equal_in_python_have_cells_of_their_own(tmp_path):
+def test_levels_that_are_none_or_equal_in_python_have_separate_cells(tmp_path):
     speeds = SPEED | {"set": "/components/usv/period", "values": [None, 1, 1.0]}
     sweep = sweep_of(tmp_path, factors=[CONTROLLER, speeds], seeds=None)
     (found,) = success_maps(sweep, rows(sweep, dict(enumerate([0.1, 0.2, 0.3]))))
@@ -99,23 +99,23 @@ def test_levels_that_are_nothing_or_equal_in_python_have_cells_of_their_own(tmp_
 
 
 def squares(figure):
-    """Colour of each cell by its place in the first panel."""
+    """Return the colour of each cell of the first panel by its position."""
     patches = [patch for patch in figure.axes[0].patches if isinstance(patch, Rectangle)]
     return {(patch.get_x() + 0.5, patch.get_y() + 0.5): to_hex(patch.get_facecolor()) for patch in patches}
 
 
-def test_colours_say_the_share_and_grey_that_nothing_is_known(success_map):
+def test_colours_show_the_success_rate_and_grey_a_cell_without_runs(success_map):
     colours = squares(draw_map(success_map))
     shades = colormaps["cividis"]
     assert colours == {(0, 0): to_hex(shades(1.0)), (1, 0): to_hex(shades(1 / 3)), (0, 1): to_hex(shades(0.0)), (1, 1): "#eeeeee"}
 
 
-def test_text_says_how_many_runs_and_how_sure(success_map):
+def test_cells_show_their_counts_and_confidence_intervals(success_map):
     texts = [text.get_text() for text in draw_map(success_map).axes[0].texts]
     assert texts == ["100 %", "3/3\n44–100 %", "33 %", "1/3\n6–79 %", "0 %", "0/3\n0–56 %"]
 
 
-def test_cells_too_small_for_text_have_none(tmp_path):
+def test_small_cells_have_no_text(tmp_path):
     sweep = sweep_of(tmp_path, factors=[CONTROLLER, SPEED | {"values": list(range(60))}])
     (found,) = success_maps(sweep, rows(sweep, dict.fromkeys(range(len(sweep)), 0.01)))
     assert not draw_map(found).axes[0].texts
@@ -124,6 +124,7 @@ def test_cells_too_small_for_text_have_none(tmp_path):
 WORDS = {"name": "landing controller", "levels": {"inverse kinematics": {}, "incremental nonlinear dynamic inversion": {}}}
 STEPS = SPEED | {"values": [0.0137 * i for i in range(40)]}
 MANY = {"name": "sensor", "levels": {f"sensor_number_{i}": {} for i in range(16)}}
+WIDE = {"name": "WWWW", "levels": {"MMMM WWWW MMMM WWWW": {}, "iiiiiiiiii WWWWWWWWWWWWWW": {}}}
 CROWDED = {
     "long names up": ([WORDS, SPEED], {"x": "speed", "y": "landing controller"}),
     "long names along": ([WORDS, SPEED], {"x": "landing controller", "y": "speed"}),
@@ -132,12 +133,13 @@ CROWDED = {
     "long names of columns": ([WORDS, SPEED], {"x": "speed", "y": "seed", "columns": "landing controller"}),
     "long names of many columns": ([MANY, SPEED], {"x": "speed", "y": "seed", "columns": "sensor"}),
     "long names of rows": ([WORDS, SPEED], {"x": "speed", "y": "seed", "rows": "landing controller"}),
+    "wide letters": ([WIDE, SPEED], {"x": "speed", "y": "seed", "columns": "WWWW", "titles": {"speed": "WIND " * 10}}),
     "long titles": ([WORDS, SPEED], {"x": "speed", "y": "landing controller", "titles": {"speed": "speed " * 12}}),
 }
 
 
 @pytest.mark.parametrize("name", CROWDED)
-def test_texts_lie_inside_the_figure_and_beside_each_other(tmp_path, name):
+def test_texts_are_inside_the_figure_and_do_not_overlap(tmp_path, name):
     factors, spec = CROWDED[name]
     (found,) = success_maps(sweep_of(tmp_path, factors=factors, maps=[spec]), [])
     with figure_style():
@@ -146,10 +148,18 @@ def test_texts_lie_inside_the_figure_and_beside_each_other(tmp_path, name):
         texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text()]
         places = {text: text.get_window_extent() for text in texts}
     for text, place in places.items():
-        assert figure.bbox.containsx(place.x0) and figure.bbox.containsx(place.x1), text
-        assert figure.bbox.containsy(place.y0) and figure.bbox.containsy(place.y1), text
+        assert all(map(figure.bbox.containsx, (place.x0, place.x1))), text
+        assert all(map(figure.bbox.containsy, (place.y0, place.y1))), text
     for (one, place), (other, other_place) in combinations(places.items(), 2):
         assert not place.overlaps(other_place), (one, other)
+
+
+def test_cells_have_the_same_size_whatever_the_labels(tmp_path):
+    for factors, spec in (CROWDED[name] for name in ("long names up", "long names along", "long titles")):
+        (found,) = success_maps(sweep_of(tmp_path, factors=factors, maps=[spec]), [])
+        figure = draw_map(found)
+        panel = figure.axes[0].get_position().size * figure.get_size_inches()
+        assert panel == pytest.approx([2 * 0.9, 2 * 0.46], abs=0.02)
 
 
 def test_in_svg_every_cell_with_a_run_is_a_link(success_map):
@@ -175,7 +185,7 @@ def test_in_svg_every_cell_with_a_run_is_a_link(success_map):
         ),
     ],
 )
-def test_maps_of_factors_that_have_no_levels_are_refused(tmp_path, content, words):
+def test_maps_of_factors_without_levels_are_refused(tmp_path, content, words):
     with pytest.raises(InputError) as refusal:
         sweep_of(tmp_path, **content)
     for word in words:

@@ -1,4 +1,4 @@
-block SpeedKeeper "A vessel autopilot that keeps a speed and a course; SI units, yaw counter-clockwise from east"
+block SpeedKeeper "Vessel autopilot for speed and course; SI units, yaw counter-clockwise from east"
   record Attitude
     Real yaw(unit = "rad") "Counter-clockwise from east";
   end Attitude;
@@ -31,7 +31,7 @@ block SpeedKeeper "A vessel autopilot that keeps a speed and a course; SI units,
   output Real rudder_angle(start = 0, fixed = true, unit = "rad") "Positive: bow to starboard";
 protected
   discrete Real speed_error(start = 0, fixed = true, unit = "m/s");
-  discrete Real speed_integral(start = 0, fixed = true, unit = "N") "Rests while the thrust is at its limit";
+  discrete Real speed_integral(start = 0, fixed = true, unit = "N") "Constant while the thrust is at its limit";
   discrete Real demand(start = 0, fixed = true, unit = "N") "Thrust without limit";
   discrete Real course_error(start = 0, fixed = true, unit = "rad");
 equation

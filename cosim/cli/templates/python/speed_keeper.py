@@ -1,4 +1,4 @@
-"""A vessel autopilot as a PythonFMU class, which runs in process or, exported, as an FMU: it keeps a speed and a course."""
+"""Vessel autopilot for speed and course as a PythonFMU class; it runs in process or, exported, as an FMU."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PARAMETERS = (
 
 
 class SpeedKeeper(Fmi2Slave):
-    """SI units, angles in rad, yaw counter-clockwise from east."""
+    """Autopilot for speed and course; SI units, angles in rad, yaw counter-clockwise from east."""
 
     description = "Keeps a speed and a course"
 
@@ -39,23 +39,27 @@ class SpeedKeeper(Fmi2Slave):
         self.register_variable(Real("speed_integral", causality=Fmi2Causality.local))
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Outputs from the measurements at the start of the step, which hold until its end."""
+        """Compute the outputs of a step from the measurements at its start."""
         self.thrust = self._thrust(self.speed_command - self.vehicle.velocity_body.u, step_size)
         self.rudder_angle = self._rudder_angle(self.vehicle.attitude.yaw - self.course_command)
         return True
 
     def _thrust(self, error: float, step_size: float) -> float:
-        """PI on the speed error; the integral rests while the thrust is at its limit."""
+        """Return the thrust of a PI controller of the speed; its integral is constant while the thrust is at its limit."""
         thrust = self.speed_P * error + self.speed_integral
         if abs(thrust) < self.thrust_limit:
             self.speed_integral += self.speed_I * step_size * error
         return limited(thrust, self.thrust_limit)
 
     def _rudder_angle(self, error: float) -> float:
-        """PD with the yaw rate as derivative; a positive rudder angle turns the bow to starboard and reduces the yaw angle."""
+        """Return the rudder angle of a PD controller of the course.
+
+        A positive rudder angle turns the bow to starboard, which reduces the yaw angle.
+        """
         error = math.atan2(math.sin(error), math.cos(error))
         return limited(self.course_P * error + self.course_D * self.vehicle.rates.r, self.rudder_limit)
 
 
 def limited(value: float, limit: float) -> float:
+    """Return `value` limited to the range from `-limit` to `limit`."""
     return max(-limit, min(limit, value))

@@ -1,4 +1,4 @@
-"""What a run looks like: a figure of it, and the vessel in the 3-D replay."""
+"""Figure of a run, and the vessel in its 3-D replay."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ HULL = {"orientation": [0, math.sqrt(0.5), 0, math.sqrt(0.5)], "colour": [0.9, 0
 
 
 def course(result: Result, vessel: str) -> Figure:
-    """The course and the speed of `vessel` over time."""
+    """Draw the course (rad) and the speed (m/s) of `vessel` over time (s)."""
     figure = Figure(layout="constrained")
     yaw, speed = figure.subplots(2, sharex=True)
     yaw.plot(result.time, result[f"{vessel}.attitude.yaw"])
@@ -24,7 +24,7 @@ def course(result: Result, vessel: str) -> Figure:
 
 
 def scene(scenario: dict[str, Any], vessel: str) -> dict[str, Any]:
-    """The catamaran `vessel` on calm water; m, in its own frame: x forward, y to port, z up."""
+    """Return the scene: the catamaran `vessel` on calm water; lengths in m, body frame x forward, y to port, z up."""
     parts = [
         {"shape": "box", "size": [0.7, 0.6, 0.02], "position": [0, 0, 0.13], "colour": [0.4, 0.4, 0.4]},
         {"shape": "box", "size": [0.52, 0.3, 0.18], "position": [0, 0, 0.03], "colour": [0.2, 0.4, 0.7]},

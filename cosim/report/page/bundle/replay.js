@@ -1,4 +1,4 @@
-/* made from sources 7f0c43c632623dc3bd862c2cafeaa29eb0f44a4f32b5f37035cbaafee8493143
+/* made from sources e51042f237994af208470e828a20e7c18ef04b82b28c8c96c4c54284d119609d
 
 three
 
@@ -4785,7 +4785,7 @@ void main() {
   vec3 ruled = mix(colour, ink, 0.05 * lines(1.0, width) + 0.08 * lines(5.0, width));
   gl_FragColor = vec4(mix(ruled, horizon, haze), 1.0);
 }`},y0={vertexShader:`${_0}
-attribute vec4 shade; // x, y, reach, how dark it is
+attribute vec4 shade; // x, y, radius, darkness
 varying vec3 off;
 void main() {
   vec2 slope;

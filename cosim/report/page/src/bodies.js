@@ -1,4 +1,4 @@
-// Bodies made of coloured parts: those of one opacity become one geometry, so that they are one draw call.
+// Bodies made of coloured parts; parts of the same opacity are merged into one geometry, so that they need one draw call.
 import {
   BoxGeometry, Color, CylinderGeometry, DoubleSide, Float32BufferAttribute, Group, Matrix4, Mesh, MeshLambertMaterial,
   Quaternion, SphereGeometry, TorusGeometry, Vector3,
@@ -7,7 +7,7 @@ import { mergeGeometries, mergeVertices } from "three/addons/utils/BufferGeometr
 import { RoundedBoxGeometry } from "three/addons/geometries/RoundedBoxGeometry.js";
 import { detailed } from "./quality.js";
 
-const UP = new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), Math.PI / 2); // a cylinder's axis from y to z
+const UP = new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), Math.PI / 2); // turns a cylinder's axis from y to z
 
 const SHAPES = {
   box: ([x, y, z], fine) => {
@@ -23,7 +23,7 @@ const SHAPES = {
   ring: ([radius, thickness], fine) => new TorusGeometry(radius, thickness, ...(fine ? [8, 56] : [5, 32])),
 };
 
-/** One geometry with vertex colours of all parts. */
+/** One geometry of all parts, with vertex colours. */
 function geometryOf(parts, fine) {
   return mergeGeometries(parts.map((part) => {
     const shape = SHAPES[part.shape](part.size, fine).deleteAttribute("uv");
@@ -42,7 +42,7 @@ function meshOf(parts, look) {
   return detailed(new Mesh(undefined, material), geometryOf(parts, true), geometryOf(parts, false));
 }
 
-/** A group of solid and of translucent parts; `solid` is the mesh of the former, if there are any. */
+/** A group of opaque and translucent parts; `solid` is the mesh of the opaque ones, if there are any. */
 export function bodyOf(parts) {
   const group = new Group();
   const opaque = parts.filter((part) => part.opacity === 1);

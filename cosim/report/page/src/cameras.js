@@ -1,4 +1,4 @@
-// Cameras: all are the same orbiting camera, which some of them carry along with a vehicle.
+// Cameras: one orbiting camera, which follows a vehicle in some of its modes.
 import { Box3, MathUtils, PerspectiveCamera, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
@@ -18,13 +18,13 @@ export class Cameras {
     this.carried = new Vector3();
   }
 
-  /** This box is everything, as far as it is known. */
+  /** Set the box that contains all bodies so far. */
   cover(box) {
     this.centre = box.getCenter(new Vector3());
     this.size = box.getSize(new Vector3()).length();
   }
 
-  /** Turn to a camera: "orbit", "chase", "top", or a view that is fixed to a body. `subject` is what is followed. */
+  /** Select a camera: "orbit", "chase", "top", or a view that is fixed to a body. `subject` is the followed body. */
   choose(mode, subject) {
     this.mode = mode;
     this.controls.enabled = !(mode in this.views);
@@ -38,7 +38,7 @@ export class Cameras {
     this.update(subject);
   }
 
-  /** How far away everything is in the picture. */
+  /** Distance from which all bodies are visible. */
   #fitting() {
     const half = MathUtils.degToRad(this.camera.fov / 2);
     const narrow = Math.min(1, this.camera.aspect);
@@ -50,7 +50,7 @@ export class Cameras {
     this.camera.updateProjectionMatrix();
   }
 
-  /** Go along with the subject, or with the body that the camera is mounted on. */
+  /** Move with the subject, or with the body that the camera is mounted on. */
   update(subject, mounted) {
     const view = this.views[this.mode];
     if (view && mounted) {
@@ -69,7 +69,7 @@ export class Cameras {
   }
 }
 
-/** The box around places of bodies, and half a metre more. */
+/** The bounding box of positions, enlarged by half a metre. */
 export function boxAround(places) {
   return new Box3().setFromPoints(places).expandByScalar(0.5);
 }

@@ -1,4 +1,4 @@
-// What the user touches: play, scrubber, speed, cameras, vehicles, layers and the choice of signals.
+// User controls: play, time slider, speed, cameras, vehicles, layers and selection of signals.
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 const PLAY = '<svg viewBox="0 0 16 16"><path d="M4 2.5v11l9-5.5z"/></svg>';
@@ -58,7 +58,7 @@ function key(event, player) {
   event.preventDefault();
 }
 
-/** Buttons of which one is pressed. */
+/** A group of buttons of which one is pressed. */
 function choice(parent, labels, choose) {
   const buttons = Object.entries(labels).map(([value, label]) => {
     const button = parent.appendChild(document.createElement("button"));
@@ -95,7 +95,7 @@ function chip(actor, follow) {
   return button;
 }
 
-/** Where Boolean signals hold, along the scrubber. */
+/** Intervals in which Boolean signals are true, along the time slider. */
 export function showSpans(page, run, spans) {
   const length = run.last - run.first || 1;
   page.spans.replaceChildren();

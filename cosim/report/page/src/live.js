@@ -1,9 +1,9 @@
-// A run that goes on: its rows come from the server of this page, and commands go there (cosim/live/server.py).
+// A running simulation: rows come from the server of this page, and commands are sent to it (cosim/report/live/server.py).
 import { Run } from "./run.js";
 
 const REST = 60; // ms between requests
 
-/** A run of which there are more rows from time to time. */
+/** A run that receives more rows while it is shown. */
 export class GrowingRun extends Run {
   constructor({ name, units, columns, capacity }) {
     const table = new Map(columns.map((column) => [column, new Float32Array(capacity)]));
@@ -11,7 +11,7 @@ export class GrowingRun extends Run {
     Object.assign(this, { table, rows: 0 });
   }
 
-  /** Take in `count` rows that lie column by column in `values`. */
+  /** Append `count` rows, stored column by column in `values`. */
   append(values, count) {
     let place = 0;
     for (const column of this.table.values()) {
@@ -33,7 +33,7 @@ export class Live {
     this.state = { version: -1, complete: false };
   }
 
-  /** The rows that there are, or wait for some; and what the run is doing. */
+  /** Fetch new rows and the state of the run; the server waits until there are any. */
   async look() {
     const response = await fetch(`rows?first=${this.run.rows}&version=${this.state.version}`);
     if (!response.ok) throw new Error(response.statusText);
@@ -48,7 +48,7 @@ export class Live {
     return this.run;
   }
 
-  /** Look until the end; `listener` is called after every look. A server that has gone means that the run has, too. */
+  /** Fetch until the run ends and call `listener` after every response. The run has ended too if the server is gone. */
   async follow(listener) {
     while (!this.state.complete) {
       await new Promise((resume) => setTimeout(resume, REST));
@@ -61,7 +61,7 @@ export class Live {
     }
   }
 
-  /** What the run answers: `error` when it refuses. */
+  /** Send a command and return the reply, with `error` if it was refused. */
   async command(message) {
     try {
       const headers = { "Content-Type": "application/json" };

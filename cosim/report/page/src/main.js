@@ -1,4 +1,4 @@
-// The replay page. Its data stands in the element #replay-data, as `cosim/report/replay.py` writes it.
+// The replay page. Its data is in the element #replay-data, written by `cosim/report/replay.py`.
 import "uplot/dist/uPlot.min.css";
 import "./style.css";
 import { build, connectSignals, connectTime, connectView, showSpans } from "./controls.js";
@@ -10,7 +10,7 @@ import { steer } from "./steering.js";
 import { onThemeChange, themeButtons } from "./theme.js";
 import { View } from "./view.js";
 
-const REDRAW = 500; // ms between drawings of what has grown
+const REDRAW = 500; // ms between two updates of a growing run
 
 async function start(root, data) {
   const live = data.live && new Live(data.live);
@@ -37,7 +37,7 @@ async function start(root, data) {
   return { player, view, plots, runs, live };
 }
 
-/** Show what comes until the run has ended; then the page is a replay as any. */
+/** Show new rows until the run has ended; then the page is an ordinary replay. */
 function watch(live, page, { player, view, plots, spans }) {
   const show = steer(page, live);
   let drawn = 0;

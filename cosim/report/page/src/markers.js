@@ -1,4 +1,4 @@
-// Waypoints: rings of acceptance on the water, all of them one draw call, and numbers above them.
+// Waypoints: circles of acceptance on the water, merged into one draw call, with numbers above them.
 import { CanvasTexture, DoubleSide, Group, Mesh, MeshBasicMaterial, RingGeometry, Sprite, SpriteMaterial } from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 

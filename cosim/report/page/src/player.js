@@ -1,6 +1,6 @@
-// The clock of the replay: one moment that everything shows, moved by the user or by playing.
+// The clock of the replay: the time that is shown, changed by the user or by playing.
 
-const READING = 100; // ms
+const READING = 100; // ms between two updates of texts
 
 export class Player {
   constructor(first, last) {
@@ -12,7 +12,7 @@ export class Player {
     this.listeners.push(listener);
   }
 
-  /** Call `reader` as often as people can read, and at the end of every change. */
+  /** Call `reader` at every change, but at most once per READING, and at the end of a change. */
   onReading(reader) {
     this.readers.push(reader);
   }
@@ -30,7 +30,7 @@ export class Player {
     this.tell();
   }
 
-  /** There is more to see, until `last`; who stands at the end stays there. */
+  /** Extend the replay to the time `last`; a replay at its end stays at the end. */
   grow(last) {
     if (last === this.last) return;
     if (this.time >= this.last) this.time = last;
@@ -53,7 +53,7 @@ export class Player {
     this.tell();
   }
 
-  /** Let wall time (s) pass. */
+  /** Advance by an elapsed wall time (s). */
   advance(seconds) {
     if (!this.playing) return;
     this.time = Math.min(this.time + Math.max(seconds, 0) * this.speed, this.last);

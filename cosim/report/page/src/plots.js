@@ -1,14 +1,14 @@
-// Signals over time, with a cursor that is the moment of the replay: press or drag in a plot to go there.
+// Signals over time, with a cursor at the time of the replay; press or drag in a plot to change it.
 import uPlot from "uplot";
 import { theme } from "./theme.js";
 
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 const HEIGHT = 148;
 
-/** Four significant digits without an exponent where that is short. */
+/** Four significant digits, without an exponent if that is short. */
 export const shown = (value) => (Number.isFinite(value) ? String(Number(value.toPrecision(4))) : "–");
 
-/** The numbers along an axis with all their digits; where those are many and exponents are shorter, all have exponents. */
+/** Tick labels with all digits; all have exponents if that is shorter. */
 function written(_, values) {
   const plain = values.map(String);
   const powers = values.map((value) => (value ? value.toExponential() : "0"));
@@ -24,7 +24,7 @@ function axis(unit) {
   return unit === undefined ? { ...style, size: 26, space: 70 } : { ...style, size: room, space: 28 };
 }
 
-/** The width of an axis: the same for all plots whose numbers are short, so that their times stand below each other. */
+/** The width of an axis: equal in all plots with short tick labels, so that their time axes are aligned. */
 function room(chart, texts, number) {
   [chart.ctx.font] = chart.axes[number].font;
   const widest = Math.max(0, ...(texts ?? []).map((text) => chart.ctx.measureText(text).width / uPlot.pxRatio));
@@ -85,7 +85,7 @@ class Plot {
     return tables.length === 1 ? tables[0] : uPlot.join(tables.filter((table) => table.length > 1));
   }
 
-  /** The runs have more rows. */
+  /** Update after the runs have received more rows. */
   grow() {
     this.chart.setData(this.#data(this.#series()));
     this.update();
@@ -141,7 +141,7 @@ export class Plots {
     player.onReading(() => this.list.forEach((plot) => plot.read()));
   }
 
-  /** A plot of the signals that match any of the patterns; "*" stands for any text. False when nothing matches. */
+  /** Add a plot of the signals that match any of the patterns ("*" matches any text); return false if there are none. */
   add(patterns) {
     const tests = patterns.map((pattern) => new RegExp(`^${pattern.split("*").map((s) => s.replace(/[.[\]()+?^$|{}\\]/g, "\\$&")).join(".*")}$`));
     const signals = this.runs[0].signals.filter((name) => tests.some((test) => test.test(name)));

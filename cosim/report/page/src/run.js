@@ -1,14 +1,14 @@
-// A recorded run in the browser: its columns, and where bodies are at any moment.
+// A recorded run in the browser: its columns, and the poses of bodies at any time.
 import { Quaternion, Vector3, Euler } from "three";
 
-/** Bytes of a zlib stream in base64. */
+/** Decompress a zlib stream in base64. */
 async function inflated(base64) {
   const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** Undo what `cosim/report/samples.py` does: bytes of equal weight lie together, and each row holds the change from the last. */
+/** Decode a column of `cosim/report/samples.py`: bytes of equal weight are grouped, and each row is the difference from the last. */
 function column(bytes, rows, index) {
   const words = new Int32Array(rows);
   const start = 4 * rows * index;
@@ -45,7 +45,7 @@ export class Run {
     return this.columns.has(signal) || signal in this.constants;
   }
 
-  /** The row at or before a moment and how far the moment is on the way to the next. */
+  /** The row at or before a time, and the fraction of the interval to the next row. */
   place(time) {
     let low = 0;
     let high = this.time.length - 1;
@@ -59,7 +59,7 @@ export class Run {
     return { row: low, next, share: step > 0 ? Math.min(Math.max((time - this.time[low]) / step, 0), 1) : 0 };
   }
 
-  /** Value of a signal, of its negative ("-signal"), or of a number that stands in its place, in a row. */
+  /** Value in a row of a signal, of its negative ("-signal"), or of a constant number. */
   at(name, row) {
     if (typeof name === "number") return name;
     if (name.startsWith("-")) return -this.at(name.slice(1), row);
@@ -67,7 +67,7 @@ export class Run {
     return values ? values[row] : this.constants[name];
   }
 
-  /** Value of a signal at a moment: that of the row at or before it. */
+  /** Value of a signal at a time: that of the row at or before it. */
   value(name, time) {
     return this.at(name, this.place(time).row);
   }
@@ -93,7 +93,7 @@ export class Run {
     return new Quaternion().setFromEuler(new Euler(roll, pitch, yaw, "ZYX"));
   }
 
-  /** Where a body is between two rows. */
+  /** Pose of a body between two rows. */
   pose(body, time) {
     const { row, next, share } = this.place(time);
     return {
@@ -102,7 +102,7 @@ export class Run {
     };
   }
 
-  /** Spans of time [first, last] in which a Boolean signal holds. */
+  /** Intervals of time [first, last] in which a Boolean signal is true. */
   spans(name) {
     const values = this.values(name);
     const spans = [];

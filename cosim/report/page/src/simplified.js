@@ -1,7 +1,7 @@
-// A path drawn with few points.
+// Simplification of a path to few points.
 import { Line3, Vector3 } from "three";
 
-/** Numbers of the points that are needed for no other to lie more than `tolerance` beside the path (Douglas and Peucker 1973). */
+/** Indices of the points of a simplified path with a deviation of at most `tolerance` (Douglas and Peucker 1973). */
 export function simplified(points, tolerance) {
   const kept = new Set([0, points.length - 1]);
   const spans = [[0, points.length - 1]];
@@ -15,7 +15,7 @@ export function simplified(points, tolerance) {
   return [...kept].filter((i) => i >= 0).sort((a, b) => a - b);
 }
 
-/** The point that lies furthest from the straight line between two others. */
+/** The point with the largest distance from the straight line between two others. */
 function furthest(points, first, last) {
   const line = new Line3(points[first], points[last]);
   const foot = new Vector3();

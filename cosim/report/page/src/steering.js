@@ -1,4 +1,4 @@
-// What the user touches while a run goes on: pause, step, speed, tunable parameters and unconnected inputs.
+// Controls of a running simulation: pause, step, speed, tunable parameters and unconnected inputs.
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 
@@ -16,7 +16,7 @@ function speeds(select, speed) {
   select.value = speed ?? "";
 }
 
-/** Show the bar and the fields above the signals; the function that comes of it is to be called whenever the state has changed. */
+/** Show the controls above the signals; return a function to be called when the state of the run has changed. */
 export function steer(page, live) {
   const holder = document.createElement("div");
   holder.className = "live";
@@ -53,7 +53,7 @@ function filtering(input, fields) {
   });
 }
 
-/** One value to set: a box to tick, a slider with its number where there are bounds, a number, or a text (lists as JSON). */
+/** Field of one value: a check box, a slider with a number if there are bounds, a number, or a text (lists as JSON). */
 function field(about, set) {
   const label = document.createElement("label");
   label.dataset.name = about.name;
@@ -95,7 +95,7 @@ function put(input, value) {
   else input.value = Array.isArray(value) ? JSON.stringify(value) : value;
 }
 
-/** What stands in an input, undefined when it is no such value. */
+/** The value of a field, or undefined if it is invalid. */
 function taken(input, { value }) {
   if (input.type === "checkbox") return input.checked;
   if (input.type !== "text") return Number.isFinite(input.valueAsNumber) ? input.valueAsNumber : undefined;

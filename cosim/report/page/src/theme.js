@@ -18,13 +18,13 @@ export function themeName() {
 
 export const theme = () => THEMES[themeName()];
 
-/** Call `listener` whenever light turns to dark or back. */
+/** Call `listener` when the theme changes between light and dark. */
 export function onThemeChange(listener) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", listener);
   new MutationObserver(listener).observe(document.documentElement, { attributeFilter: ["data-theme"] });
 }
 
-/** Buttons that choose between light and dark. */
+/** Buttons that switch between the light and the dark theme. */
 export function themeButtons(root) {
   for (const button of root.querySelectorAll("[data-toggle-theme]")) {
     button.addEventListener("click", () => {

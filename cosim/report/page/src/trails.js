@@ -1,4 +1,4 @@
-// What a body leaves behind: its path, brighter where it has been, and ghosts of where it was.
+// Trails of bodies: the path, brighter in the past, and ghosts at earlier poses.
 import { Box3, BufferGeometry, InstancedMesh, Line, LineBasicMaterial, Matrix4, MeshLambertMaterial, Vector3 } from "three";
 import { Line2 } from "three/addons/lines/Line2.js";
 import { LineGeometry } from "three/addons/lines/LineGeometry.js";
@@ -6,13 +6,13 @@ import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { detailed } from "./quality.js";
 import { simplified } from "./simplified.js";
 
-const MOST_POINTS = 2000; // of which those are drawn that a path needs
+const MOST_POINTS = 2000; // before simplification
 const MOST_GHOSTS = 24;
-const FLAT = 1 / 6000; // of a path's extent: so far may what is drawn lie beside it
-const QUAD = [2, 4, 3, 4, 5, 3]; // a piece of a thick line without the caps at its ends, which nobody sees
+const FLAT = 1 / 6000; // tolerance of the simplification, relative to the extent of the path
+const QUAD = [2, 4, 3, 4, 5, 3]; // indices of a segment of a thick line without its caps, which are not visible
 const ONE = new Vector3(1, 1, 1);
 
-/** Rows of a run, at most `count` and evenly spaced, the last among them. */
+/** At most `count` evenly spaced rows of a run, including the last one. */
 function spread(run, count) {
   const last = run.time.length - 1;
   const stride = Math.max(1, Math.ceil(last / count));
@@ -43,7 +43,7 @@ export class Trail {
     for (const line of this.lines) line.geometry.dispose(), line.material.dispose();
   }
 
-  /** Draw as past what lies before a row, to where the body is. */
+  /** Draw the path up to a row as past, up to the position of the body. */
   update(row, position) {
     let count = 0;
     while (count < this.rows.length - 2 && this.rows[count + 1] <= row) count++;
@@ -79,7 +79,7 @@ export class Ghosts {
     this.mesh.dispose();
   }
 
-  /** Show those of the past. */
+  /** Show the ghosts of the past. */
   update(time) {
     this.mesh.count = Math.floor((time - this.first) / this.interval + 1e-6) + 1;
   }

@@ -1,4 +1,4 @@
-// The scene: light, sky, water, bodies with their trails, and the camera; drawn only when something has changed.
+// The scene: light, sky, water, bodies with their trails, and the camera; rendered only after a change.
 import {
   BasicShadowMap, Color, ColorManagement, DirectionalLight, Euler, Group, HemisphereLight, LinearSRGBColorSpace, MeshLambertMaterial,
   PCFShadowMap, Scene, Vector3, WebGLRenderer,
@@ -11,13 +11,13 @@ import { theme } from "./theme.js";
 import { Ghosts, Trail } from "./trails.js";
 import { Water } from "./water.js";
 
-const REST = 350; // ms without a change until the picture is made as fine as can be
+const REST = 350; // ms without a change until the picture is rendered at the highest quality
 const SUN = new Vector3(-0.45, -0.6, 0.66).normalize();
 const OTHER = "#c2185b";
 
-ColorManagement.enabled = false; // colours are mixed as they are shown: powers for each pixel take a processor long
+ColorManagement.enabled = false; // blend colours without conversion, which is slow in software rendering
 
-/** A renderer, and whether the processor has to do its work. What lies behind its canvas is never seen, nor mixed with it. */
+/** Create a renderer with an opaque canvas; `software` is true if the processor renders. */
 function rendererOn(canvas) {
   const software = drawnBySoftware(document.createElement("canvas").getContext("webgl2"));
   const context = canvas.getContext("webgl2", { alpha: false, antialias: !software });
@@ -34,7 +34,7 @@ export class View {
     Object.assign(this, { runs, time: runs[0].first });
     this.scene = new Scene();
     const { renderer, software } = rendererOn(canvas);
-    const most = software ? Infinity : devicePixelRatio; // smaller pixels smooth edges, which a graphics card can do for less
+    const most = software ? Infinity : devicePixelRatio; // smaller pixels smooth edges; a graphics card does that at a lower cost
     Object.assign(this, { renderer, quality: new Quality(software), most, shown: null, frames: 0, changed: 0 });
     this.#surroundings(scene);
     this.actors = runs.flatMap((run, i) => scene.bodies.filter((body) => run.knows(body)).map((body) => this.#actor(run, body, i > 0)));
@@ -83,7 +83,7 @@ export class View {
     return boxAround(places.filter((place) => place.toArray().every(Number.isFinite)));
   }
 
-  /** The runs have more rows. */
+  /** Update after the runs have received more rows. */
   grow() {
     for (const actor of this.actors) {
       const { trail, ghosts } = actor;
@@ -136,7 +136,7 @@ export class View {
     this.update(this.time);
   }
 
-  /** Put everything where it is at a moment. */
+  /** Set the poses of all bodies at a time. */
   update(time) {
     this.time = time;
     for (const { run, body, object, trail, ghosts } of this.actors) {
@@ -177,7 +177,7 @@ export class View {
     this.stale = true;
   }
 
-  /** Draw at the moment `now` (ms) if anything has changed; `elapsed` (ms) since the frame before if the replay is playing. */
+  /** Render at the wall time `now` (ms) after a change; `elapsed` is the time since the last frame (ms) if the replay is playing. */
   draw(now, elapsed) {
     if (this.stale) {
       this.stale = false;
@@ -196,7 +196,7 @@ export class View {
     this.renderer.render(this.scene, this.cameras.camera);
   }
 
-  /** From now on draw like this. */
+  /** Set the quality of the following frames. */
   #turn(how) {
     this.shown = how;
     this.renderer.setPixelRatio(Math.min(this.most, how.ratio));

@@ -1,4 +1,4 @@
-// Water as one plane: the run's waves lift it, ripples and a metre grid give it scale, vehicles darken it below them.
+// Water as one plane, displaced by the waves of the run, with ripples, a metre grid and soft shadows of vehicles.
 import {
   BufferAttribute, BufferGeometry, Color, CustomBlending, Group, InstancedBufferAttribute, InstancedBufferGeometry, Mesh, PlaneGeometry,
   ShaderMaterial, Vector2, Vector3, Vector4,
@@ -7,10 +7,10 @@ import { detailed } from "./quality.js";
 import { FINE, MOST_WAVES, SHADE, WATER } from "./water_shaders.js";
 
 const MOST_SHADES = 16;
-const REACH = 600; // m
-const CELLS = { calm: [64, 32], waves: [160, 60] }; // along each side, fine and coarse
+const REACH = 600; // m from the centre
+const CELLS = { calm: [64, 32], waves: [160, 60] }; // number of cells along each side, fine and coarse
 
-/** A square mesh that is fine in its middle. */
+/** A square mesh that is finer in its middle. */
 function mesh(count) {
   const line = Array.from({ length: count + 1 }, (_, i) => {
     const s = (2 * i) / count - 1;
@@ -28,12 +28,12 @@ function mesh(count) {
   return geometry.setIndex(cells);
 }
 
-/** Soft shadows of vehicles: patches that are laid on the water before anything else is drawn. */
+/** Soft shadows of vehicles: patches that are drawn on the water before everything else. */
 function shades(uniforms) {
   const patch = new PlaneGeometry(2, 2, 4, 4);
   const geometry = new InstancedBufferGeometry().setIndex(patch.index).setAttribute("position", patch.attributes.position);
   geometry.setAttribute("shade", new InstancedBufferAttribute(new Float32Array(4 * MOST_SHADES), 4));
-  const blended = { blending: CustomBlending, depthTest: false, depthWrite: false }; // not `transparent`, which is drawn last
+  const blended = { blending: CustomBlending, depthTest: false, depthWrite: false }; // not `transparent`, which would be drawn last
   return new Mesh(geometry, new ShaderMaterial({ uniforms, ...SHADE, ...blended }));
 }
 
@@ -54,7 +54,7 @@ export class Water {
     this.object.children.forEach((child, i) => Object.assign(child, { frustumCulled: false, renderOrder: i - 2 }));
   }
 
-  /** Whether light is reckoned for corners only. */
+  /** True if the lighting is computed per vertex. */
   light(coarse) {
     this.surface.material.defines = coarse ? { COARSE: "" } : {};
     this.surface.material.needsUpdate = true;
@@ -81,7 +81,7 @@ export class Water {
     this.#shade(bodies.slice(0, MOST_SHADES));
   }
 
-  /** Shadows of bodies, softer the higher they are. */
+  /** Shadows of bodies; they are softer at greater heights. */
   #shade(bodies) {
     const sun = this.uniforms.sun.value;
     const { shade } = this.shades.geometry.attributes;
@@ -94,7 +94,7 @@ export class Water {
     this.shades.geometry.instanceCount = bodies.length;
   }
 
-  /** Height of the water at a place (m). */
+  /** Height of the water at a position (m). */
   height(x, y) {
     const { waves, count } = this.uniforms;
     return waves.value.slice(0, count.value).reduce((sum, w) => sum + w.x * Math.cos(w.y * x + w.z * y + w.w), 0);

@@ -1,7 +1,7 @@
-// The programs that draw water, and the shade of vehicles on it.
+// Shaders of the water and of the shadows of vehicles on it.
 
 export const MOST_WAVES = 64;
-export const FINE = 26; // m: so far from its middle the mesh is as fine as waves need it
+export const FINE = 26; // m: distance from its middle up to which the mesh resolves the waves
 
 const SURFACE = `
 uniform vec4 waves[${MOST_WAVES}];
@@ -42,7 +42,7 @@ vec3 lit(vec3 place, vec2 slope) {
   return mix(deep, shallow, 0.12 + 0.88 * grazing * grazing * grazing) + shallow * dot(normal.xy, sun.xy) + 0.10 * glint * glint;
 }`;
 
-// Light is reckoned for the corners of the mesh if COARSE, otherwise for every pixel.
+// The lighting is computed per vertex if COARSE, otherwise per pixel.
 export const WATER = {
   vertexShader: `${SURFACE}
 varying vec3 place;
@@ -89,7 +89,7 @@ void main() {
 
 export const SHADE = {
   vertexShader: `${SURFACE}
-attribute vec4 shade; // x, y, reach, how dark it is
+attribute vec4 shade; // x, y, radius, darkness
 varying vec3 off;
 void main() {
   vec2 slope;

@@ -68,10 +68,10 @@ def test_an_argument_isolates_all_components(probe, tmp_path, arguments):
 @pytest.mark.parametrize(
     ("options", "lines"),
     [
-        ([], ["the supervised run: b", "a: one of its own"]),
-        (["--isolation", "none"], ["that of the command: b", "a: one of its own"]),
-        (["--sandbox"], ["a: one of its own, in a sandbox", "b: one of its own, in a sandbox"]),
-        (["--sandbox", "strict"], ["processes, all of them in bubblewrap", "b: one of its own, in a sandbox"]),
+        ([], ["supervised process: b", "a: its own process"]),
+        (["--isolation", "none"], ["process of the command: b", "a: its own process"]),
+        (["--sandbox"], ["a: its own process, in a sandbox", "b: its own process, in a sandbox"]),
+        (["--sandbox", "strict"], ["processes, all in bubblewrap", "b: its own process, in a sandbox"]),
     ],
 )
 def test_check_lists_the_process_of_each_component(probe, tmp_path, options, lines, capsys):

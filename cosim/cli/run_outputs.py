@@ -1,0 +1,203 @@
+"""Files and text that `cosim run` produces from a run that has ended."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+from . import current_command_line, report_error
+
+if TYPE_CHECKING:
+    from ..api import Execution
+    from ..engine.pacer import LatePolicy
+    from ..results import Result
+    from ..results.checks import CheckOutcome
+    from ..scenario import PreparedRun
+
+_LATENESS_LABELS = {"max": "max_lateness", "mean": "mean_lateness", "99 %": "lateness_99_percent"}
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """Options of `cosim run`, apart from those of its supervision and its live view."""
+
+    scenario: str
+    output_dir: Path | None
+    stop_time: str | None
+    step_size: str | None
+    settings: tuple[str, ...]
+    real_time: float | None
+    late: LatePolicy
+    parquet: bool
+    mcap: bool
+    no_report: bool
+    isolation: Literal["fmu", "none"]
+    sandbox: bool
+
+    def output_folder(self, name: str) -> Path:
+        """Return the output directory of the scenario called `name`, as messages show it."""
+        return self.output_dir or Path("runs") / name
+
+
+@dataclass(frozen=True)
+class RunOutcome:
+    """A run that has ended, and the outputs made from it so far.
+
+    Attributes:
+        options: options of the command.
+        prepared: the run as it was prepared.
+        execution: its result or failure.
+        began: `time.perf_counter()` before the scenario was loaded (s).
+        pictures: SVG text of each figure, by figure name.
+        files: names of the files that the summary lists.
+    """
+
+    options: RunOptions
+    prepared: PreparedRun
+    execution: Execution
+    began: float
+    pictures: dict[str, str] = field(default_factory=dict)
+    files: list[str] = field(default_factory=list)
+
+    @property
+    def result(self) -> Result:
+        """The result; after a failure, what was recorded until then."""
+        return self.execution.result
+
+    @property
+    def shown_folder(self) -> Path:
+        """The output directory as messages show it."""
+        return self.options.output_folder(self.prepared.spec.name)
+
+    @cached_property
+    def folder(self) -> Path:
+        """The output directory as an absolute path."""
+        return self.shown_folder.absolute()
+
+    @cached_property
+    def checks(self) -> Sequence[CheckOutcome]:
+        """Outcomes of the scenario's checks."""
+        from ..api import evaluate_scenario_checks
+
+        return evaluate_scenario_checks(self.prepared, self.result)
+
+
+def write_outputs(outcome: RunOutcome) -> int:
+    """Write, print and draw all outputs of a run, and return the exit code of the command."""
+    if outcome.execution.failure:
+        code = _report_failed_run(outcome, outcome.execution.failure)
+    else:
+        for write in _COMPLETE_RUN_WRITERS:
+            write(outcome)
+        code = 0 if all(check.passed for check in outcome.checks) else 3
+    for write in _EVERY_RUN_WRITERS:
+        write(outcome)
+    return code
+
+
+def write_partial_result(partial: Result, folder: Path, shown_folder: Path) -> None:
+    """Write the rows recorded before a failure, if there are any."""
+    from ..results.result import write_run
+
+    if len(partial.time):
+        write_run(partial, folder)
+        click.echo(f"{len(partial.time)} rows until t = {partial.time[-1]:g} s kept in {shown_folder}", err=True)
+
+
+def _report_failed_run(outcome: RunOutcome, failure: BaseException) -> int:
+    from ..process.run_files.folder import remove_run_files
+
+    write_partial_result(outcome.result, outcome.folder, outcome.shown_folder)
+    remove_run_files()
+    return report_error(failure, current_command_line())
+
+
+def _write_result_files(outcome: RunOutcome) -> None:
+    """Write result.csv, kpis.json and run.json in place of the files of the unfinished run."""
+    from ..process.run_files.folder import remove_run_files
+    from ..results.result import write_run
+
+    write_run(outcome.result, outcome.folder)
+    remove_run_files()
+    outcome.files.extend(("result.csv", "kpis.json", "run.json"))
+
+
+def _print_kpis(outcome: RunOutcome) -> None:
+    from ..report.tables import print_kpis
+    from ..results.kpi import kpi_units
+
+    result = outcome.result
+    print_kpis(result.kpis, outcome.checks, kpi_units(outcome.prepared.kpis(), result.kpis, result.units))
+
+
+def _write_figures(outcome: RunOutcome) -> None:
+    from ..report.figures import draw_figure, figure_to_svg, save_figure
+
+    if outcome.options.no_report:
+        return
+    for name, function, arguments in outcome.prepared.figures():
+        figure = draw_figure(outcome.result, name, function, arguments)
+        save_figure(figure, outcome.folder / f"{name}.png")
+        outcome.pictures[name] = figure_to_svg(figure)
+        outcome.files.append(f"{name}.png")
+
+
+def _write_report(outcome: RunOutcome) -> None:
+    from ..report.run_page import write_report
+
+    if not outcome.options.no_report:
+        write_report(outcome.result, outcome.checks, outcome.pictures, outcome.folder / "report.html")
+        outcome.files.append("report.html")
+
+
+def _print_summary(outcome: RunOutcome) -> None:
+    result = outcome.result
+    loop, simulated = result.timing["loop_seconds"], float(result.time[-1] - result.time[0])
+    seconds = time.perf_counter() - outcome.began
+    click.echo(f"\n{simulated:g} s simulated in {loop:.2f} s: {simulated / loop:.0f} times real time")
+    click.echo(f"{', '.join(outcome.files)} in {outcome.shown_folder} ({seconds:.1f} s in all)")
+    if pacing := result.metadata["real_time"]:
+        click.echo(_format_pacing(pacing))
+    if events := result.metadata.get("live_events"):
+        times = "1 time" if len(events) == 1 else f"{len(events)} times"
+        click.echo(
+            f"values were set {times} while it ran: copy live_events of run.json into the scenario's events to repeat the run"
+        )
+    if termination := result.metadata["terminated_by"]:
+        click.echo(f"{termination['component']} requested the end of the simulation at t = {termination['time']:g} s")
+
+
+def _format_pacing(pacing: Mapping[str, Any]) -> str:
+    lateness = ", ".join(f"{label} {1e3 * pacing[key]:.3g} ms" for label, key in _LATENESS_LABELS.items())
+    late = f"{pacing['late_steps']} of {pacing['steps']} steps late"
+    return f"paced to {pacing['factor']:g} times real time: {late}; lateness {lateness}"
+
+
+def _write_parquet(outcome: RunOutcome) -> None:
+    if outcome.options.parquet:
+        outcome.result.to_parquet(outcome.folder / "result.parquet")
+
+
+def _write_mcap(outcome: RunOutcome) -> None:
+    if outcome.options.mcap:
+        from ..report.scene import build_scene
+
+        outcome.result.to_mcap(outcome.folder / "result.mcap", build_scene(outcome.result.metadata))
+
+
+#: outputs of a run that reached its end, in this order
+_COMPLETE_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (
+    _write_result_files,
+    _print_kpis,
+    _write_figures,
+    _write_report,
+    _print_summary,
+)
+#: outputs of every run, also of one that failed
+_EVERY_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (_write_parquet, _write_mcap)
