@@ -14,7 +14,7 @@ import numpy as np
 
 from cosim.results import Result
 from cosim.results.checks import Number
-from cosim.results.kpi import Prefix, Signal, better, units
+from cosim.results.kpi import Prefix, Signal, better, declared_units, units
 
 from . import deck_frame
 from .recorded_motion import distance_from_line, horizontal_distance, touchdown_row
