@@ -8,30 +8,16 @@ that a run does not have is NaN or False.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from cosim.results import Result
 from cosim.results.checks import Number
-from cosim.results.kpi import Prefix, Signal, better, units
+from cosim.results.kpi import Prefix, Signal, better, declared_units, units
 
 from . import deck_frame
 from .recorded_motion import distance_from_line, horizontal_distance, touchdown_row
-
-_TOUCHDOWN_UNITS: Mapping[str, str] = {
-    "forward_error": "m",
-    "left_error": "m",
-    "lateral_error": "m",
-    "normal_speed": "m/s",
-    "tangential_speed": "m/s",
-    "kinetic_energy": "J",
-    "tilt": "rad",
-    "deck_roll": "rad",
-    "deck_pitch": "rad",
-    "deck_heave": "m",
-    "peak_force": "N",
-}
 
 
 @better(
@@ -99,7 +85,19 @@ def _values_without_landing() -> dict[str, Number]:
     tilt="lower",
     peak_force="lower",
 )
-@units(**_TOUCHDOWN_UNITS)
+@units(
+    forward_error="m",
+    left_error="m",
+    lateral_error="m",
+    normal_speed="m/s",
+    tangential_speed="m/s",
+    kinetic_energy="J",
+    tilt="rad",
+    deck_roll="rad",
+    deck_pitch="rad",
+    deck_heave="m",
+    peak_force="N",
+)
 def touchdown(result: Result, vehicle: Prefix, deck: Prefix, mass: float) -> dict[str, Number]:
     """Evaluate a touchdown in the axes of a deck that may roll, pitch, heave and turn.
 
@@ -127,7 +125,7 @@ def touchdown(result: Result, vehicle: Prefix, deck: Prefix, mass: float) -> dic
     """
     row = touchdown_row(result, vehicle)
     if row is None:
-        return dict.fromkeys(_TOUCHDOWN_UNITS, math.nan)
+        return dict.fromkeys(declared_units(touchdown), math.nan)
     vessel = deck.removesuffix(".deck")
     forward, left, _ = deck_frame.relative_position(result, vehicle, deck)[row].tolist()
     u, v, w = deck_frame.relative_velocity(result, vehicle, deck)[row - 1].tolist()

@@ -58,7 +58,7 @@ def measurements(rng: np.random.Generator, k: int) -> dict[str, Any]:
     return vehicle | deck | {"vehicle.position.z": altitude, "vehicle.contact.vessel": k > 890, "altitude_command": 1.9}
 
 
-def test_one_fmu_equals_the_wired_system_to_the_bit(controller: Any) -> None:
+def test_one_fmu_equals_the_nested_system_bit_for_bit(controller: Any) -> None:
     rng, whole, wired = np.random.default_rng(0), controller("ar_drone_cascaded"), Wired(controller)
     for k in range(1000):
         inputs = measurements(rng, k)
@@ -68,7 +68,7 @@ def test_one_fmu_equals_the_wired_system_to_the_bit(controller: Any) -> None:
     assert [one[f"rotor_speed[{n}]"] for n in range(1, 5)] == [0.0] * 4
 
 
-def test_parameters_have_the_same_address_in_both(controller: Any) -> None:
+def test_parameters_have_equal_names_in_both(controller: Any) -> None:
     whole = controller("ar_drone_cascaded").variables
     for name, block in Wired(controller).blocks.items():
         parameters = {v.name for v in block.variables.values() if v.causality == "parameter"}

@@ -1,4 +1,4 @@
-"""The hand-written C controller against its law in numpy, and in the place of the shipped autopilot."""
+"""The C controller against its control law in NumPy, and as a replacement of the shipped autopilot."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def stepped(keeper, measured):
 
 
 def expected_thrust(error):
-    """PI whose integral rests at the limit, tick by tick."""
+    """PI control whose integral is held at the limit, step by step."""
     integral, out = 0.0, []
     for e in error:
         demand = PARAMETERS["speed_P"] * e + integral

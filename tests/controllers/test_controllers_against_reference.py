@@ -1,4 +1,4 @@
-"""Every controller FMU computes what the fact sheet's equations say: with its gains as shipped, and with any others."""
+"""Controller FMUs against the equations of the fact sheet, with the shipped gains and with random ones."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ RESETTABLE = {"position_controller", "altitude_controller", "attitude_controller
 
 
 def wandering(name: str, rng: np.random.Generator) -> list[dict[str, Any]]:
-    """Inputs of every tick: jumps and smooth stretches; the controllers that can be reset are, now and then."""
+    """Inputs of every tick: jumps and smooth parts, with a reset at some ticks."""
     ticks: list[dict[str, Any]] = [{} for _ in range(TICKS)]
     for variable, span in INPUTS[name].items():
         centre, half = span if isinstance(span, tuple) else (0.0, span)

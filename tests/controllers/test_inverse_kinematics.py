@@ -72,7 +72,7 @@ def random_ticks(rng: np.random.Generator, count: int = 600) -> list[dict[str, f
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_it_computes_what_the_paper_says(controller: Callable[..., ControllerFmu], seed: int) -> None:
+def test_outputs_equal_the_equations_of_the_paper(controller: Callable[..., ControllerFmu], seed: int) -> None:
     rng = np.random.default_rng(seed)
     gains = {name: value * float(rng.uniform(0.7, 1.3)) if seed else value for name, value in GAINS.items()}
     fmu, reference = controller("inverse_kinematics", gains), Reference(gains)
@@ -159,7 +159,7 @@ def test_demo3_keeps_altitude_and_heading(demo: Result) -> None:
     assert np.abs(demo["quadcopter.attitude.yaw"] - math.pi / 2).max() < 0.001
 
 
-def test_the_end_error_is_the_trim_and_the_mass(demo: Result) -> None:
+def test_the_end_error_comes_from_trim_and_mass(demo: Result) -> None:
     """Rotors do not act through the centre of mass: while the attitude integrals find their trim, a tilt of some hundredths of
     a degree second leaves a speed error that stays; and the vehicle is heavier than the controller believes.
     """

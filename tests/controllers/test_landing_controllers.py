@@ -70,13 +70,13 @@ def flights(tmp_path_factory):
     return {"geometric": fly("ar_drone_geometric"), "cascaded": fly("ar_drone_cascaded", unread=["velocity.z"])}
 
 
-def test_it_moves_with_a_deck_in_a_swell_to_some_centimetres(flights):
+def test_geometric_control_follows_a_deck_in_a_swell_within_centimetres(flights):
     horizontal, vertical = errors(flights["geometric"])
     assert horizontal < 0.025
     assert vertical < 0.015
 
 
-def test_the_cascaded_control_lags_behind(flights):
+def test_cascaded_control_lags_behind_the_deck(flights):
     geometric, cascaded = (np.array(errors(flights[name])) for name in ("geometric", "cascaded"))
     assert cascaded[0] > 4 * geometric[0]
     assert cascaded[1] > geometric[1]
@@ -87,7 +87,7 @@ def test_the_cascaded_control_lags_behind(flights):
     [{"fmu": str(FMUS / "ar_drone_geometric.fmu")}, {"system": str(SCENARIOS / "systems" / "ar_drone_inverse_landing.json")}],
     ids=["geometric", "inverse kinematics"],
 )
-def test_in_the_place_of_the_cascaded_control_others_land_in_the_first_demo(tmp_path, controller):
+def test_other_controllers_land_in_the_first_demo(tmp_path, controller):
     path = SCENARIOS / "demo1_box.json"
     document = json.loads(path.read_text())
     parameters = {"vtol.landing_time": 5.0, "altitude_command": 2.0, "yaw_command": 0.0}
@@ -113,7 +113,7 @@ def touchdown_tilt(**parameters):
     return cosim.run(SCENARIOS / "landing_waves.json", flight, stop_time=13.0).kpis["touchdown.tilt"]
 
 
-def test_just_above_the_deck_it_rights_itself():
+def test_tilt_is_limited_just_above_the_deck():
     assert touchdown_tilt(flare_height=0.0) > 0.35
     assert touchdown_tilt() < 0.25
 

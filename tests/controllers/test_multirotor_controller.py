@@ -1,4 +1,4 @@
-"""The controller for multirotors of any layout: its rotors together make the thrust and torque that it wants."""
+"""Controller for multirotors of any layout: rotor speeds give the commanded thrust and torque."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ def loads(layout: dict[str, list[float]], outputs: dict[str, Any]) -> np.ndarray
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_a_level_vehicle_in_its_place_gets_its_weight(controller: Any, name: str) -> None:
+def test_thrust_equals_the_weight_without_errors(controller: Any, name: str) -> None:
     outputs = controller("multirotor_controller", parameters(LAYOUTS[name])).step({})
     assert loads(LAYOUTS[name], outputs) == pytest.approx([MASS * GRAVITY, 0, 0, 0], abs=1e-9)
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_errors_are_answered_with_the_torque_that_the_gains_say(controller: Any, name: str) -> None:
+def test_torques_follow_from_errors_and_gains(controller: Any, name: str) -> None:
     given = {"vehicle.attitude.roll": 0.1, "vehicle.attitude.pitch": -0.05, "vehicle.rates.r": 0.2, "yaw_reference": 0.1}
     outputs = controller("multirotor_controller", parameters(LAYOUTS[name])).step(given)
     torques = [INERTIA[0] * 40 * -0.1, INERTIA[1] * 40 * 0.05, INERTIA[2] * (4 * 0.1 - 4 * 0.2)]
@@ -46,12 +46,12 @@ def test_errors_are_answered_with_the_torque_that_the_gains_say(controller: Any,
     assert loads(LAYOUTS[name], outputs) == pytest.approx([thrust, *torques], rel=1e-9)
 
 
-def test_rotors_that_are_not_there_rest(controller: Any) -> None:
+def test_unused_rotors_have_no_speed(controller: Any) -> None:
     outputs = controller("multirotor_controller", parameters(LAYOUTS["hexagon"])).step({})
     assert [outputs["rotor_speed[7]"], outputs["rotor_speed[8]"]] == [0.0, 0.0]
 
 
-def test_a_place_ahead_lowers_the_nose_and_one_to_the_left_the_left_side(controller: Any) -> None:
+def test_it_tilts_towards_a_reference_ahead_and_to_the_left(controller: Any) -> None:
     for place, sign in (("x", [0, 1]), ("y", [-1, 0])):
         instance = controller("multirotor_controller", parameters(LAYOUTS["cross"]))
         roll_torque, pitch_torque = loads(LAYOUTS["cross"], instance.step({f"position_reference.{place}": 0.5}))[1:3]

@@ -1,4 +1,4 @@
-"""The controllers in Python compute what those in Modelica compute: in process, exported, and in a whole mission."""
+"""Controllers in Python against those in Modelica: in process, exported and in a whole mission."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ EAGER_LANDING = {
 
 
 class InProcess:
-    """A Python controller without FMU, with the interface of `conftest.Controller`."""
+    """Python controller in process with the interface of `ControllerFmu`."""
 
     def __init__(self, name: str, parameters: dict[str, Any]):
         self.component, self.time = load_component(f"{name}.py:{TWINS[name]}", SOURCES, name, {}), 0.0
@@ -111,7 +111,7 @@ def assert_same(name: str, found: dict[str, Any], expected: dict[str, Any], tick
 
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("name", TWINS)
-def test_in_process_is_as_in_modelica(controller: Callable[..., ControllerFmu], name: str, seed: int) -> None:
+def test_in_process_equals_modelica(controller: Callable[..., ControllerFmu], name: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     parameters = random_parameters(controller(name).variables, rng)
     modelica, python = controller(name, parameters), InProcess(name, parameters)
@@ -120,7 +120,7 @@ def test_in_process_is_as_in_modelica(controller: Callable[..., ControllerFmu], 
 
 
 @pytest.mark.parametrize("name", TWINS)
-def test_exported_is_as_in_modelica(controller: Callable[..., ControllerFmu], tmp_path: Path, name: str) -> None:
+def test_exported_equals_modelica(controller: Callable[..., ControllerFmu], tmp_path: Path, name: str) -> None:
     rng = np.random.default_rng(3)
     parameters = random_parameters(controller(name).variables, rng)
     modelica, python = controller(name, parameters), exported(name, parameters, tmp_path)

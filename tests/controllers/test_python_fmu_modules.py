@@ -1,4 +1,4 @@
-"""Python FMUs carry the modules they import, and do not meet in the interpreter they share."""
+"""Python FMUs contain the modules that they import and stay independent in a shared interpreter."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def oracle(folder: Path, number: float) -> Path:
     return folder / "oracle.py"
 
 
-def test_modules_of_the_same_name_do_not_meet(tmp_path: Path) -> None:
+def test_modules_with_equal_names_are_independent(tmp_path: Path) -> None:
     instances = []
     for number in (1.0, 2.0):
         folder = tmp_path / str(number)
@@ -55,14 +55,14 @@ def test_modules_of_the_same_name_do_not_meet(tmp_path: Path) -> None:
         instance.close()
 
 
-def test_what_is_imported_is_inside_and_nothing_else(tmp_path: Path) -> None:
+def test_an_fmu_contains_exactly_the_imported_modules(tmp_path: Path) -> None:
     with ZipFile(write_python_fmu(oracle(tmp_path, 1.0), tmp_path / "oracle.fmu")) as archive:
         names = {name.removeprefix("resources/") for name in archive.namelist()}
     assert {"oracle.py", "parts/helper.py", "parts/numbers.py"} <= names
     assert "parts/unused.py" not in names
 
 
-def test_another_helper_makes_another_guid(tmp_path: Path) -> None:
+def test_a_changed_imported_module_changes_the_guid(tmp_path: Path) -> None:
     guids = set()
     for number in (1.0, 2.0):
         folder = tmp_path / str(number)
@@ -71,7 +71,7 @@ def test_another_helper_makes_another_guid(tmp_path: Path) -> None:
     assert len(guids) == 2
 
 
-def test_imports_from_above_the_source_are_refused(tmp_path: Path) -> None:
+def test_imports_from_above_the_source_are_rejected(tmp_path: Path) -> None:
     source = oracle(tmp_path / "inner", 1.0)
     (tmp_path / "outer.py").write_text("answer = None\n")
     source.write_text(SOURCE.replace(".parts.helper", "..outer"))
@@ -79,7 +79,7 @@ def test_imports_from_above_the_source_are_refused(tmp_path: Path) -> None:
         write_python_fmu(source, tmp_path / "oracle.fmu")
 
 
-def test_a_source_with_a_syntax_error_is_refused(tmp_path: Path) -> None:
+def test_a_source_with_a_syntax_error_is_rejected(tmp_path: Path) -> None:
     source = tmp_path / "broken.py"
     source.write_text("class Broken(:\n")
     with pytest.raises(InputError, match=r"broken\.py: cannot be exported: invalid syntax"):

@@ -1,4 +1,4 @@
-"""Which way things turn: right-hand rule, body axes forward, left, up; rotors 1 front, 2 left, 3 rear, 4 right."""
+"""Sign conventions: right-hand rule, body axes forward, left, up; rotors 1 front, 2 left, 3 rear, 4 right."""
 
 from __future__ import annotations
 

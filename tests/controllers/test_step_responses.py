@@ -1,4 +1,4 @@
-"""The control loops around the quadcopter's equations answer steps as a published re-simulation of the original does.
+"""Step responses of the control loops with the quadcopter's equations against a published re-simulation.
 
 The original charged its altitude integrator from 0 in the first seconds; a controller that believes in no mass does the same.
 The figures hold within 3 % or 0.05 s.
@@ -32,12 +32,12 @@ def respond(controller: Any, seconds: float, step: dict[str, float], mass: float
 
 
 def rise_time(signal: np.ndarray) -> float:
-    """When the signal first reaches 90 % of its final command, 1."""
+    """Time (s) at which the signal first reaches 90 % of its final command, 1."""
     return 0.01 * int(np.argmax(signal >= 0.9))
 
 
 def settling_time(signal: np.ndarray, band: float) -> float:
-    """When the signal is within the band around 1 for good."""
+    """Time (s) from which the signal stays within the band around 1."""
     return 0.01 * (1 + int(np.flatnonzero(np.abs(signal - 1) > band)[-1]))
 
 

@@ -126,7 +126,7 @@ def test_one_block_in_another_language_changes_nothing(tmp_path: Path, block: st
         assert_same(cosim.run("free_flight", changes, stop_time=20), expected)
 
 
-def test_a_foreign_heading_controller_flies_demo1(tmp_path: Path) -> None:
+def test_another_heading_controller_sails_demo1(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(RATE_DAMPED)
     system = with_block(tmp_path, "heading", {"python": str(tmp_path / "own.py:RateDamped")})
     assembly = cosim.load("demo1_box", nested("demo1_box", system))
@@ -135,7 +135,7 @@ def test_a_foreign_heading_controller_flies_demo1(tmp_path: Path) -> None:
     assert not np.array_equal(result["usv.rudder_angle"], cosim.run("demo1_box")["usv.rudder_angle"])
 
 
-def test_a_foreign_guidance_needs_no_more_than_two_references(tmp_path: Path) -> None:
+def test_another_guidance_needs_only_two_references(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(COURSE)
     usv = {"system": str(with_block(tmp_path, "guidance", {"python": str(tmp_path / "own.py:Course")}))}
     result = cosim.run("free_flight", {"/components/usv": usv})

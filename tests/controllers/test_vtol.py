@@ -1,4 +1,4 @@
-"""The flight modes of the quadcopter, told as short flights of a vehicle that follows its references perfectly."""
+"""Flight modes of the quadcopter in short flights of a vehicle that follows its references exactly."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ APPROACH_ALTITUDE = RESTING + 0.675
 
 @dataclass
 class Flight:
-    """A vehicle that is where its references are, `offset` m east of the deck's centre once it follows."""
+    """Vehicle at its reference position, `offset` (m) east of the deck centre from the mode follow on."""
 
     vtol: Any
     offset: float = 0.0
@@ -190,7 +190,7 @@ def test_landing_can_be_called_off(flight: Any, mode: int) -> None:
     assert landing.fly(3.0)["altitude_reference"] == 2.0
 
 
-def test_a_brush_with_the_deck_is_no_touchdown(flight: Any) -> None:
+def test_a_short_contact_is_not_a_touchdown(flight: Any) -> None:
     descent = flight()
     descent.until(DESCEND)
     for contact in (True, True, False, True, True, False):

@@ -1,4 +1,4 @@
-"""The autopilot's way through its list of waypoints."""
+"""Order of waypoints in the vessel's autopilot."""
 
 from __future__ import annotations
 

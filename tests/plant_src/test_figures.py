@@ -59,7 +59,7 @@ def test_without_a_landing_there_is_no_mark(figure):
     assert all("touchdown" not in drawn(axes) for axes in figure(not_landed(), **DECK).axes)
 
 
-def test_a_metre_is_a_metre_in_both_directions():
+def test_both_axes_have_the_same_scale():
     figure = paths(mission_result(), **DECK, x=[0.0, 0.0], y=[-3.0, 14.0], radius=0.5)
     axes = figure.axes[0]
     figure.draw_without_rendering()

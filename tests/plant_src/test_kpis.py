@@ -16,12 +16,12 @@ TIME = mission_result().time
 
 
 def contacts(*spans):
-    """Contact with the vessel, and with it any contact, in these spans of time; start on the platform."""
+    """Contact with the vessel in these time spans, after a start on the platform."""
     vessel = np.any([(start <= TIME) & (stop > TIME) for start, stop in spans], axis=0)
     return {"plant__uav__contact__vessel": vessel, "plant__uav__contact__touching": vessel | (TIME < TAKE_OFF)}
 
 
-def test_a_landing_is_measured_where_it_happens():
+def test_landing_is_evaluated_at_the_touchdown():
     kpis = landing(mission_result(offset=(0.03, 0.04)), **DECK)
     assert kpis == pytest.approx(
         {
@@ -61,7 +61,7 @@ def test_a_start_just_above_the_deck_is_no_landing():
     assert math.isnan(landing(dropped, **DECK)["time"])
 
 
-def test_leaving_the_deck_and_coming_back_is_one():
+def test_leaving_the_deck_and_returning_is_a_landing():
     back = mission_result(**contacts((0.0, 2.0), (7.0, STOP + 1)))
     assert landing(back, **DECK)["time"] == 7.0
 
@@ -84,7 +84,7 @@ def test_leaving_for_good_is_not_landed_at_the_end():
 
 
 def carried(yaw, forward, left):
-    """A quadcopter on a turning deck, at this place in the vessel's axes."""
+    """A quadcopter on a rotating deck, at this position in the vessel's axes."""
     x, y = forward * np.cos(yaw) - left * np.sin(yaw), forward * np.sin(yaw) + left * np.cos(yaw)
     places = {"plant__uav__position__x": TIME + x, "plant__uav__position__y": y}
     return mission_result(yaw=yaw, **places)
@@ -95,13 +95,13 @@ def test_a_turning_deck_carries_without_a_slide():
     assert landing(turning, **DECK)["slide"] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_a_slide_is_the_largest_way_across_the_deck():
+def test_slide_is_the_largest_distance_on_the_deck():
     there_and_back = 0.03 * np.clip(TIME - 13, 0, 1) - 0.02 * np.clip(TIME - 15, 0, 1)
     sliding = carried(yaw=0.5 * TIME, forward=0.1 + there_and_back, left=0.0)
     assert landing(sliding, **DECK)["slide"] == pytest.approx(0.03)
 
 
-def test_the_way_after_leaving_the_deck_is_no_slide():
+def test_motion_after_leaving_the_deck_is_not_a_slide():
     away = carried(yaw=0.0 * TIME, forward=0.1 + np.maximum(0, TIME - 15), left=0.0)
     assert landing(with_signals(away, **contacts((12.0, 15.0))), **DECK)["slide"] == pytest.approx(0.0, abs=1e-12)
 
@@ -116,7 +116,7 @@ def test_waypoints_are_reached_one_after_the_other():
     assert kpis == {"reached": 2, "all_reached": True, "time[1]": 4.6, "time[2]": 9.5}
 
 
-def test_a_waypoint_out_of_turn_does_not_count():
+def test_a_waypoint_out_of_order_does_not_count():
     kpis = waypoints(mission_result(), "plant.usv", x=[10.0, 5.0, 15.0], y=[0.0, 0.0, 0.0], radius=0.5)
     assert (kpis["reached"], kpis["all_reached"], kpis["time[1]"]) == (1, False, 9.5)
     assert math.isnan(kpis["time[2]"])
@@ -163,7 +163,7 @@ def test_motors_that_never_ran_stopped_at_the_start():
     assert motors(idle, "uav.rotor_speed")["stop_time"] == 0.0
 
 
-def test_names_that_are_not_there_are_refused():
+def test_unknown_signal_names_are_rejected():
     with pytest.raises(InputError, match=r'KPI "landing": no signal "plant.uva.contact.vessel" .* "plant.uav.contact.vessel"'):
         evaluate_kpis(mission_result(), [("landing", landing, {**DECK, "vehicle": "plant.uva"})])
     with pytest.raises(InputError, match=r'KPI "motors": no signal "uav.rotors\[1\]"'):

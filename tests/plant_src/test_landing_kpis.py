@@ -40,7 +40,7 @@ def test_errors_are_those_along_the_deck():
     assert (kpis["forward_error"], kpis["left_error"]) == pytest.approx((0.04, -0.03))
 
 
-def test_a_rolled_deck_is_met_at_a_slant():
+def test_speeds_refer_to_the_normal_of_a_rolled_deck():
     """Left side up by 0.2 rad: the normal leans to the right, a fall straight down slides to the right."""
     falling = mission_result(plant__usv__attitude__roll=ZERO + 0.2, plant__uav__velocity__x=ZERO + 1.0)
     kpis = touchdown(falling, **DECK, mass=MASS)
@@ -117,7 +117,7 @@ def test_time_to_land_counts_from_the_first_descent():
     }
 
 
-def test_aborts_are_ways_back_up():
+def test_aborts_are_changes_to_a_lower_mode():
     modes = mission_result()["uav.vtol.mode"].copy()
     modes[(TIME >= 9.5) & (TIME < 10)] = 4
     modes[(TIME >= 10.5) & (TIME < 11)] = 3

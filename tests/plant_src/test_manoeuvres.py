@@ -33,7 +33,7 @@ def sailed(time, place, heading, speed):
 
 
 def circle(side, turns=2.5, radius=4.0, speed=1.5, later=1.5):
-    """On a circle all the time, with `later` as speed from a second after the order on."""
+    """Circle with the speed `speed` until one second after the order, then `later` (m/s)."""
     time = np.arange(round(100 * (6 + turns * 2 * math.pi * radius / later)) + 1) / 100
     run = np.where(time < 6, speed * (time - ORDER), speed * (6 - ORDER) + later * (time - 6))
     place = radius * np.sin(run / radius) + 1j * side * radius * (1 - np.cos(run / radius))
@@ -62,7 +62,7 @@ def test_a_circle_has_the_measures_of_a_circle(side):
     )
 
 
-def test_the_speed_that_is_lost_is_that_of_the_last_turn():
+def test_speed_loss_refers_to_the_last_full_turn():
     kpis = turning_circle(circle(1, later=0.6), "usv", ORDER, LENGTH)
     assert (kpis["steady_speed"], kpis["speed_loss"], kpis["advance"]) == pytest.approx((0.6, 0.6, 4.0), rel=1e-5)
 
@@ -167,7 +167,7 @@ def test_an_order_before_the_run_is_refused():
 
 
 @pytest.mark.parametrize("manoeuvre", [turning_circle, initial_turning, stopping])
-def test_after_an_order_that_never_came_nothing_was_reached(manoeuvre):
+def test_values_are_nan_for_an_order_after_the_end(manoeuvre):
     assert all(math.isnan(value) for value in manoeuvre(circle(1), "usv", 999.0, LENGTH).values())
 
 

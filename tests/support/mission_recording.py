@@ -1,4 +1,4 @@
-"""A made-up mission whose every figure of merit is known: take-off, pursuit of a sailing vessel, landing on it."""
+"""Synthetic mission whose KPIs are known: take-off, pursuit of a vessel and landing on it."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The made-up mission with all that the scene needs."""
+"""Synthetic mission with the signals and the scenario that the scene needs."""
 
 from dataclasses import replace
 

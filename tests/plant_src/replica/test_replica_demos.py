@@ -1,4 +1,4 @@
-"""The demos of the published simulator: the figures of an independent re-simulation of it are met."""
+"""Demos of the published simulator against an independent re-simulation."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def test_the_box_is_sailed_in_time(box: Result, waypoint: int, time: float, meas
 
 
 @pytest.mark.parametrize(("leg", "overshoot"), list(enumerate([0.94, 1.97, 1.01, 1.11, 1.59], start=1)))
-def test_the_box_is_left_as_far(box: Result, leg: int, overshoot: float, measured: MeasurementCheck) -> None:
+def test_overshoots_of_the_box_equal_the_reference(box: Result, leg: int, overshoot: float, measured: MeasurementCheck) -> None:
     found, case = box.kpis[f"overshoots.leg[{leg}]"], f"leg {leg}"
     measured(REPLICA, "overshoots of the box", found, overshoot, "m", AGAIN, within=0.1, case=case)
 
 
-def test_the_box_fits_the_same_frame(box: Result) -> None:
+def test_the_extent_of_the_box_equals_the_reference(box: Result) -> None:
     x, y = (box[f"plant.usv.position.{axis}"] for axis in "xy")
     assert [x.min(), x.max(), y.min(), y.max()] == pytest.approx([-4.44, 5.30, -4.34, 4.22], abs=0.1)
 
@@ -50,7 +50,7 @@ def test_the_vessel_keeps_its_speed(sweep: Result, measured: MeasurementCheck) -
     measured(REPLICA, "mean speed of the vessel on a sweep", speed, 0.9988, "m/s", AGAIN, within=1e-3)
 
 
-def test_the_vessel_turns_as_fast(box: Result, measured: MeasurementCheck) -> None:
+def test_the_yaw_rate_of_the_vessel_equals_the_reference(box: Result, measured: MeasurementCheck) -> None:
     rate = np.abs(box["plant.usv.angular_velocity.z"]).max()
     measured(REPLICA, "largest yaw rate in the box", rate, 1.28, "rad/s", AGAIN, relative=0.03)
 
@@ -69,7 +69,7 @@ def test_landing_is_commanded_half_a_second_earlier(box: Result) -> None:
 
 
 def test_the_first_sample_of_the_controllers_is_zero(box: Result) -> None:
-    """They see a quadcopter at the height 0 above the vessel at first, though the plant is elsewhere."""
+    """The first inputs of the controllers are zero, although the plant is elsewhere."""
     assert box["plant.uav.position.z"][0] == pytest.approx(0.725)
     assert box["uav.horizontal_error"][0] == 0
 
@@ -86,7 +86,7 @@ def test_the_sweep_is_sailed_in_time(sweep: Result, waypoint: int, time: float, 
 
 
 @pytest.mark.parametrize(("leg", "overshoot"), list(enumerate([0.01, 1.65, 1.39], start=1)))
-def test_the_sweep_is_left_as_far(sweep: Result, leg: int, overshoot: float) -> None:
+def test_overshoots_of_the_sweep_equal_the_reference(sweep: Result, leg: int, overshoot: float) -> None:
     assert sweep.kpis[f"overshoots.leg[{leg}]"] == pytest.approx(overshoot, abs=0.05)
 
 
@@ -94,7 +94,7 @@ def test_straight_legs_are_followed_within_8_millimetres(sweep: Result) -> None:
     assert sweep.kpis["tracking.straight"] < 0.008
 
 
-def test_turns_throw_the_quadcopter_off_by_as_much(sweep: Result) -> None:
+def test_tracking_peaks_in_turns_equal_the_reference(sweep: Result) -> None:
     assert 0.39 <= sweep.kpis["tracking.least_turn"] <= sweep.kpis["tracking.turn"] <= 0.48
 
 

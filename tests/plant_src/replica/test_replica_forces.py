@@ -20,7 +20,7 @@ Loads = Callable[..., dict[str, float]]
 
 @pytest.fixture(params=["fmus", "fmus/fmi3"])
 def loads(request: pytest.FixtureRequest) -> Loads:
-    """What an FMU (by name) makes of its inputs, with parameters."""
+    """Function that evaluates an FMU (by name) with inputs and parameters."""
 
     def evaluated(name: str, inputs: Mapping[str, float], **parameters: float) -> dict[str, float]:
         file = FmuFile(resources.root() / request.param / f"{name}.fmu")
@@ -44,7 +44,7 @@ def rotors(loads: Loads, *throttles: float) -> list[tuple[float, float]]:
 
 
 def motion(u: float, v: float, r: float, yaw: float = 0.0) -> dict[str, float]:
-    """What the bus says about a vessel with a body velocity (m/s) and a yaw rate (rad/s)."""
+    """Signals of the bus for a vessel with a body velocity (m/s) and a yaw rate (rad/s)."""
     velocity = complex(u, v) * complex(math.cos(yaw), math.sin(yaw))
     return {
         "vehicle.velocity.x": velocity.real,

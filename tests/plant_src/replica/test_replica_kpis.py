@@ -1,4 +1,4 @@
-"""The KPIs of the replica, on made-up voyages whose figures are known."""
+"""KPIs of the replica on synthetic motions whose values are known."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_a_leg_that_is_not_finished_has_no_overshoot() -> None:
     assert math.isnan(legs["leg[2]"])
 
 
-def test_turns_and_straight_legs_are_told_apart() -> None:
+def test_turns_and_straight_legs_are_evaluated_separately() -> None:
     """The waypoints are reached at 9.5 s and 22 s."""
     target = vessel()
     off = np.select([TIME < 4, (TIME > 10) & (TIME < 11), TIME > 22.5], [3.0, 0.4, 0.2], 0.01)
@@ -57,16 +57,16 @@ def landing(start: float) -> dict[str, float]:
     return touchdown(result(**columns, uav__velocity__z=vertical, **vessel_at_rest), "plant.uav", "plant.usv", 0.3255, start)
 
 
-def test_a_touchdown_is_seen_by_its_height() -> None:
+def test_a_touchdown_is_found_by_the_altitude() -> None:
     expected = {"time": 5.34, "error": 0.05, "speed": 0.5, "lowest": 3 - 0.5 * 4.83}
     assert landing(start=2.0) == pytest.approx(expected, abs=1e-9)
 
 
-def test_what_happens_before_the_start_is_no_landing() -> None:
+def test_a_descent_before_the_start_is_not_a_landing() -> None:
     assert landing(start=0.0)["time"] == 0.0
 
 
-def test_without_a_touchdown_there_are_no_figures() -> None:
+def test_all_values_are_nan_without_a_touchdown() -> None:
     high = np.full_like(TIME, 2.0)
     kpis = touchdown(result(uav__position__z=high), "plant.uav", "plant.usv", 0.3255, 5.0)
     assert all(math.isnan(value) for value in kpis.values())

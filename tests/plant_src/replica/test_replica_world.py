@@ -206,7 +206,7 @@ def test_more_sub_steps_change_little_in_flight() -> None:
     assert 1e-6 < np.linalg.norm(ends[0] - ends[1]) < 0.02
 
 
-def test_going_back_repeats_bit_for_bit() -> None:
+def test_a_restored_state_repeats_bit_for_bit() -> None:
     trial = Trial({"position": [0, 0, 0.36]}, {"position": [0, 0]}).step(12)
     state = trial.world.get_state()
     first = trial.step(30).outputs.copy()
@@ -214,7 +214,7 @@ def test_going_back_repeats_bit_for_bit() -> None:
     assert np.array_equal(trial.step(30).outputs, first)
 
 
-def test_what_is_not_finite_is_refused_by_name() -> None:
+def test_a_value_that_is_not_finite_is_rejected_by_name() -> None:
     with pytest.raises(ComponentError, match=r"uav\.torque\[2\] is nan"):
         Trial({"position": [0, 0, 10]}).step(**{"uav__torque[2]": float("nan")})
 

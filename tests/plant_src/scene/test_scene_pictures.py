@@ -40,7 +40,7 @@ def test_a_ball_appears_where_the_camera_projects_it(place):
     assert AHEAD.pixels(np.array([place]), *SIZE)[0] == pytest.approx((x.mean() + 0.5, y.mean() + 0.5), abs=1.0)
 
 
-def test_parts_turn_with_their_thing():
+def test_parts_rotate_with_their_object():
     with SolidRenderer([RED._replace(position=(1.0, 0.0, 0.0))]) as stage:
         stage.set_pose(0, [6.0, 0.0, 2.0], (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)))
         _, x = np.nonzero(np.isfinite(stage.render(AHEAD, *SIZE).depth))
@@ -129,7 +129,7 @@ def test_a_window_is_not_much_larger_than_its_ball():
     assert width <= bottom - top <= width + 6
 
 
-def test_a_kept_backdrop_gives_the_same_pictures():
+def test_a_reused_background_gives_the_same_pictures():
     mission = mission_of_result(scene_mission())
     with Scene(mission) as scene:
         scene.render("landing", [900], [1.0], *SIZE)
@@ -138,7 +138,7 @@ def test_a_kept_backdrop_gives_the_same_pictures():
         assert np.array_equal(scene.render("landing", [1100], [1.0], *SIZE), kept)
 
 
-def test_a_moved_camera_has_a_backdrop_of_its_own():
+def test_a_moved_camera_gets_a_new_background():
     mission = mission_of_result(scene_mission())
     with Scene(mission) as scene:
         scene.render("chase", [600], [0.0], *SIZE)
@@ -155,17 +155,17 @@ def layer_and_ghost(ghost_depth):
     return before, float(layer.colour[0, 0, 0])
 
 
-def test_a_ghost_shines_over_what_is_behind_it():
+def test_a_vehicle_is_blended_over_farther_pixels():
     before, after = layer_and_ghost(3.0)
     assert after == pytest.approx(0.75 * before + 0.25)
 
 
-def test_a_ghost_behind_something_is_hidden():
+def test_a_vehicle_behind_a_solid_is_hidden():
     before, after = layer_and_ghost(7.0)
     assert after == before
 
 
-def test_a_ghost_covers_the_sky_by_its_share():
+def test_a_vehicle_covers_the_sky_by_its_opacity():
     layer = Layer.from_solids(Picture(np.zeros((1, 1, 3), np.uint8), np.full((1, 1), np.inf, np.float32)))
     for share in (0.5, 0.5):
         layer.blend(Picture(np.full((1, 1, 3), 255, np.uint8), np.full((1, 1), 4.0, np.float32)), share)
@@ -190,7 +190,7 @@ def test_cameras_stay_above_the_water(name):
     assert all(CAMERAS[name](mission, row).eye[2] > 0.3 for row in range(0, 2001, 250))
 
 
-def test_the_quadcopter_is_seen_and_its_absence_too():
+def test_the_quadcopter_changes_the_picture():
     result = scene_mission()
     row = 1100
     with Scene(mission_of_result(result)) as scene:
@@ -212,7 +212,7 @@ def test_pictures_are_the_same_every_time():
     assert np.array_equal(picture(), picture())
 
 
-def test_no_client_is_left_behind():
+def test_all_clients_are_disconnected():
     with Scene(mission_of_result(scene_mission())) as scene:
         clients = [scene.static.client, scene.vehicles.client]
         assert all(pybullet.getConnectionInfo(client)["isConnected"] for client in clients)
@@ -220,7 +220,7 @@ def test_no_client_is_left_behind():
 
 
 @pytest.mark.parametrize("vehicle", VEHICLE_MODELS)
-def test_every_vehicle_has_a_look_of_about_the_size_of_its_body(vehicle):
+def test_visual_parts_have_about_the_size_of_the_collision_boxes(vehicle):
     parts = vehicle_parts(vehicle)
     seen = max(math.hypot(*part.position) for part in parts)
     solid = max(np.linalg.norm(box.corners(), axis=1).max() for box in next(iter(VEHICLE_MODELS[vehicle].values())).body.boxes)

@@ -1,4 +1,4 @@
-"""Sensors and faults to try: bound like the engine binds them, driven by names."""
+"""Harness that binds a sensor like the engine and drives it by the names of its variables."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ STEP = 0.01  # s
 
 
 class SensorHarness:
-    """A bound component in step mode; `parameters` are set before it is initialized."""
+    """Bound component in step mode, with access to variables by name."""
 
     def __init__(self, component: SignalComponent, start: float = 0.0, step: float = STEP, **inputs: Any):
         self.component, self.start, self.step_size, self.steps = component, start, step, 0
@@ -27,7 +27,7 @@ class SensorHarness:
         component.exit_initialization_mode()
 
     def set_inputs(self, **values: Any) -> SensorHarness:
-        """Give inputs ("vehicle__position=(x, y, z)" for vehicle.position.x|y|z); in initialization the outputs follow."""
+        """Set inputs ("vehicle__position=(x, y, z)" for vehicle.position.x|y|z); outputs follow in initialization mode."""
         for name, value in values.items():
             prefix = name.replace("__", ".")
             names = [v.name for v in self._inputs.variables if v.name == prefix or v.name.startswith(prefix + ".")]
@@ -96,6 +96,6 @@ def with_parameters(component: SignalComponent, **parameters: Any) -> SignalComp
 
 
 def quaternion(axis: Sequence[float], angle: float) -> np.ndarray:
-    """(w, x, y, z) of a turn about an axis."""
+    """Quaternion (w, x, y, z) of a rotation about an axis."""
     direction = np.asarray(axis) / np.linalg.norm(axis)
     return np.array([np.cos(angle / 2), *(np.sin(angle / 2) * direction)])

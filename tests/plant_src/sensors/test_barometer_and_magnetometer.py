@@ -23,12 +23,12 @@ def test_pressures_of_the_standard_atmosphere(measured):
         assert altitude_at(pressure_at(altitude)) == pytest.approx(altitude, abs=1e-8)
 
 
-def test_the_barometer_without_errors_knows_the_altitude():
+def test_altitude_is_exact_without_errors():
     trial = SensorHarness(with_parameters(Barometer("b"), noise=0.0, drift=0.0)).set_inputs(vehicle__position__z=12.5)
     assert trial.step(2)["altitude"] == pytest.approx(12.5, abs=1e-8)
 
 
-def test_the_weather_shifts_the_altitude():
+def test_pressure_at_zero_shifts_the_altitude():
     barometer = with_parameters(Barometer("b"), noise=0.0, drift=0.0, pressure_at_zero=101325.0 - 120.0)
     assert SensorHarness(barometer)["altitude"] == pytest.approx(10.0, abs=0.05)  # 12 Pa for a metre at sea level
 
@@ -41,14 +41,14 @@ def test_noise_and_drift_of_the_pressure():
 
 
 @pytest.mark.parametrize("angles", [(0, 0, 0), (0.3, 0, 1.0), (0, -0.4, -2.5), (0.5, 0.4, 3.0)])
-def test_the_field_is_that_of_the_earth_in_body_axes_and_tells_the_heading(angles, measured):
+def test_field_is_rotated_to_body_axes_and_yields_the_heading(angles, measured):
     turn, orientation = attitude(*angles)
     trial = SensorHarness(with_parameters(Magnetometer("m"), noise=0.0), vehicle__orientation=orientation)
     assert np.allclose(trial.vector("field"), turn.inv().apply(EARTH_FIELD), atol=1e-18)
     measured("Sensors", "magnetometer: heading", trial["yaw"], angles[2], "rad", "rotated field", within=1e-9)
 
 
-def test_iron_distorts_the_field():
+def test_hard_and_soft_iron_distort_the_field():
     soft, hard = np.diag([1.1, 0.9, 1.0]) + 0.02, np.array([4e-6, -3e-6, 2e-6])
     turn, orientation = attitude(0.1, 0.2, 0.3)
     magnetometer = with_parameters(Magnetometer("m"), noise=0.0, soft_iron=soft, hard_iron=hard)
@@ -56,7 +56,7 @@ def test_iron_distorts_the_field():
     assert np.allclose(trial.vector("field"), soft @ turn.inv().apply(EARTH_FIELD) + hard, atol=1e-18)
 
 
-def test_hard_iron_bends_the_heading_by_its_share_of_the_horizontal_field():
+def test_hard_iron_rotates_the_heading():
     horizontal = np.hypot(*EARTH_FIELD[:2])
     trial = SensorHarness(
         with_parameters(Magnetometer("m"), noise=0.0, earth=[0, horizontal, 0], hard_iron=[0.1 * horizontal, 0, 0])

@@ -1,4 +1,4 @@
-"""Satellite navigation: when what comes, and how wrong it is."""
+"""GNSS receiver: times of the samples and their errors."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def moving(trial, steps):
     return np.array(rows)
 
 
-def test_samples_come_at_the_rate_and_exactly_a_latency_late(measured):
+def test_samples_have_the_rate_and_the_latency(measured):
     trial = SensorHarness(with_parameters(Gnss("gnss"), **EXACT, rate=5.0, latency=0.13))
     now, position, time = moving(trial, 200).T
     newest = np.floor((now - 0.13) / 0.2 + 1e-9) * 0.2
@@ -31,13 +31,13 @@ def test_samples_come_at_the_rate_and_exactly_a_latency_late(measured):
     assert np.allclose(time, position, atol=1e-12)
 
 
-def test_without_latency_a_sample_is_seen_at_once():
+def test_a_sample_is_published_in_its_step_without_latency():
     trial = SensorHarness(with_parameters(Gnss("gnss"), **EXACT, rate=10.0, latency=0.0))
     now, position, _ = moving(trial, 100).T
     assert np.allclose(position, np.floor(now / 0.1 + 1e-9) * 0.1, atol=1e-12)
 
 
-def test_a_rate_that_is_no_part_of_the_step_rate_is_kept_on_average():
+def test_the_mean_rate_is_kept_if_it_does_not_divide_the_step_rate():
     trial = SensorHarness(with_parameters(Gnss("gnss"), **EXACT, rate=30.0, latency=0.0))
     _, _, time = moving(trial, 300).T
     assert len(np.unique(time)) == pytest.approx(3.0 * 30, abs=1)
@@ -63,13 +63,13 @@ def test_the_drift_is_correlated_as_a_gauss_markov_process(measured):
         measured("Sensors", "GNSS drift, correlation", correlation, expected, "1", "exp(-t/T)", within=0.05, case=case)
 
 
-def test_the_first_fix_is_as_wrong_as_any():
+def test_the_first_fix_has_the_stationary_drift():
     parameters = {**EXACT, "horizontal_drift": 3.0}
     first = [SensorHarness(with_parameters(Gnss("gnss", seed=seed), **parameters))["position.x"] for seed in range(300)]
     assert np.std(first) == pytest.approx(3.0, rel=0.13)
 
 
-def test_without_satellites_the_last_fix_stays_and_is_not_valid():
+def test_the_last_fix_stays_and_is_invalid_without_satellites():
     trial = SensorHarness(with_parameters(Gnss("gnss"), **EXACT, rate=10.0, latency=0.0))
     moving(trial, 50)
     trial.component.set("available", False)

@@ -18,21 +18,21 @@ def exact_imu(**parameters):
     return with_parameters(Imu("imu"), **EXACT, **parameters)
 
 
-def test_at_rest_it_reads_one_g_upwards_in_any_attitude(measured):
+def test_specific_force_is_one_g_upwards_at_rest_in_every_attitude(measured):
     attitude = quaternion((1, 2, 3), 0.7)
     trial = SensorHarness(exact_imu(), vehicle__orientation=attitude).step(3)
     upwards = Rotation.from_quat([*attitude[1:], attitude[0]]).inv().apply([0, 0, 9.81])
     measured("Sensors", "IMU at rest, tilted", trial.vector("acceleration"), upwards, "m/s2", "gravity", within=1e-12)
 
 
-def test_in_free_fall_it_reads_nothing(measured):
+def test_specific_force_is_zero_in_free_fall(measured):
     trial = SensorHarness(exact_imu(), vehicle__velocity=(1.0, 2.0, 3.0))
     for step in range(1, 5):
         trial.set_inputs(vehicle__velocity=(1.0, 2.0, 3.0 - 9.81 * step * STEP)).step()
         measured("Sensors", "IMU in free fall", trial.vector("acceleration"), 0.0, "m/s2", "weightlessness", within=1e-12)
 
 
-def test_a_turn_on_a_circle_shows_the_centripetal_acceleration():
+def test_specific_force_on_a_circle_is_centripetal():
     speed, rate = 4.0, 0.8
     angles = rate * STEP * np.arange(4)
     trial = SensorHarness(exact_imu(), vehicle__velocity=(speed, 0, 0), vehicle__rates=(0, 0, rate))
@@ -44,7 +44,7 @@ def test_a_turn_on_a_circle_shows_the_centripetal_acceleration():
     assert np.array_equal(trial.vector("rates", "pqr"), (0, 0, rate))
 
 
-def test_a_quaternion_that_changes_its_sign_changes_nothing():
+def test_the_sign_of_the_quaternion_does_not_matter():
     attitude = quaternion((1, 0, 0), 0.3)
     trial = SensorHarness(exact_imu(), vehicle__orientation=attitude).step()
     before = trial.vector("acceleration")
@@ -77,7 +77,7 @@ def test_white_noise_has_the_allan_deviation_of_its_density(measured):
             measured("Sensors", "IMU noise, Allan deviation", found, expected, "m/s2, rad/s", ALLAN, relative=0.12, case=case)
 
 
-def test_the_wandering_bias_has_the_allan_deviation_of_a_random_walk(measured):
+def test_bias_walk_has_the_allan_deviation_of_a_random_walk(measured):
     walk = 2e-2
     imu = with_parameters(Imu("imu", seed=3), **{**EXACT, "gyroscope__bias_walk": walk, "accelerometer__bias_walk": walk})
     bias = SensorHarness(imu).record(20000, AXES)
@@ -86,7 +86,7 @@ def test_the_wandering_bias_has_the_allan_deviation_of_a_random_walk(measured):
     measured("Sensors", "IMU bias walk, Allan deviation", found, expected, "m/s2, rad/s", ALLAN, relative=0.12)
 
 
-def test_the_bias_at_turn_on_has_its_standard_deviation_over_many_devices():
+def test_turn_on_bias_has_its_standard_deviation_over_many_devices():
     parameters = {**EXACT, "gyroscope__turn_on_bias": 0.5}
     biases = [SensorHarness(with_parameters(Imu("imu", seed=seed), **parameters)).vector("rates", "pqr") for seed in range(150)]
     assert np.std(biases) == pytest.approx(0.5, rel=0.12)

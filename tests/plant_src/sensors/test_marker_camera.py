@@ -32,7 +32,7 @@ def projected(points, vehicle, attitude, tilt, mounting):
     return homogeneous[:, :2] / homogeneous[:, 2:], homogeneous[:, 2]
 
 
-def test_it_sees_exactly_the_markers_whose_corners_are_in_the_picture(measured):
+def test_a_marker_is_valid_if_all_corners_are_in_the_picture(measured):
     random = np.random.default_rng(8)
     square = np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]]) * SIZE / 2
     seen, wrong = [], 0
@@ -50,7 +50,7 @@ def test_it_sees_exactly_the_markers_whose_corners_are_in_the_picture(measured):
     measured("Sensors", "marker camera: wrong decisions what is in view, of 300", wrong, 0, "1", "pinhole projection in NumPy")
 
 
-def test_without_errors_the_pose_leads_from_the_vehicle_to_the_deck(measured):
+def test_pose_is_exact_without_errors(measured):
     vehicle, deck = np.array([1.0, 2.0, 2.5]), np.array([1.2, 1.9, 0.3])
     attitude, deck_attitude = Rotation.from_euler("ZYX", [2.0, 0.1, -0.1]), Rotation.from_euler("ZYX", [2.4, -0.05, 0.08])
     trial = look(vehicle, attitude, deck, deck_attitude, tilt=0.1, mounting=[0.02, 0.01, -0.03])
@@ -65,7 +65,7 @@ LEVEL = Rotation.identity()
 
 
 @pytest.mark.parametrize("why", ["below", "oblique", "far", "upside down"])
-def test_it_does_not_see_a_marker(why):
+def test_a_marker_is_invalid(why):
     place, attitude, parameters = {
         "below": ([0, 0, -2.0], Rotation.from_euler("x", np.pi), {}),
         "oblique": ([-2.5, 0, 1.5], LEVEL, {"tilt": np.arctan2(2.5, 1.5), "incidence": 1.0}),
@@ -75,7 +75,7 @@ def test_it_does_not_see_a_marker(why):
     assert look(place, attitude, [0, 0, 0], LEVEL, **parameters)["valid"] is False
 
 
-def test_it_sees_the_oblique_marker_if_it_may():
+def test_an_oblique_marker_is_valid_with_a_larger_incidence():
     tilt = np.arctan2(2.5, 1.5)
     assert look([-2.5, 0, 1.5], LEVEL, [0, 0, 0], LEVEL, tilt=tilt, incidence=1.1)["valid"] is True
 
@@ -88,12 +88,12 @@ def test_noise_grows_with_the_depth_across_and_with_its_square_along_the_view():
         assert trial.record(4000, names).std(axis=0) == pytest.approx([across, across, turn * depth, turn, 3 * turn], rel=0.06)
 
 
-def test_the_share_of_drop_outs():
+def test_drop_outs_have_their_rate():
     trial = look([0, 0, 2.0], LEVEL, [0, 0, 0], LEVEL, drop_out=0.3)
     assert 1 - trial.record(4000, ["valid"]).mean() == pytest.approx(0.3, abs=0.03)
 
 
-def test_what_is_no_longer_seen_stays_where_it_was_seen_last():
+def test_the_last_pose_stays_when_the_marker_is_lost():
     trial = look([0, 0, 2.0], LEVEL, [0.1, 0, 0], LEVEL, latency=0.05)
     trial.step(20).set_inputs(deck__position=(30.0, 0, 0)).step(20)
     assert (trial["valid"], trial["position.x"], trial["time"]) == (False, pytest.approx(0.1), pytest.approx(0.2))

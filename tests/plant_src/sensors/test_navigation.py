@@ -31,8 +31,8 @@ def swing(t):
 
 
 @cache
-def felt(n):
-    """Specific force, rates and field in body axes that exact sensors feel in the step that ends at n STEP."""
+def sensor_values(n):
+    """Specific force, rates and field in body axes of exact sensors in the step that ends at n STEP."""
     (_, v0, _, r0), (_, v1, _, r1) = (swing(max(k, 0) / 100) for k in (n - 1, n))
     turn = (r0.inv() * r1).as_rotvec()
     middle = r0 * Rotation.from_rotvec(turn / 2)
@@ -40,7 +40,7 @@ def felt(n):
 
 
 class Flight:
-    """Navigation fed with what exact sensors would say of the motion; fixes come ten times a second, `latency` (s) late."""
+    """Navigation with the values of exact sensors; fixes at 10 Hz, `latency` (s) late."""
 
     def __init__(self, latency=0.0, gyro_bias=(0, 0, 0)):
         self.latency, self.bias = round(latency / STEP), np.array(gyro_bias)
@@ -51,7 +51,7 @@ class Flight:
         self.trial.component.exit_initialization_mode()
 
     def feed(self, n):
-        force, rates, field = felt(n)
+        force, rates, field = sensor_values(n)
         taken = max(0, (n - self.latency) // 10 * 10) / 100
         place, velocity, _, _ = swing(taken)
         self.trial.set_inputs(
@@ -102,7 +102,7 @@ def test_biases_of_the_gyroscopes_are_found_while_standing():
     assert np.allclose(flight.trial.vector("rates", "pqr"), truth, atol=2e-3)
 
 
-def test_a_wrong_vertical_is_corrected_by_the_fixes():
+def test_fixes_correct_an_attitude_error():
     flight = Flight()
     flight.fly(1.5)
     state = flight.trial.component.get_state()
@@ -119,7 +119,7 @@ def test_names_and_frames_are_those_of_the_plant():
     assert np.allclose(velocity, trial.vector("velocity"), atol=1e-12)
 
 
-def test_a_history_gives_the_values_of_a_moment():
+def test_history_returns_the_values_of_a_time():
     history = History(span=0.5)
     for n in range(100):
         history.add(n * 0.01, (float(n),))
@@ -130,7 +130,7 @@ def test_a_history_gives_the_values_of_a_moment():
 
 
 def drive(tracker, seconds, speed=1.0, latency=0.1, marker=None):
-    """A deck that runs east; fixes every 0.1 s, sights (an offset from the true place) with every step."""
+    """Track a deck that moves east; fixes every 0.1 s, marker measurements (offset from the true position) in every step."""
     for n in range(1, round(seconds / STEP) + 1):
         taken = max(0, (n - round(latency / STEP)) // 10 * 10)
         inputs = {"gnss__position": (speed * taken * STEP, 2.0, 0.3), "gnss__velocity": (speed, 0, 0), "gnss__time": taken * STEP}
@@ -148,6 +148,6 @@ def test_the_deck_is_followed_without_lag():
     assert np.allclose(tracker.vector("velocity"), (1.0, 0, 0), atol=1e-3)
 
 
-def test_a_marker_in_sight_outweighs_the_fixes():
+def test_marker_measurements_outweigh_fixes():
     tracker = drive(SensorHarness(with_parameters(DeckTracker("deck"), sight_gain=0.2, fix_gain=0.2)), 10.0, marker=(0.05, 0, 0))
     assert tracker["position.x"] == pytest.approx(10.05, abs=0.01)

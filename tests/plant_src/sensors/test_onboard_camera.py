@@ -1,4 +1,4 @@
-"""Pictures of the camera on a vehicle: where things are in them, and when they are written."""
+"""Pictures of the onboard camera: positions of objects in them and times of the files."""
 
 import matplotlib.image
 import numpy as np
@@ -56,7 +56,7 @@ def test_a_deck_is_where_a_pinhole_camera_sees_it(camera, tilt):
     assert (top.max(axis=0) + 1)[0] >= high[0] - 2
 
 
-def test_it_sees_another_vehicle_but_not_its_carrier(camera):
+def test_other_vehicles_are_drawn_but_not_the_carrier(camera):
     both = {"vehicles": {"uav": "ar_drone", "usv": "strider"}}
     alone = camera()
     assert len(changed(alone, camera(vehicles={"uav": "strider"}))) == 0
@@ -84,7 +84,7 @@ def test_the_same_pose_gives_the_same_picture(camera):
     assert pictures[0] == pictures[1]
 
 
-def test_all_bad_arguments_are_told_at_once():
+def test_all_invalid_arguments_are_reported_together():
     with pytest.raises(InputError) as caught:
         Camera("eye", {"uav": "ar_dron"}, "usv", "frames", {"start": {"size": [1, 2, 3]}}, [0, 10])
     assert {problem.subject[1] for problem in caught.value.problems} == {"vehicles", "carrier", "platforms", "size"}

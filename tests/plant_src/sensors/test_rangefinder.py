@@ -70,14 +70,14 @@ def test_the_deck_moves_on_and_leaves_the_water(sensor):
     assert trial["distance"] == pytest.approx(2.0, abs=1e-6)
 
 
-def test_out_of_reach_is_told_as_the_largest_distance_and_not_valid(sensor):
+def test_out_of_reach_is_the_largest_distance_and_invalid(sensor):
     trial = sensor(inputs={"vehicle__position": (0, 0, 12.5)})
     assert (trial["distance"], trial["valid"]) == (12.0, False)
     assert trial.set_inputs(vehicle__position=(0, 0, 0.05)).step()["valid"] is False
     assert trial.set_inputs(vehicle__position=(0, 0, 11.9)).step()["valid"] is True
 
 
-def test_without_water_the_beam_goes_on(sensor):
+def test_the_beam_passes_the_water_plane_without_water(sensor):
     assert sensor(water=False, inputs={"vehicle__position": (0, 0, 2.0)})["valid"] is False
 
 
@@ -88,14 +88,14 @@ def test_noise_grows_with_distance(sensor):
         assert trial.record(3000, ["distance"]).std() == pytest.approx(sigma, rel=0.05)
 
 
-def test_a_vehicle_that_is_no_vessel_is_refused_with_the_rest():
+def test_a_vehicle_that_is_not_a_vessel_is_rejected_with_the_other_problems():
     with pytest.raises(InputError) as caught:
         Rangefinder("range", vessels={"uav": "ar_drone"}, platforms={"start": {"size": [1, 2], "position": [0, 0, 0]}})
     assert [problem.subject[1:3] for problem in caught.value.problems] == [("vessels", "uav"), ("platforms", "start")]
 
 
 @pytest.mark.parametrize(("vehicle", "motion"), [("strider", "planar"), ("strider", "6dof"), ("otter", "6dof")])
-def test_it_meets_the_deck_where_the_world_says_it_is(sensor, vehicle, motion):
+def test_distance_to_the_deck_agrees_with_the_world(sensor, vehicle, motion):
     world = World("plant", {"usv": {"model": vehicle, "motion": motion, "position": [3.0, -2.0], "yaw": 0.6}})
     try:
         pose = {f"usv.{name}": [world.get(f"usv.{name}.{axis}") for axis in axes] for name, axes in POSE.items()}

@@ -15,20 +15,20 @@ def scipys(q):
 
 
 @pytest.mark.parametrize("q", QUATERNIONS)
-def test_vectors_turn_as_in_scipy_and_back(q):
+def test_vector_rotations_equal_scipy_and_are_inverse(q):
     v = RANDOM.normal(size=3)
     assert np.allclose(rotations.to_world(q, v), scipys(q).apply(v), atol=1e-14)
     assert np.allclose(rotations.to_body(q, rotations.to_world(q, v)), v, atol=1e-14)
 
 
 @pytest.mark.parametrize("q", QUATERNIONS)
-def test_angles_are_those_of_scipy_and_lead_back(q):
+def test_euler_angles_equal_scipy_and_are_inverse(q):
     roll, pitch, yaw = rotations.euler_angles(q)
     assert np.allclose((yaw, pitch, roll), scipys(q).as_euler("ZYX"), atol=1e-12)
     assert abs(np.dot(rotations.quaternion_from_euler(roll, pitch, yaw), q)) == pytest.approx(1, abs=1e-14)
 
 
-def test_products_and_rotation_vectors_are_those_of_scipy():
+def test_products_and_rotation_vectors_equal_scipy():
     for a, b in zip(QUATERNIONS[::2], QUATERNIONS[1::2], strict=True):
         assert np.allclose(
             scipys(rotations.quaternion_product(a, b)).as_matrix(), (scipys(a) * scipys(b)).as_matrix(), atol=1e-14
@@ -39,7 +39,7 @@ def test_products_and_rotation_vectors_are_those_of_scipy():
         )
 
 
-def test_halfway_turns_by_half_of_the_shorter_way():
+def test_midpoint_is_half_of_the_shorter_rotation():
     a, b = rotations.quaternion_from_rotation_vector((0.0, 0.0, 0.2)), rotations.quaternion_from_rotation_vector((0.0, 0.0, 0.8))
     for other in (b, [-x for x in b]):
         assert np.allclose(

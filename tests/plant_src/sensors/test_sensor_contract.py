@@ -1,4 +1,4 @@
-"""What holds for every sensor and for the fault: determinism, rollback, and what the engine expects of a component."""
+"""Contract of all sensors and of the fault block: determinism, restored states and the interface of a component."""
 
 import ctypes
 import math
@@ -50,7 +50,7 @@ def make(request):
 
 
 def wiggle(trial, steps, stir=lambda: None):
-    """Feed values that move with the number of the step, with the vehicle above; all outputs after every step."""
+    """Return all outputs after every step, for inputs that vary with the number of the step."""
     inputs = [v for v in trial.component.variables if v.causality == "input"]
     middle = [np.ravel(v.start) + 2.0 * (v.name == "vehicle.position.z") for v in inputs]
     seen = []
@@ -68,19 +68,19 @@ def test_the_same_seed_gives_the_same_bytes(make):
 
 
 @pytest.mark.parametrize("make", sorted({*MAKERS} - {"navigation", "deck_tracker"}), indirect=True)
-def test_another_seed_gives_others(make):
+def test_another_seed_gives_other_values(make):
     assert wiggle(make(seed=5), 40) != wiggle(make(seed=6), 40)
 
 
 @pytest.mark.parametrize("make", sorted({*MAKERS} - {"navigation", "deck_tracker"}), indirect=True)
 @pytest.mark.parametrize("seed", [-1, 1.5, "7", True, 2**31])
-def test_a_seed_that_is_none_is_refused(make, seed):
+def test_an_invalid_seed_is_rejected(make, seed):
     with pytest.raises(InputError, match="expected an integer") as caught:
         make(seed=seed)
     assert caught.value.problems[0].subject == ("arguments", "seed")
 
 
-def test_to_ask_more_often_changes_nothing(make):
+def test_repeated_reads_change_nothing(make):
     one, other = make(), make()
 
     def ask():
@@ -91,21 +91,21 @@ def test_to_ask_more_often_changes_nothing(make):
     assert wiggle(one, 60) == wiggle(other, 60, ask)
 
 
-def test_the_way_of_the_engine_is_the_way_of_single_calls(make):
+def test_prepared_calls_equal_single_calls(make):
     one, other = make(), make()
     clock = ctypes.c_double()
     (call,) = other.component.prepare_step_calls(clock, 0.01)
 
-    def turn(_count=1):
+    def step_once():
         clock.value = other.steps * 0.01
         assert call.function(*call.arguments) == 0
         other.steps += 1
 
-    other.step = turn
+    other.step = step_once
     assert wiggle(one, 60) == wiggle(other, 60)
 
 
-def test_a_saved_state_is_returned_to_bit_for_bit_and_again(make):
+def test_a_saved_state_can_be_restored_repeatedly_bit_for_bit(make):
     trial = make(seed=2)
     wiggle(trial, 57)
     state, steps = trial.component.get_state(), trial.steps

@@ -1,4 +1,4 @@
-"""What a step of each sensor costs: CPU time, least of several rounds.
+"""CPU time of a step of each sensor, smallest of several rounds.
 
 Run with: pytest -m benchmark -n 0 -s tests/plant_src/sensors/test_sensor_cost.py
 """

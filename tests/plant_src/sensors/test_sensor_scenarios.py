@@ -1,4 +1,4 @@
-"""Sensors and faults in the shipped scenarios: what they do to a flight, and that both executors see the same."""
+"""Sensors and faults in the shipped scenarios and in both executors."""
 
 import numpy as np
 import pytest
@@ -88,7 +88,7 @@ def simulated(components, wires, record, stop, events=()):
 
 
 @pytest.mark.usefixtures("executor")
-def test_in_the_importer_a_sensor_after_the_plant_is_in_step_with_it():
+def test_a_sensor_in_a_later_stage_measures_the_same_time():
     gnss = Gnss("gnss", receiver="rtk")
     for name in gnss.parameters:
         if name.endswith(("_noise", "_drift")):
@@ -109,7 +109,7 @@ def test_in_the_importer_a_sensor_after_the_plant_is_in_step_with_it():
     assert set(faulty[frozen]) == {0.5}
 
 
-def test_initial_outputs_pass_from_sensors_to_navigation():
+def test_initial_outputs_reach_navigation_through_the_sensors():
     components = {"plant": Rising(), "gnss": Gnss("gnss", seed=3), "navigation": Navigation("navigation")}
     wires = {"plant.position.z": "gnss.vehicle.position.z", "gnss.position.z": "navigation.gnss.position.z"}
     recording = simulated(components, wires, ["gnss.position.z", "navigation.position.z"], "0.01")
@@ -117,7 +117,7 @@ def test_initial_outputs_pass_from_sensors_to_navigation():
     assert passed == first != 0
 
 
-def test_on_sensors_it_lands_on_a_deck_in_waves_too():
+def test_landing_on_sensors_succeeds_on_a_deck_in_waves():
     waves = {"spectrum": "jonswap", "significant_height": 0.05, "peak_period": 2.0, "direction": 0.6, "spreading": 2}
     sea = {"vehicles/usv/motion": "6dof", "environment": {"seed": 1, "waves": waves}}
     settings = {f"/components/plant/arguments/{key}": value for key, value in sea.items()}
