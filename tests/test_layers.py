@@ -31,6 +31,7 @@ LAYERS = (
 #: folders and modules of `plant_src` from the bottom to the top
 PLANT_LAYERS = (
     "json_reader",
+    "variable_views",
     "vehicles",
     "placement",
     "catalogue",
