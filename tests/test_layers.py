@@ -32,6 +32,9 @@ LAYERS = (
 PLANT_LAYERS = (
     "json_reader",
     "variable_views",
+    "figure_style",
+    "recorded_motion",
+    "manoeuvre_track",
     "vehicles",
     "placement",
     "catalogue",
