@@ -31,6 +31,10 @@ LAYERS = (
 #: folders and modules of `plant_src`, the lowest layer first
 PLANT_LAYERS = (
     "json_reader",
+    "variable_views",
+    "figure_style",
+    "recorded_motion",
+    "manoeuvre_track",
     "vehicles",
     "placement",
     "catalogue",

@@ -148,13 +148,13 @@ def test_the_page_shows_warnings_of_components(tmp_path):
 
 
 def test_a_run_without_a_scene_shows_its_changing_signals(tmp_path):
-    """Plots instead of an empty page, and the command says why there is nothing in 3-D."""
+    """Plots instead of an empty page, and the command says that there is no 3-D view."""
     columns = {"a.x": np.array([0.0, 1.0]), "a.still": np.zeros(2), "a.v": np.array([2.0, 1.0]), "b.x": np.array([3.0, 1.0])}
     units = {"a.x": "m", "a.still": "m", "a.v": "m/s", "b.x": "m"}
     write_run(Result(Recording(np.array([0.0, 1.0]), columns, units), metadata={"name": "numbers"}), tmp_path)
     done = invoke(replay, tmp_path)
     assert done.exit_code == 0
-    assert "nothing says what this run looks like" in done.stderr
+    assert "the page shows only signals and no 3-D view" in done.stderr
     data = re.search(r'id="replay-data">(.*?)</script>', (tmp_path / "replay.html").read_text(), re.S).group(1)
     assert json.loads(data)["scene"]["plots"] == [["a.x", "b.x"], ["a.v"]]
 
