@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 
-#: folders and modules of `cosim` from the bottom to the top
+#: folders and modules of `cosim`, the lowest layer first
 LAYERS = (
     "core",
     "process",
@@ -28,7 +28,7 @@ LAYERS = (
     "pytest_plugin",
 )
 
-#: folders and modules of `plant_src` from the bottom to the top
+#: folders and modules of `plant_src`, the lowest layer first
 PLANT_LAYERS = (
     "json_reader",
     "vehicles",
@@ -38,11 +38,15 @@ PLANT_LAYERS = (
     "environment",
     "world_settings",
     "deck_frame",
+    "recorded_motion",
     "kpis",
+    "manoeuvre_track",
     "manoeuvres",
     "scene",
+    "figure_style",
     "figures",
     "sensors",
+    "variable_views",
     "world",
     "world_fmu",
     "replica",
@@ -54,7 +58,7 @@ def module_name(path):
 
 
 def sources(package):
-    """Python files and stubs of extensions, without those that are shipped as data."""
+    """Return the Python files and stubs of a package, without those that are package data."""
     return sorted(
         path for path in (ROOT / package).rglob("*.py*") if not {"_bundle", "templates", "__pycache__"} & set(path.parts)
     )
@@ -66,7 +70,7 @@ MODULES = {
 
 
 def runtime_nodes(tree):
-    """Nodes of a module, functions included, without those for type checking only."""
+    """Yield all nodes of a syntax tree, except those below `if TYPE_CHECKING`."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
             continue
@@ -75,7 +79,7 @@ def runtime_nodes(tree):
 
 
 def imported(name):
-    """Modules of this project that a module imports anywhere, or names in a string such as "cosim.engine.plan"."""
+    """Yield the modules that a module imports, also inside functions, or names in a string such as "cosim.kpis:rms"."""
     path = MODULES[name]
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     for node in runtime_nodes(ast.parse(path.read_text())):
@@ -86,8 +90,8 @@ def imported(name):
                 yield f"{module}.{alias.name}" if f"{module}.{alias.name}" in MODULES else module
         elif isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.Constant) and node.value in MODULES and "." in str(node.value):
-            yield node.value
+        elif isinstance(node, ast.Constant) and "." in (module := str(node.value).partition(":")[0]) and module in MODULES:
+            yield module
 
 
 GRAPH = {name: {other for other in imported(name) if other in MODULES} - {name} for name in MODULES}

@@ -80,7 +80,7 @@ class Variable:
     maximum: float | None = None
     items: tuple[tuple[str, int], ...] = ()
     relative_quantity: bool = False
-    dtype: np.dtype[Any] = field(default=None)  # type: ignore[arg-type]
+    dtype: np.dtype[Any] = field(default=None)  # type: ignore[arg-type]  # None only until __post_init__
 
     def __post_init__(self) -> None:
         if self.type not in DTYPES:

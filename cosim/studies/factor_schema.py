@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
 from ..core.errors import did_you_mean
-from ..scenario.schema import NameList, Spec
+from ..scenario.schema_types import NameList, Spec
 
 #: arguments of each distribution; `min` and `max` of truncated_normal are optional
 DISTRIBUTIONS = {

@@ -41,7 +41,7 @@ def test_units_are_declared_once_also_for_arrays():
 
 
 def test_a_failing_kpi_is_named():
-    def ratio(result):
+    def ratio(_result):
         return {"ratio": 1 / 0}
 
     with pytest.raises(
@@ -51,7 +51,7 @@ def test_a_failing_kpi_is_named():
 
 
 def test_a_kpi_whose_library_panics_is_named():
-    def ratio(result):
+    def ratio(_result):
         raise BaseException("index out of bounds")
 
     with pytest.raises(ComponentError, match=r'^KPI "speed": ratio failed: BaseException: index out of bounds'):
@@ -88,7 +88,7 @@ def test_wrong_arguments_are_refused_before_the_call(arguments, message):
 )
 def test_anything_but_numbers_is_refused(returned, message):
     with pytest.raises(ComponentError, match=message):
-        evaluate_kpis(RESULT, [("bad", lambda result: returned, {})])
+        evaluate_kpis(RESULT, [("bad", lambda _result: returned, {})])
 
 
 @pytest.mark.parametrize(
@@ -136,5 +136,6 @@ def test_a_check_of_a_missing_kpi_fails():
 def test_repr_of_a_result_lists_failed_checks():
     result = cosim.run("demo1_box", stop_time=0.1)
     failed = {outcome.check["kpi"] for outcome in result.checks if not outcome.passed}
-    assert len(result.checks) == 5 and "landing.landed_at_end" in failed
+    assert len(result.checks) == 5
+    assert "landing.landed_at_end" in failed
     assert "  landing.landed_at_end is false, expected equals true" in repr(result).splitlines()

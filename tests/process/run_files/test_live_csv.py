@@ -127,7 +127,8 @@ def test_the_final_file_is_not_replaced(table, tmp_path):
     journal, final = running(table, tmp_path), tmp_path / "result.csv"
     journal[ROW_COUNT] = 10
     csv = LiveCsvWriter(journal)
-    assert csv._open_copies(1.0) is False and csv._open_copies(1.0)
+    assert csv._open_copies(1.0) is False
+    assert csv._open_copies(1.0)
     journal.enter_phase(Phase.IDLE)
     final.write_text("final")
     csv._append_rows(float("inf"))

@@ -29,7 +29,8 @@ def small_chunks(monkeypatch):
         monkeypatch.setattr(f"cosim.process.run_files.row_store.{name}", value)
 
 
-def test_many_rows_are_kept_in_a_file_and_are_the_same(small_chunks):
+@pytest.mark.usefixtures("small_chunks")
+def test_many_rows_are_kept_in_a_file_and_are_the_same():
     recording = recorded()
     assert isinstance(recording.columns["a.y"].base, np.memmap)
     assert isinstance(recording.time, np.memmap)
@@ -38,7 +39,8 @@ def test_many_rows_are_kept_in_a_file_and_are_the_same(small_chunks):
     assert recording.columns["a.n"].tolist() == list(range(STEPS + 1))
 
 
-def test_rows_of_every_nth_step_have_the_right_times(small_chunks):
+@pytest.mark.usefixtures("small_chunks")
+def test_rows_of_every_nth_step_have_the_right_times():
     recording = recorded(every=3)
     assert recording.time.tolist() == [n / 100 for n in range(0, STEPS + 1, 3)]
     assert recording.columns["a.y"].tolist() == list(range(0, STEPS + 1, 3))
@@ -50,7 +52,8 @@ def test_rows_are_stored_in_the_given_file(tmp_path):
     assert read_rows(tmp_path / "rows", dtype, STEPS + 1)["n"].tolist() == recording.columns["a.n"].tolist()
 
 
-def test_csv_is_written_from_a_file_of_rows(small_chunks, tmp_path):
+@pytest.mark.usefixtures("small_chunks")
+def test_csv_is_written_from_a_file_of_rows(tmp_path):
     recording = recorded()
     write_csv(recording, tmp_path / "result.csv")
     again = read_csv(tmp_path / "result.csv")

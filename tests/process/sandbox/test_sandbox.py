@@ -161,15 +161,14 @@ class TestLimits:
         done = subprocess.run(words, capture_output=True, text=True, input="typed", check=False, timeout=60)
         assert json.loads(done.stdout) == ""
 
-    def test_the_process_says_what_holds(self):
+    def test_restrictions_in_force_are_reported(self):
         """A confined process cannot list the root folder."""
-        said = worker(
-            "__import__('dataclasses').asdict(probe_restrictions())", memory=2 << 30, open_files=99, confine="available"
-        )
-        assert said["files_confined"] is (AVAILABLE.landlock > 0)
-        assert said["tcp_closed"] is (AVAILABLE.landlock >= landlock.NETWORK_ABI)
-        assert (said["own_session"], said["no_new_privileges"], said["open_files"]) == (True, True, 99)
-        assert said["memory"] > 2 << 30
+        code = "__import__('dataclasses').asdict(probe_restrictions())"
+        found = worker(code, memory=2 << 30, open_files=99, confine="available")
+        assert found["files_confined"] is (AVAILABLE.landlock > 0)
+        assert found["tcp_closed"] is (AVAILABLE.landlock >= landlock.NETWORK_ABI)
+        assert (found["own_session"], found["no_new_privileges"], found["open_files"]) == (True, True, 99)
+        assert found["memory"] > 2 << 30
 
     def test_a_free_process_claims_nothing(self):
         free = subprocess.run(

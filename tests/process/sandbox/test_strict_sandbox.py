@@ -118,7 +118,8 @@ def test_a_refused_scenario_leaves_no_folder(home):
     file = prowling(home, connections=[{"from": "p.z", "to": "q.u"}])
     done = cosim(home, "run", file, "--output-dir", "new/out", "--sandbox", "strict")
     assert done.returncode == 2
-    assert "q" in done.stderr and "connections" in done.stderr
+    assert "q" in done.stderr
+    assert "connections" in done.stderr
     assert not (home / "new").exists()
 
 
