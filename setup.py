@@ -18,6 +18,7 @@ class BuildWithBundle(build_py):
     """The usual build of the package, and the bundle beside it (not in an editable install, which uses the checkout)."""
 
     def run(self) -> None:
+        """Build the package, then copy the bundle into it."""
         super().run()
         if self.editable_mode:
             return

@@ -30,7 +30,7 @@ class Schedule:
         self.phases = [self._schedule_phase(phase) for phase in self._plan.phases]
 
     def add_step(self, step: Step, calls: Sequence[PreparedCall]) -> ScheduledStep:
-        """Number the calls of a step, after those of all earlier steps."""
+        """Append a step; its calls are numbered after those of all earlier steps."""
         first_call = self._steps[-1].first_call + len(self._steps[-1].calls) if self._steps else 0
         self._steps.append(ScheduledStep(step, calls, first_call))
         return self._steps[-1]
@@ -46,12 +46,13 @@ class Schedule:
         return [(step.step.name, call.name) for step in self._steps for call in step.calls]
 
     def _schedule_phase(self, phase: Phase) -> list[ScheduledStep]:
-        steps = []
-        for step in phase.steps:
-            calls = step.component.prepare_step_calls(self._runner.current_time, step.step_size)
-            calls = calls or [PreparedCall(self._runner.run_python_component, (step,), "do_step")]
-            steps.append(self.add_step(step, calls))
+        steps = [self.add_step(step, self._step_calls(step)) for step in phase.steps]
         return [*steps, self._schedule_loop(phase.loop)] if phase.loop else steps
+
+    def _step_calls(self, step: Step) -> Sequence[PreparedCall]:
+        return step.component.prepare_step_calls(self._runner.current_time, step.step_size) or [
+            PreparedCall(self._runner.run_python_component, (step,), "do_step")
+        ]
 
     def _schedule_loop(self, loop: Loop) -> ScheduledStep:
         """Schedule all iterations of a loop as one call."""

@@ -47,7 +47,7 @@ class Phase(IntEnum):
 
     @property
     def in_loop(self) -> bool:
-        """Whether rows are being recorded."""
+        """True while rows are recorded."""
         return self in (Phase.STEPPING, Phase.WAITING)
 
 
@@ -99,7 +99,7 @@ class Journal:
 
     @property
     def is_valid(self) -> bool:
-        """Whether the content is plausible; foreign code in the process can overwrite it."""
+        """True if the content is plausible; foreign code in the process can overwrite it."""
         deadline, counts = self[DEADLINE], (self[STEP_COUNT], self[ROW_COUNT], self[CHANGE_COUNT])
         return self[PHASE] in _PHASES and self[CSV_UPDATE] in (0, 1) and -1 <= deadline <= _MAX_DEADLINE and min(counts) >= 0
 

@@ -17,12 +17,12 @@ class _Setting(NamedTuple):
 
     @property
     def is_pointer(self) -> bool:
-        """Whether the setting changes the scenario's JSON; variables are set after all JSON changes."""
+        """True if the setting changes the scenario's JSON; variables are set after all JSON changes."""
         return self.name.startswith("/")
 
     @property
     def is_nested(self) -> bool:
-        """Whether the setting is part of an object that is set."""
+        """True if the setting is part of an object that is set."""
         return self.path != _setting_path(self.name)
 
     def conflict_message(self, other: _Setting) -> str:

@@ -84,7 +84,7 @@ class ObservedKpis:
 
     @property
     def has_enough_runs(self) -> bool:
-        """Whether a name that is not among the KPIs may be reported as unknown before all runs have finished."""
+        """True if a name that is not among the KPIs may be reported as unknown before all runs have finished."""
         return self.runs >= _ENOUGH_RUNS
 
 

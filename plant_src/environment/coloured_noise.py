@@ -83,7 +83,7 @@ class ColouredNoise:
         self._block_number, self._values = number, list(zip(*self._map_channels(values).tolist(), strict=True))
 
     def _map_channels(self, values: np.ndarray) -> np.ndarray:
-        """Hook for subclasses: map channel values, shape (channels, BLOCK_LENGTH), to the published values."""
+        """Map channel values, shape (channels, BLOCK_LENGTH), to the published values; a hook for subclasses."""
         return values
 
 

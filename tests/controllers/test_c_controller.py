@@ -66,7 +66,8 @@ def test_rudder_takes_the_short_way_to_the_course(keeper, measured):
     error = np.angle(np.exp(1j * (measured["vehicle.attitude.yaw"] - PARAMETERS["course_command"])))
     demand = PARAMETERS["course_P"] * error + PARAMETERS["course_D"] * measured["vehicle.rates.r"]
     assert rudder == pytest.approx(np.clip(demand, -0.5, 0.5), abs=1e-12)
-    assert (np.abs(rudder) < 0.5).any() and (np.abs(rudder) == 0.5).any()
+    assert (np.abs(rudder) < 0.5).any()
+    assert (np.abs(rudder) == 0.5).any()
 
 
 def test_a_restored_state_repeats_the_future(keeper, measured):

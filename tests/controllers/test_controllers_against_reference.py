@@ -99,7 +99,7 @@ REFERENCES: dict[str, Callable[..., Any]] = {
     "position_controller": controller_reference.PositionReference,
     "altitude_controller": controller_reference.AltitudeReference,
     "attitude_controller": controller_reference.AttitudeReference,
-    "mixer": lambda parameters: controller_reference.mix_rotor_speeds,
+    "mixer": lambda _parameters: controller_reference.mix_rotor_speeds,
     "waypoint_guidance": controller_reference.Guidance,
     "speed_controller": controller_reference.SpeedReference,
     "heading_controller": controller_reference.HeadingReference,

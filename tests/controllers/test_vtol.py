@@ -70,7 +70,8 @@ def test_motors_spin_up_evenly_before_the_climb(flight: Any) -> None:
     taking_off = flight()
     shares = [taking_off.fly(0.01)["motor_share"] for _ in range(29)]
     assert shares == pytest.approx([k / 30 for k in range(1, 30)])
-    assert taking_off.out["reset"] and taking_off.out["motors_on"]
+    assert taking_off.out["reset"]
+    assert taking_off.out["motors_on"]
     assert taking_off.out["altitude_reference"] == 0.532
     out = taking_off.fly(0.02)
     assert (out["motor_share"], out["reset"]) == (1.0, False)

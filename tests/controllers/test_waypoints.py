@@ -77,7 +77,8 @@ def test_guidance_commands_no_speed_after_a_stop_only(controller: Any, end_polic
 
 def test_on_top_of_a_waypoint_nothing_is_undefined(controller: Any) -> None:
     out = controller("strider_autopilot", {"waypoint_x": [1.0]}).step(at(1, 0))
-    assert out["finished"] and out["rudder_angle"] == 0.0
+    assert out["finished"]
+    assert out["rudder_angle"] == 0.0
 
 
 def test_uses_all_32_waypoints(controller: Any) -> None:

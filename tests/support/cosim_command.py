@@ -42,7 +42,8 @@ class ForkServer:
             conditions: What differs from CONDITIONS.
         """
         request = {**CONDITIONS, **conditions, "arguments": [*map(str, words)], "folder": str(folder), "output": str(output)}
-        assert self._process.stdin is not None and self._process.stdout is not None
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
         print(json.dumps({**request, "environment": dict(environment)}), file=self._process.stdin, flush=True)
         return dict(json.loads(self._process.stdout.readline()))
 

@@ -37,7 +37,7 @@ class Verdict(NamedTuple):
 
     @property
     def passed(self) -> bool:
-        """Whether the signal has no problem."""
+        """True if the signal has no problem."""
         return not self.problem
 
     def __str__(self) -> str:
@@ -52,7 +52,7 @@ class Comparison:
 
     @property
     def passed(self) -> bool:
-        """Whether at least one signal was compared and all passed."""
+        """True if at least one signal was compared and all passed."""
         return bool(self.verdicts) and all(verdict.passed for verdict in self.verdicts)
 
     @property

@@ -94,7 +94,7 @@ class MapLayout:
 
     @cached_property
     def rotate_x_labels(self) -> bool:
-        """Whether a word of the tick labels along x is wider than a cell, so that they must be rotated."""
+        """True if a word of the tick labels along x is wider than a cell, so that they must be rotated."""
         return _text_width("\n".join(self._wrapped_x_labels).split("\n"), TICK_FONT_SIZE) > self.cell[0] - _PAD
 
     @cached_property

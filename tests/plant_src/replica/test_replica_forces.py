@@ -24,7 +24,7 @@ def loads(request: pytest.FixtureRequest) -> Loads:
 
     def evaluated(name: str, inputs: Mapping[str, float], **parameters: float) -> dict[str, float]:
         file = FmuFile(resources.root() / request.param / f"{name}.fmu")
-        source = FakeComponent(outputs(*inputs), lambda values, time, step_size: None, start=inputs)
+        source = FakeComponent(outputs(*inputs), lambda *_: None, start=inputs)
         connected = [Connection(Endpoint("in", slot), Endpoint("fmu", slot)) for slot in inputs]
         components = {"in": source, "fmu": create_component(file, "fmu")}
         wired = System(components, connected, (("in", "fmu"),), start_values={"fmu": parameters})

@@ -30,8 +30,8 @@ MAKERS = {
     "magnetometer": Magnetometer,
     "marker_camera": MarkerCamera,
     "rangefinder": Rangefinder,
-    "navigation": lambda name, seed=0: Navigation(name),
-    "deck_tracker": lambda name, seed=0: DeckTracker(name),
+    "navigation": lambda name, **_: Navigation(name),
+    "deck_tracker": lambda name, **_: DeckTracker(name),
     "fault": faulty,
 }
 
@@ -96,7 +96,7 @@ def test_the_way_of_the_engine_is_the_way_of_single_calls(make):
     clock = ctypes.c_double()
     (call,) = other.component.prepare_step_calls(clock, 0.01)
 
-    def turn(count=1):
+    def turn(_count=1):
         clock.value = other.steps * 0.01
         assert call.function(*call.arguments) == 0
         other.steps += 1

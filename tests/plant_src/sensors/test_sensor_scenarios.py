@@ -1,6 +1,7 @@
 """Sensors and faults in the shipped scenarios: what they do to a flight, and that both executors see the same."""
 
 import numpy as np
+import pytest
 
 import cosim
 from cosim.core.component import Component
@@ -52,7 +53,7 @@ class Rising(Component):
         self.variables = [v for v in Gnss("x").variables if v.causality == "output" and v.name.startswith(("pos", "vel"))]
         self._z = 0.0
 
-    def bind(self, inputs, outputs):
+    def bind(self, _inputs, outputs):
         self._names, (self._values,) = [v.name for v in outputs.variables], outputs.arrays.values()
 
     def enter_initialization_mode(self, start_time, stop_time): ...
@@ -86,7 +87,8 @@ def simulated(components, wires, record, stop, events=()):
     return outcome.recording
 
 
-def test_in_the_importer_a_sensor_after_the_plant_is_in_step_with_it(executor):
+@pytest.mark.usefixtures("executor")
+def test_in_the_importer_a_sensor_after_the_plant_is_in_step_with_it():
     gnss = Gnss("gnss", receiver="rtk")
     for name in gnss.parameters:
         if name.endswith(("_noise", "_drift")):

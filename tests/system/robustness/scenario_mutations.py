@@ -58,7 +58,7 @@ def value_at(value: Any, path: Path_) -> Any:
     return value
 
 
-def _drop(draw: Callable[..., Any], document: Any, path: Path_) -> None:
+def _drop(_draw: Callable[..., Any], document: Any, path: Path_) -> None:
     del value_at(document, path[:-1])[path[-1]]
 
 
@@ -73,7 +73,7 @@ def _rename(draw: Callable[..., Any], document: Any, path: Path_) -> None:
         parent[draw(st.sampled_from([key[:-1], key + "s", key.upper(), key[::-1], "", "a.b", "\ud800"]))] = parent.pop(key)
 
 
-def _duplicate(draw: Callable[..., Any], document: Any, path: Path_) -> None:
+def _duplicate(_draw: Callable[..., Any], document: Any, path: Path_) -> None:
     parent = value_at(document, path[:-1])
     if isinstance(parent, list):
         parent.insert(path[-1], copy.deepcopy(parent[path[-1]]))

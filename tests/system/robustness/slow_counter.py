@@ -45,7 +45,7 @@ class SlowCounter(Fmi2Slave):
         Path("starting").write_text(repr(self.clock))
         Path("starting").rename("started")
 
-    def do_step(self, current_time, step_size):
+    def do_step(self, current_time, step_size):  # noqa: ARG002  signature of Fmi2Slave
         time.sleep(self.pause)
         self.count, self.clock = self.count + 1, time.monotonic()
         self.tens = tens(self.count)
@@ -65,12 +65,12 @@ def row_count(result):
     return {"number": len(result.time)}
 
 
-def slow_kpi(result):
+def slow_kpi(_result):
     signal_and_sleep("kpi")
     return {"value": 1}
 
 
-def slow_figure(result):
+def slow_figure(_result):
     signal_and_sleep("figure")
 
 

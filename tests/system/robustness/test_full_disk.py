@@ -66,10 +66,14 @@ class Disk(CommandFolder):
         rows, whole = kept(self), round(1 + 100 * self._stop())
         assert rows <= whole
         if self.process.returncode == 0:
-            assert rows == whole and (self.out / "picture.png").exists() and (self.out / "run.json").exists(), where
+            assert rows == whole, where
+            assert (self.out / "picture.png").exists(), where
+            assert (self.out / "run.json").exists(), where
             return full
-        assert full and self.process.returncode == 1, where
-        assert errors.count(FULL) == 1 and "Traceback" not in errors, where
+        assert full, where
+        assert self.process.returncode == 1, where
+        assert errors.count(FULL) == 1, where
+        assert "Traceback" not in errors, where
         return True
 
     def _stop(self) -> float:
@@ -81,7 +85,7 @@ def test_a_disk_that_is_full_after_some_operations(full_disk, tmp_path, kind):
     disks = [Disk(tmp_path / str(n), full_disk, n) for n in (0, 2, 6, 9, 12)]
     for disk in disks:
         disk.begin(**kind)
-    assert all([disk.end() for disk in disks])
+    assert all(disk.end() for disk in disks)
 
 
 @pytest.mark.long

@@ -57,7 +57,8 @@ class Killed:
             assert self.place.leftovers() == []
         file = self.place.out / "result.csv"
         if not file.exists():
-            assert self.whom != "child" and self.moment - self.started <= PROMISE
+            assert self.whom != "child"
+            assert self.moment - self.started <= PROMISE
             return
         result = cosim.Result.from_csv(file)
         rows = len(result.time)

@@ -73,7 +73,7 @@ def test_a_killed_worker_leaves_no_descriptor_in_the_importer(workplace, probe, 
     cosim.run(file)  # imports
     before, others = sorted(DESCRIPTORS.iterdir()), child_processes(os.getpid())
 
-    def killer(finished: int, count: int) -> None:
+    def killer(finished: int, _count: int) -> None:
         if finished == 50:
             lag, _ = (child for child in child_processes(os.getpid()) if child not in others)
             os.kill(lag, signal.SIGKILL)
@@ -115,7 +115,8 @@ def test_what_a_killed_program_left_goes_at_the_start_of_the_next_one(workplace,
     try:
         done = workplace.run("run", scenario(workplace, probe, 0.1), "--output-dir", "out", "--no-report")
         assert done.returncode == 0, done.stderr
-        assert len(living) == 6 and len(list(workplace.tmp.iterdir())) == 3
+        assert len(living) == 6
+        assert len(list(workplace.tmp.iterdir())) == 3
         assert folders(workplace) == {"cosim-fmu", "cosim-worker"}
     finally:
         other.kill()
