@@ -8,7 +8,10 @@ import pytest
 ROOT = Path(__file__).parents[1]
 OPENINGS = ("What", "Whether", "How", "Where", "Of", "Who", "Which", "That", "As far as")
 FILES = sorted(
-    path for package in ("cosim", "plant_src", "controllers") for path in (ROOT / package).rglob("*.py") if "_bundle" not in path.parts
+    path
+    for package in ("cosim", "plant_src", "controllers")
+    for path in (ROOT / package).rglob("*.py")
+    if "_bundle" not in path.parts
 )
 
 

@@ -15,7 +15,35 @@ from ..components.python_import import load_object
 from ..core.errors import Problem, did_you_mean
 from ..core.paths import is_file
 from .nested_systems import Node
-from .schema import CallSpec, FunctionSpec, accepted
+from .schema import CallSpec, FunctionSpec, ScenarioSpec
+from .schema_types import accepted
+
+
+def find_function_problems(root: Node, spec: ScenarioSpec, signals: Collection[str] | None) -> Iterator[Problem]:
+    """Yield the problems of a scenario's KPIs, figures, scene and checks.
+
+    Args:
+        root: The scenario.
+        spec: Its specification.
+        signals: The names of the recorded signals, or None if they are not all known.
+    """
+    for kind in ("kpis", "figures"):
+        functions = list(accepted(getattr(spec, kind)))
+        for i, function in functions:
+            if text := function_problem(function, root.folder):
+                yield Problem(text, root.where(kind, i))
+        names = [function.name for _, function in functions]
+        for i, function in functions:
+            if function.name in names[:i]:
+                yield Problem(f'the name "{function.name}" is used more than once', root.where(kind, i, "name"))
+    if spec.scene and (text := function_problem(spec.scene, root.folder)):
+        yield Problem(text, root.where("scene"))
+    if signals is not None:
+        yield from signal_problems(root, "kpis", signals)
+    kpis = [kpi for _, kpi in accepted(spec.kpis)]
+    for i, check in accepted(spec.checks):
+        if text := _kpi_name_problem(check.kpi, kpis, root.folder):
+            yield Problem(text, root.where("checks", i, "kpi"))
 
 
 def function_problem(spec: CallSpec, folder: Path) -> str:
@@ -72,7 +100,7 @@ def _unknown_signals(spec: CallSpec, folder: Path, signals: Collection[str]) -> 
             yield parameter.arg, f'no signal below "{value}" is recorded{did_you_mean(value, _signal_prefixes(signals))}'
 
 
-def kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> str:
+def _kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> str:
     """Return why a KPI value such as "landing.lateral_error" cannot result from `kpis`, or "" if it may.
 
     The names of a function's values are known only if its `return` statements write them as literals.

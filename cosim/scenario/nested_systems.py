@@ -13,7 +13,8 @@ from ..components.python_import import package_files
 from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean
 from .json_document import Document, read_document
-from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, accepted
+from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec
+from .schema_types import accepted
 from .validation import validate_document
 
 

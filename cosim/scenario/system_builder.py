@@ -19,10 +19,11 @@ from ..engine.settings import Event, Settings
 from ..process.journal import Deadlines
 from .component_factory import ComponentFactory
 from .name_resolution import SlotIndex, Target, UnknownNameError, check_assignment, resolve_name
-from .named_functions import function_problem, kpi_name_problem, signal_problems
+from .named_functions import find_function_problems
 from .nested_systems import Node, Scenario
 from .recorded_signals import SignalSelector
-from .schema import SystemSpec, accepted
+from .schema import SystemSpec
+from .schema_types import accepted
 from .wiring import Wiring
 
 #: prefix of the components made from input profiles: inputs.0, inputs.1, ...
@@ -77,9 +78,8 @@ class SystemBuilder:
             for problem in find_problems(self.system, self.settings)
             if not self._is_consequence(problem)
         ]
-        self._check_functions()
-
-    # -- components and their start values -----------------------------------------------------------------------------
+        signals = None if self._has_missing_signals else self.settings.columns
+        self.problems += find_function_problems(self.root, self.spec, signals)
 
     def make_components(self) -> None:
         """Create the components of the scenario and its nested systems, and the tables of its input profiles."""
@@ -124,8 +124,6 @@ class SystemBuilder:
         if name not in self._variables_by_component:
             self._variables_by_component[name] = {variable.name: variable for variable in self.components[name].variables}
         return self._variables_by_component[name]
-
-    # -- wiring --------------------------------------------------------------------------------------------------------
 
     def _connections(self) -> Iterator[Connection]:
         inputs_with_values = {
@@ -202,8 +200,6 @@ class SystemBuilder:
         slots = SlotIndex(self.components[target.component], "output").below(target.prefix)
         return {alias + rest: Endpoint(target.component, slot) for rest, slot in slots.items()}
 
-    # -- recorded signals, events and functions ----------------------------------------------------------------------------
-
     def _columns(self, aliases: Mapping[str, Endpoint]) -> dict[str, Endpoint]:
         invalid = [node.full_name(name) for node in self.root.walk() for name in node.invalid_components]
         invalid += [node.prefix for node in self.root.walk() if "components" in node.invalid_keys]
@@ -220,29 +216,6 @@ class SystemBuilder:
             for name, value in spec.values.items():
                 self._assign(values, self.root, name, value, self.root.where("events", i, "set", name), all_elements=True)
             yield Event(spec.time, values, self.root.where("events", i))
-
-    def _check_functions(self) -> None:
-        for kind in ("kpis", "figures"):
-            specs = list(accepted(getattr(self.spec, kind)))
-            for i, spec in specs:
-                if text := function_problem(spec, self.root.folder):
-                    self.problems.append(Problem(text, self.root.where(kind, i)))
-            names = [spec.name for _, spec in specs]
-            for i, spec in specs:
-                if spec.name in names[:i]:
-                    self.problems.append(
-                        Problem(f'the name "{spec.name}" is used more than once', self.root.where(kind, i, "name"))
-                    )
-        if self.spec.scene and (text := function_problem(self.spec.scene, self.root.folder)):
-            self.problems.append(Problem(text, self.root.where("scene")))
-        kpis = [spec for _, spec in accepted(self.spec.kpis)]
-        if not self._has_missing_signals:
-            self.problems += signal_problems(self.root, "kpis", self.settings.columns)
-        for i, check in accepted(self.spec.checks):
-            if text := kpi_name_problem(check.kpi, kpis, self.root.folder):
-                self.problems.append(Problem(text, self.root.where("checks", i, "kpi")))
-
-    # -- reporting -----------------------------------------------------------------------------------------------------
 
     def _add_problems(self, error: InputError, node: Node, *path: str | int) -> None:
         """Add the problems of an error; those without a location get that of a part of `node`."""

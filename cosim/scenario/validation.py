@@ -16,7 +16,8 @@ from pydantic import BaseModel, ValidationError
 
 from ..core.errors import Problem, did_you_mean
 from .json_document import Document
-from .schema import INVALID, SystemSpec
+from .schema import SystemSpec
+from .schema_types import INVALID
 
 S = TypeVar("S", bound=SystemSpec)
 

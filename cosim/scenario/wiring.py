@@ -10,7 +10,8 @@ from ..core.errors import Problem, did_you_mean
 from ..core.system import Connection, Endpoint
 from .name_resolution import SlotIndex, Target, UnknownNameError, resolve_name
 from .nested_systems import Node
-from .schema import ConnectionSpec, accepted
+from .schema import ConnectionSpec
+from .schema_types import accepted
 
 
 class _Candidate(NamedTuple):

@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .schema import DesignSpec, DistributionSpec, FactorSpec, RangeSpec, SweepSpec
+from .factor_schema import DistributionSpec, FactorSpec, RangeSpec
+from .schema import DesignSpec, SweepSpec
 
 #: largest double below 1
 _LARGEST_BELOW_ONE = float(np.nextafter(1.0, 0.0))

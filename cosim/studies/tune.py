@@ -29,13 +29,12 @@ from .document import StudyFile, read_study
 from .execution.job import Job
 from .execution.run_store import RunStore
 from .objective import Constraint, Expression, parse_constraint, parse_expression
-from .schema import MethodSpec, ParameterSpec, TuneSpec
+from .optimizers import INFEASIBLE_RANK, METHODS
+from .schema import ParameterSpec, TuneSpec
 from .study import CheckingRunner, ObservedKpis, RecordObserver, Study, run_pending
 
-#: ranks of points worse than any value; small enough for optimizers to square and add them
-_MAX_VALUE, _INFEASIBLE_RANK, _NO_VALUE_RANK, _FAILED_RANK = 1e99, 1e100, 1e149, 1e150
-#: differential evolution has converged when the standard deviation of the values is this fraction of their mean
-_CONVERGENCE_TOLERANCE = 1e-6
+#: ranks of points worse than any feasible value, beside INFEASIBLE_RANK; small enough for optimizers to square and add them
+_MAX_VALUE, _NO_VALUE_RANK, _FAILED_RANK = 1e99, 1e149, 1e150
 
 
 @dataclass(frozen=True)
@@ -61,12 +60,12 @@ class Trial:
             return _FAILED_RANK
         if not self.value < math.inf:
             return _NO_VALUE_RANK
-        return min(_INFEASIBLE_RANK * (1 + self.violation), _NO_VALUE_RANK) if self.violation else min(self.value, _MAX_VALUE)
+        return min(INFEASIBLE_RANK * (1 + self.violation), _NO_VALUE_RANK) if self.violation else min(self.value, _MAX_VALUE)
 
     @property
     def feasible(self) -> bool:
-        """True if the point has a value and meets all constraints."""
-        return self.rank < _INFEASIBLE_RANK
+        """Whether the point has a value and meets all constraints."""
+        return self.rank < INFEASIBLE_RANK
 
 
 @dataclass
@@ -195,58 +194,3 @@ def _unit_coordinate(spec: ParameterSpec, value: float) -> float:
     if spec.scale == "log":
         return math.log(value / spec.min) / math.log(spec.max / spec.min)
     return (value - spec.min) / (spec.max - spec.min)
-
-
-#: returns the ranks of points in the unit cube
-Evaluator = Callable[[Sequence[Sequence[float]]], list[float]]
-
-
-def _differential_evolution(evaluate: Evaluator, start: Sequence[float], spec: MethodSpec) -> None:
-    """Search by differential evolution (R. Storn, K. Price, J. Global Optim. 11 (1997), 341-359).
-
-    A whole generation is evaluated in parallel; the first one contains the start.
-    """
-    from scipy.optimize import differential_evolution
-    from scipy.stats import qmc
-
-    generator = np.random.default_rng(spec.seed)
-    population = qmc.LatinHypercube(len(start), rng=generator).random(spec.population)
-    population[0] = start
-
-    def converged(intermediate_result: Any) -> bool:
-        """Return whether SciPy's criterion of convergence is met and all points are feasible."""
-        ranks = intermediate_result.population_energies
-        return bool(ranks.max() < _INFEASIBLE_RANK and np.std(ranks) <= _CONVERGENCE_TOLERANCE * abs(np.mean(ranks)))
-
-    differential_evolution(
-        lambda points: np.array(evaluate(points.T.tolist())),
-        [(0.0, 1.0)] * len(start),
-        maxiter=spec.generations,
-        init=population,
-        rng=generator,
-        polish=False,
-        vectorized=True,
-        updating="deferred",
-        callback=converged,
-        tol=0.0,
-        atol=-1.0,  # disables SciPy's own criterion
-    )
-
-
-def _scipy_minimizer(method: str) -> Callable[[Evaluator, Sequence[float], MethodSpec], None]:
-    def search(evaluate: Evaluator, start: Sequence[float], spec: MethodSpec) -> None:
-        from scipy.optimize import minimize
-
-        options = {"maxfev": spec.evaluations}
-        bounds = [(0.0, 1.0)] * len(start)
-        minimize(lambda point: evaluate([point.tolist()])[0], start, method=method, bounds=bounds, options=options)
-
-    return search
-
-
-#: optimization methods: search from a start within the unit cube
-METHODS: Mapping[str, Callable[[Evaluator, Sequence[float], MethodSpec], None]] = {
-    "differential_evolution": _differential_evolution,
-    "nelder_mead": _scipy_minimizer("Nelder-Mead"),
-    "powell": _scipy_minimizer("Powell"),
-}

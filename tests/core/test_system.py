@@ -6,7 +6,7 @@ from cosim.core.units import parse_unit
 
 
 def typed(causality, kind, **more):
-    return FakeComponent([Variable("v", kind, causality, **more)], lambda *_: None)
+    return FakeComponent([Variable("v", kind, causality, **more)], lambda _values, _time, _step: None)
 
 
 def texts(built):
@@ -40,8 +40,8 @@ def test_a_component_in_two_stages_is_refused():
 
 
 def test_different_quantities_are_not_connected():
-    a = FakeComponent(outputs("y", unit=parse_unit("m")), lambda *_: None)
-    b = FakeComponent(inputs("u", unit=parse_unit("rad")), lambda *_: None)
+    a = FakeComponent(outputs("y", unit=parse_unit("m")), lambda _values, _time, _step: None)
+    b = FakeComponent(inputs("u", unit=parse_unit("rad")), lambda _values, _time, _step: None)
     (text,) = texts(make_system({"a": a, "b": b}, "a.y > b.u"))
     assert text == 'a.y cannot feed b.u: units "m" and "rad" measure different quantities'
 

@@ -209,7 +209,7 @@ def test_arguments_may_have_the_parameter_names_of_the_loader(folder):
 
 def test_the_instance_name_cannot_be_an_argument(folder):
     (line,) = refused(folder, {"a": folder.block("Gain", arguments={"instance_name": "b"})})
-    assert 'Gain gets its "instance_name" from the scenario' in line
+    assert 'Gain receives its "instance_name" from the scenario' in line
 
 
 def test_problems_of_a_python_component_are_located_at_its_arguments(folder):

@@ -7,7 +7,8 @@ import pytest
 from scipy import stats
 
 from cosim.studies.design import build_design
-from cosim.studies.schema import DISTRIBUTIONS, SweepSpec
+from cosim.studies.factor_schema import DISTRIBUTIONS
+from cosim.studies.schema import SweepSpec
 
 ARGUMENTS = {
     "min": 1.0,

@@ -27,7 +27,7 @@ from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
 from ...core.units import Unit, parse_unit
 from ...scenario.json_document import Document, read_document
-from ...scenario.schema import Spec
+from ...scenario.schema_types import Spec
 
 
 class OutputsSpec(Spec):

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..design import Design
-from ..schema import QUANTILES
+from ..factor_schema import QUANTILES
 from ..sweep import SweepRow
 from .table import RowSource
 

@@ -13,7 +13,7 @@ from typing import Any
 from ...results.files import remove_files, write_json
 from ..execution.bundle import cosim_fingerprint
 from ..execution.run_store import RunStore
-from ..schema import AGGREGATE_COLUMNS, SUCCESS_COLUMNS
+from ..factor_schema import AGGREGATE_COLUMNS, SUCCESS_COLUMNS
 from ..sweep import Sweep, SweepRow, kpi_names
 from .statistics import RunGroup, failure_causes, group_rows, groupings
 from .table import write_csv, write_csv_rows, write_parquet

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ...results.files import write_json
 from ..execution.bundle import cosim_fingerprint
-from ..schema import TRIAL_COLUMNS
+from ..factor_schema import TRIAL_COLUMNS
 from ..tune import Trial, Tuning
 from .table import write_csv_rows
 

@@ -1,0 +1,91 @@
+"""Types of values in scenario files, and the base class of their data model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, StringConstraints, WithJsonSchema, model_validator
+
+from ..core.time_grid import exact_fraction
+
+S = TypeVar("S")
+
+
+def _parse_time(value: Any) -> Fraction:
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError('expected seconds as a number or as a fraction in text such as "1/60"')
+    try:
+        return exact_fraction(value)
+    except (ValueError, ZeroDivisionError):
+        raise ValueError('expected seconds as a number or as a fraction in text such as "1/60"') from None
+
+
+def _check_positive(value: Fraction) -> Fraction:
+    if value <= 0:
+        raise ValueError("expected a positive number of seconds")
+    return value
+
+
+def _check_value(value: Any) -> Any:
+    values = value if isinstance(value, list) else [value]
+    if not values or not all(isinstance(v, bool | int | float | str) for v in values):
+        raise ValueError("expected a number, true, false, a text, or a list of these")
+    return value
+
+
+def _check_auto_or_bool(value: Any) -> Any:
+    if value != "auto" and not isinstance(value, bool):
+        raise ValueError('expected "auto", true or false')
+    return value
+
+
+def _as_list(value: Any) -> Any:
+    return [value] if isinstance(value, str) else value
+
+
+Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+Seconds = Annotated[
+    Fraction,
+    BeforeValidator(_parse_time),
+    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^\d+/\d+$"}]}),
+]
+Period = Annotated[Seconds, AfterValidator(_check_positive)]
+_SCALAR_SCHEMAS = [{"type": kind} for kind in ("number", "boolean", "string")]
+Value = Annotated[
+    Any,
+    BeforeValidator(_check_value),
+    WithJsonSchema({"anyOf": [*_SCALAR_SCHEMAS, {"type": "array", "items": {"anyOf": _SCALAR_SCHEMAS}, "minItems": 1}]}),
+]
+AutoOrBool = Annotated[
+    Literal["auto"] | bool, BeforeValidator(_check_auto_or_bool), WithJsonSchema({"enum": ["auto", True, False]})
+]
+NameList = Annotated[
+    list[str],
+    BeforeValidator(_as_list),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
+]
+
+
+class InvalidElement:
+    """Placeholder of an invalid list element, which keeps the indices of the elements after it."""
+
+
+INVALID: Any = InvalidElement()
+
+
+class Spec(BaseModel):
+    """Base of all parts of a scenario; unknown keys and implicit type conversions are errors."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, arbitrary_types_allowed=True)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _pass_invalid(cls, value: Any, handler: Any) -> Any:
+        return value if value is INVALID else handler(value)
+
+
+def accepted(specs: Iterable[S]) -> Iterator[tuple[int, S]]:
+    """Yield (index, specification) of the valid elements of a list."""
+    return ((i, spec) for i, spec in enumerate(specs) if spec is not INVALID)

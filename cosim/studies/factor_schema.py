@@ -1,0 +1,144 @@
+"""Schema of the factors of a sweep, and of the names and bounds that factors and parameters of a tuning share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, StringConstraints, model_validator
+
+from ..core.errors import did_you_mean
+from ..scenario.schema_types import NameList, Spec
+
+#: arguments of each distribution; `min` and `max` of truncated_normal are optional
+DISTRIBUTIONS = {
+    "uniform": ("min", "max"),
+    "normal": ("mean", "std"),
+    "truncated_normal": ("mean", "std", "min", "max"),
+    "lognormal": ("median", "sigma"),
+    "triangular": ("min", "mode", "max"),
+    "exponential": ("mean",),
+    "weibull": ("shape", "scale"),
+}
+_OPTIONAL_ARGUMENTS = {"truncated_normal": {"min", "max"}}
+_POSITIVE_ARGUMENTS = ("std", "sigma", "median", "shape", "scale")
+#: keys of a factor that define its levels
+_LEVEL_SOURCES = ("values", "range", "distribution", "levels")
+#: quantiles in aggregates.csv
+QUANTILES = {"min": 0.0, "q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95, "max": 1.0}
+#: columns of the output files beside those of factors or parameters
+TABLE_COLUMNS = ("run", "seed", "status", "passed", "failure", "output", "command")
+AGGREGATE_COLUMNS = ("kpi", "count", "mean", "std", *QUANTILES)
+SUCCESS_COLUMNS = ("runs", "distinct", "failed", "passed", "rate", "low", "high")
+TRIAL_COLUMNS = ("value", "violation", "failure")
+
+
+def reject_column_names(*names: str) -> AfterValidator:
+    """Return a validator that refuses the names of columns."""
+
+    def check(value: str) -> str:
+        if value in names:
+            raise ValueError(f"expected a name other than those of columns: {', '.join(dict.fromkeys(names))}")
+        return value
+
+    return AfterValidator(check)
+
+
+SettingPaths = Annotated[NameList, Field(min_length=1)]
+FactorName = Annotated[
+    str,
+    StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_. ]*$"),
+    reject_column_names(*TABLE_COLUMNS, *AGGREGATE_COLUMNS, *SUCCESS_COLUMNS),
+]
+Scale = Literal["linear", "log"]
+
+
+def check_order(low: float | None, high: float | None) -> None:
+    """Raise ValueError unless `low` is less than `high`; None stands for no bound."""
+    if low is not None and high is not None and not low < high:
+        raise ValueError('expected "min" to be less than "max"')
+
+
+def check_log_scale(scale: Scale, low: float) -> None:
+    """Raise ValueError for a logarithmic scale with a lower bound that is not positive."""
+    if scale == "log" and low <= 0:
+        raise ValueError('a logarithmic scale needs a positive "min"')
+
+
+class RangeSpec(Spec):
+    """Evenly spaced values from `min` to `max`; `count` of them in a full factorial design."""
+
+    min: float
+    max: float
+    count: int | None = Field(None, ge=2)
+    scale: Scale = "linear"
+
+    @model_validator(mode="after")
+    def _possible(self) -> RangeSpec:
+        check_order(self.min, self.max)
+        check_log_scale(self.scale, self.min)
+        return self
+
+
+class DistributionSpec(Spec):
+    """A probability distribution; a full factorial design takes the medians of `count` equally likely parts."""
+
+    kind: Literal["uniform", "normal", "truncated_normal", "lognormal", "triangular", "exponential", "weibull"]
+    min: float | None = None
+    max: float | None = None
+    mean: float | None = None
+    std: float | None = None
+    median: float | None = None
+    sigma: float | None = Field(None, description="standard deviation of the logarithm")
+    mode: float | None = None
+    shape: float | None = None
+    scale: float | None = None
+    count: int | None = Field(None, ge=1)
+
+    @model_validator(mode="after")
+    def _complete(self) -> DistributionSpec:
+        known, given = DISTRIBUTIONS[self.kind], self.arguments
+        if unknown := [name for name in given if name not in known]:
+            raise ValueError(f'"{self.kind}" has no "{unknown[0]}"{did_you_mean(unknown[0], known)}')
+        if missing := [name for name in known if name not in given and name not in _OPTIONAL_ARGUMENTS.get(self.kind, ())]:
+            raise ValueError(f'"{self.kind}" needs {", ".join(missing)}')
+        if small := [name for name in _POSITIVE_ARGUMENTS if given.get(name, 1.0) <= 0]:
+            raise ValueError(f'expected a positive "{small[0]}"')
+        if self.kind == "exponential" and given["mean"] <= 0:
+            raise ValueError('expected a positive "mean"')
+        check_order(self.min, self.max)
+        if self.mode is not None and not given["min"] <= self.mode <= given["max"]:
+            raise ValueError('expected "mode" between "min" and "max"')
+        return self
+
+    @property
+    def arguments(self) -> dict[str, float]:
+        """Arguments of the distribution that the file gives."""
+        return {name: value for name, value in self.model_dump(exclude={"kind", "count"}).items() if value is not None}
+
+
+class FactorSpec(Spec):
+    """A factor that varies: variables or JSON pointers with their values, or named levels with several settings each."""
+
+    name: FactorName
+    set: SettingPaths | None = Field(None, description="variable or JSON pointer; of several, all get the same value")
+    values: list[Any] | None = Field(None, min_length=1)
+    range: RangeSpec | None = None
+    distribution: DistributionSpec | None = None
+    levels: dict[str, dict[str, Any]] | None = Field(None, min_length=1, description="label -> settings")
+    integer: bool = Field(False, description="values of a range or distribution are rounded")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> FactorSpec:
+        given = [name for name in _LEVEL_SOURCES if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"expected exactly one of {', '.join(_LEVEL_SOURCES)}; found {' and '.join(given) or 'none'}")
+        if (self.levels is None) == (self.set is None):
+            raise ValueError('expected "set" together with values, range or distribution, and not together with levels')
+        return self
+
+    def settings(self) -> Iterator[tuple[str, Any]]:
+        """Yield each path that the factor sets with its listed values, or with None if it has none."""
+        for level in (self.levels or {}).values():
+            yield from level.items()
+        yield from ((path, value) for path in self.set or () for value in self.values or (None,))
