@@ -64,7 +64,7 @@ class Trial:
 
     @property
     def feasible(self) -> bool:
-        """Whether the point has a value and meets all constraints."""
+        """True if the point has a value and meets all constraints."""
         return self.rank < INFEASIBLE_RANK
 
 
