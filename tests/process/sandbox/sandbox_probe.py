@@ -37,5 +37,5 @@ class SandboxProbe(Fmi2Slave):
     def exit_initialization_mode(self):
         print(json.dumps({what: attempt(act) for what, act in self.attempts.items()}))
 
-    def do_step(self, current_time, step_size):  # noqa: ARG002
+    def do_step(self, current_time, step_size):  # noqa: ARG002  signature of Fmi2Slave
         return True
