@@ -129,6 +129,12 @@ def better(**sense: Literal["lower", "higher"]) -> Callable[[KpiFunction], KpiFu
     return declare
 
 
+def declared_units(function: Callable[..., Any]) -> Mapping[str, str]:
+    """Return the units that `units` declared, by name of the value."""
+    unit_of: Mapping[str, str] = getattr(function, "units", {})
+    return unit_of
+
+
 def evaluate_kpis(result: Result, kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]]) -> dict[str, Number]:
     """Evaluate KPIs.
 
@@ -201,7 +207,7 @@ def kpi_units(
     declared = {
         f"{name}.{key}": _resolve_unit(unit, arguments, signal_units)
         for name, function, arguments in kpis
-        for key, unit in getattr(function, "units", {}).items()
+        for key, unit in declared_units(function).items()
     }
     return {name: declared.get(name.partition("[")[0], "") for name in names}
 
