@@ -67,13 +67,13 @@ def test_the_fmu_can_be_rebuilt_from_its_sources_alone(folder, tmp_path):
 
 def test_several_files_are_compiled_together(folder, description, tmp_path):
     replace(
-        folder / "speed_keeper.c", "static double limited(double value, double limit) {", "double limited(double, double); /*"
+        folder / "speed_keeper.c", "static double clamp(double value, double limit) {", "double clamp(double, double); /*"
     )
     replace(folder / "speed_keeper.c", "fmax(-limit, fmin(limit, value)); }", "*/")
-    (folder / "limited.c").write_text(
-        "double limited(double value, double limit) { return value < limit ? value : limit / 2; }\n"
+    (folder / "clamp.c").write_text(
+        "double clamp(double value, double limit) { return value < limit ? value : limit / 2; }\n"
     )
-    replace(description, '<File name="speed_keeper.c"/>', '<File name="speed_keeper.c"/><File name="limited.c"/>')
+    replace(description, '<File name="speed_keeper.c"/>', '<File name="speed_keeper.c"/><File name="clamp.c"/>')
     fmu = build_to(folder, None, tmp_path / "keeper.fmu")
     assert simulate_fmu(str(fmu), stop_time=0.1, output=["thrust"])["thrust"][-1] == 1.5
 
@@ -132,8 +132,8 @@ def test_compiler_errors_are_shown_with_their_line(folder, tmp_path):
 
 
 def test_a_missing_function_is_named(folder, tmp_path):
-    replace(folder / "speed_keeper.c", "static double limited(", "extern double limited(double, double);\nstatic double unused(")
-    with pytest.raises(InputError, match="undefined reference to `limited'"):
+    replace(folder / "speed_keeper.c", "static double clamp(", "extern double clamp(double, double);\nstatic double unused(")
+    with pytest.raises(InputError, match="undefined reference to `clamp'"):
         build_to(folder, None, tmp_path / "keeper.fmu")
 
 
