@@ -66,13 +66,9 @@ def test_the_fmu_can_be_rebuilt_from_its_sources_alone(folder, tmp_path):
 
 
 def test_several_files_are_compiled_together(folder, description, tmp_path):
-    replace(
-        folder / "speed_keeper.c", "static double clamp(double value, double limit) {", "double clamp(double, double); /*"
-    )
+    replace(folder / "speed_keeper.c", "static double clamp(double value, double limit) {", "double clamp(double, double); /*")
     replace(folder / "speed_keeper.c", "fmax(-limit, fmin(limit, value)); }", "*/")
-    (folder / "clamp.c").write_text(
-        "double clamp(double value, double limit) { return value < limit ? value : limit / 2; }\n"
-    )
+    (folder / "clamp.c").write_text("double clamp(double value, double limit) { return value < limit ? value : limit / 2; }\n")
     replace(description, '<File name="speed_keeper.c"/>', '<File name="speed_keeper.c"/><File name="clamp.c"/>')
     fmu = build_to(folder, None, tmp_path / "keeper.fmu")
     assert simulate_fmu(str(fmu), stop_time=0.1, output=["thrust"])["thrust"][-1] == 1.5
