@@ -17,7 +17,7 @@ def called_functions(action):
     calls = []
 
     def record(frame, event, _):
-        if event == "call" and frame.f_code.co_filename.startswith(str(ROOT)):
+        if event == "call" and frame.f_code.co_filename.startswith(f"{ROOT}/cosim/"):
             calls.append((str(Path(frame.f_code.co_filename).relative_to(ROOT)), frame.f_code.co_qualname))
 
     sys.setprofile(record)
