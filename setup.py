@@ -1,4 +1,4 @@
-"""What pyproject.toml cannot say: the optional native executor, and the bundle.
+"""Build steps beyond pyproject.toml: the optional native executor and the bundle of shipped files.
 
 The wheel carries scenarios, FMUs, plant and controller sources as cosim/_bundle/ in the layout of the checkout.
 """

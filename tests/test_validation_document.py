@@ -18,7 +18,7 @@ FILE = "plant_src/sensors/test_barometer_and_magnetometer.py"
 
 
 def stated(file: Path) -> Iterator[Statement]:
-    """What the tests of a file state: the literal arguments of their calls of `measured`."""
+    """Yield the statements of a test file: the literal arguments of their calls of `measured`."""
     tree = ast.parse(file.read_text())
     constants = dict(constant for line in tree.body if isinstance(line, ast.Assign) for constant in texts(line))
     for function in (line for line in tree.body if isinstance(line, ast.FunctionDef)):

@@ -101,7 +101,7 @@ def test_other_controllers_land_in_the_first_demo(tmp_path, controller):
 
 
 def touchdown_tilt(**parameters):
-    """Of the geometric control in short waves and gusts, on a fast vessel."""
+    """Return the touchdown tilt of the geometric controller in short waves and gusts, on a fast vessel."""
     sea = "/components/plant/arguments/environment"
     weather = {
         f"{sea}/waves/significant_height": 0.1,

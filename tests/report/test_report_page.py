@@ -43,7 +43,7 @@ def invoke(command, *words):
 
 @pytest.fixture(scope="module")
 def directory(tmp_path_factory):
-    """What `cosim run` leaves of Demo 1 as it is shipped."""
+    """Return the output directory of `cosim run` for the shipped Demo 1."""
     folder = tmp_path_factory.mktemp("demo1")
     done = invoke(run, "demo1_box", "--isolation", "none", "--output-dir", folder)
     assert done.exit_code == 0, done.output

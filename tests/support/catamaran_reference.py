@@ -62,7 +62,7 @@ class Catamaran:
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def rate(self, time: float, state: np.ndarray) -> np.ndarray:
-        """Of position, rotation matrix and nu."""
+        """Return the time derivatives of position, rotation matrix and nu."""
         place, to_world, nu = state[:3], state[3:12].reshape(3, 3), state[12:]
         yaw = np.arctan2(to_world[1, 0], to_world[0, 0])
         elevation, slopes, orbital, flow = wave_kinematics(self.sea, place[0], place[1], yaw, time)

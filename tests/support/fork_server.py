@@ -117,7 +117,7 @@ def run_and_exit(request: dict[str, Any]) -> None:
 
 
 def process_state() -> dict[str, Any]:
-    """What belongs to the whole process and no FMU may change."""
+    """Return the process state that no FMU may change."""
     own = ctypes.CDLL(None)
     own.getenv.restype = own.setlocale.restype = ctypes.c_char_p
     mask = os.umask(0)

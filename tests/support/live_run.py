@@ -61,7 +61,7 @@ class LiveRun:
         return self.post(json.dumps({"command": command, **more}).encode()).json()
 
     def page(self) -> Any:
-        """What the page is told when it is opened."""
+        """Return the data that the page receives when it is opened."""
         data = self.get().body.partition(b'id="replay-data">')[2].partition(b"</script>")[0]
         return json.loads(data)["live"]
 

@@ -32,7 +32,7 @@ def vessel(centre: Any, attitude: Rotation) -> Any:
 
 
 def ray(point: np.ndarray, centre: np.ndarray, attitude: Rotation) -> float | None:
-    """Where a ray straight down from a point meets the deck (height, m)."""
+    """Return the height (m) at which a ray straight down from a point meets the deck."""
     forward, left, _ = attitude.as_matrix().T
     _, s, t = np.linalg.solve(np.column_stack([[0.0, 0.0, 1.0], forward, left]), point - centre)
     inside = abs(s) <= PLATE[0] and abs(t) <= PLATE[1]

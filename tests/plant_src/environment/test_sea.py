@@ -101,7 +101,7 @@ def test_elevation_is_the_sum_of_travelling_waves(measured: MeasurementCheck):
 
 
 def test_long_crests_run_one_way():
-    """Where and when the phase is the same, so is the height: a step along the crest changes nothing."""
+    """Equal phase means equal height: a step along the crest changes nothing."""
     waves = realisation(**SWELL, direction=math.pi / 2)
     assert waves.elevation(50.0, 3.0, 8.0) == pytest.approx(waves.elevation(-20.0, 3.0, 8.0), abs=1e-9)
     assert set(waves.direction) == {math.pi / 2}

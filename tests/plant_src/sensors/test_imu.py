@@ -60,7 +60,7 @@ def test_scale_misalignment_bias_and_range():
 
 
 def allan_deviation(values, count):
-    """Of rates at STEP, from means over `count` samples next to each other."""
+    """Return the Allan deviation of rates sampled at STEP, from means over `count` samples next to each other."""
     means = values[: len(values) // count * count].reshape(-1, count).mean(axis=1)
     return np.sqrt(np.mean(np.diff(means) ** 2) / 2)
 

@@ -39,13 +39,13 @@ class CommandResult:
 
     @cached_property
     def changes(self) -> list[str]:
-        """What the command changed in its own process (folder, locale, signals ...); an entry when it never came to its end."""
+        """Changes of the command to its own process (folder, locale, signals ...); an entry when it never came to its end."""
         report = self.folder / "changes"
         return report.read_text().splitlines() if report.exists() else ["the process ended early"]
 
     @cached_property
     def temporary_files(self) -> list[str]:
-        """What was left in the folder for temporary files."""
+        """Names left in the folder for temporary files."""
         return sorted(path.name for path in (self.folder / "tmp").iterdir())
 
 

@@ -1,4 +1,4 @@
-"""What an importer may call, judged from the record of calls: FMI 2.0 section 4.2.4, FMI 3.0 sections 2.3 and 4.2."""
+"""Rules for the calls of an importer, checked from the record of calls: FMI 2.0 section 4.2.4, FMI 3.0 sections 2.3 and 4.2."""
 
 from __future__ import annotations
 

@@ -222,7 +222,7 @@ def test_one_fmu_alone_is_supervised_too(fmus, runner, tmp_path, version, what):
 
 
 def test_the_innocent_are_not_accused(fmus, runner, tmp_path, version):
-    """Of two instances in one stage the one that crashed is named."""
+    """The crashed one of two instances in one stage is named."""
     components = {name: {"fmu": str(fmus(version))} for name in ("first", "second", "third")}
     file = scenario(tmp_path, fmus.folder, components=components, algorithm={"stages": [list(components)]})
     words = ("run", file, "--output-dir", "out", "--no-report", "--set", "second.fault=DoStep 6 segv")

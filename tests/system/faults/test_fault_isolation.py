@@ -144,7 +144,7 @@ def test_one_fmu_alone(fmus, runner, tmp_path, version):
 
 
 def may_leave_network() -> bool:
-    """Whether a process may have a network of its own."""
+    """Return True if a process may have a network namespace of its own."""
     child = os.fork()
     if child == 0:
         os._exit(min(1, abs(ctypes.CDLL(None).unshare(0x50000000))))

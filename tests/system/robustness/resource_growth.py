@@ -1,4 +1,4 @@
-"""How much a process grows over many runs, or over the steps of one run: `python resource_growth.py SCENARIO runs|steps COUNT`.
+"""Growth of a process over many runs, or over the steps of one run: `python resource_growth.py SCENARIO runs|steps COUNT`.
 
 Prints JSON: growth of the resident memory (bytes), and of open descriptors, threads, child processes and temporary files, from
 the end of a warm-up on (the first runs, or a tenth of the steps).

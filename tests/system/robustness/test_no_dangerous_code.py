@@ -1,4 +1,4 @@
-"""What must not stand in the code: whatever turns data into a program; and the locked environment fits the project."""
+"""Forbidden code: anything that turns data into a program; and the locked environment fits the project."""
 
 from __future__ import annotations
 

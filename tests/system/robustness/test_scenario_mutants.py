@@ -51,7 +51,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, probes: dict[int, Path]) ->
 
 
 def judge(file: Path, text: str, limit: float = 2.0) -> bool:
-    """Whether a scenario is accepted, within `limit` s of processor time."""
+    """Return True if a scenario is accepted within `limit` s of processor time."""
     file.write_text(text, encoding="utf-8")
     gc.disable()  # it would go through all that Hypothesis keeps, seconds long
     begin = time.process_time()
