@@ -8,12 +8,24 @@ from types import ModuleType
 
 _STANDARD_ERROR = 2
 
+_MISSING = (
+    "PyBullet is not installed, and the world needs it for contact; use Python 3.11 to 3.13, for which wheels exist "
+    '(`pip install fmi-cosim`), build it with `pip install pybullet`, or replace the world by a plant FMU ("fmu" for "python")'
+)
+
 
 def _import_without_stderr() -> ModuleType:
+    """Return the module `pybullet`.
+
+    Raises:
+        ModuleNotFoundError: If PyBullet is not installed; the message names the ways out.
+    """
     saved, null = os.dup(_STANDARD_ERROR), os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, _STANDARD_ERROR)
     try:
         import pybullet
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(_MISSING, name="pybullet") from error
     finally:
         os.dup2(saved, _STANDARD_ERROR)
         os.close(saved)
