@@ -154,12 +154,12 @@ def refused(folder: Path, text: str, words: str, capsys: pytest.CaptureFixture[s
     code = cli._run_command_line(
         ["run", str(folder / "scenario.json"), "--isolation", "none", "--output-dir", str(folder / "out")]
     )
-    taken = time.process_time() - begin
+    processor_time = time.process_time() - begin
     errors = capsys.readouterr().err
     assert code == 2, errors
     assert words in errors
     assert all(PLACE.match(line) for line in errors.splitlines()), errors
-    assert taken < 0.5
+    assert processor_time < 2  # seconds; a search without end takes minutes
 
 
 @pytest.mark.parametrize("name", TEXTS)
