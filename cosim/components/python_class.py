@@ -3,196 +3,15 @@
 from __future__ import annotations
 
 import inspect
-import operator
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from pythonfmu import Fmi2Slave
-from pythonfmu.enums import Fmi2Status
-from pythonfmu.variables import Boolean, Integer, Real, ScalarVariable, String
-
-from ..core import component_log
-from ..core.component import Component, Ports, Variable
-from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, Problem, describe_exception
-from ..core.units import parse_unit
+from ..core.component import Component
+from ..core.errors import PASS_THROUGH_EXCEPTIONS, InputError, Problem, describe_exception
 from .conformance import find_violations
-from .object_state import snapshot
 from .python_import import load_object
-
-_TYPES = {Real: "Float64", Integer: "Int32", Boolean: "Boolean", String: "String"}
-_CASTS: Mapping[str, Callable[[Any], Any]] = {"Float64": float, "Int32": int, "Boolean": bool, "String": str}
-
-
-def _to_float(value: Any) -> float:
-    if isinstance(value, str | bytes):
-        raise TypeError
-    return float(value)
-
-
-def _to_bool(value: Any) -> bool:
-    if isinstance(value, np.bool_):
-        return bool(value)
-    if operator.index(value) not in (0, 1):
-        raise ValueError
-    return bool(value)
-
-
-def _to_str(value: Any) -> str:
-    if not isinstance(value, str):
-        raise TypeError
-    return value
-
-
-#: FMI type -> the usual Python type of an output, and a lossless conversion from other types
-_OUTPUT_TYPES: Mapping[str, tuple[type, Callable[[Any], Any]]] = {
-    "Float64": (float, _to_float),
-    "Int32": (int, operator.index),
-    "Boolean": (bool, _to_bool),
-    "String": (str, _to_str),
-}
-
-
-class PythonFmuComponent(Component):
-    """Component that runs a `pythonfmu.Fmi2Slave` in the importer's process, without export as an FMU.
-
-    Its state is the whole state of the Python object (see `object_state`), or the result of an overridden `_get_fmu_state`.
-    The state of an FMU exported by PythonFMU contains only the registered variables.
-    """
-
-    binds_everything = False
-    has_state = True
-
-    def __init__(self, slave: Fmi2Slave, instance_name: str):
-        self._slave, self._name, self._time = slave, instance_name, 0.0
-        self._pythonfmu_variables: dict[str, ScalarVariable] = {v.name: v for v in slave.vars.values()}
-        self.variables = [_to_variable(v) for v in slave.vars.values()]
-        self._setters: list[tuple[Callable[[Any], None], np.ndarray, int]] = []
-        self._getters: list[tuple[str, Callable[[], Any], type, Callable[[Any], Any], np.ndarray, int]] = []
-        self._types = {variable.name: variable.type for variable in self.variables}
-        self._has_custom_state = type(slave)._get_fmu_state is not Fmi2Slave._get_fmu_state
-
-    def set(self, name: str, value: Any) -> None:
-        """Set one variable by its PythonFMU setter."""
-        registered = self._pythonfmu_variables[name]
-        self._call_user_code("set", registered.setter, _CASTS[_fmi_type(registered)](value))
-
-    def get(self, name: str) -> Any:
-        """Return the value of one variable by its PythonFMU getter."""
-        registered = self._pythonfmu_variables[name]
-        return _CASTS[_fmi_type(registered)](self._call_user_code("get", registered.getter))
-
-    def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
-        """Call the slave's `setup_experiment` and `enter_initialization_mode`."""
-        self._time = start_time
-        self._call_user_code("setup_experiment", self._slave.setup_experiment, start_time, stop_time, None)
-        self._call_user_code("enter_initialization_mode", self._slave.enter_initialization_mode)
-
-    def exit_initialization_mode(self) -> None:
-        """Call the slave's `exit_initialization_mode`."""
-        self._call_user_code("exit_initialization_mode", self._slave.exit_initialization_mode)
-
-    def bind(self, inputs: Ports, outputs: Ports) -> None:
-        """Pair the slave's setters and getters with the elements of the bound arrays."""
-        self._setters = [(self._pythonfmu_variables[v.name].setter, *element) for v, element in _array_elements(inputs)]
-        self._getters = [
-            (v.name, self._pythonfmu_variables[v.name].getter, *_OUTPUT_TYPES[v.type], *element)
-            for v, element in _array_elements(outputs)
-        ]
-
-    def set_inputs(self) -> None:
-        """Pass the bound input values to the slave's setters."""
-        self._call_user_code("set_inputs", self._apply_setters)
-
-    def _apply_setters(self) -> None:
-        for setter, array, index in self._setters:
-            setter(array.item(index))
-
-    def do_step(self, time: float, step_size: float) -> None:
-        """Call the slave's `do_step`; any result but True is a ComponentError."""
-        self._time = time
-        returned = self._call_user_code("do_step", self._slave.do_step, time, step_size)
-        if not returned:
-            raise ComponentError(self._name, "do_step", f"returned {returned}, expected True", time)
-
-    def get_outputs(self) -> None:
-        """Write the values of the slave's getters into the bound output arrays."""
-        self._call_user_code("get_outputs", self._apply_getters)
-
-    def _apply_getters(self) -> None:
-        for name, getter, usual_type, convert, array, index in self._getters:
-            value = getter()
-            try:
-                array[index] = value if value.__class__ is usual_type else convert(value)
-            except (TypeError, ValueError, OverflowError):
-                raise TypeError(f'output "{name}" is {value!r}, expected a value of type {self._types[name]}') from None
-
-    def get_state(self) -> Any:
-        """Return the slave's own state, or a snapshot of its attributes."""
-        return self._slave._get_fmu_state() if self._has_custom_state else snapshot(self._slave, {"vars", "log_queue"})
-
-    def set_state(self, state: Any) -> None:
-        """Restore a state that `get_state` returned."""
-        self._slave._set_fmu_state(state) if self._has_custom_state else state()
-
-    def free_state(self, state: Any) -> None:
-        """Do nothing: states are garbage-collected."""
-
-    def terminate(self) -> None:
-        """Call the slave's `terminate`."""
-        self._call_user_code("terminate", self._slave.terminate)
-
-    def free(self) -> None:
-        """Do nothing: the slave is garbage-collected."""
-
-    def _call_user_code(self, function: str, call: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a method of the slave, convert its exceptions to ComponentError and forward its log messages."""
-        try:
-            return call(*arguments)
-        except PASS_THROUGH_EXCEPTIONS:
-            raise
-        except BaseException as error:
-            raise ComponentError(self._name, function, describe_exception(error), self._time) from error
-        finally:
-            if self._slave.log_queue:
-                self._forward_log()
-
-    def _forward_log(self) -> None:
-        for message in self._slave.log_queue:
-            level = {Fmi2Status.ok: component_log.INFO, Fmi2Status.warning: component_log.WARNING}.get(
-                message.status, component_log.ERROR
-            )
-            component_log.log_message(self._name, level, message.msg)
-        self._slave.log_queue.clear()
-
-
-def _fmi_type(registered: ScalarVariable) -> str:
-    return next(name for kind, name in _TYPES.items() if isinstance(registered, kind))
-
-
-def _to_variable(registered: ScalarVariable) -> Variable:
-    unit = getattr(registered, "unit", None)
-    causality: Any = registered.causality.name if registered.causality else "local"
-    return Variable(
-        registered.name,
-        _fmi_type(registered),
-        causality,
-        registered.variability.name if registered.variability else "continuous",
-        registered.getter() if causality in ("parameter", "input") else None,
-        parse_unit(unit) if unit else None,
-        description=registered.description or "",
-    )
-
-
-def _array_elements(ports: Ports) -> list[tuple[Variable, tuple[np.ndarray, int]]]:
-    """Pair each scalar variable with its array and its index in it."""
-    next_index = dict.fromkeys(ports.arrays, 0)
-    elements = []
-    for variable in ports.variables:
-        elements.append((variable, (ports.arrays[variable.dtype], next_index[variable.dtype])))
-        next_index[variable.dtype] += 1
-    return elements
 
 
 def load_component(reference: str, folder: Path, instance_name: str, arguments: Mapping[str, Any]) -> Component:
@@ -209,7 +28,9 @@ def load_component(reference: str, folder: Path, instance_name: str, arguments: 
             object does not conform to `Component`.
     """
     factory = load_object(reference, folder)
-    if inspect.isclass(factory) and issubclass(factory, Fmi2Slave):
+    if _is_pythonfmu_class(factory):
+        from .python_fmu import PythonFmuComponent
+
         if "instance_name" in arguments:
             raise InputError(f'{reference} receives its "instance_name" from the scenario; remove it from the arguments')
         return PythonFmuComponent(_construct(factory, reference, instance_name=instance_name, **arguments), instance_name)
@@ -218,6 +39,12 @@ def load_component(reference: str, folder: Path, instance_name: str, arguments: 
     if problems := [Problem(f"{reference} creates a {type_name}: {text}") for text in find_violations(component)]:
         raise InputError(problems)
     return component
+
+
+def _is_pythonfmu_class(factory: object) -> bool:
+    """Return whether a class derives from `pythonfmu.Fmi2Slave`, without an import: its own module has imported the package."""
+    package = sys.modules.get("pythonfmu")
+    return package is not None and inspect.isclass(factory) and issubclass(factory, package.Fmi2Slave)
 
 
 def _construct(factory: Callable[..., Any], reference: str, /, *positional: Any, **named: Any) -> Any:

@@ -9,7 +9,7 @@ from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 from systems import connection, make_system, run_system
 
 from cosim.api import load
-from cosim.components.python_class import PythonFmuComponent
+from cosim.components.python_fmu import PythonFmuComponent
 from cosim.core import resources
 from cosim.core.component import StepResult
 from cosim.core.errors import ComponentError, InputError

@@ -5,7 +5,7 @@ import pytest
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Integer, Real, String
 from systems import make_system, run_system
 
-from cosim.components.python_class import PythonFmuComponent
+from cosim.components.python_fmu import PythonFmuComponent
 from cosim.core.errors import ComponentError
 
 START = {Real: 0.0, Integer: 0, Boolean: False, String: ""}
