@@ -6,17 +6,17 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-OPENINGS = ("What", "Whether", "How", "Where", "Of", "Who", "Which", "That", "As far as")
+OPENINGS = ("What", "Whether", "When", "How", "Where", "Of", "Who", "Which", "That", "As")
 FILES = sorted(
     path
-    for package in ("cosim", "plant_src", "controllers")
+    for package in ("cosim", "plant_src", "controllers", "tests")
     for path in (ROOT / package).rglob("*.py")
     if "_bundle" not in path.parts
 )
 
 
 def docstrings(path):
-    """First lines of the docstrings of a file."""
+    """Return the first lines of the docstrings of a file."""
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             yield (ast.get_docstring(node) or "").partition("\n")[0]

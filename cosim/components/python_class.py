@@ -1,4 +1,4 @@
-"""Components made from Python classes: PythonFMU slaves, or classes that implement `Component` themselves."""
+"""Loading of components from Python classes: PythonFMU slaves, or classes that implement `Component` themselves."""
 
 from __future__ import annotations
 
@@ -42,7 +42,10 @@ def load_component(reference: str, folder: Path, instance_name: str, arguments: 
 
 
 def _is_pythonfmu_class(factory: object) -> bool:
-    """Return whether a class derives from `pythonfmu.Fmi2Slave`, without an import: its own module has imported the package."""
+    """Return whether a class derives from `pythonfmu.Fmi2Slave`.
+
+    A module that defines such a class has imported `pythonfmu`, so other components are loaded without importing it.
+    """
     package = sys.modules.get("pythonfmu")
     return package is not None and inspect.isclass(factory) and issubclass(factory, package.Fmi2Slave)
 

@@ -1,4 +1,4 @@
-"""Components made from PythonFMU classes."""
+"""Adapter from PythonFMU classes to `Component`."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Settings:
-    """When and how a system is simulated.
+    """Time span, step size and further settings of a simulation.
 
     Attributes:
         start_time: start time (s, exact).

@@ -9,8 +9,8 @@ from types import ModuleType
 _STANDARD_ERROR = 2
 
 _MISSING = (
-    "PyBullet is not installed, and the world needs it for contact; use Python 3.11 to 3.13, for which wheels exist "
-    '(`pip install fmi-cosim`), build it with `pip install pybullet`, or replace the world by a plant FMU ("fmu" for "python")'
+    "PyBullet is not installed, and the world needs it; use Python 3.11 to 3.13, for which wheels exist, "
+    'build it with `pip install pybullet`, or replace the world by a plant FMU ("fmu" for "python")'
 )
 
 

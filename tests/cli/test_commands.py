@@ -89,7 +89,7 @@ def test_checks_decide_the_exit_code(tmp_path):
 
 @pytest.mark.parametrize("isolation", ["run", "none"])
 def test_a_closed_pipe_does_not_end_the_run(tmp_path, isolation):
-    """As with `| head`: all results are written, and the exit code is that of the run, here of a failed check."""
+    """The reader closes the pipe as `| head` does: all results are written, and the exit code is that of a failed check."""
     (tmp_path / "kpis.py").write_text(KPIS)
     kpi = {"name": "end", "python": "kpis.py:last", "arguments": {"signal": "a.y"}}
     file = scenario(tmp_path, kpis=[kpi], checks=[{"kpi": "end.value", "min": 1}])

@@ -124,7 +124,7 @@ def test_ghosts_can_be_switched_on(opened):
 
 
 def test_something_is_drawn(opened):
-    """Where the vessel is, the middle of the picture has another colour than the water beside it."""
+    """The vessel in the middle of the picture is grey, the water beside it is blue."""
     opened.page.click("text=usv")
     colours = opened(
         """() => { const {view} = cosimReplay, gl = view.renderer.getContext(), pixel = new Uint8Array(4);

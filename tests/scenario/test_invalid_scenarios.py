@@ -380,7 +380,7 @@ def test_missing_signals_of_an_invalid_component_are_not_reported(folder):
     ],
 )
 def test_checks_must_name_a_value_of_a_kpi(folder, number, message):
-    """As far as the function writes them down; what it makes elsewhere may have any name."""
+    """Only names in a literal after `return` can be checked; `unsaid` returns a variable, so any name is accepted."""
     (folder.path / "f.py").write_text(FUNCTIONS)
     known, unknown = ({"name": name, "python": f"f.py:{name}", "arguments": {"vehicle": "a"}} for name in ("error", "unsaid"))
     checks = [{"kpi": each, "max": 1} for each in (number, "error.largest", "error.time[2]", "unsaid.anything")]

@@ -1,5 +1,8 @@
 """Component classes of users are checked when they are loaded, so that mistakes are reported before the run."""
 
+import subprocess
+import sys
+
 import pytest
 from test_invalid_scenarios import refused
 
@@ -56,6 +59,12 @@ def own(folder):
 
 def test_a_valid_component_runs_without_the_optional_methods(folder, own):
     assert cosim.run(folder.scenario(own()))["a.y"].tolist() == [6.0] * 4
+
+
+def test_pythonfmu_is_not_imported_for_a_scenario_without_its_classes(folder, own):
+    program = "import sys, cosim; cosim.load(sys.argv[1]).free(); print('pythonfmu' in sys.modules)"
+    command = [sys.executable, "-c", program, folder.scenario(own())]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "False\n"
 
 
 @pytest.mark.parametrize(

@@ -74,12 +74,12 @@ class LiveRun:
         return told, table.reshape(-1, told["count"]) if told["count"] else table
 
     def count(self) -> int:
-        """Rows that there are."""
+        """Return the number of recorded rows."""
         self.version = -1
         return int(self.rows()[0]["count"])
 
     def end(self) -> int:
-        """As fast as possible to the end; the exit code."""
+        """Run to the end as fast as possible and return the exit code."""
         self.command("speed", factor=None)
         self.command("resume")
         return self.wait()

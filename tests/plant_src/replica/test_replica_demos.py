@@ -75,7 +75,7 @@ def test_the_first_sample_of_the_controllers_is_zero(box: Result) -> None:
 
 
 def test_controllers_act_on_the_sample_before(box: Result) -> None:
-    """What they publish at a row was computed one step earlier, from the plant another step earlier."""
+    """The published value of a row was computed one step earlier, from the state of the plant another step before."""
     np.testing.assert_allclose(box["uav.horizontal_error"][2:], distance(box)[:-2], atol=1e-12)
 
 

@@ -31,7 +31,7 @@ def rows(commands):
 
 
 def passing(values, level):
-    """When a value first passes a level (s), from straight lines between steps."""
+    """Return the time (s) at which a value first passes a level, by linear interpolation between steps."""
     k = int(np.argmax(values >= level))
     return (k - (values[k] - level) / (values[k] - values[k - 1])) * STEP
 

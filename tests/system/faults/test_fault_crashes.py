@@ -86,7 +86,7 @@ def test_a_crash_is_named_and_the_rows_are_kept(fmus, runner, tmp_path, case, ve
 
 
 def test_the_command_itself_survives(fmus, tmp_path, version):
-    """As a user starts it: the other runs of this room skip the imports."""
+    """The command is started like a user's, with its own imports; the other tests fork a process that has done them."""
     words = ["simulate", fmus(version, "DoStep 6 segv"), "--output-file", tmp_path / "result.csv"]
     done = subprocess.run([sys.executable, "-m", "cosim", *words], capture_output=True, text=True, check=False)
     assert done.returncode == 1
@@ -145,7 +145,7 @@ def test_another_thread_of_an_fmu_may_log(fmus, runner, tmp_path, version, execu
 
 @pytest.mark.parametrize("isolation", ["run", "fmu"])
 def test_an_fmu_that_overwrites_what_the_supervisor_reads(fmus, runner, tmp_path, version, isolation):
-    """Where the child notes what it does; it would wait for ever, and nobody would know for what."""
+    """The FMU overwrites the journal in which the child records its present call; the deadline still ends the run by name."""
     file = scenario(tmp_path, fmus(version, "DoStep 6 overwrite"), deadlines={"step": 3.0})
     done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", "--isolation", isolation, limit=20)
     assert done.code == 1, done.err

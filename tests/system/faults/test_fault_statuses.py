@@ -73,8 +73,8 @@ def test_a_bad_return_stops_the_run_with_one_line_and_keeps_the_rows(fmus, runne
         ("DoStep @0.08 round_up", T8 + "changed the floating-point mode"),
     ],
 )
-def test_nothing_is_overlooked_in_the_usual_turn_of_set_step_and_get(fmus, runner, tmp_path, version, order, words):
-    """Which the native executor takes without looking at each operation, once steps have been measured: long before 0.08 s."""
+def test_every_fault_is_reported_in_packed_steps(fmus, runner, tmp_path, version, order, words):
+    """The native executor runs these packed steps after the measured ones, so a fault at 0.08 s is met by packed steps."""
     components = {"lag": {"fmu": str(fmus(version, order))}, "next": {"fmu": str(fmus(version, name="next"))}}
     ring = [{"from": "lag.y", "to": "next.u"}, {"from": "next.y", "to": "lag.u"}]
     stages = {"stages": [["lag", "next"]]}

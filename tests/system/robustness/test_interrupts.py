@@ -68,7 +68,7 @@ def test_a_second_interrupt_does_not_ask(workplace):
 
 
 def test_the_end_of_the_terminal_is_no_loss(workplace):
-    """What ends a process politely, such as a closed terminal or `timeout`, counts as an interrupt."""
+    """SIGTERM and SIGHUP, as from `timeout` or a closed terminal, count as an interrupt."""
     process = workplace.start("run", workplace.scenario(), *RUN)
     before = wait_until(lambda: rows(workplace))
     process.send_signal(signal.SIGTERM)

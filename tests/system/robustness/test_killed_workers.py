@@ -98,7 +98,7 @@ def folders(place: CommandFolder) -> set[str]:
 
 
 def test_what_a_killed_program_left_goes_at_the_start_of_the_next_one(workplace, probe):
-    """Of two programs that use the Python interface one is killed: its folders go, those of the other stay."""
+    """Two programs use the Python interface and one is killed: its folders are removed, those of the other stay."""
     file = scenario(workplace, probe)
     environment = {**os.environ, "TMPDIR": str(workplace.tmp)}
     programs = []
