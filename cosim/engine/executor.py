@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..core.errors import ComponentError
+from ..process.float_mode import enabled_traps
 from ..process.journal import MARKER_SIZE, ROW_COUNT
 from .finite_check import FiniteCheck
 from .initialization import initialize_components
@@ -94,12 +95,23 @@ class Executor(ABC):
         while self.completed_steps < end and not self.termination:
             try:
                 self._run_macro_steps(self.completed_steps, min(end, self.recorder.last_point_in_chunk(self.completed_steps)))
+                if enabled_traps():
+                    self._restore_float_traps(self.completed_steps)
             finally:
                 self.recorder.set_row_count(int(self.marker[ROW_COUNT]))
 
     def close(self) -> None:
         """End the threads; no step may be run afterwards."""
         self._parallel_steps.close()
+
+    def _restore_float_mode(self, call_number: int) -> None:
+        """Set the default floating-point mode again after the step of this call changed it."""
+        step, _ = self._schedule.find_call(call_number)
+        self._runner.restore_float_mode(step.step.name)
+
+    def _restore_float_traps(self, n: int) -> None:
+        """Disable floating-point traps again that a step before communication point `n` enabled."""
+        self._runner.restore_float_traps(self.plan.system.components, self.plan.grid.time_at(n))
 
     def _transfer_call(self, transfer: Transfer) -> TransferCall:
         return self._delay_lines[transfer].apply if transfer.delay else compile_transfer(transfer)

@@ -129,10 +129,13 @@ class NativeExecutor(Executor):
         if status == _native.NOT_FINITE:
             self._finite_check.run()
             return _native.CONTINUE
-        step, call = self._schedule.find_call(number)
         if status == _native.FLOAT_MODE_CHANGED:
-            self._runner.raise_float_mode_changed(step, call)
-        self._runner.handle_status(step, call, status)
+            self._restore_float_mode(number)
+            return _native.CONTINUE
+        if status == _native.FLOAT_TRAPS_ENABLED:
+            self._restore_float_traps(self.completed_steps + 1)
+            return _native.CONTINUE
+        self._runner.handle_status(*self._schedule.find_call(number), status)
         if self.termination is None:
             return _native.CONTINUE
         return _native.END_AFTER_STEP if self.termination.complete else _native.END_BEFORE_STEP

@@ -204,7 +204,7 @@ class FmuInstance(FunctionCaller, Component):
                 status = call.function(*call.arguments)
             if status not in SUCCESS_STATUSES:
                 return self.interpret_status(call.name, status)
-            self._check_float_mode(call.name)
+            self.restore_float_mode(call.name)
         return None
 
     def interpret_status(self, function: str, status: int) -> StepResult:
