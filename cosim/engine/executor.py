@@ -29,14 +29,13 @@ class Executor(ABC):
         recorder: stores the recorded outputs.
         marker: int64 array, shape (MARKER_SIZE,), updated before every call, so that a process which shares its memory can see
             the current call; see CALL_NUMBER, STEP_COUNT and ROW_COUNT in `process.journal`.
-        require_finite: a connected output that is NaN or infinite ends the run.
     """
 
-    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None, require_finite: bool = True):
+    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None):
         self.plan, self.recorder = plan, recorder
         self.marker = np.zeros(MARKER_SIZE, np.int64) if marker is None else marker
         self._runner = StepRunner(self.marker)
-        self._finite_check = FiniteCheck(plan, self._runner.current_time, require_finite)
+        self._finite_check = FiniteCheck(plan, self._runner.current_time)
         self._delay_lines = {t: DelayLine(t) for phase in plan.all_phases for t in phase.transfers if t.delay}
         self._schedule = Schedule(plan, self._runner, self._delay_lines)
         self._parallel_steps = ParallelSteps(self._runner)
@@ -50,11 +49,6 @@ class Executor(ABC):
     def termination(self) -> Termination | None:
         """A component's request to end the simulation, if there was one."""
         return self._runner.termination
-
-    @property
-    def call_names(self) -> list[tuple[str, str]]:
-        """(component, function) of every call, by its number in the marker."""
-        return self._schedule.call_names
 
     def initialize(self) -> None:
         """Bring the components from instantiated to step mode, and record the initial outputs as row 0.
@@ -70,6 +64,7 @@ class Executor(ABC):
         self._schedule.prepare()
         self._parallel_steps.find_candidates(self.plan.phases, self._schedule)
         self._prepare()
+        self.recorder.write_header(self._schedule.call_names)
         self.recorder.record(0)
         self.marker[ROW_COUNT] = self.recorder.row_count
 

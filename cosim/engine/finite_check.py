@@ -13,10 +13,10 @@ _FLOAT_DTYPES = (np.dtype(np.float64), np.dtype(np.float32))
 
 
 class FiniteCheck:
-    """Check of the connected float outputs for NaN and infinity; does nothing unless `enabled`."""
+    """Check of the connected float outputs for NaN and infinity; does nothing if the settings allow these."""
 
-    def __init__(self, plan: Plan, current_time: ctypes.c_double, enabled: bool):
-        self._plan, self._current_time, self._enabled = plan, current_time, enabled
+    def __init__(self, plan: Plan, current_time: ctypes.c_double):
+        self._plan, self._current_time, self._enabled = plan, current_time, plan.settings.require_finite
 
     @property
     def monitored_floats(self) -> list[np.ndarray]:

@@ -9,7 +9,7 @@ from math import inf
 from pathlib import Path
 
 from ..core.component import Variable
-from ..core.errors import Problem
+from ..core.errors import InputError, Problem
 from ..core.system import Endpoint, System
 from ..core.time_grid import TimeGrid
 from ..process.journal import current_journal
@@ -21,10 +21,12 @@ _BYTES_PER_VALUE = 8 + 20
 _SIZE_CHECK_THRESHOLD = 1_000_000_000
 
 
-def find_problems(system: System, settings: Settings) -> list[Problem]:
-    """Return all reasons why the system cannot be simulated with these settings; empty if it can.
+def check_run(system: System, settings: Settings) -> TimeGrid:
+    """Check that the system can be simulated with these settings, and return its communication points.
 
-    The `subject` of a problem names the setting: ("stop_time",), ("components", NAME, "period"), ("events", "time"), ...
+    Raises:
+        InputError: it cannot. The `subject` of each problem names the setting: ("stop_time",), ("components", NAME, "period"),
+            ("events", "time"), ...
     """
     problems = [*system.problems(), *_find_event_problems(system, settings.events)]
     if settings.real_time is not None and not 0 < settings.real_time < inf:
@@ -34,12 +36,14 @@ def find_problems(system: System, settings: Settings) -> list[Problem]:
     except ValueError as error:
         problems.append(Problem(str(error), subject=("stop_time",)))
         if settings.step_size <= 0:
-            return problems
+            raise InputError(problems) from None
         grid = TimeGrid.from_times(settings.start_time, settings.start_time, settings.step_size)
     problems += _find_period_problems(system, grid)
     problems += _find_recording_problems(settings, grid)
     problems += _find_event_time_problems(settings.events, grid)
-    return problems
+    if problems:
+        raise InputError(problems)
+    return grid
 
 
 def settable_variables(system: System) -> Iterator[tuple[str, Variable]]:

@@ -14,7 +14,8 @@ from ..components.input_table import read_input_table
 from ..core.component import Component, Variable
 from ..core.errors import InputError, Problem
 from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System
-from ..engine.run_checks import find_problems
+from ..engine.pacer import LatePolicy
+from ..engine.plan import Plan, compile_plan
 from ..engine.settings import Event, Settings
 from ..process.journal import Deadlines
 from .component_factory import ComponentFactory
@@ -34,10 +35,7 @@ _TIMED_SETTINGS = (("stop_time",), ("record",), ("events",))
 
 
 class SystemBuilder:
-    """Builder of a system: call `make_components`, then `build_system`; each adds to `problems`.
-
-    `system` and `settings` exist after `build_system`; they can be simulated if there are no problems.
-    """
+    """Builder of a system: call `make_components`, then `build_plan`; each adds to `problems`."""
 
     def __init__(self, scenario: Scenario, isolate_fmus: bool, sandbox: bool, loaded_fmus: Mapping[Path, FmuFile]) -> None:
         self.root, self.spec, self.assignments = scenario.root, scenario.spec, scenario.assignments
@@ -50,12 +48,20 @@ class SystemBuilder:
         self._has_missing_signals = False
         self.start_values: dict[str, dict[str, Any]] = defaultdict(dict)
 
-    def build_system(self) -> None:
-        """Set start values, connections, stages, recorded signals and events, and check the result."""
+    def build_plan(self, real_time: float | None, late: LatePolicy) -> Plan:
+        """Set start values, connections, stages, recorded signals and events, and compile the result.
+
+        Args:
+            real_time: See `Settings`.
+            late: See `Settings`.
+
+        Raises:
+            InputError: Carries all problems found since the scenario was read.
+        """
         self._set_start_values()
         aliases = self._aliases()
         connections = list(self._connections())
-        self.system = System(
+        system = System(
             self.components,
             connections,
             (*self._root_stages(), *([tuple(self.profiles)] if self.profiles else [])),
@@ -64,7 +70,7 @@ class SystemBuilder:
             aliases,
             _parallel_mode(self.spec),
         )
-        self.settings = Settings(
+        settings = Settings(
             self.spec.start_time,
             self.spec.stop_time,
             self.spec.step_size,
@@ -72,14 +78,19 @@ class SystemBuilder:
             self.spec.record.interval,
             list(self._events()),
             require_finite=self.spec.non_finite == "error",
+            real_time=real_time,
+            late=late,
         )
-        self.problems += [
-            self._with_location(problem)
-            for problem in find_problems(self.system, self.settings)
-            if not self._is_consequence(problem)
-        ]
-        signals = None if self._has_missing_signals else self.settings.columns
+        try:
+            plan = compile_plan(system, settings)
+        except InputError as error:
+            found = (problem for problem in error.problems if not self._is_consequence(problem))
+            self.problems += map(self._with_location, found)
+        signals = None if self._has_missing_signals else settings.columns
         self.problems += find_function_problems(self.root, self.spec, signals)
+        if self.problems:
+            raise InputError(dict.fromkeys(self.problems))
+        return plan
 
     def make_components(self) -> None:
         """Create the components of the scenario and its nested systems, and the tables of its input profiles."""

@@ -97,18 +97,18 @@ def _run_scenario(options: RunOptions, link: Connection | None = None) -> int:
     warnings = messages.print_log()
     _require_packages(options)
     began = time.perf_counter()
-    prepared = _load(options)
+    prepared = _load(options, None if link else options.real_time)
     folder = options.output_folder(prepared.spec.name).absolute()
     try:
         _prepare_folder(prepared, options, folder)
-        control = live.create_control(prepared, link) if link else None
+        control = live.create_control(prepared, link, options.real_time) if link else None
     except CosimError:
         prepared.free()  # from here on `executing` frees the components
         raise
     with (
-        keeping_run_files(folder / UNFINISHED_FOLDER, folder / "result.csv"),
+        keeping_run_files(folder / UNFINISHED_FOLDER, folder / "result.csv", prepared.metadata),
         _progress_observers(prepared) as observers,
-        executing(live.with_control(prepared, control), observers) as execution,
+        executing(prepared, observers, control) as execution,
     ):
         execution.result.metadata["warnings"] = warnings
         if control:
@@ -127,7 +127,7 @@ def _require_packages(options: RunOptions) -> None:
         require_mcap()
 
 
-def _load(options: RunOptions) -> PreparedRun:
+def _load(options: RunOptions, real_time: float | None) -> PreparedRun:
     """Load the scenario, announce its deadlines to the supervisor and print warnings about it."""
     from ...api import load
     from ...scenario.nested_systems import parse_settings
@@ -139,7 +139,7 @@ def _load(options: RunOptions) -> PreparedRun:
         parse_settings(options.settings),
         stop_time=options.stop_time,
         step_size=options.step_size,
-        real_time=options.real_time,
+        real_time=real_time,
         late=options.late,
         isolation=options.isolation,
         sandbox=options.sandbox,

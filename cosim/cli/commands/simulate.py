@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from ...components.fmi import Isolation
     from ...core.component import Component
     from ...core.recording import Recording
-    from ...core.system import System
-    from ...engine.settings import Settings
+    from ...engine.plan import Plan
 
 FMU_NAME, PROFILE_NAME = "fmu", "profile"
 
@@ -71,10 +70,10 @@ def _simulate(
     messages.print_log()
     if output:
         check_writable(output.parent)
-    system, settings = _build_system(fmu, fmu_isolation, stop_time, step_size, parse_settings(start_values), input_file)
+    plan = _compile_system(fmu, fmu_isolation, stop_time, step_size, parse_settings(start_values), input_file)
     if output:
         remove_files(output.parent, output.name)
-    with keeping_run_files(folder, output), simulating(system, settings) as run:
+    with keeping_run_files(folder, output), simulating(plan) as run:
         if output:
             _write_recording(run.recording, output, shown)
             remove_run_files()
@@ -105,17 +104,18 @@ def _isolation(isolation: str, sandbox: bool) -> Isolation | None:
     return Isolation(sandbox=sandbox) if sandbox or isolation == "fmu" else None
 
 
-def _build_system(
+def _compile_system(
     fmu: Path,
     fmu_isolation: Isolation | None,
     stop_time: str | None,
     step_size: str | None,
     start_values: dict[str, Any],
     input_file: Path | None,
-) -> tuple[System, Settings]:
-    """Return a system of the FMU, and of the input file if there is one, with the settings of its simulation."""
+) -> Plan:
+    """Compile the system of the FMU, and of the input file if there is one."""
     from ...components.fmi import FmuFile, create_component
     from ...core.system import Connection, Endpoint, System
+    from ...engine.plan import compile_plan
     from ...engine.settings import Settings
 
     file = FmuFile(fmu)
@@ -134,7 +134,8 @@ def _build_system(
     assigned = _check_start_values(components[FMU_NAME], start_values)
     outputs = [slot for v in components[FMU_NAME].variables if v.causality == "output" for slot in v.scalar_names]
     columns = {slot: Endpoint(FMU_NAME, slot) for slot in outputs}
-    return System(components, connections, stages, start_values={FMU_NAME: assigned}), Settings(start, stop, step, columns)
+    system = System(components, connections, stages, start_values={FMU_NAME: assigned})
+    return compile_plan(system, Settings(start, stop, step, columns))
 
 
 def _read_profile(path: Path, component: Component) -> Component:

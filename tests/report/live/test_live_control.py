@@ -54,8 +54,8 @@ class Steered:
 
     def run(self, events=(), control=True):
         columns = {"y": endpoint("a.y")}
-        settings = Settings(Fraction(0), Fraction(1), STEP, columns, events=events, step_hook=self.control if control else None)
-        return simulate(self.system, settings)
+        settings = Settings(Fraction(0), Fraction(1), STEP, columns, events=events)
+        return simulate(self.system, settings, step_hook=self.control if control else None)
 
     def said(self):
         messages = []
