@@ -23,6 +23,7 @@ static unsigned float_mode(void) { return (unsigned)fegetround(); }
 static void set_float_mode(unsigned mode) { fesetround((int)mode); }
 #endif
 
+enum { INTERFACE = 1 };                              /* also in native_executor.py, where it is described */
 enum { WARNING = 1, DISCARD = 2 };                   /* FMI statuses; 0 is OK, everything but OK and WARNING is bad */
 /* Codes passed to `on_status` like an FMI status. They exceed 32 bits, so no FMU can return them. */
 #define FLOAT_MODE_CHANGED (INT64_C(1) << 33)
@@ -754,7 +755,7 @@ static PyType_Spec specification = {
 static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "_native", "The native executor.", 0, NULL, NULL, NULL, NULL, NULL};
 
 static const struct { const char *name; int64_t value; } constants[] = {
-    {"FLOAT_MODE_CHANGED", FLOAT_MODE_CHANGED}, {"NOT_FINITE", NOT_FINITE}, {"CONTINUE", CONTINUE},
+    {"INTERFACE", INTERFACE}, {"FLOAT_MODE_CHANGED", FLOAT_MODE_CHANGED}, {"NOT_FINITE", NOT_FINITE}, {"CONTINUE", CONTINUE},
     {"END_AFTER_STEP", END_AFTER_STEP}, {"END_BEFORE_STEP", END_BEFORE_STEP}, {"MARKER_CALL", MARKER_CALL},
     {"MARKER_STEPS", MARKER_STEPS}, {"MARKER_ROWS", MARKER_ROWS}, {"MEASURED_STEPS", MEASURED_STEPS},
 };
