@@ -65,6 +65,7 @@ def _simulate(
     from ...engine.run_loop import simulating
     from ...process.run_files.folder import keeping_run_files, remove_run_files
     from ...results.files import check_writable, remove_files
+    from ...results.result import describe_termination
     from ...scenario.nested_systems import parse_settings
     from .. import messages
 
@@ -82,6 +83,8 @@ def _simulate(
             return supervision.results_written(report_error(run.failure, current_command_line()))
         if not output:
             _print_final_values(run.recording)
+        if run.termination:
+            click.echo(describe_termination("the FMU", run.termination.time), err=True)
         return supervision.results_written(0)
 
 
