@@ -20,6 +20,7 @@ from .process.run_files.folder import write_metadata
 from .results import Kpis, Result
 from .results.checks import CheckOutcome, evaluate_all_checks, evaluate_checks
 from .results.kpi import evaluate_kpis, kpi_senses, kpi_units
+from .results.non_finite import warn_non_finite
 from .scenario import PreparedRun, prepare
 from .scenario.overview import describe_system
 
@@ -137,7 +138,7 @@ def executing(prepared: PreparedRun, observers: Sequence[Observer] = ()) -> Iter
     write_metadata(metadata)
     with simulating(prepared.system, prepared.settings, observers) as outcome:
         timing = {**_add_timings(prepared.timing, outcome.timing), "simulate_seconds": time.perf_counter() - began}
-        result = Result(outcome.recording, timing=timing, metadata={**metadata, **_outcome_metadata(outcome)})
+        result = Result(outcome.recording, timing=timing, metadata={**metadata, **_outcome_metadata(prepared, outcome)})
         yield Execution(result, outcome.failure) if outcome.failure else _evaluate_run(result, prepared)
 
 
@@ -220,12 +221,13 @@ def _run_metadata(prepared: PreparedRun) -> dict[str, Any]:
     }
 
 
-def _outcome_metadata(outcome: SimulationOutcome) -> dict[str, Any]:
-    """Return the metadata that is known after the run: steps, timing, termination, failure."""
+def _outcome_metadata(prepared: PreparedRun, outcome: SimulationOutcome) -> dict[str, Any]:
+    """Return the metadata that is known after the run: steps, timing, signals that are not finite, termination, failure."""
     termination = outcome.termination
     return {
         "macro_steps": outcome.macro_steps,
         "real_time": outcome.real_time,
+        "non_finite": {} if prepared.spec.non_finite == "allow" else warn_non_finite(outcome.recording),
         "terminated_by": {"component": termination.component, "time": termination.time} if termination else None,
         "failure": "interrupted" if isinstance(outcome.failure, KeyboardInterrupt) else _failure_text(outcome.failure),
     }

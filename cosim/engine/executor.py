@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.errors import ComponentError
 from ..process.journal import MARKER_SIZE, ROW_COUNT
-from .finite_check import FiniteCheck
+from .finite_check import FiniteCheck, NonFinitePolicy
 from .initialization import initialize_components
 from .parallel import MEASURED_STEPS, ParallelSteps
 from .plan import Plan
@@ -28,14 +28,14 @@ class Executor(ABC):
         recorder: stores the recorded outputs.
         marker: int64 array, shape (MARKER_SIZE,), updated before every call, so that a process which shares its memory can see
             the current call; see CALL_NUMBER, STEP_COUNT and ROW_COUNT in `process.journal`.
-        require_finite: a connected output that is NaN or infinite ends the run.
+        non_finite: treatment of NaN and infinity, see `FiniteCheck`.
     """
 
-    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None, require_finite: bool = True):
+    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None, non_finite: NonFinitePolicy = "error"):
         self.plan, self.recorder = plan, recorder
         self.marker = np.zeros(MARKER_SIZE, np.int64) if marker is None else marker
         self._runner = StepRunner(self.marker)
-        self._finite_check = FiniteCheck(plan, self._runner.current_time, require_finite)
+        self._finite_check = FiniteCheck(plan, recorder.endpoints, self._runner, non_finite)
         self._delay_lines = {t: DelayLine(t) for phase in plan.all_phases for t in phase.transfers if t.delay}
         self._schedule = Schedule(plan, self._runner, self._delay_lines)
         self._parallel_steps = ParallelSteps(self._runner)
@@ -59,7 +59,7 @@ class Executor(ABC):
         """Bring the components from instantiated to step mode, and record the initial outputs as row 0.
 
         Raises:
-            ComponentError: a component failed, an algebraic loop did not converge, or a connected output is not finite.
+            ComponentError: a component failed, an algebraic loop did not converge, or a checked output is not finite.
         """
         self._runner.current_time.value = self.plan.grid.time_at(0)
         initialize_components(self.plan)
@@ -76,7 +76,7 @@ class Executor(ABC):
         """Run macro steps until communication point `end` is reached or a component requests termination.
 
         Raises:
-            ComponentError: a component failed, or a connected output is not finite.
+            ComponentError: a component failed, or a checked output is not finite.
         """
         try:
             if self._parallel_steps.has_candidates and self.completed_steps < MEASURED_STEPS:

@@ -16,6 +16,7 @@ from ..process import float_mode
 from ..process.journal import CALL_NUMBER, ROW_COUNT, STEP_COUNT
 from .component_step import ScheduledStep
 from .executor import Executor
+from .finite_check import NonFinitePolicy
 from .parallel import MEASURED_STEPS
 from .plan import Phase, Plan
 from .recorder import Recorder
@@ -50,8 +51,8 @@ class _DueSteps:
 class PythonExecutor(Executor):
     """Executor without native code of its own."""
 
-    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None, require_finite: bool = True):
-        super().__init__(plan, recorder, marker, require_finite)
+    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None, non_finite: NonFinitePolicy = "error"):
+        super().__init__(plan, recorder, marker, non_finite)
         self._shortest_durations: dict[int, float] = {}
 
     def _prepare(self) -> None:

@@ -43,6 +43,8 @@ class Recorder:
 
     def __init__(self, plan: Plan, columns: Mapping[str, Endpoint], every: int = 1, file: Path | None = None):
         self._plan, self.every = plan, every
+        #: the recorded outputs
+        self.endpoints = tuple(columns.values())
         #: recorded name -> its variable
         self.variables = {name: plan.system.find_element(endpoint).variable for name, endpoint in columns.items()}
         self._positions = {name: plan.outputs.positions[endpoint] for name, endpoint in columns.items()}

@@ -133,7 +133,7 @@ def _create_executor(system: System, settings: Settings) -> Executor:
     else:
         recorder = Recorder(plan, settings.columns, every, settings.rows_file)
     marker = None if journal is None else np.frombuffer(journal.memory, np.int64, MARKER_SIZE)
-    return executor_class(settings.executor)(plan, recorder, marker, settings.require_finite)
+    return executor_class(settings.executor)(plan, recorder, marker, settings.non_finite)
 
 
 def _run_executor(executor: Executor, settings: Settings, observers: Sequence[Observer], watch: Stopwatch) -> SimulationOutcome:

@@ -71,7 +71,7 @@ class SystemBuilder:
             self._columns(aliases),
             self.spec.record.interval,
             list(self._events()),
-            require_finite=self.spec.non_finite == "error",
+            non_finite=self.spec.non_finite,
         )
         self.problems += [
             self._with_location(problem)
