@@ -169,8 +169,11 @@ def _print_summary(outcome: RunOutcome) -> None:
         click.echo(
             f"values were set {times} while it ran: copy live_events of run.json into the scenario's events to repeat the run"
         )
-    if termination := result.metadata["terminated_by"]:
-        click.echo(f"{termination['component']} requested the end of the simulation at t = {termination['time']:g} s")
+
+
+def _print_termination(outcome: RunOutcome) -> None:
+    if outcome.result.termination:
+        click.echo(outcome.result.termination)
 
 
 def _format_pacing(pacing: Mapping[str, Any]) -> str:
@@ -200,4 +203,4 @@ _COMPLETE_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (
     _print_summary,
 )
 #: outputs of every run, also of one that failed
-_EVERY_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (_write_parquet, _write_mcap)
+_EVERY_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (_print_termination, _write_parquet, _write_mcap)

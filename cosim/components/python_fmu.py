@@ -14,7 +14,7 @@ from pythonfmu.variables import Boolean, Integer, Real, ScalarVariable, String
 from ..core import component_log
 from ..core.component import Component, Ports, Variable
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, describe_exception
-from ..core.units import parse_unit
+from ..core.units import named_unit
 from .object_state import snapshot
 
 _TYPES = {Real: "Float64", Integer: "Int32", Boolean: "Boolean", String: "String"}
@@ -176,7 +176,7 @@ def _to_variable(registered: ScalarVariable) -> Variable:
         causality,
         registered.variability.name if registered.variability else "continuous",
         registered.getter() if causality in ("parameter", "input") else None,
-        parse_unit(unit) if unit else None,
+        named_unit(unit) if unit else None,
         description=registered.description or "",
     )
 

@@ -35,7 +35,7 @@ class Executor(ABC):
         self.plan, self.recorder = plan, recorder
         self.marker = np.zeros(MARKER_SIZE, np.int64) if marker is None else marker
         self._runner = StepRunner(self.marker)
-        self._finite_check = FiniteCheck(plan, self._runner.current_time)
+        self._finite_check = FiniteCheck(plan, self._runner)
         self._delay_lines = {t: DelayLine(t) for phase in plan.all_phases for t in phase.transfers if t.delay}
         self._schedule = Schedule(plan, self._runner, self._delay_lines)
         self._parallel_steps = ParallelSteps(self._runner)
@@ -54,7 +54,7 @@ class Executor(ABC):
         """Bring the components from instantiated to step mode, and record the initial outputs as row 0.
 
         Raises:
-            ComponentError: a component failed, an algebraic loop did not converge, or a connected output is not finite.
+            ComponentError: a component failed, an algebraic loop did not converge, or a checked output is not finite.
         """
         self._runner.current_time.value = self.plan.grid.time_at(0)
         initialize_components(self.plan)
@@ -72,7 +72,7 @@ class Executor(ABC):
         """Run macro steps until communication point `end` is reached or a component requests termination.
 
         Raises:
-            ComponentError: a component failed, or a connected output is not finite.
+            ComponentError: a component failed, or a checked output is not finite.
         """
         try:
             if self._parallel_steps.has_candidates and self.completed_steps < MEASURED_STEPS:

@@ -154,13 +154,18 @@ def _save_after_crash(outcome: SupervisedOutcome) -> None:
     """Write the rows of a child process that crashed, was killed or was interrupted."""
     from ...process.run_files.folder import read_metadata
     from ...results import Result
+    from ...results.non_finite import warn_non_finite
+    from .. import messages
 
     folder = outcome.journal.folder
     if folder is not None:
         failure = "interrupted" if outcome.interrupted else str(outcome.failure)
         metadata = {**read_metadata(folder), "macro_steps": outcome.journal[STEP_COUNT], "failure": failure}
-        result = Result(supervision.recover_outcome_recording(outcome), metadata=metadata)
-        write_partial_result(result, folder.parent, folder.parent)
+        recording = supervision.recover_outcome_recording(outcome)
+        if metadata.get("scenario", {}).get("non_finite") != "allow":
+            messages.print_log()
+            metadata["non_finite"] = warn_non_finite(recording)
+        write_partial_result(Result(recording, metadata=metadata), folder.parent, folder.parent)
 
 
 def _prepare_folder(prepared: PreparedRun, options: RunOptions, folder: Path) -> None:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ...core.component import Component
     from ...core.recording import Recording
     from ...engine.plan import Plan
+    from ...process.supervisor import SupervisedOutcome
 
 FMU_NAME, PROFILE_NAME = "fmu", "profile"
 
@@ -46,7 +47,7 @@ def command(isolation: str, sandbox: str | None, output_file: Path | None, **opt
         return supervision.run_supervised_command(
             lambda: _simulate(unfinished, output, output_file, _isolation(isolation, bool(sandbox)), **options),
             isolation,
-            lambda outcome: _write_recording(supervision.recover_outcome_recording(outcome), output, output_file),
+            lambda outcome: _save_after_crash(outcome, output, output_file),
         )
 
 
@@ -64,6 +65,8 @@ def _simulate(
     from ...engine.run_loop import simulating
     from ...process.run_files.folder import keeping_run_files, remove_run_files
     from ...results.files import check_writable, remove_files
+    from ...results.non_finite import warn_non_finite
+    from ...results.result import describe_termination
     from ...scenario.nested_systems import parse_settings
     from .. import messages
 
@@ -74,6 +77,7 @@ def _simulate(
     if output:
         remove_files(output.parent, output.name)
     with keeping_run_files(folder, output), simulating(plan) as run:
+        warn_non_finite(run.recording)
         if output:
             _write_recording(run.recording, output, shown)
             remove_run_files()
@@ -81,7 +85,20 @@ def _simulate(
             return supervision.results_written(report_error(run.failure, current_command_line()))
         if not output:
             _print_final_values(run.recording)
+        if run.termination:
+            click.echo(describe_termination("the FMU", run.termination.time), err=True)
         return supervision.results_written(0)
+
+
+def _save_after_crash(outcome: SupervisedOutcome, output: Path | None, shown: Path | None) -> None:
+    """Write the rows of a child process that crashed, was killed or was interrupted."""
+    from ...results.non_finite import warn_non_finite
+    from .. import messages
+
+    messages.print_log()
+    recording = supervision.recover_outcome_recording(outcome)
+    warn_non_finite(recording)
+    _write_recording(recording, output, shown)
 
 
 def _write_recording(recording: Recording, output: Path | None, shown: Path | None) -> None:
