@@ -13,6 +13,7 @@ import click
 
 from ...core.errors import CosimError, InputError
 from ...process.journal import STEP_COUNT
+from ...process.output_lock import LOCK_FILE, LockKeeper
 from .. import live, strict_sandbox, supervision
 from ..progress import progress_bar
 from ..run_outputs import RunOptions, RunOutcome, write_outputs, write_partial_result
@@ -74,9 +75,12 @@ def command(isolation: str, sandbox: str | None, view: bool, view_port: int, **o
         live.check_view_options(isolation, sandbox, run_options.late)
     if strict_sandbox.must_rerun(sandbox):
         return strict_sandbox.rerun_in_bubblewrap(*_sandbox_paths(run_options))
-    if view:
-        return live.run_with_view(lambda link: _run_scenario(run_options, link), isolation, _save_after_crash, view_port)
-    return supervision.run_supervised_command(lambda: _run_scenario(run_options), isolation, _save_after_crash)
+    with LockKeeper() as locks:
+        if view:
+            return live.run_with_view(
+                lambda link: _run_scenario(run_options, locks, link), isolation, _save_after_crash, view_port
+            )
+        return supervision.run_supervised_command(lambda: _run_scenario(run_options, locks), isolation, _save_after_crash)
 
 
 def _sandbox_paths(options: RunOptions) -> tuple[list[Path], Path | None]:
@@ -88,8 +92,14 @@ def _sandbox_paths(options: RunOptions) -> tuple[list[Path], Path | None]:
     return loaded.files(), None if loaded.problems else options.output_folder(loaded.spec.name).absolute()
 
 
-def _run_scenario(options: RunOptions, link: Connection | None = None) -> int:
-    """Run the scenario in this process, write its outputs and return the exit code; `link` connects to a live view."""
+def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | None = None) -> int:
+    """Run the scenario in this process, write its outputs and return the exit code.
+
+    Args:
+        options: options of the command.
+        locks: keeper of the lock of the output directory.
+        link: connection to a live view; None: no live view.
+    """
     from ...api import executing
     from ...process.run_files.folder import keeping_run_files
     from .. import messages
@@ -100,7 +110,7 @@ def _run_scenario(options: RunOptions, link: Connection | None = None) -> int:
     prepared = _load(options)
     folder = options.output_folder(prepared.spec.name).absolute()
     try:
-        _prepare_folder(prepared, options, folder)
+        _prepare_folder(prepared, options, locks)
         control = live.create_control(prepared, link) if link else None
     except CosimError:
         prepared.free()  # from here on `executing` frees the components
@@ -146,7 +156,6 @@ def _load(options: RunOptions) -> PreparedRun:
     )
     supervision.set_deadlines(prepared.spec.deadlines)
     messages.log_problems(missing_connections(prepared))
-    _warn_overwriting(options.output_folder(prepared.spec.name), prepared.document.file.resolve())
     return prepared
 
 
@@ -163,13 +172,17 @@ def _save_after_crash(outcome: SupervisedOutcome) -> None:
         write_partial_result(result, folder.parent, folder.parent)
 
 
-def _prepare_folder(prepared: PreparedRun, options: RunOptions, folder: Path) -> None:
-    """Check the figures and that results can be written to `folder`, then remove the results of an earlier run."""
+def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeeper) -> None:
+    """Check the figures and that results can be written, lock the output directory, and remove results of an earlier run."""
     from ...results.files import check_writable, remove_files
 
     if not options.no_report and (problems := prepared.figure_problems()):
         raise InputError(problems)
+    shown = options.output_folder(prepared.spec.name)
+    folder = shown.absolute()
     check_writable(folder)
+    locks.lock(folder / LOCK_FILE, shown)
+    _warn_overwriting(shown, prepared.document.file.resolve())
     figures = (f"{figure.name}{suffix}" for figure in prepared.spec.figures for suffix in (".png", ".svg", ".csv"))
     remove_files(folder, *RESULT_FILES, *figures)
 

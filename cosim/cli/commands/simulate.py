@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ...process.output_lock import LOCK_FILE, LockKeeper
 from ...process.temporary_folders import temporary_run_folder
 from .. import current_command_line, report_error, strict_sandbox, supervision
 
@@ -42,16 +43,17 @@ def command(isolation: str, sandbox: str | None, output_file: Path | None, **opt
         return strict_sandbox.rerun_in_bubblewrap(
             [path for path in (options["fmu"], options["input_file"]) if path], output and output.parent
         )
-    with temporary_run_folder() as folder:
+    with temporary_run_folder() as folder, LockKeeper() as locks:
         unfinished = output.with_name(f".{output.name}.unfinished") if output else Path(folder) / "run"
         return supervision.run_supervised_command(
-            lambda: _simulate(unfinished, output, output_file, _isolation(isolation, bool(sandbox)), **options),
+            lambda: _simulate(locks, unfinished, output, output_file, _isolation(isolation, bool(sandbox)), **options),
             isolation,
             lambda outcome: _write_recording(supervision.recover_outcome_recording(outcome), output, output_file),
         )
 
 
 def _simulate(
+    locks: LockKeeper,
     folder: Path,
     output: Path | None,
     shown: Path | None,
@@ -72,7 +74,8 @@ def _simulate(
     if output:
         check_writable(output.parent)
     system, settings = _build_system(fmu, fmu_isolation, stop_time, step_size, parse_settings(start_values), input_file)
-    if output:
+    if output and shown:
+        locks.lock(output.with_name(f".{output.name}{LOCK_FILE}"), shown)
         remove_files(output.parent, output.name)
     with keeping_run_files(folder, output), simulating(system, settings) as run:
         if output:
