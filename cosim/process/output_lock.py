@@ -1,4 +1,4 @@
-"""Locks of outputs, so that two commands never write the same results at once.
+"""Locks of outputs and of the cache, so that two processes never write the same file at once.
 
 The operating system releases a lock when the processes that hold it have ended, even if they were killed. A lock file that a
 killed process left behind locks nothing.
@@ -10,7 +10,8 @@ import json
 import os
 import socket
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 
@@ -97,12 +98,34 @@ def acquire_lock(path: Path, output: Path, process: int | None = None) -> Output
     return lock
 
 
-def _open_locked(path: Path) -> int:
+@contextmanager
+def waiting_for_lock(path: Path) -> Iterator[None]:
+    """Hold a lock file during the block, after waiting until no other process holds it.
+
+    Args:
+        path: The lock file; missing folders are created, and the file is left there.
+
+    Raises:
+        InputError: The file cannot be written.
+        OutputError: The disk is full or defective.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        descriptor = _open_locked(path, wait=True)
+    except OSError as error:
+        raise write_error(f'cannot write to "{path.parent}": {error.strerror}', error) from None
+    try:
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _open_locked(path: Path, wait: bool = False) -> int:
     """Open and lock a file that exists: its former holder may remove it between opening and locking."""
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
         try:
-            _lock_if_possible(descriptor)
+            _lock_if_possible(descriptor, wait)
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(descriptor), path.stat()):
                     return descriptor
@@ -112,12 +135,12 @@ def _open_locked(path: Path) -> int:
         os.close(descriptor)
 
 
-def _lock_if_possible(descriptor: int) -> None:
+def _lock_if_possible(descriptor: int, wait: bool) -> None:
     try:
-        lock_descriptor(descriptor)
+        lock_descriptor(descriptor, wait)
     except BlockingIOError:
         raise
-    except OSError:  # without locks, results are written as if the output were not in use
+    except OSError:  # without locks, files are written as if no other process did
         return
 
 

@@ -6,10 +6,10 @@ import glob
 import json
 import math
 import mmap
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from secrets import token_hex
 from tempfile import TemporaryFile
 from typing import Any
 
@@ -59,7 +59,7 @@ def writing_atomically(path: str | Path) -> Iterator[Path]:
         OutputError: The disk is full or defective.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}{_PART_SUFFIX}")
+    temporary = path.with_name(f".{path.name}.{token_hex(8)}{_PART_SUFFIX}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield temporary
