@@ -9,6 +9,7 @@ from math import inf
 from pathlib import Path
 
 from ..core.component import Variable
+from ..core.csv_text import BYTES_PER_NUMBER
 from ..core.errors import Problem
 from ..core.system import Endpoint, System
 from ..core.time_grid import TimeGrid
@@ -16,7 +17,7 @@ from ..process.journal import current_journal
 from .settings import Event, Settings
 
 #: bytes of a recorded number in the rows and in the CSV file, approximately
-_BYTES_PER_VALUE = 8 + 20
+_BYTES_PER_VALUE = 8 + BYTES_PER_NUMBER
 #: size of the recording (bytes) from which the free disk space is checked
 _SIZE_CHECK_THRESHOLD = 1_000_000_000
 

@@ -13,10 +13,11 @@ import click
 
 from ...core.errors import CosimError, InputError
 from ...process.journal import STEP_COUNT
-from ...process.output_lock import LOCK_FILE, LockKeeper
+from ...process.output_lock import LockKeeper
 from .. import live, strict_sandbox, supervision
 from ..progress import progress_bar
 from ..run_outputs import RunOptions, RunOutcome, write_outputs, write_partial_result
+from ..unfinished_runs import OutputFiles
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
     from ...engine.run_loop import Observer
     from ...process.supervisor import SupervisedOutcome
     from ...scenario import PreparedRun
-
-#: folder of an unfinished run, inside its output directory
-UNFINISHED_FOLDER = ".unfinished"
 
 RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run.json", "report.html", "replay.html")
 
@@ -116,7 +114,7 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
         prepared.free()  # from here on `executing` frees the components
         raise
     with (
-        keeping_run_files(folder / UNFINISHED_FOLDER, folder / "result.csv"),
+        keeping_run_files(OutputFiles.of_folder(folder).unfinished, folder / "result.csv"),
         _progress_observers(prepared) as observers,
         executing(live.with_control(prepared, control), observers) as execution,
     ):
@@ -169,7 +167,7 @@ def _save_after_crash(outcome: SupervisedOutcome) -> None:
         failure = "interrupted" if outcome.interrupted else str(outcome.failure)
         metadata = {**read_metadata(folder), "macro_steps": outcome.journal[STEP_COUNT], "failure": failure}
         result = Result(supervision.recover_outcome_recording(outcome), metadata=metadata)
-        write_partial_result(result, folder.parent, folder.parent)
+        write_partial_result(result, folder.parent, folder.parent, folder)
 
 
 def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeeper) -> None:
@@ -181,7 +179,7 @@ def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeepe
     shown = options.output_folder(prepared.spec.name)
     folder = shown.absolute()
     check_writable(folder)
-    locks.lock(folder / LOCK_FILE, shown)
+    locks.lock(OutputFiles.of_folder(folder).lock, shown)
     _warn_overwriting(shown, prepared.document.file.resolve())
     figures = (f"{figure.name}{suffix}" for figure in prepared.spec.figures for suffix in (".png", ".svg", ".csv"))
     remove_files(folder, *RESULT_FILES, *figures)

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...process.output_lock import LOCK_FILE, LockKeeper
+from ...process.output_lock import LockKeeper
 from ...process.temporary_folders import temporary_run_folder
 from .. import current_command_line, report_error, strict_sandbox, supervision
+from ..unfinished_runs import OutputFiles, writing_results
 
 if TYPE_CHECKING:
     from ...components.fmi import Isolation
@@ -44,11 +45,13 @@ def command(isolation: str, sandbox: str | None, output_file: Path | None, **opt
             [path for path in (options["fmu"], options["input_file"]) if path], output and output.parent
         )
     with temporary_run_folder() as folder, LockKeeper() as locks:
-        unfinished = output.with_name(f".{output.name}.unfinished") if output else Path(folder) / "run"
+        unfinished = OutputFiles.of_file(output).unfinished if output else Path(folder) / "run"
         return supervision.run_supervised_command(
             lambda: _simulate(locks, unfinished, output, output_file, _isolation(isolation, bool(sandbox)), **options),
             isolation,
-            lambda outcome: _write_recording(supervision.recover_outcome_recording(outcome), output, output_file),
+            lambda outcome: _write_recording(
+                supervision.recover_outcome_recording(outcome), output, output_file, outcome.journal.folder
+            ),
         )
 
 
@@ -65,7 +68,7 @@ def _simulate(
     input_file: Path | None,
 ) -> int:
     from ...engine.run_loop import simulating
-    from ...process.run_files.folder import keeping_run_files, remove_run_files
+    from ...process.run_files.folder import keeping_run_files, remove_run_files, run_folder
     from ...results.files import check_writable, remove_files
     from ...scenario.nested_systems import parse_settings
     from .. import messages
@@ -75,11 +78,11 @@ def _simulate(
         check_writable(output.parent)
     system, settings = _build_system(fmu, fmu_isolation, stop_time, step_size, parse_settings(start_values), input_file)
     if output and shown:
-        locks.lock(output.with_name(f".{output.name}{LOCK_FILE}"), shown)
+        locks.lock(OutputFiles.of_file(output).lock, shown)
         remove_files(output.parent, output.name)
     with keeping_run_files(folder, output), simulating(system, settings) as run:
         if output:
-            _write_recording(run.recording, output, shown)
+            _write_recording(run.recording, output, shown, run_folder())
             remove_run_files()
         if run.failure:
             return supervision.results_written(report_error(run.failure, current_command_line()))
@@ -88,11 +91,13 @@ def _simulate(
         return supervision.results_written(0)
 
 
-def _write_recording(recording: Recording, output: Path | None, shown: Path | None) -> None:
-    from ...results.csv_files import write_csv
+def _write_recording(recording: Recording, output: Path | None, shown: Path | None, unfinished: Path | None) -> None:
+    from ...results import Result
 
-    if output and len(recording.time):
-        write_csv(recording, output)
+    if output and shown and len(recording.time):
+        result = Result(recording)
+        with writing_results(result, unfinished, shown):
+            result.to_csv(output)
         click.echo(f"{len(recording.time)} rows in {shown}")
 
 
