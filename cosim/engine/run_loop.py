@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..core import component_log
 from ..core.component import Component
-from ..core.errors import ComponentError, InputError, join_alternatives
+from ..core.errors import ComponentError, InputError, Problem, join_alternatives
 from ..core.recording import Recording
 from ..core.stopwatch import Stopwatch
 from ..core.system import System
@@ -23,7 +25,7 @@ from ..process.process_state import restoring_process_state
 from . import Executor, Recorder, Termination, compile_plan, executor_class
 from .initialization import instantiate_components
 from .pacer import Pacer
-from .run_checks import find_problems
+from .run_checks import find_problems, find_space_problems
 from .saving_recorder import SavingRecorder, write_header
 from .settings import Event, Settings, StepHook
 
@@ -107,7 +109,7 @@ def simulating(system: System, settings: Settings, observers: Sequence[Observer]
             stack.callback(_free_component, name, component)
         watch = Stopwatch()
         with watch.measure("wiring_seconds"):
-            if problems := find_problems(system, settings):
+            if problems := find_problems(system, settings) or _space_problems(settings):
                 raise InputError(problems)
             executor = _create_executor(system, settings)
         outcome = _run_executor(executor, settings, observers, watch)
@@ -116,6 +118,12 @@ def simulating(system: System, settings: Settings, observers: Sequence[Observer]
             for name, component in system.components.items():
                 with calling_component(name, "terminate", "end"):
                     component.terminate()
+
+
+def _space_problems(settings: Settings) -> list[Problem]:
+    journal = current_journal()
+    rows = (journal and journal.folder) or (settings.rows_file and settings.rows_file.parent)
+    return find_space_problems(settings, rows or Path(tempfile.gettempdir()), csv=bool(journal and journal.csv_path))
 
 
 def _free_component(name: str, component: Component) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...core.errors import CosimError, InputError
+from ...core.errors import CosimError, InputError, Problem
 from ...process.journal import STEP_COUNT
 from ...process.output_lock import LockKeeper
 from .. import live, strict_sandbox, supervision
@@ -172,6 +172,7 @@ def _save_after_crash(outcome: SupervisedOutcome) -> None:
 
 def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeeper) -> None:
     """Check the figures and that results can be written, lock the output directory, and remove results of an earlier run."""
+    from ...engine.run_checks import find_space_problems
     from ...results.files import check_writable, remove_files
 
     if not options.no_report and (problems := prepared.figure_problems()):
@@ -181,6 +182,9 @@ def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeepe
     check_writable(folder)
     locks.lock(OutputFiles.of_folder(folder).lock, shown)
     _warn_overwriting(shown, prepared.document.file.resolve())
+    replaced = sum((folder / name).stat().st_size for name in RESULT_FILES if (folder / name).is_file())
+    if problems := find_space_problems(prepared.settings, folder, csv=True, replaced=replaced):
+        raise InputError([Problem(problem.message, prepared.root.where(*problem.subject)) for problem in problems])
     figures = (f"{figure.name}{suffix}" for figure in prepared.spec.figures for suffix in (".png", ".svg", ".csv"))
     remove_files(folder, *RESULT_FILES, *figures)
 

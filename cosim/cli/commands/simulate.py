@@ -67,6 +67,8 @@ def _simulate(
     start_values: tuple[str, ...],
     input_file: Path | None,
 ) -> int:
+    from ...core.errors import InputError
+    from ...engine.run_checks import find_space_problems
     from ...engine.run_loop import simulating
     from ...process.run_files.folder import keeping_run_files, remove_run_files, run_folder
     from ...results.files import check_writable, remove_files
@@ -79,6 +81,9 @@ def _simulate(
     system, settings = _build_system(fmu, fmu_isolation, stop_time, step_size, parse_settings(start_values), input_file)
     if output and shown:
         locks.lock(OutputFiles.of_file(output).lock, shown)
+        replaced = output.stat().st_size if output.is_file() else 0
+        if problems := find_space_problems(settings, output.parent, csv=True, replaced=replaced):
+            raise InputError(problems)
         remove_files(output.parent, output.name)
     with keeping_run_files(folder, output), simulating(system, settings) as run:
         if output:

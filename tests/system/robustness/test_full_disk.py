@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -209,6 +210,40 @@ def test_nothing_to_recover(workplace, output):
     assert done.returncode == 2
     assert done.stderr == f'no rows were kept for "{output}"; expected an output directory or an output file\n'
     assert workplace.leftovers() == []
+
+
+#: rows for about 1.1 GB
+MANY = {"stop": 200_000, "arguments": {"pause": 0, "fail_at": 10}, "record": {"signals": ["ticker.count"]}}
+
+
+@pytest.mark.parametrize("command", ["run", "run --isolation none"])
+def test_a_small_temporary_folder_does_not_limit_the_rows_in_the_output_directory(tmp_path, command):
+    workplace = CommandFolder(tmp_path / "work")
+    workplace.scenario(**MANY)
+    done = on_small_disk(workplace, "20m", f"TMPDIR=$PWD/out $COSIM {command} robust.json --output-dir big --no-report; code=$?")
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.startswith("10 rows until t = 0.09 s kept in big\n")
+
+
+def test_a_recording_larger_than_the_output_directory_is_refused_before_results_are_removed(tmp_path):
+    workplace = CommandFolder(tmp_path / "work")
+    workplace.scenario(**MANY)
+    run = "$COSIM run robust.json --output-dir out --no-report"
+    done = on_small_disk(workplace, "20m", f"{run} --stop-time 0.05 >&2", f"{run}; code=$?")
+    assert done.returncode == 2, done.stderr
+    where = re.escape(str(workplace.folder / "out"))
+    text = f"robust.json:1:.* 20000001 rows of 1 signal take about 1.12 GB, 0.0.* GB are free in {where}; make the step longer.*"
+    assert re.fullmatch(text, done.stderr.splitlines()[-1])
+    assert kept(workplace) == 6
+
+
+def test_one_fmu_alone_is_refused_before_its_former_result_is_removed(tmp_path):
+    workplace = CommandFolder(tmp_path / "work")
+    simulate = f"$COSIM simulate {FMU} --step-size 0.01 --output-file out/x.csv"
+    done = on_small_disk(workplace, "20m", f"{simulate} --stop-time 1", f"{simulate} --stop-time 100000; code=$?")
+    assert done.returncode == 2, done.stderr
+    assert "GB are free in" in done.stderr
+    assert len(cosim.Result.from_csv(workplace.out / "x.csv").time) == 101
 
 
 def without_privileges() -> None:
