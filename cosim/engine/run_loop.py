@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..core import component_log
 from ..core.component import Component
-from ..core.errors import ComponentError, join_alternatives
+from ..core.errors import ComponentError, InputError, Problem, join_alternatives
 from ..core.recording import Recording
 from ..core.stopwatch import Stopwatch
 from ..core.system import System
@@ -21,6 +23,7 @@ from ..process.process_state import restoring_process_state
 from . import Executor, Plan, Recorder, Termination, compile_plan, executor_class
 from .initialization import instantiate_components
 from .pacer import Pacer
+from .run_checks import find_space_problems
 from .saving_recorder import SavingRecorder
 from .settings import Event, Settings
 
@@ -107,11 +110,14 @@ def simulating(plan: Plan, observers: Sequence[Observer] = (), step_hook: StepHo
         The outcome, after the last step.
 
     Raises:
+        InputError: the recorded rows are larger than the free disk space.
         ComponentError: a component failed in terminate or free.
     """
     components = plan.system.components
     with default_float_mode(), ExitStack() as stack:
         stack.callback(free_components, components)
+        if problems := _space_problems(plan.settings):
+            raise InputError(problems)
         executor = _create_executor(plan)
         outcome = _run(executor, observers, step_hook)
         yield outcome
@@ -131,6 +137,12 @@ def free_components(components: Mapping[str, Component]) -> None:
         for name, component in components.items():
             stack.enter_context(calling_component(name, "free", "end"))
             stack.callback(component.free)
+
+
+def _space_problems(settings: Settings) -> list[Problem]:
+    journal = current_journal()
+    rows = (journal and journal.folder) or (settings.rows_file and settings.rows_file.parent)
+    return find_space_problems(settings, rows or Path(tempfile.gettempdir()), csv=bool(journal and journal.csv_path))
 
 
 def _create_executor(plan: Plan) -> Executor:
