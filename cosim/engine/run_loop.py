@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -102,20 +102,30 @@ def simulating(system: System, settings: Settings, observers: Sequence[Observer]
         InputError: the system cannot be simulated with these settings.
         ComponentError: a component failed in terminate or free.
     """
-    with default_float_mode(), ExitStack() as stack:
-        for name, component in system.components.items():
+    completed = False
+    with default_float_mode():
+        try:
+            watch = Stopwatch()
+            with watch.measure("wiring_seconds"):
+                if problems := find_problems(system, settings):
+                    raise InputError(problems)
+                executor = _create_executor(system, settings)
+            outcome = _run_executor(executor, settings, observers, watch)
+            yield outcome
+            completed = outcome.failure is None
+        finally:
+            with restoring_process_state(join_alternatives(system.components)):
+                _end_components(system.components, terminate=completed)
+
+
+def _end_components(components: Mapping[str, Component], terminate: bool) -> None:
+    """Free all components, even if freeing one of them fails; call their `terminate` before if asked for."""
+    with ExitStack() as stack:
+        for name, component in components.items():
             stack.callback(_free_component, name, component)
-        watch = Stopwatch()
-        with watch.measure("wiring_seconds"):
-            if problems := find_problems(system, settings):
-                raise InputError(problems)
-            executor = _create_executor(system, settings)
-        outcome = _run_executor(executor, settings, observers, watch)
-        yield outcome
-        if outcome.failure is None:
-            for name, component in system.components.items():
-                with calling_component(name, "terminate", "end"):
-                    component.terminate()
+        for name, component in components.items() if terminate else ():
+            with calling_component(name, "terminate", "end"):
+                component.terminate()
 
 
 def _free_component(name: str, component: Component) -> None:
@@ -142,17 +152,20 @@ def _run_executor(executor: Executor, settings: Settings, observers: Sequence[Ob
     for event in settings.events:
         events[grid.index(event.time)].append(event)
     pacer = Pacer(grid, settings.real_time, settings.late) if settings.real_time else None
+    components = executor.plan.system.components
+    names, runs_foreign_code = join_alternatives(components), any(c.runs_foreign_code for c in components.values())
     failure = None
     try:
-        with watch.measure("instantiate_seconds"):
-            instantiate_components(executor.plan)
-        with watch.measure("initialize_seconds"):
-            executor.initialize()
+        with restoring_process_state(names):
+            with watch.measure("instantiate_seconds"):
+                instantiate_components(executor.plan)
+            with watch.measure("initialize_seconds"):
+                executor.initialize()
         if journal and journal.folder:
             write_header(journal.folder, executor)
         if journal:
             journal.enter_phase(Phase.STEPPING, journal.deadlines.step)
-        with restoring_process_state(join_alternatives(executor.plan.system.components)), watch.measure("loop_seconds"):
+        with restoring_process_state(names) if runs_foreign_code else nullcontext(), watch.measure("loop_seconds"):
             _step_to_end(executor, events, observers, pacer, settings.step_hook)
     except (Exception, KeyboardInterrupt) as error:
         failure = error

@@ -19,6 +19,7 @@ from ..core.system import System
 from ..engine.settings import Settings
 from ..process.float_mode import default_float_mode
 from ..process.journal import as_component_error
+from ..process.process_state import exclusive_process_state
 from .component_factory import ComponentFactory
 from .json_document import Document
 from .named_functions import load_function, signal_problems
@@ -103,6 +104,7 @@ class PreparedRun:
 
 
 @default_float_mode()
+@exclusive_process_state()
 def prepare(
     scenario: str | Path,
     settings: Mapping[str, Any] | None = None,
