@@ -41,6 +41,11 @@ def run(
 ) -> Result:
     """Run a scenario in this process and evaluate its KPIs and checks.
 
+    Runs in several threads of one process are safe, also in an event loop (`asyncio.to_thread(cosim.run, ...)`) and after a fork.
+    They load and step in turns, because FMUs may change the state of the whole process. This state (working directory,
+    environment, locale and others) is restored after each turn. So an observer must not wait for a run of another thread. Runs
+    whose components are all isolated FMUs step at the same time.
+
     Args:
         scenario: Path of a scenario file, or the name of a shipped scenario.
         parameters: Values that replace those of the file, see `load`.
