@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import site
 import sys
+from functools import cache
 from pathlib import Path
 
 from ...core.errors import InputError
@@ -59,6 +60,7 @@ def _folders_of_packages(installed: list[str]) -> list[Path]:
     return folders
 
 
+@cache
 def _first_file_of_no_package(folder: Path) -> Path | None:
     """Return a file or unreadable folder in a folder that belongs to no Python package; None if there is none."""
     try:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
-import platform
 import sys
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -88,7 +87,7 @@ class Condition(NamedTuple):
 
 def is_available() -> bool:
     """Return whether this system supports the filter, and the filter this processor."""
-    if sys.platform != "linux" or platform.machine() not in _ARCHITECTURES:
+    if sys.platform != "linux" or os.uname().machine not in _ARCHITECTURES:
         return False
     # a filter at no address is refused with EFAULT where filters are supported
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_SECCOMP, _SECCOMP_MODE_FILTER, None, 0, 0)
@@ -103,7 +102,7 @@ def enter_filter() -> None:
     Raises:
         OSError: The kernel refused the filter.
     """
-    program = b"".join(_encode(instruction) for instruction in filter_program(platform.machine(), os.getpid()))
+    program = b"".join(_encode(instruction) for instruction in filter_program(os.uname().machine, os.getpid()))
     instructions = ctypes.create_string_buffer(program, len(program))
     header = _Program(len(program) // 8, ctypes.addressof(instructions))
     library = ctypes.CDLL(None, use_errno=True)
