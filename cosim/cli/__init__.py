@@ -13,7 +13,7 @@ import click
 
 from ..core.errors import CosimError
 from ..core.version import __version__
-from ..process.standard_streams import ignoring_broken_pipe
+from ..process.standard_streams import protected_stream
 
 #: module in `commands` and description of each command
 COMMANDS = {
@@ -86,7 +86,7 @@ def main(arguments: list[str] | None = None) -> None:
     Args:
         arguments: words after the program's name; default: those of this process.
     """
-    sys.stdout, sys.stderr = ignoring_broken_pipe(sys.stdout), ignoring_broken_pipe(sys.stderr)
+    sys.stdout, sys.stderr = protected_stream(sys.stdout), protected_stream(sys.stderr)
     sys.exit(_run_command_line(sys.argv[1:] if arguments is None else arguments))
 
 

@@ -15,6 +15,7 @@ from ...core.errors import CosimError, InputError, Problem
 from ...process.journal import STEP_COUNT
 from ...process.output_lock import LockKeeper
 from .. import live, strict_sandbox, supervision
+from ..csv_options import csv_options
 from ..progress import progress_bar
 from ..run_outputs import RunOptions, RunOutcome, write_outputs, write_partial_result
 from ..unfinished_runs import OutputFiles
@@ -59,6 +60,7 @@ RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run
 @click.option("--parquet", is_flag=True, help="Also write result.parquet (extra `parquet`).")
 @click.option("--mcap", is_flag=True, help="Also write result.mcap, for Foxglove and ROS 2 (extra `mcap`).")
 @click.option("--no-report", is_flag=True, help="Write neither figures nor report.html.")
+@csv_options
 @live.view_options
 @supervision.supervision_options
 def command(isolation: str, sandbox: str | None, view: bool, view_port: int, **options: Any) -> int:

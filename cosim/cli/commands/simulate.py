@@ -11,6 +11,8 @@ import click
 from ...process.output_lock import LockKeeper
 from ...process.temporary_folders import temporary_run_folder
 from .. import current_command_line, report_error, strict_sandbox, supervision
+from ..csv_options import csv_options
+from ..messages import print_line
 from ..unfinished_runs import OutputFiles, writing_results
 
 if TYPE_CHECKING:
@@ -36,6 +38,7 @@ FMU_NAME, PROFILE_NAME = "fmu", "profile"
 @click.option(
     "--input-file", type=click.Path(path_type=Path), help='CSV file with the column "time" and columns named like inputs.'
 )
+@csv_options
 @supervision.supervision_options
 def command(isolation: str, sandbox: str | None, output_file: Path | None, **options: Any) -> int:
     """Simulate a single FMU (FMI 2.0 or 3.0 Co-Simulation) from its default start time."""
@@ -123,7 +126,7 @@ def _write_recording(recording: Recording, output: Path | None, shown: Path | No
 def _print_final_values(recording: Recording) -> None:
     click.echo(f"time = {recording.time.tolist()[-1]!r} s")
     for name, values in recording.columns.items():
-        click.echo(f"{name} = {values.tolist()[-1]!r} {recording.units[name]}".rstrip())
+        print_line(f"{name} = {values.tolist()[-1]!r} {recording.units[name]}".rstrip())
 
 
 def _isolation(isolation: str, sandbox: bool) -> Isolation | None:
