@@ -27,7 +27,8 @@ from pathlib import Path
 from typing import Literal
 
 from ...core.errors import InputError
-from . import landlock, limits
+from .. import limits
+from . import landlock
 from .bubblewrap import bubblewrap_command, find_bubblewrap
 from .folders import interpreter_folders
 from .status import ActiveRestrictions, AvailableSandboxes, find_available_sandboxes, probe_restrictions

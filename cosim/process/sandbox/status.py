@@ -8,7 +8,8 @@ import resource
 import socket
 from dataclasses import dataclass
 
-from . import landlock, limits
+from .. import limits
+from . import landlock
 from .bubblewrap import find_bubblewrap
 
 #: port 9 (discard), which is normally closed: a permitted connection is refused at once
