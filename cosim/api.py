@@ -15,6 +15,7 @@ from .engine.run_loop import Observer, SimulationOutcome, StepHook, simulating
 from .results import Kpis, Result
 from .results.checks import CheckOutcome, evaluate_all_checks, evaluate_checks
 from .results.kpi import evaluate_kpis, kpi_senses, kpi_units
+from .results.non_finite import warn_non_finite
 from .scenario import IsolationMode, PreparedRun, load
 
 __all__ = ["Execution", "evaluate_scenario_checks", "execute", "executing", "load", "run"]
@@ -39,6 +40,11 @@ def run(
     **options: Unpack[LoadOptions],
 ) -> Result:
     """Run a scenario in this process and evaluate its KPIs and checks.
+
+    Runs in several threads of one process are safe, also in an event loop (`asyncio.to_thread(cosim.run, ...)`) and after a fork.
+    They load and step in turns, because FMUs may change the state of the whole process. This state (working directory,
+    environment, locale and others) is restored after each turn. So an observer must not wait for a run of another thread. Runs
+    whose components are all isolated FMUs step at the same time.
 
     Args:
         scenario: Path of a scenario file, or the name of a shipped scenario.
@@ -91,7 +97,8 @@ def executing(
     began = time.perf_counter()
     with simulating(prepared.plan, observers, step_hook) as outcome:
         timing = {**_add_timings(prepared.timing, outcome.timing), "simulate_seconds": time.perf_counter() - began}
-        result = Result(outcome.recording, timing=timing, metadata={**prepared.metadata, **_outcome_metadata(outcome)})
+        metadata = {**prepared.metadata, **_outcome_metadata(prepared, outcome)}
+        result = Result(outcome.recording, timing=timing, metadata=metadata)
         yield Execution(result, outcome.failure) if outcome.failure else _evaluate_run(result, prepared)
 
 
@@ -161,12 +168,13 @@ def _adding_location(prepared: PreparedRun, *path: str | int) -> Iterator[None]:
         raise InputError([Problem(str(problem), prepared.root.where(*path)) for problem in error.problems]) from error
 
 
-def _outcome_metadata(outcome: SimulationOutcome) -> dict[str, Any]:
-    """Return the metadata that is known after the run: steps, timing, termination, failure."""
+def _outcome_metadata(prepared: PreparedRun, outcome: SimulationOutcome) -> dict[str, Any]:
+    """Return the metadata that is known after the run: steps, timing, signals that are not finite, termination, failure."""
     termination = outcome.termination
     return {
         "macro_steps": outcome.macro_steps,
         "real_time": outcome.real_time,
+        "non_finite": {} if prepared.spec.non_finite == "allow" else warn_non_finite(outcome.recording),
         "terminated_by": {"component": termination.component, "time": termination.time} if termination else None,
         "failure": "interrupted" if isinstance(outcome.failure, KeyboardInterrupt) else _failure_text(outcome.failure),
     }

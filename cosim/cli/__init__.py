@@ -20,6 +20,7 @@ from ..process.standard_streams import ignoring_broken_pipe
 COMMANDS = {
     "run": ("run", "Run a scenario and write results, figures and a report."),
     "check": ("check", "Check a scenario without running it and print the expanded system."),
+    "recover": ("recover", "Write the results of a run that could not be written when it ended."),
     "simulate": ("simulate", "Simulate a single FMU."),
     "compare": ("compare", "Compare a result with a reference, signal by signal."),
     "regress": ("regress", "Run all scenarios that have checks or a reference, and compare their results with these."),

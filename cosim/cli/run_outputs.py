@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from ..core.errors import CosimError, OutputError
 from . import current_command_line, report_error
+from .unfinished_runs import writing_results
 
 if TYPE_CHECKING:
     from ..api import Execution
@@ -101,29 +103,36 @@ def write_outputs(outcome: RunOutcome) -> int:
     return code
 
 
-def write_partial_result(partial: Result, folder: Path, shown_folder: Path) -> None:
-    """Write the rows recorded before a failure, if there are any."""
+def write_partial_result(partial: Result, folder: Path, shown_folder: Path, unfinished: Path | None) -> None:
+    """Write the rows recorded before a failure, if there are any; see `writing_results`."""
     from ..results.result import write_run
 
     if len(partial.time):
-        write_run(partial, folder)
+        with writing_results(partial, unfinished, shown_folder):
+            write_run(partial, folder)
         click.echo(f"{len(partial.time)} rows until t = {partial.time[-1]:g} s kept in {shown_folder}", err=True)
 
 
 def _report_failed_run(outcome: RunOutcome, failure: BaseException) -> int:
-    from ..process.run_files.folder import remove_run_files
+    from ..process.run_files.folder import remove_run_files, run_folder
 
-    write_partial_result(outcome.result, outcome.folder, outcome.shown_folder)
-    remove_run_files()
+    try:
+        write_partial_result(outcome.result, outcome.folder, outcome.shown_folder, run_folder())
+        remove_run_files()
+    except CosimError as error:
+        if isinstance(failure, OSError | OutputError):  # most likely the same cause
+            raise
+        report_error(error, current_command_line())
     return report_error(failure, current_command_line())
 
 
 def _write_result_files(outcome: RunOutcome) -> None:
     """Write result.csv, kpis.json and run.json in place of the files of the unfinished run."""
-    from ..process.run_files.folder import remove_run_files
+    from ..process.run_files.folder import remove_run_files, run_folder
     from ..results.result import write_run
 
-    write_run(outcome.result, outcome.folder)
+    with writing_results(outcome.result, run_folder(), outcome.shown_folder):
+        write_run(outcome.result, outcome.folder)
     remove_run_files()
     outcome.files.extend(("result.csv", "kpis.json", "run.json"))
 
@@ -169,8 +178,11 @@ def _print_summary(outcome: RunOutcome) -> None:
         click.echo(
             f"values were set {times} while it ran: copy live_events of run.json into the scenario's events to repeat the run"
         )
-    if termination := result.metadata["terminated_by"]:
-        click.echo(f"{termination['component']} requested the end of the simulation at t = {termination['time']:g} s")
+
+
+def _print_termination(outcome: RunOutcome) -> None:
+    if outcome.result.termination:
+        click.echo(outcome.result.termination)
 
 
 def _format_pacing(pacing: Mapping[str, Any]) -> str:
@@ -200,4 +212,4 @@ _COMPLETE_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (
     _print_summary,
 )
 #: outputs of every run, also of one that failed
-_EVERY_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (_write_parquet, _write_mcap)
+_EVERY_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (_print_termination, _write_parquet, _write_mcap)

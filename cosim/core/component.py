@@ -177,12 +177,14 @@ class Component(Protocol):
         binds_everything: `bind` gets all inputs and outputs, not only those that are connected or recorded.
         shared_code: Components with an equal value other than None never step at the same time, because their common code may
             have static variables.
+        runs_foreign_code: Code that is not cosim's runs in this process, where it may change the state of the process.
         has_state: `get_state` and `set_state` are supported (FMI: canGetAndSetFMUState).
     """
 
     variables: Sequence[Variable]
     binds_everything: bool
     shared_code: object = None
+    runs_foreign_code: bool = True
     has_state: bool
 
     def set(self, name: str, value: Any) -> None:

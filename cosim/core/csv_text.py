@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+#: size of a number in a CSV file (bytes), approximately
+BYTES_PER_NUMBER = 20
+
 
 def quote_cell(text: object) -> str:
     """Return a text as a quoted cell."""

@@ -11,6 +11,7 @@ CosimError
 from __future__ import annotations
 
 import difflib
+import errno
 import traceback
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -20,6 +21,8 @@ from typing import Any
 
 #: exceptions that are not a failure of the foreign code they pass through; all others are, even if not derived from Exception
 PASS_THROUGH_EXCEPTIONS = (KeyboardInterrupt, GeneratorExit)
+#: errors of the disk, not of the path
+_DISK_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 #: maximum number of characters shown of an exception's text
 _MAX_TEXT_LENGTH = 2000
 
@@ -114,6 +117,11 @@ class CheckError(CosimError):
     """Violation of a check, a reference or a manifest."""
 
     exit_code = 3
+
+
+def write_error(text: str, error: OSError) -> CosimError:
+    """Return the error for a file that cannot be written: OutputError if the disk is full or defective, else InputError."""
+    return OutputError(text) if error.errno in _DISK_ERRORS else InputError(text)
 
 
 def describe_exception(error: BaseException) -> str:

@@ -16,6 +16,7 @@ def executor_class(kind: ExecutorKind) -> type[Executor]:
 
     Raises:
         ValueError: the native executor is required but was not built.
+        InputError: the native executor was built from other sources.
     """
     if kind == "native" and not native_available():
         raise ValueError("the native executor was not built: install cosim on a machine with a C compiler")

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..core.errors import ComponentError
+from ..process.float_mode import enabled_traps
 from ..process.journal import MARKER_SIZE, ROW_COUNT
 from .finite_check import FiniteCheck
 from .initialization import initialize_components
@@ -34,7 +35,7 @@ class Executor(ABC):
         self.plan, self.recorder = plan, recorder
         self.marker = np.zeros(MARKER_SIZE, np.int64) if marker is None else marker
         self._runner = StepRunner(self.marker)
-        self._finite_check = FiniteCheck(plan, self._runner.current_time)
+        self._finite_check = FiniteCheck(plan, self._runner)
         self._delay_lines = {t: DelayLine(t) for phase in plan.all_phases for t in phase.transfers if t.delay}
         self._schedule = Schedule(plan, self._runner, self._delay_lines)
         self._parallel_steps = ParallelSteps(self._runner)
@@ -53,7 +54,7 @@ class Executor(ABC):
         """Bring the components from instantiated to step mode, and record the initial outputs as row 0.
 
         Raises:
-            ComponentError: a component failed, an algebraic loop did not converge, or a connected output is not finite.
+            ComponentError: a component failed, an algebraic loop did not converge, or a checked output is not finite.
         """
         self._runner.current_time.value = self.plan.grid.time_at(0)
         initialize_components(self.plan)
@@ -71,7 +72,7 @@ class Executor(ABC):
         """Run macro steps until communication point `end` is reached or a component requests termination.
 
         Raises:
-            ComponentError: a component failed, or a connected output is not finite.
+            ComponentError: a component failed, or a checked output is not finite.
         """
         try:
             if self._parallel_steps.has_candidates and self.completed_steps < MEASURED_STEPS:
@@ -89,12 +90,23 @@ class Executor(ABC):
         while self.completed_steps < end and not self.termination:
             try:
                 self._run_macro_steps(self.completed_steps, min(end, self.recorder.last_point_in_chunk(self.completed_steps)))
+                if enabled_traps():
+                    self._restore_float_traps(self.completed_steps)
             finally:
                 self.recorder.set_row_count(int(self.marker[ROW_COUNT]))
 
     def close(self) -> None:
         """End the threads; no step may be run afterwards."""
         self._parallel_steps.close()
+
+    def _restore_float_mode(self, call_number: int) -> None:
+        """Set the default floating-point mode again after the step of this call changed it."""
+        step, _ = self._schedule.find_call(call_number)
+        self._runner.restore_float_mode(step.step.name)
+
+    def _restore_float_traps(self, n: int) -> None:
+        """Disable floating-point traps again that a step before communication point `n` enabled."""
+        self._runner.restore_float_traps(self.plan.system.components, self.plan.grid.time_at(n))
 
     def _transfer_call(self, transfer: Transfer) -> TransferCall:
         return self._delay_lines[transfer].apply if transfer.delay else compile_transfer(transfer)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..core import component_log
 from ..core.component import Component
-from ..core.errors import ComponentError, join_alternatives
+from ..core.errors import ComponentError, InputError, Problem, join_alternatives
 from ..core.recording import Recording
 from ..core.stopwatch import Stopwatch
 from ..core.system import System
@@ -21,6 +23,7 @@ from ..process.process_state import restoring_process_state
 from . import Executor, Plan, Recorder, Termination, compile_plan, executor_class
 from .initialization import instantiate_components
 from .pacer import Pacer
+from .run_checks import find_space_problems
 from .saving_recorder import SavingRecorder
 from .settings import Event, Settings
 
@@ -107,18 +110,30 @@ def simulating(plan: Plan, observers: Sequence[Observer] = (), step_hook: StepHo
         The outcome, after the last step.
 
     Raises:
+        InputError: the recorded rows are larger than the free disk space.
         ComponentError: a component failed in terminate or free.
     """
     components = plan.system.components
-    with default_float_mode(), ExitStack() as stack:
+    completed = False
+    with default_float_mode():
+        try:
+            if problems := _space_problems(plan.settings):
+                raise InputError(problems)
+            outcome = _run(_create_executor(plan), observers, step_hook)
+            yield outcome
+            completed = outcome.failure is None
+        finally:
+            with restoring_process_state(join_alternatives(components)):
+                _end_components(components, terminate=completed)
+
+
+def _end_components(components: Mapping[str, Component], terminate: bool) -> None:
+    """Free all components, even if freeing one of them fails; call their `terminate` before if asked for."""
+    with ExitStack() as stack:
         stack.callback(free_components, components)
-        executor = _create_executor(plan)
-        outcome = _run(executor, observers, step_hook)
-        yield outcome
-        if outcome.failure is None:
-            for name, component in components.items():
-                with calling_component(name, "terminate", "end"):
-                    component.terminate()
+        for name, component in components.items() if terminate else ():
+            with calling_component(name, "terminate", "end"):
+                component.terminate()
 
 
 def free_components(components: Mapping[str, Component]) -> None:
@@ -133,6 +148,12 @@ def free_components(components: Mapping[str, Component]) -> None:
             stack.callback(component.free)
 
 
+def _space_problems(settings: Settings) -> list[Problem]:
+    journal = current_journal()
+    rows = (journal and journal.folder) or (settings.rows_file and settings.rows_file.parent)
+    return find_space_problems(settings, rows or Path(tempfile.gettempdir()), csv=bool(journal and journal.csv_path))
+
+
 def _create_executor(plan: Plan) -> Executor:
     journal, settings = current_journal(), plan.settings
     if journal and journal.folder and not settings.rows_file:
@@ -145,17 +166,19 @@ def _create_executor(plan: Plan) -> Executor:
 
 def _run(executor: Executor, observers: Sequence[Observer], step_hook: StepHook | None) -> SimulationOutcome:
     journal, plan, watch = current_journal(), executor.plan, Stopwatch()
-    settings = plan.settings
+    settings, components = plan.settings, plan.system.components
     pacer = Pacer(plan.grid, settings.real_time, settings.late) if settings.real_time else None
+    names, runs_foreign_code = join_alternatives(components), any(c.runs_foreign_code for c in components.values())
     failure = None
     try:
-        with watch.measure("instantiate_seconds"):
-            instantiate_components(plan)
-        with watch.measure("initialize_seconds"):
-            executor.initialize()
+        with restoring_process_state(names):
+            with watch.measure("instantiate_seconds"):
+                instantiate_components(plan)
+            with watch.measure("initialize_seconds"):
+                executor.initialize()
         if journal:
             journal.enter_phase(Phase.STEPPING, journal.deadlines.step)
-        with restoring_process_state(join_alternatives(plan.system.components)), watch.measure("loop_seconds"):
+        with restoring_process_state(names) if runs_foreign_code else nullcontext(), watch.measure("loop_seconds"):
             _step_to_end(executor, observers, pacer, step_hook)
     except (Exception, KeyboardInterrupt) as error:
         failure = error

@@ -12,6 +12,7 @@ from ..core.system import Endpoint
 from .pacer import LatePolicy
 
 ExecutorKind = Literal["auto", "native", "python"]
+NonFinitePolicy = Literal["error", "allow", "fail"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +42,8 @@ class Settings:
         record_interval: time between recorded points (s, exact); None: every macro step.
         events: values to set during the run.
         executor: kind of the executor.
-        require_finite: a connected output that is NaN or infinite ends the run.
+        non_finite: treatment of NaN and infinity; "error": a connected output ends the run; "fail": a recorded output ends it
+            too; "allow": no output ends it.
         real_time: simulated seconds per second of wall time; None: as fast as possible.
         late: reaction to a step that is more than one step late in real time.
         rows_file: file for the recorded rows; None: in memory, or in a temporary file if there are very many.
@@ -54,7 +56,7 @@ class Settings:
     record_interval: Fraction | None = None
     events: Sequence[Event] = ()
     executor: ExecutorKind = "auto"
-    require_finite: bool = True
+    non_finite: NonFinitePolicy = "error"
     real_time: float | None = None
     late: LatePolicy = "warn"
     rows_file: Path | None = None

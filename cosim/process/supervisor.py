@@ -158,7 +158,9 @@ class _Supervisor:
         while True:
             try:
                 poll.poll(POLL_INTERVAL * 1000)
-                self._forward_output()
+                if not self._forward_output():
+                    with suppress(KeyError):
+                        poll.unregister(self.reader)  # a closed pipe is always ready
                 pid, status = os.waitpid(self.child, os.WNOHANG)
                 if pid:
                     return status
@@ -203,20 +205,21 @@ class _Supervisor:
                     os.kill(orphan, signal.SIGKILL)
                     os.waitpid(orphan, 0)
 
-    def _forward_output(self) -> None:
-        """Write the output of foreign code to standard error, up to `MAX_OUTPUT_SIZE`."""
+    def _forward_output(self) -> bool:
+        """Write the output of foreign code to standard error, up to `MAX_OUTPUT_SIZE`; return False if its pipe is closed."""
         for _ in range(64):
             try:
                 data = os.read(self.reader, 1 << 16)
             except BlockingIOError:
-                return
+                return True
             if not data:
-                return
+                return False
             remaining = MAX_OUTPUT_SIZE - self._output_size
             self._output_size += len(data)
             if remaining > 0:
                 sys.stderr.write(data[:remaining].decode("utf-8", "replace"))
                 sys.stderr.flush()
+        return True
 
     def _outcome(self, status: int) -> SupervisedOutcome:
         """Return the outcome of a child that ended with `status`."""

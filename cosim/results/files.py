@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import errno
 import glob
 import json
 import math
 import mmap
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from secrets import token_hex
 from tempfile import TemporaryFile
 from typing import Any
 
 import numpy as np
 
-from ..core.errors import CosimError, InputError, OutputError
-
-#: errors of the disk, not of the path
-_DISK_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+from ..core.errors import write_error
 
 #: suffix of files that are being written
 _PART_SUFFIX = ".part"
@@ -63,20 +59,16 @@ def writing_atomically(path: str | Path) -> Iterator[Path]:
         OutputError: The disk is full or defective.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}{_PART_SUFFIX}")
+    temporary = path.with_name(f".{path.name}.{token_hex(8)}{_PART_SUFFIX}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield temporary
         temporary.replace(path)
     except OSError as error:
-        raise _write_error(f"cannot write {path}: {error}", error) from error
+        raise write_error(f"cannot write {path}: {error}", error) from error
     finally:
         with suppress(OSError):
             temporary.unlink()
-
-
-def _write_error(text: str, error: OSError) -> CosimError:
-    return OutputError(text) if error.errno in _DISK_ERRORS else InputError(text)
 
 
 def check_writable(directory: Path) -> None:
@@ -86,7 +78,7 @@ def check_writable(directory: Path) -> None:
         with TemporaryFile(dir=directory):
             pass
     except OSError as error:
-        raise _write_error(f'cannot write to "{directory}": {error.strerror or error}', error) from None
+        raise write_error(f'cannot write to "{directory}": {error.strerror or error}', error) from None
 
 
 def remove_files(directory: Path, *names: str) -> None:
@@ -101,7 +93,7 @@ def remove_files(directory: Path, *names: str) -> None:
             for path in (directory / name, *directory.glob(f".{glob.escape(name)}.*{_PART_SUFFIX}")):
                 path.unlink(missing_ok=True)
     except OSError as error:
-        raise _write_error(f'cannot replace "{path}": {error.strerror or error}', error) from None
+        raise write_error(f'cannot replace "{path}": {error.strerror or error}', error) from None
 
 
 def write_json(data: Mapping[str, Any], path: str | Path) -> None:

@@ -97,12 +97,19 @@ class Result:
         """Return the number of signals."""
         return len(self.recording.columns)
 
+    @property
+    def termination(self) -> str:
+        """Sentence that names the component that ended the run and the time; "" if none did."""
+        terminated_by = self.metadata.get("terminated_by")
+        return describe_termination(**terminated_by) if terminated_by else ""
+
     def __repr__(self) -> str:
-        """Return name, size, failure, failed checks and KPIs, in several lines."""
+        """Return name, size, failure, termination, failed checks and KPIs, in several lines."""
         rows = f"{len(self.time)} rows of {len(self)} signals"
         span = f", {self.time[0]:g} s to {self.time[-1]:g} s" if len(self.time) else ""
         failure, units = self.metadata.get("failure"), self.metadata.get("kpi_units", {})
         lines = [f"{self.metadata.get('name', 'Result')}: {rows}{span}", *([f"ended early: {failure}"] if failure else [])]
+        lines += [self.termination] if self.termination else []
         lines += self._summarize_checks()
         width = max(map(len, self.kpis), default=0)
         for name, value in self.kpis.items():
@@ -178,6 +185,11 @@ class Result:
             InputError: The file cannot be read.
         """
         return cls(read_csv(path))
+
+
+def describe_termination(component: str, time: float) -> str:
+    """Return a sentence that says that a component ended the run at `time` (s)."""
+    return f"{component} requested the end of the simulation at t = {time:.12g} s"
 
 
 def write_run(result: Result, directory: str | Path) -> None:

@@ -18,14 +18,13 @@ from typing import Any
 
 from ..core.errors import InputError, Problem
 from ..core.paths import open_text
+from ..core.text import acceptable_text, text_problem
 
 #: keys and indices from the root of a document to a value
 JsonPath = tuple["str | int", ...]
 _DECODER = json.JSONDecoder()
 _WHITESPACE = re.compile(r"[ \t\r\n]*")
 _LITERAL = re.compile(r"-?Infinity|NaN|true|false|null|-?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][-+]?\d+)?")
-#: NUL is not allowed in file names, and surrogates are not allowed in UTF-8
-_FORBIDDEN_CHARACTERS = re.compile("[\0\ud800-\udfff]")
 #: longest number that is read (characters); a longer one counts as infinite
 _MAX_NUMBER_LENGTH = 1000
 _IDENTIFIER = re.compile(r"[A-Za-z_]\w*")
@@ -160,10 +159,9 @@ class _JsonParser:
             text, end = _DECODER.raw_decode(self.text, offset)
         except json.JSONDecodeError as error:
             raise self.error(error.pos, error.msg) from None
-        if match := _FORBIDDEN_CHARACTERS.search(text):
-            message = f"the character U+{ord(match.group()):04X} is not allowed"
+        if message := text_problem(text):
             self.document.problems.append(Problem(message, self.document.position(offset)))
-        return _FORBIDDEN_CHARACTERS.sub("\N{REPLACEMENT CHARACTER}", text), end
+        return acceptable_text(text), end
 
     def literal(self, offset: int, path: JsonPath) -> tuple[Any, int]:
         match = _LITERAL.match(self.text, offset)

@@ -12,6 +12,7 @@ from typing import Any
 from ..components.python_import import package_files
 from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean
+from ..core.text import acceptable_text, shorten, text_problem
 from .json_document import Document, read_document
 from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec
 from .schema_types import accepted
@@ -129,7 +130,9 @@ def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = Non
     problems: list[Problem] = []
     variables: dict[str, Any] = {}
     for name, value in (settings or {}).items():
-        if name.startswith("/"):
+        if text := next(_text_problems([name, value]), ""):
+            problems.append(Problem(text, f'setting "{shorten(acceptable_text(name))}"'))
+        elif name.startswith("/"):
             problems += _set_pointer(document, name, value)
         else:
             variables[name] = value
@@ -191,6 +194,15 @@ def _set_pointer(document: Document, pointer: str, value: Any) -> list[Problem]:
     return []
 
 
+def _text_problems(value: Any) -> Iterator[str]:
+    """Yield what is wrong with the texts in a JSON value."""
+    if isinstance(value, str) and (problem := text_problem(value)):
+        yield problem
+    elif isinstance(value, dict | list):
+        for part in value if isinstance(value, list) else (*value, *value.values()):
+            yield from _text_problems(part)
+
+
 def _json_child(value: Any, key: str) -> Any:
     if isinstance(value, dict):
         return value.get(key)
@@ -213,14 +225,21 @@ def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
             problems.append(Problem(f'expected NAME=value, found "{text}"'))
             continue
         try:
-            parsed[name] = json.loads(value)
-        except ValueError:
-            parsed[name] = value
-        if not _is_finite(parsed[name]):
-            problems.append(Problem(f"expected finite numbers, found {value}", name))
+            parsed[name] = _parse_json_or_text(value)
+            if not _is_finite(parsed[name]):
+                problems.append(Problem(f"expected finite numbers, found {shorten(value)}", name))
+        except RecursionError:
+            problems.append(Problem("nested too deep", name))
     if problems:
         raise InputError(problems)
     return parsed
+
+
+def _parse_json_or_text(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
 
 
 def _is_finite(value: Any) -> bool:

@@ -22,6 +22,7 @@ from ..engine.plan import Plan
 from ..engine.run_loop import free_components
 from ..engine.settings import Settings
 from ..process.float_mode import default_float_mode
+from ..process.process_state import exclusive_process_state
 from .component_factory import ComponentFactory
 from .json_document import Document
 from .named_functions import load_function, signal_problems
@@ -130,6 +131,7 @@ class PreparedRun:
 
 
 @default_float_mode()
+@exclusive_process_state()
 def load(
     scenario: str | Path,
     parameters: Mapping[str, Any] | None = None,

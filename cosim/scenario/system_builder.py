@@ -77,7 +77,7 @@ class SystemBuilder:
             self._columns(aliases),
             self.spec.record.interval,
             list(self._events()),
-            require_finite=self.spec.non_finite == "error",
+            non_finite=self.spec.non_finite,
             real_time=real_time,
             late=late,
         )

@@ -2,6 +2,7 @@
 
 import ctypes
 import platform
+import shutil
 import struct
 import sys
 from contextlib import contextmanager
@@ -15,7 +16,7 @@ from cosim.components.fmi import FmuFile, create_component
 from cosim.core.component import StepResult, Variable
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.run_checks import check_run
+from cosim.engine.run_checks import check_run, find_space_problems
 from cosim.engine.run_loop import simulate
 from cosim.engine.settings import Event, Settings
 from cosim.process.float_mode import enabled_traps, is_changed
@@ -131,6 +132,17 @@ def test_a_recording_larger_than_the_disk_is_refused():
         simulate(make_system({"a": counter()}), settings(30, exact_fraction("1/1000000000000")))
     sparse = settings(30, exact_fraction("1/1000000000000"), record_interval=exact_fraction(30))
     assert check_run(make_system({"a": counter()}), sparse).count == 30 * 10**12
+
+
+@pytest.mark.parametrize(
+    ("csv", "replaced", "fits"), [(False, 0.0, True), (True, 0.0, False), (True, 1.0, True), (True, 0.5, False)]
+)
+def test_the_free_space_is_that_of_the_folder_with_the_rows(tmp_path, csv, replaced, fits):
+    """Rows of half the free space; with a CSV file they need 1.75 times of it."""
+    free = shutil.disk_usage(tmp_path).free
+    assert free > 2e9
+    large = settings(free // 32, record=["a.y"])
+    assert (find_space_problems(large, tmp_path, csv, int(replaced * free)) == []) == fits
 
 
 def flush_small_numbers(library):

@@ -8,14 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ...process.output_lock import LockKeeper
 from ...process.temporary_folders import temporary_run_folder
 from .. import current_command_line, report_error, strict_sandbox, supervision
+from ..unfinished_runs import OutputFiles, writing_results
 
 if TYPE_CHECKING:
     from ...components.fmi import Isolation
     from ...core.component import Component
     from ...core.recording import Recording
     from ...engine.plan import Plan
+    from ...process.supervisor import SupervisedOutcome
 
 FMU_NAME, PROFILE_NAME = "fmu", "profile"
 
@@ -41,16 +44,17 @@ def command(isolation: str, sandbox: str | None, output_file: Path | None, **opt
         return strict_sandbox.rerun_in_bubblewrap(
             [path for path in (options["fmu"], options["input_file"]) if path], output and output.parent
         )
-    with temporary_run_folder() as folder:
-        unfinished = output.with_name(f".{output.name}.unfinished") if output else Path(folder) / "run"
+    with temporary_run_folder() as folder, LockKeeper() as locks:
+        unfinished = OutputFiles.of_file(output).unfinished if output else Path(folder) / "run"
         return supervision.run_supervised_command(
-            lambda: _simulate(unfinished, output, output_file, _isolation(isolation, bool(sandbox)), **options),
+            lambda: _simulate(locks, unfinished, output, output_file, _isolation(isolation, bool(sandbox)), **options),
             isolation,
-            lambda outcome: _write_recording(supervision.recover_outcome_recording(outcome), output, output_file),
+            lambda outcome: _save_after_crash(outcome, output, output_file),
         )
 
 
 def _simulate(
+    locks: LockKeeper,
     folder: Path,
     output: Path | None,
     shown: Path | None,
@@ -61,9 +65,13 @@ def _simulate(
     start_values: tuple[str, ...],
     input_file: Path | None,
 ) -> int:
+    from ...core.errors import InputError
+    from ...engine.run_checks import find_space_problems
     from ...engine.run_loop import simulating
-    from ...process.run_files.folder import keeping_run_files, remove_run_files
+    from ...process.run_files.folder import keeping_run_files, remove_run_files, run_folder
     from ...results.files import check_writable, remove_files
+    from ...results.non_finite import warn_non_finite
+    from ...results.result import describe_termination
     from ...scenario.nested_systems import parse_settings
     from .. import messages
 
@@ -71,24 +79,44 @@ def _simulate(
     if output:
         check_writable(output.parent)
     plan = _compile_system(fmu, fmu_isolation, stop_time, step_size, parse_settings(start_values), input_file)
-    if output:
+    if output and shown:
+        locks.lock(OutputFiles.of_file(output).lock, shown)
+        replaced = output.stat().st_size if output.is_file() else 0
+        if problems := find_space_problems(plan.settings, output.parent, csv=True, replaced=replaced):
+            raise InputError(problems)
         remove_files(output.parent, output.name)
     with keeping_run_files(folder, output), simulating(plan) as run:
+        warn_non_finite(run.recording)
         if output:
-            _write_recording(run.recording, output, shown)
+            _write_recording(run.recording, output, shown, run_folder())
             remove_run_files()
         if run.failure:
             return supervision.results_written(report_error(run.failure, current_command_line()))
         if not output:
             _print_final_values(run.recording)
+        if run.termination:
+            click.echo(describe_termination("the FMU", run.termination.time), err=True)
         return supervision.results_written(0)
 
 
-def _write_recording(recording: Recording, output: Path | None, shown: Path | None) -> None:
-    from ...results.csv_files import write_csv
+def _save_after_crash(outcome: SupervisedOutcome, output: Path | None, shown: Path | None) -> None:
+    """Write the rows of a child process that crashed, was killed or was interrupted."""
+    from ...results.non_finite import warn_non_finite
+    from .. import messages
 
-    if output and len(recording.time):
-        write_csv(recording, output)
+    messages.print_log()
+    recording = supervision.recover_outcome_recording(outcome)
+    warn_non_finite(recording)
+    _write_recording(recording, output, shown, outcome.journal.folder)
+
+
+def _write_recording(recording: Recording, output: Path | None, shown: Path | None, unfinished: Path | None) -> None:
+    from ...results import Result
+
+    if output and shown and len(recording.time):
+        result = Result(recording)
+        with writing_results(result, unfinished, shown):
+            result.to_csv(output)
         click.echo(f"{len(recording.time)} rows in {shown}")
 
 

@@ -55,8 +55,8 @@ class FmuInstance(FunctionCaller, Component):
 
     # -- what differs between the FMI versions ---------------------------------------------------------------------------
 
-    def _create_fmpy_slave(self, **arguments: Any) -> Any:
-        """Create FMPy's slave object of this FMI version, which loads the library."""
+    def _fmpy_class(self) -> type:
+        """Import FMPy's class of a slave of this FMI version."""
         raise NotImplementedError
 
     def _instantiate_fmu(self) -> None:
@@ -104,7 +104,7 @@ class FmuInstance(FunctionCaller, Component):
     def _copy_fmpy_slave(self, folder: Path) -> Any:
         """Return FMPy's slave object for this instance, a copy because creating one takes milliseconds."""
         if self._file.library is None:
-            self._file.library = load_library(self._file, folder, self._create_fmpy_slave)
+            self._file.library = load_library(self._file, folder, self._fmpy_class())
         slave = copy(self._file.library)
         slave.instanceName = self.name
         return slave
@@ -204,7 +204,7 @@ class FmuInstance(FunctionCaller, Component):
                 status = call.function(*call.arguments)
             if status not in SUCCESS_STATUSES:
                 return self.interpret_status(call.name, status)
-            self._check_float_mode(call.name)
+            self.restore_float_mode(call.name)
         return None
 
     def interpret_status(self, function: str, status: int) -> StepResult:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mmap
 import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -11,6 +12,8 @@ from typing import IO, Any
 from weakref import finalize
 
 import numpy as np
+
+from ...core.errors import write_error
 
 #: maximum size of a chunk of a file (bytes); number of values computed at a time
 CHUNK_BYTES, BATCH_VALUES = 1 << 24, 1 << 18
@@ -45,8 +48,8 @@ class RowStore:
 class FileRowStore(RowStore):
     """Rows in a file, which contains all recorded rows even if the process is killed.
 
-    Only the last chunk occupies memory. Disk space is allocated chunk by chunk, so that a full disk raises OSError instead of
-    crashing the process (SIGBUS).
+    Only the last chunk occupies memory. Disk space is allocated chunk by chunk, so that a full disk raises OutputError instead
+    of crashing the process (SIGBUS).
     """
 
     def __init__(self, dtype: np.dtype[Any], expected: int, file: IO[bytes]):
@@ -55,13 +58,23 @@ class FileRowStore(RowStore):
         finalize(self, file.close)
 
     def add_chunk(self) -> np.ndarray:
-        """Append a chunk of zeros and return it, shape (chunk_rows,), mapped to the file."""
+        """Append a chunk of zeros and return it, shape (chunk_rows,), mapped to the file.
+
+        Raises:
+            OutputError: The disk has no space for the chunk.
+        """
         if not self.dtype.itemsize:
             return np.zeros(self.chunk_rows, self.dtype)
         begin = self._rows * self.dtype.itemsize
         self._rows += self.chunk_rows
         end = self._rows * self.dtype.itemsize
-        _allocate_disk_space(self._file.fileno(), begin, end)
+        try:
+            _allocate_disk_space(self._file.fileno(), begin, end)
+        except OSError as error:
+            self._rows -= self.chunk_rows
+            where = self._file.name if isinstance(self._file.name, str) else tempfile.gettempdir()
+            text = f"cannot write {(end - begin) / 1e6:.3g} MB of recorded rows to {where}: {error.strerror}"
+            raise write_error(text, error) from None
         page = begin - begin % mmap.ALLOCATIONGRANULARITY
         mapped = mmap.mmap(self._file.fileno(), end - page, offset=page)
         return np.frombuffer(mapped, self.dtype, self.chunk_rows, begin - page)
