@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 import traceback
 from collections.abc import Callable
@@ -37,6 +38,10 @@ COMMANDS = {
     "schema": ("schema", "Print the JSON Schema of scenarios, sweeps or tunings."),
     "doctor": ("doctor", "Print which packages, tools and sandboxes are available on this machine."),
 }
+
+
+#: new objects after which Python searches for reference cycles; almost all objects of imports and models stay
+_GC_THRESHOLD = 100_000
 
 
 class _LazyGroup(click.Group):
@@ -86,6 +91,7 @@ def main(arguments: list[str] | None = None) -> None:
     Args:
         arguments: words after the program's name; default: those of this process.
     """
+    gc.set_threshold(_GC_THRESHOLD)
     sys.stdout, sys.stderr = protected_stream(sys.stdout), protected_stream(sys.stderr)
     sys.exit(_run_command_line(sys.argv[1:] if arguments is None else arguments))
 

@@ -146,10 +146,10 @@ def _print_kpis(outcome: RunOutcome) -> None:
 
 
 def _write_figures(outcome: RunOutcome) -> None:
-    from ..report.figures import draw_figure, figure_to_svg, save_figure
-
     if outcome.options.no_report:
         return
+    from ..report.figures import draw_figure, figure_to_svg, save_figure
+
     for name, function, arguments in outcome.prepared.figures():
         figure = draw_figure(outcome.result, name, function, arguments)
         save_figure(figure, outcome.folder / f"{name}.png")
@@ -158,9 +158,9 @@ def _write_figures(outcome: RunOutcome) -> None:
 
 
 def _write_report(outcome: RunOutcome) -> None:
-    from ..report.run_page import write_report
-
     if not outcome.options.no_report:
+        from ..report.run_page import write_report
+
         write_report(outcome.result, outcome.checks, outcome.pictures, outcome.folder / "report.html")
         outcome.files.append("report.html")
 

@@ -11,7 +11,7 @@ from typing import NoReturn
 
 from . import journal as journals
 from .journal import EXIT_CODE, Journal, Phase
-from .sandbox.limits import detach, lower_limit
+from .limits import detach, lower_limit
 from .standard_streams import protected_stream
 
 #: limit of the private memory of a supervised run (bytes); mapped files of rows do not count

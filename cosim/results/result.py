@@ -14,8 +14,6 @@ from ..core.errors import InputError, did_you_mean
 from ..core.recording import Recording
 from .csv_files import read_csv, write_csv
 from .files import write_json
-from .mcap_files import write_mcap
-from .parquet_files import write_parquet
 
 if TYPE_CHECKING:
     from .checks import CheckOutcome
@@ -156,6 +154,8 @@ class Result:
             InputError: The path cannot be written, or the package pyarrow is not installed.
             OutputError: The disk is full or defective.
         """
+        from .parquet_files import write_parquet
+
         write_parquet(self.recording, path)
 
     def to_mcap(self, path: str | Path, scene: Mapping[str, Any] | None = None) -> None:
@@ -169,6 +169,8 @@ class Result:
             InputError: The path cannot be written, or the package foxglove-sdk is not installed.
             OutputError: The disk is full or defective.
         """
+        from .mcap_files import write_mcap
+
         about = {key: value for key, value in self.metadata.items() if key in ("name", "versions", "sha256")}
         write_mcap(self.recording, path, scene, about)
 

@@ -96,7 +96,7 @@ class Scenario:
                 python.append(node.folder / spec.python.rpartition(":")[0])
             else:
                 files.append(node.folder / (spec.fmu or (spec.modelica or "").rpartition(":")[0]))
-        return [*files, *(member for file in python for member in package_files(file))]
+        return [*files, *package_files(python)]
 
 
 def find_scenario(scenario: str | Path) -> Path:

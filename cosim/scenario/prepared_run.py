@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -111,10 +112,11 @@ class PreparedRun:
         own += [self.root.folder / spec.file for spec in self.spec.inputs]
         calls = (*self.spec.kpis, *self.spec.figures, *([self.spec.scene] if self.spec.scene else []))
         modules = (spec.python.rpartition(":")[0] for spec in calls)
-        functions = [self.root.folder / module for module in modules if module.endswith(".py")]
-        python = [member for file in (*functions, *self.component_factory.python_files) for member in package_files(file)]
-        files = {file.resolve() for file in (*own, *python, *self.component_factory.fmus, *self.component_factory.modelica_files)}
-        return {Path(relpath(file, self.root.folder.resolve())).as_posix(): file for file in sorted(files)}
+        functions = (self.root.folder / module for module in modules if module.endswith(".py"))
+        factory, folder = self.component_factory, self.root.folder.resolve()
+        data = {file.resolve() for file in (*own, *factory.fmus, *factory.modelica_files)}
+        files = data | package_files((*functions, *factory.python_files))
+        return {relpath(file, folder).replace(os.sep, "/"): file for file in sorted(files, key=str)}
 
     @property
     def sources(self) -> dict[str, str]:

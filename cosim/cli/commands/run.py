@@ -128,12 +128,13 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
 
 def _require_packages(options: RunOptions) -> None:
     """Raise InputError if an optional package for one of the output files is not installed."""
-    from ...results.mcap_files import require_mcap
-    from ...results.parquet_files import require_parquet
-
     if options.parquet:
+        from ...results.parquet_files import require_parquet
+
         require_parquet()
     if options.mcap:
+        from ...results.mcap_files import require_mcap
+
         require_mcap()
 
 
