@@ -23,7 +23,7 @@ SLOW = {
 }
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # its processes are busy also when nobody uses them
 def two_workers(tmp_path_factory):
     with running_cluster(tmp_path_factory.mktemp("cluster")) as made:
         yield made
