@@ -131,7 +131,7 @@ def _load(options: RunOptions) -> PreparedRun:
     """Load the scenario, announce its deadlines to the supervisor and print warnings about it."""
     from ...api import load
     from ...scenario.nested_systems import parse_settings
-    from ...scenario.plausibility import missing_connections
+    from ...scenario.plausibility import find_run_warnings
     from .. import messages
 
     prepared = load(
@@ -145,7 +145,7 @@ def _load(options: RunOptions) -> PreparedRun:
         sandbox=options.sandbox,
     )
     supervision.set_deadlines(prepared.spec.deadlines)
-    messages.log_problems(missing_connections(prepared))
+    messages.log_problems(find_run_warnings(prepared))
     _warn_overwriting(options.output_folder(prepared.spec.name), prepared.document.file.resolve())
     return prepared
 
