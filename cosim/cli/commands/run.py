@@ -142,7 +142,7 @@ def _load(options: RunOptions, real_time: float | None) -> PreparedRun:
     """Load the scenario, announce its deadlines to the supervisor and print warnings about it."""
     from ...api import load
     from ...scenario.nested_systems import parse_settings
-    from ...scenario.plausibility import missing_connections
+    from ...scenario.plausibility import find_run_warnings
     from .. import messages
 
     prepared = load(
@@ -156,7 +156,7 @@ def _load(options: RunOptions, real_time: float | None) -> PreparedRun:
         sandbox=options.sandbox,
     )
     supervision.set_deadlines(prepared.spec.deadlines)
-    messages.log_problems(missing_connections(prepared))
+    messages.log_problems(find_run_warnings(prepared))
     return prepared
 
 
