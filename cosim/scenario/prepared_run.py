@@ -91,10 +91,10 @@ class PreparedRun:
 
     def component_source(self, name: str) -> str:
         """Return the source of a component as the scenario names it: an FMU, a Python class, a Modelica model or a CSV file."""
-        for node, own in self.root.leaves():
-            if node.full_name(own) == name:
-                spec = node.spec.components[own]
-                return spec.fmu or spec.python or spec.modelica or ""
+        if found := self.root.find_component(name):
+            node, own = found
+            spec = node.spec.components[own]
+            return spec.fmu or spec.python or spec.modelica or ""
         return self.spec.inputs[int(name.rpartition(".")[2])].file
 
     def free(self) -> None:
