@@ -215,6 +215,11 @@ class ScenarioSpec(SystemSpec):
     )
 
 
+def ports_of(spec: SystemSpec) -> PortsSpec:
+    """Return the ports of a nested system; a scenario has none."""
+    return spec.ports if isinstance(spec, NestedSpec) else PortsSpec()
+
+
 def json_schema(nested: bool = False) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of scenario files, or of nested-system files."""
     schema = (NestedSpec if nested else ScenarioSpec).model_json_schema(by_alias=True)

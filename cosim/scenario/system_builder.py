@@ -11,8 +11,9 @@ from typing import Any
 
 from ..components.fmi import FmuFile, Isolation
 from ..components.input_table import read_input_table
-from ..core.component import Component, Variable
+from ..core.component import Component, Variable, count_scalars
 from ..core.errors import InputError, Problem
+from ..core.size_limits import MAX_SCALARS, require_at_most
 from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System
 from ..engine.pacer import LatePolicy
 from ..engine.plan import Plan, compile_plan
@@ -93,13 +94,21 @@ class SystemBuilder:
         return plan
 
     def make_components(self) -> None:
-        """Create the components of the scenario and its nested systems, and the tables of its input profiles."""
+        """Create the components of the scenario and its nested systems, and the tables of its input profiles.
+
+        Raises:
+            InputError: The components have too many scalars.
+        """
+        scalars = 0
         for node, name in self.root.leaves():
             try:
-                self.components[node.full_name(name)] = self.component_factory.create(node, name)
+                component = self.components[node.full_name(name)] = self.component_factory.create(node, name)
+                scalars += count_scalars(component.variables)
             except InputError as error:
                 node.invalid_components.add(name)
                 self._add_problems(error, node, "components", name)
+            noun = f"variables and elements of arrays up to {node.full_name(name)}"
+            require_at_most(MAX_SCALARS, scalars, noun, node.where("components", name))
         self.profiles = [f"{PROFILE_PREFIX}.{i}" for i, _ in accepted(self.spec.inputs)]
         for i, spec in accepted(self.spec.inputs):
             try:
@@ -203,6 +212,8 @@ class SystemBuilder:
                             self.problems.append(Problem(str(error), child.where("ports", "outputs", port)))
                         continue
                     aliases |= self._alias_endpoints(target, f"{node.full_name(name)}.{port}")
+                    noun = f"signals of output ports up to {node.full_name(name)}.{port}"
+                    require_at_most(MAX_SCALARS, len(aliases), noun, child.where("ports", "outputs", port))
         return aliases
 
     def _alias_endpoints(self, target: Target, alias: str) -> dict[str, Endpoint]:
@@ -246,10 +257,10 @@ class SystemBuilder:
         """Return a problem of the system with the location of its subject in the scenario file."""
         if problem.where or not problem.subject:
             return problem
-        for node in self.root.walk():
-            for name in node.spec.components:
-                if problem.subject[:2] == ("components", node.full_name(name)):
-                    return replace(problem, where=node.where("components", name, *problem.subject[2:]), subject=())
+        key, *rest = problem.subject
+        if key == "components" and rest and (found := self.root.find_component(rest[0])):
+            node, name = found
+            return replace(problem, where=node.where("components", name, *rest[1:]), subject=())
         return replace(problem, where=self.root.where(*problem.subject), subject=())
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from ..core.component import Component
 from ..core.errors import Problem, did_you_mean
+from ..core.size_limits import MAX_CONNECTIONS, require_at_most
 from ..core.system import Connection, Endpoint
 from .name_resolution import SlotIndex, Target, UnknownNameError, resolve_name
 from .nested_systems import Node
@@ -38,6 +39,8 @@ class Wiring:
         self._slots: dict[tuple[str, str], SlotIndex] = {}
         self._by_input: dict[Endpoint, _Candidate] = {}
         self._unmatched_inputs: dict[Endpoint, Problem] = {}
+        #: connections so far, including those that are overridden or invalid
+        self._count = 0
         self.problems: list[Problem] = []
 
     def connect(self, node: Node) -> None:
@@ -86,6 +89,8 @@ class Wiring:
                 self._unmatched_inputs[end] = Problem(f"input {end} has no matching output {expected}{hint}", where)
 
     def _add(self, new: _Candidate) -> None:
+        self._count += 1
+        require_at_most(MAX_CONNECTIONS, self._count, "connections of scalars up to here", new.connection.where)
         end = new.connection.target
         old = self._by_input.get(end)
         if old and old.is_variable == new.is_variable:
