@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..core.errors import ComponentError
-from ..process.journal import MARKER_SIZE, ROW_COUNT
+from ..process.journal import CALL_NUMBER, MARKER_SIZE, ROW_COUNT
 from .finite_check import FiniteCheck
 from .initialization import initialize_components
 from .parallel import MEASURED_STEPS, ParallelSteps
@@ -54,6 +54,11 @@ class Executor(ABC):
     def call_names(self) -> list[tuple[str, str]]:
         """(component, function) of every call, by its number in the marker."""
         return self._schedule.call_names
+
+    def describe_call(self) -> tuple[str, str]:
+        """Return component and function of the present call of the stepping loop."""
+        number = int(self.marker[CALL_NUMBER])
+        return self.call_names[number] if 0 <= number < len(self.call_names) else ("the run", "moving values")
 
     def initialize(self) -> None:
         """Bring the components from instantiated to step mode, and record the initial outputs as row 0.

@@ -20,6 +20,7 @@ from ..core.stopwatch import Stopwatch
 from ..core.system import System
 from ..core.time_grid import TimeGrid
 from ..process.float_mode import default_float_mode
+from ..process.forks import attributing_forks, report_forks
 from ..process.journal import MARKER_SIZE, Phase, calling_component, current_journal, suspending_deadline
 from ..process.process_state import restoring_process_state
 from . import Executor, Recorder, Termination, compile_plan, executor_class
@@ -105,6 +106,7 @@ def simulating(system: System, settings: Settings, observers: Sequence[Observer]
         ComponentError: a component failed in terminate or free.
     """
     with default_float_mode(), ExitStack() as stack:
+        stack.callback(report_forks)
         for name, component in system.components.items():
             stack.callback(_free_component, name, component)
         watch = Stopwatch()
@@ -160,7 +162,11 @@ def _run_executor(executor: Executor, settings: Settings, observers: Sequence[Ob
             write_header(journal.folder, executor)
         if journal:
             journal.enter_phase(Phase.STEPPING, journal.deadlines.step)
-        with restoring_process_state(join_alternatives(executor.plan.system.components)), watch.measure("loop_seconds"):
+        with (
+            restoring_process_state(join_alternatives(executor.plan.system.components)),
+            attributing_forks(executor.describe_call),
+            watch.measure("loop_seconds"),
+        ):
             _step_to_end(executor, events, observers, pacer, settings.step_hook)
     except (Exception, KeyboardInterrupt) as error:
         failure = error
@@ -168,6 +174,7 @@ def _run_executor(executor: Executor, settings: Settings, observers: Sequence[Ob
         executor.close()
     if journal:
         journal.enter_phase(Phase.IDLE)
+    report_forks()
     component_log.report_dropped_messages()
     lateness = pacer.statistics() if pacer else None
     return SimulationOutcome(

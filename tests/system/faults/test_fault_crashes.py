@@ -210,6 +210,50 @@ def test_no_process_of_an_fmu_outlives_the_run(fmus, runner, tmp_path, version, 
     assert len(done.rows) == ALL
 
 
+NOTICED = "WARNING lag: {f} forked the process; a copy that returns from the call is ended"
+
+
+FORKS = ["DoStep 6 fork_return", "DoStep 6 fork_silently", "DoStep 6 fork_program"]
+OTHER_FORKS = ["GetReal 6", "Instantiate 1", "ExitInitializationMode 1", "Terminate 1", "FreeInstance 1", "DoStep *"]
+
+
+@pytest.mark.parametrize(
+    ("order", "isolation", "executor"),
+    [
+        *[(order, isolation, "native") for order in FORKS for isolation in ("run", "fmu", "none")],
+        *[(f"{moment} fork_return", isolation, "python") for moment in OTHER_FORKS for isolation in ("run", "fmu")],
+    ],
+)
+def test_a_forked_copy_does_not_continue_the_run(fmus, runner, tmp_path, order, isolation, executor):
+    """Calls of a component that another one follows; without supervision a copy ends at the latest with the run."""
+    version = 2 + (isolation == "run")
+    noticed = isolation != "none" and "silently" not in order
+    components = {"lag": {"fmu": str(fmus(version, order))}, "other": {"fmu": str(fmus(version, name="other"))}}
+    file = scenario(tmp_path, fmus.folder, components=components)
+    words = ("run", file, "--output-dir", "out", "--no-report", "--isolation", isolation)
+    done = runner.cosim(tmp_path, *words, executor=executor, limit=20)
+    assert (done.code, len(done.rows)) == (0, ALL), done.err
+    assert done.out.count("simulated in") == 1
+    assert done.err.count("forked") == noticed
+    if noticed:
+        assert NOTICED.format(f=function_name(version, order.split()[0])) in done.err
+    assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
+
+
+@pytest.mark.parametrize("isolation", ["run", "none"])
+def test_a_copy_that_a_python_component_forks_does_not_continue_the_run(runner, tmp_path, isolation):
+    (tmp_path / "ticker.py").write_text(
+        TICKER.replace("        return True", "        __import__('os').fork()\n        return True")
+    )
+    file = scenario(tmp_path, tmp_path, components={"ticker": {"python": "ticker.py:Ticker"}}, stop_time=0.03)
+    done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", "--isolation", isolation, limit=20)
+    assert done.code == 0, done.err
+    assert len(Result.from_csv(tmp_path / "out/result.csv").time) == 4
+    assert done.out.count("simulated in") == 1
+    assert ("WARNING ticker: do_step forked the process" in done.err) == (isolation == "run")
+    assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
+
+
 def test_an_fmu_cannot_read_what_is_typed(fmus, runner, tmp_path, version):
     os.mkfifo(tmp_path / "typed")
     done = runner.run(tmp_path, fmus(version, "DoStep 6 read_stdin"), limit=10, stdin=str(tmp_path / "typed"))

@@ -14,6 +14,7 @@ from typing import NoReturn
 
 from ....core import component_log
 from ....process.failure_attribution import describe_exit_status
+from ....process.forks import attributing_forks
 from ....process.journal import CALL_NUMBER, CHANGE_COUNT, Journal, suspending_deadline
 from ....process.supervisor import MAX_OUTPUT_SIZE, POLL_INTERVAL
 from .pipes import READ_SIZE, STEP_DONE, SpinningPoller, decode_line, write_line
@@ -52,9 +53,10 @@ class WorkerProcess:
         commands, self._writer = os.pipe()
         self._reader, answers = os.pipe()
         self._output, output_writer = os.pipe()
-        self._pid = os.fork()
-        if self._pid == 0:
-            _run_worker(serve, commands, answers, output_writer)
+        with attributing_forks(None):
+            self._pid = os.fork()
+            if self._pid == 0:
+                _run_worker(serve, commands, answers, output_writer)
         for descriptor in (commands, answers, output_writer):
             os.close(descriptor)
         os.set_blocking(self._output, False)
