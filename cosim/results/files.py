@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import write_error
+from ..process.run_files.row_store import FileMapping
 
 #: suffix of files that are being written
 _PART_SUFFIX = ".part"
@@ -37,9 +38,9 @@ def iterate_chunks(arrays: Sequence[np.ndarray], size: int) -> Iterator[slice]:
             file.madvise(mmap.MADV_DONTNEED)
 
 
-def _memory_map(array: Any) -> mmap.mmap | None:
+def _memory_map(array: Any) -> mmap.mmap | FileMapping | None:
     """Return the file mapping behind an array; None if it is not mapped to a file."""
-    while array is not None and not isinstance(array, mmap.mmap):
+    while array is not None and not isinstance(array, mmap.mmap | FileMapping):
         array = getattr(array, "base", None)
     return array if hasattr(mmap, "MADV_DONTNEED") else None
 

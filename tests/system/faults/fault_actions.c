@@ -18,7 +18,9 @@
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/time.h>
+#include <sys/wait.h>
 #include <unistd.h>
 #include <xmmintrin.h>
 #include "fault_actions.h"
@@ -167,6 +169,17 @@ static int linger(int own_session) {
 }
 static int fork_(Lag *m) { return linger(0); }
 static int daemon_(Lag *m) { return linger(1); }
+static int fork_return(Lag *m) { return fork() < 0; } /* the copy returns, too */
+static int fork_silently(Lag *m) { return syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0) < 0; } /* unknown to the C library */
+static int fork_program(Lag *m) {
+    pid_t child = fork();
+    int status = 1;
+    if (child == 0) {
+        execl("/bin/true", "true", (char *)NULL);
+        _exit(1);
+    }
+    return waitpid(child, &status, 0) != child || status;
+}
 static void *for_ever(void *m) { for (;;) usleep(1000); }
 static int thread(Lag *m) {
     Dl_info here;
@@ -230,7 +243,9 @@ static const struct { const char *name; int (*act)(Lag *); } FAULTS[] = {
     {"change_folder", change_folder}, {"change_locale", change_locale}, {"change_umask", change_umask},
     {"limit_files", limit_files}, {"limit_size", limit_size}, {"set_alarm", set_alarm}, {"block_signals", block_signals},
     {"change_environment", change_environment}, {"ignore_interrupts", ignore_interrupts}, {"close_output", close_output},
-    {"truncate_all", truncate_all}, {"close_all", close_all}, {"fork", fork_}, {"daemon", daemon_}, {"thread", thread}, {"write_here", write_here},
+    {"truncate_all", truncate_all}, {"close_all", close_all}, {"fork", fork_}, {"daemon", daemon_},
+    {"fork_return", fork_return}, {"fork_silently", fork_silently}, {"fork_program", fork_program},
+    {"thread", thread}, {"write_here", write_here},
     {"write_temporary", write_temporary}, {"tcp", tcp}, {"udp", udp}, {"processes", processes},
 };
 

@@ -15,6 +15,7 @@ from typing import NoReturn
 from ....core import component_log
 from ....process.failure_attribution import describe_exit_status
 from ....process.foreign_output import ForeignOutput
+from ....process.forks import attributing_forks
 from ....process.journal import CALL_NUMBER, CHANGE_COUNT, Journal, suspending_deadline
 from ....process.supervisor import POLL_INTERVAL
 from .pipes import READ_SIZE, STEP_DONE, SpinningPoller, decode_line, write_line
@@ -53,9 +54,10 @@ class WorkerProcess:
         commands, self._writer = os.pipe()
         self._reader, answers = os.pipe()
         self._output, output_writer = os.pipe()
-        self._pid = os.fork()
-        if self._pid == 0:
-            _run_worker(serve, commands, answers, output_writer)
+        with attributing_forks(None):
+            self._pid = os.fork()
+            if self._pid == 0:
+                _run_worker(serve, commands, answers, output_writer)
         for descriptor in (commands, answers, output_writer):
             os.close(descriptor)
         self._foreign_output = ForeignOutput(self._output)
