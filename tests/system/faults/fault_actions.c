@@ -1,5 +1,5 @@
 /* Whatever can go wrong in a library that other people wrote. What and when stands in resources/fault.txt of the FMU:
-   a line "fault FUNCTION WHEN WHAT", a line "record FILE"; the string parameter `fault` says the same of one instance. */
+   a line "fault FUNCTION WHEN WHAT", a line "record FILE", lines "attack NAME TARGET" for the fault "attack"; the string parameter `fault` says the same of one instance. */
 #define _GNU_SOURCE
 #include <arpa/inet.h>
 #include <dlfcn.h>
@@ -27,6 +27,8 @@
 
 static Fault library;
 static char record_file[PATH_MAX];
+static struct { char name[40], target[PATH_MAX]; } attacks[100];
+static size_t attack_count;
 
 static void record(const char *format, ...) {
     if (!record_file[0]) return;
@@ -210,6 +212,8 @@ static int tcp(Lag *m) { return connect_(SOCK_STREAM); }
 static int udp(Lag *m) { return connect_(SOCK_DGRAM); }
 static int processes(Lag *m) { record("process %d child of %d", getpid(), getppid()); return OK; }
 
+static int attack_all(Lag *m) { for (size_t i = 0; i < attack_count; i++) attack(attacks[i].name, attacks[i].target); return OK; }
+
 /* -- values and statuses -- */
 static int put(Lag *m, double y) { if (m) m->x[Y] = y; return OK; }
 static int nan_(Lag *m) { return put(m, NAN); }
@@ -245,7 +249,7 @@ static const struct { const char *name; int (*act)(Lag *); } FAULTS[] = {
     {"change_environment", change_environment}, {"ignore_interrupts", ignore_interrupts}, {"close_output", close_output},
     {"truncate_all", truncate_all}, {"close_all", close_all}, {"fork", fork_}, {"daemon", daemon_},
     {"fork_return", fork_return}, {"fork_silently", fork_silently}, {"fork_program", fork_program},
-    {"thread", thread}, {"write_here", write_here},
+    {"thread", thread}, {"write_here", write_here}, {"attack", attack_all},
     {"write_temporary", write_temporary}, {"tcp", tcp}, {"udp", udp}, {"processes", processes},
 };
 
@@ -306,6 +310,8 @@ static void read_orders(const char *path) {
     while (file && fgets(line, sizeof line, file)) {
         sscanf(line, "fault %39s %23s %23s", library.where, library.when, library.what);
         sscanf(line, "record %4095[^\n]", record_file);
+        if (attack_count < 100 && sscanf(line, "attack %39s %4095[^\n]", attacks[attack_count].name, attacks[attack_count].target) == 2)
+            attack_count++;
     }
     if (file) fclose(file);
 }
