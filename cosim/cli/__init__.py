@@ -15,7 +15,7 @@ import click
 
 from ..core.errors import CosimError
 from ..core.version import __version__
-from ..process.standard_streams import ignoring_broken_pipe
+from ..process.standard_streams import protected_stream
 
 #: module in `commands` and description of each command
 COMMANDS = {
@@ -94,7 +94,7 @@ def main(arguments: list[str] | None = None) -> None:
     """
     if arguments is None:
         _avoid_useless_collections()
-    sys.stdout, sys.stderr = ignoring_broken_pipe(sys.stdout), ignoring_broken_pipe(sys.stderr)
+    sys.stdout, sys.stderr = protected_stream(sys.stdout), protected_stream(sys.stderr)
     sys.exit(_run_command_line(sys.argv[1:] if arguments is None else arguments))
 
 

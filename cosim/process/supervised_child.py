@@ -12,7 +12,7 @@ from typing import NoReturn
 from . import journal as journals
 from .journal import EXIT_CODE, Journal, Phase
 from .limits import detach, lower_limit
-from .standard_streams import ignoring_broken_pipe
+from .standard_streams import protected_stream
 
 #: limit of the private memory of a supervised run (bytes); mapped files of rows do not count
 MEMORY_LIMIT = 4 << 30
@@ -51,7 +51,7 @@ def _isolate(output: int, supervisor: int) -> None:
     detach(supervisor)
     lower_limit(resource.RLIMIT_DATA, MEMORY_LIMIT)
     lower_limit(resource.RLIMIT_CORE, 0)
-    sys.stdout, sys.stderr = ignoring_broken_pipe(sys.stdout, duplicate=True), ignoring_broken_pipe(sys.stderr, duplicate=True)
+    sys.stdout, sys.stderr = protected_stream(sys.stdout, duplicate=True), protected_stream(sys.stderr, duplicate=True)
     os.dup2(output, 1)
     os.dup2(output, 2)
     os.close(output)

@@ -7,9 +7,12 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, TextIO
 
+from ..core.printable_text import escape_control_characters
+from ..process.standard_streams import unescaped
 from ..results.checks import CheckOutcome, Number
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.table import Table
 
 MAX_LINE_WIDTH = 1000  # characters, of output that is not a terminal
@@ -31,20 +34,36 @@ def print_kpis(
         units: The units by name (see `cosim.results.kpi.kpi_units`).
         file: The output stream; default: standard output.
     """
-    from rich.console import Console
-
     if not kpis:
         return
-    console = Console(file=file or sys.stdout, highlight=False)
-    table = _kpi_table(kpis, outcomes, units or {}, plain=console.options.ascii_only)
+    console = table_console(file)
+    console.print(_kpi_table(kpis, outcomes, units or {}, plain=console.options.ascii_only))
+
+
+def table_console(file: TextIO | None = None, width: int = MAX_LINE_WIDTH) -> Console:
+    """Return a console for tables; the cells have to be made by `cell_text`.
+
+    Args:
+        file: The output stream; default: standard output.
+        width: Characters of a line unless the output is a terminal.
+    """
+    from rich.console import Console
+
+    console = Console(file=unescaped(file or sys.stdout), highlight=False)
     if not console.is_terminal:
-        console.width = MAX_LINE_WIDTH
-    console.print(table)
+        console.width = width
+    return console
+
+
+def cell_text(text: str) -> str:
+    """Return a text for Rich in which neither markup nor control characters have an effect."""
+    from rich.markup import escape
+
+    return escape(escape_control_characters(text))
 
 
 def _kpi_table(kpis: Mapping[str, Number], outcomes: Sequence[CheckOutcome], units: Mapping[str, str], plain: bool) -> Table:
     from rich import box
-    from rich.markup import escape
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
@@ -60,7 +79,9 @@ def _kpi_table(kpis: Mapping[str, Number], outcomes: Sequence[CheckOutcome], uni
             "\n".join(outcome.limits for outcome in own),
             "\n".join(_check_mark(outcome.passed, plain) for outcome in own),
         )
-        table.add_row(escape(name), format_number(value), escape(units.get(name, "")), *([limits, marks] if outcomes else []))
+        table.add_row(
+            cell_text(name), format_number(value), cell_text(units.get(name, "")), *([limits, marks] if outcomes else [])
+        )
     return table
 
 

@@ -154,7 +154,8 @@ def load(
         late: Reaction to a real-time run that falls more than one step behind: "warn", or "fail" for a LateError.
         isolation: "fmu" runs every FMU in a separate process; "none" does so only where the scenario sets `isolation`, or where
             an FMU that allows one instance per process is used again.
-        sandbox: Run every FMU in a separate process that reads and writes only its own files and has no network.
+        sandbox: Run every FMU in a separate process that reads and writes only its own files, has no network and starts no
+            programs.
         loaded_fmus: FMU files that have already been read, by resolved path.
 
     Returns:

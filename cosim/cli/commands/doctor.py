@@ -149,14 +149,17 @@ def _program_finding(name: str, program: str, option: str) -> Finding:
 
 
 def _sandbox_findings() -> Iterator[Finding]:
-    from ...process.sandbox import find_available_sandboxes, landlock, probe_restrictions
+    from ...process.sandbox import find_available_sandboxes, probe_restrictions
 
     available = find_available_sandboxes()
     if available.landlock:
-        kinds = ["files", *(["TCP"] if available.landlock >= landlock.NETWORK_ABI else [])]
-        yield Finding("sandbox", "Landlock", f"version {available.landlock}: can confine {', '.join(kinds)}; not UDP")
+        yield Finding("sandbox", "Landlock", f"version {available.landlock}: can confine files")
     else:
         yield Finding("sandbox", "Landlock", "not in this kernel (Linux 5.13 or newer)", "missing")
+    if available.system_call_filter:
+        yield Finding("sandbox", "system call filter", "can close the network and all other processes")
+    else:
+        yield Finding("sandbox", "system call filter", "needs Linux with seccomp on x86_64 or aarch64", "missing")
     if available.bubblewrap:
         yield Finding("sandbox", "bubblewrap", f"{available.bubblewrap} works: --sandbox strict can be used")
     else:

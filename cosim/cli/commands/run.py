@@ -15,6 +15,7 @@ from ...core.errors import CosimError, InputError, Problem
 from ...process.journal import STEP_COUNT
 from ...process.output_lock import LockKeeper
 from .. import live, strict_sandbox, supervision
+from ..csv_options import csv_options
 from ..progress import progress_bar
 from ..run_outputs import RunOptions, RunOutcome, write_outputs, write_partial_result
 from ..unfinished_runs import OutputFiles
@@ -60,6 +61,7 @@ RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run
 @click.option("--parquet", is_flag=True, help="Also write result.parquet (extra `parquet`).")
 @click.option("--mcap", is_flag=True, help="Also write result.mcap, for Foxglove and ROS 2 (extra `mcap`).")
 @click.option("--no-report", is_flag=True, help="Write neither figures nor report.html.")
+@csv_options
 @live.view_options
 @supervision.supervision_options
 def command(isolation: str, sandbox: str | None, view: bool, view_port: int, **options: Any) -> int:
@@ -197,7 +199,7 @@ def _save_after_crash(outcome: SupervisedOutcome) -> None:
 
 def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeeper) -> None:
     """Check the figures and that results can be written, lock the output directory, and remove results of an earlier run."""
-    from ...engine.run_checks import find_space_problems
+    from ...engine.disk_space import find_space_problems
     from ...results.files import check_writable, remove_files
 
     if not options.no_report and (problems := prepared.figure_problems()):
@@ -208,7 +210,7 @@ def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeepe
     locks.lock(OutputFiles.of_folder(folder).lock, shown)
     _warn_overwriting(shown, prepared.document.file.resolve())
     replaced = sum((folder / name).stat().st_size for name in RESULT_FILES if (folder / name).is_file())
-    if problems := find_space_problems(prepared.settings, folder, csv=True, replaced=replaced):
+    if problems := find_space_problems(prepared.plan, folder, csv=True, replaced=replaced):
         raise InputError([Problem(problem.message, prepared.root.where(*problem.subject)) for problem in problems])
     figures = (f"{figure.name}{suffix}" for figure in prepared.spec.figures for suffix in (".png", ".svg", ".csv"))
     remove_files(folder, *RESULT_FILES, *figures)

@@ -11,6 +11,8 @@ import click
 from ...process.output_lock import LockKeeper
 from ...process.temporary_folders import temporary_run_folder
 from .. import current_command_line, report_error, strict_sandbox, supervision
+from ..csv_options import csv_options
+from ..messages import print_line
 from ..unfinished_runs import OutputFiles, writing_results
 
 if TYPE_CHECKING:
@@ -36,6 +38,7 @@ FMU_NAME, PROFILE_NAME = "fmu", "profile"
 @click.option(
     "--input-file", type=click.Path(path_type=Path), help='CSV file with the column "time" and columns named like inputs.'
 )
+@csv_options
 @supervision.supervision_options
 def command(isolation: str, sandbox: str | None, output_file: Path | None, **options: Any) -> int:
     """Simulate a single FMU (FMI 2.0 or 3.0 Co-Simulation) from its default start time."""
@@ -66,7 +69,7 @@ def _simulate(
     input_file: Path | None,
 ) -> int:
     from ...core.errors import InputError
-    from ...engine.run_checks import find_space_problems
+    from ...engine.disk_space import find_space_problems
     from ...engine.run_loop import simulating
     from ...process.run_files.folder import keeping_run_files, remove_run_files, run_folder
     from ...results.files import check_writable, remove_files
@@ -82,7 +85,7 @@ def _simulate(
     if output and shown:
         locks.lock(OutputFiles.of_file(output).lock, shown)
         replaced = output.stat().st_size if output.is_file() else 0
-        if problems := find_space_problems(plan.settings, output.parent, csv=True, replaced=replaced):
+        if problems := find_space_problems(plan, output.parent, csv=True, replaced=replaced):
             raise InputError(problems)
         remove_files(output.parent, output.name)
     with keeping_run_files(folder, output), simulating(plan) as run:
@@ -123,7 +126,7 @@ def _write_recording(recording: Recording, output: Path | None, shown: Path | No
 def _print_final_values(recording: Recording) -> None:
     click.echo(f"time = {recording.time.tolist()[-1]!r} s")
     for name, values in recording.columns.items():
-        click.echo(f"{name} = {values.tolist()[-1]!r} {recording.units[name]}".rstrip())
+        print_line(f"{name} = {values.tolist()[-1]!r} {recording.units[name]}".rstrip())
 
 
 def _isolation(isolation: str, sandbox: bool) -> Isolation | None:

@@ -110,6 +110,9 @@ static int open_files(Lag *m) {
 static int log_directives(Lag *m) { say(WARNING, "info", "%s%s%n%d%f 100%"); return OK; }
 static int log_null(Lag *m) { say(WARNING, NULL, NULL); return OK; }
 static int log_bytes(Lag *m) { say(WARNING, "\xff", "bad \xff\xfe\x80 bytes \x1b[31m red"); return OK; }
+#define CONTROL "\x1b[31mred\x1b]0;title\a\xc2\x9b" "31m \xe2\x80\xae" "rtl\r"
+static int log_control(Lag *m) { say(WARNING, "info", CONTROL "\nERROR other: faked"); return OK; }
+static int print_control(Lag *m) { printf(CONTROL "\n"); fflush(stdout); fprintf(stderr, CONTROL "\n"); return OK; }
 static int log_long(Lag *m) {
     char *text = malloc(1 << 20);
     memset(text, 'y', 1 << 20);
@@ -222,7 +225,7 @@ static const struct { const char *name; int (*act)(Lag *); } FAULTS[] = {
     {"abort", abort_}, {"overwrite", overwrite}, {"free_twice", free_twice}, {"exit_0", exit_0}, {"exit_3", exit_3}, {"exit_at_once", exit_at_once},
     {"kill", kill_}, {"loop", loop}, {"sleep", sleep_}, {"read_stdin", read_stdin}, {"memory", memory},
     {"flood_stdout", flood_stdout}, {"flood_stderr", flood_stderr}, {"flood_log", flood_log}, {"open_files", open_files},
-    {"log_directives", log_directives}, {"log_null", log_null}, {"log_bytes", log_bytes}, {"log_long", log_long},
+    {"log_directives", log_directives}, {"log_null", log_null}, {"log_bytes", log_bytes}, {"log_long", log_long}, {"log_control", log_control}, {"print_control", print_control},
     {"log_thread", log_thread}, {"log_20000", log_20000}, {"round_up", round_up}, {"flush_to_zero", flush_to_zero}, {"fp_traps", fp_traps},
     {"change_folder", change_folder}, {"change_locale", change_locale}, {"change_umask", change_umask},
     {"limit_files", limit_files}, {"limit_size", limit_size}, {"set_alarm", set_alarm}, {"block_signals", block_signals},

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
-import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,11 +13,9 @@ from fault_fmu import STEP_COUNT, FaultFmus, lag_output, scenario
 from fmi_call_rules import calls, violations
 from test_fault_crashes import ALL, CRASHES, DEADLINES, EXIT, FAILED, LATE, SIGNAL, SLACK, T5, Case, check, table
 
-from cosim.process.sandbox import find_available_sandboxes, landlock
+from cosim.process.sandbox import find_available_sandboxes
 
-needs_landlock = pytest.mark.skipif(
-    find_available_sandboxes().landlock < landlock.NETWORK_ABI, reason="this kernel cannot confine files and network (Linux 6.7)"
-)
+needs_sandbox = pytest.mark.skipif(not find_available_sandboxes().confines_fmus, reason="this system cannot confine FMUs")
 needs_bubblewrap = pytest.mark.skipif(not find_available_sandboxes().bubblewrap, reason="no bubblewrap that works")
 
 
@@ -143,14 +139,6 @@ def test_one_fmu_alone(fmus, runner, tmp_path, version):
     assert f"fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.err
 
 
-def may_leave_network() -> bool:
-    """Return True if a process may have a network namespace of its own."""
-    child = os.fork()
-    if child == 0:
-        os._exit(min(1, abs(ctypes.CDLL(None).unshare(0x50000000))))
-    return os.waitpid(child, 0)[1] == 0
-
-
 @dataclass(frozen=True)
 class Loud(FaultFmus):
     """FMUs that record their calls where a sandbox lets them: on what they print."""
@@ -160,7 +148,7 @@ class Loud(FaultFmus):
         return Path("/dev/stderr")
 
 
-@needs_landlock
+@needs_sandbox
 class TestSandbox:
     @pytest.fixture
     def confined(self, fmus, runner, tmp_path, version):
@@ -185,21 +173,15 @@ class TestSandbox:
         assert "fault_was_here 1" in done.err
         assert (done.code, done.temporary_files) == (0, [])
 
-    @pytest.mark.parametrize(("words", "answer"), [((), "Connection refused"), (("--sandbox",), "Permission denied")])
-    def test_it_opens_no_connection(self, confined, words, answer):
-        done = confined("DoStep 6 tcp", *words)
-        assert f"connect -1 {answer}" in done.err
-        assert done.code == 0
-
     @needs_bubblewrap
     @pytest.mark.parametrize(
         ("order", "words"),
         [
             ("DoStep 6 write_here", "file fault_was_here 0"),
             ("DoStep 6 write_temporary", "fault_was_here 1"),
-            ("DoStep 6 tcp", "connect -1 Permission denied"),
-            ("DoStep 6 udp", "connect -1 Network is unreachable"),
-            ("DoStep 6 daemon", "child "),
+            ("DoStep 6 tcp", "connect -1 Bad file descriptor"),
+            ("DoStep 6 udp", "connect -1 Bad file descriptor"),
+            ("DoStep 6 daemon", "child -1"),
             ("DoStep 6 processes", "process [1-9] child of [1-9]\n"),
         ],
     )
@@ -214,10 +196,3 @@ class TestSandbox:
         done = confined("DoStep 6 segv", "--sandbox", "strict", "--isolation", "run")
         assert f"lag: fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.err
         assert (done.code, len(done.rows), done.processes, done.temporary_files) == (1, 6, [], [])
-
-    @pytest.mark.skipif(not may_leave_network(), reason="user namespaces are forbidden here")
-    @pytest.mark.parametrize(("words", "answer"), [((), "0 Success"), (("--sandbox",), "-1 Network is unreachable")])
-    def test_it_sends_nothing_by_udp(self, confined, words, answer):
-        done = confined("DoStep 6 udp", *words)
-        assert f"connect {answer}" in done.err
-        assert done.code == 0

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from ....core.errors import InputError
+from ....core.printable_text import escape_control_characters
 
 Severity = Literal["error", "warning"]
 DESCRIPTION_FILE = "modelDescription.xml"
@@ -87,6 +88,5 @@ def raise_errors(path: Path, findings: Iterable[Finding]) -> None:
 
 def escape_unprintable(text: str, length: int = 300) -> str:
     """Return text of an FMU as one line of at most `length` characters, with control characters escaped."""
-    text = text[: length + 1]
-    escaped = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+    escaped = escape_control_characters(text[: length + 1])
     return escaped if len(escaped) <= length else escaped[: length - 3] + "..."
