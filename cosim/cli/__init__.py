@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import sys
 import traceback
@@ -40,7 +41,7 @@ COMMANDS = {
 }
 
 
-#: new objects after which Python searches for reference cycles; almost all objects of imports and models stay
+#: new objects after which Python searches for reference cycles
 _GC_THRESHOLD = 100_000
 
 
@@ -91,9 +92,16 @@ def main(arguments: list[str] | None = None) -> None:
     Args:
         arguments: words after the program's name; default: those of this process.
     """
-    gc.set_threshold(_GC_THRESHOLD)
+    if arguments is None:
+        _avoid_useless_collections()
     sys.stdout, sys.stderr = protected_stream(sys.stdout), protected_stream(sys.stderr)
     sys.exit(_run_command_line(sys.argv[1:] if arguments is None else arguments))
+
+
+def _avoid_useless_collections() -> None:
+    """Search for reference cycles rarely, and not at the end: almost all objects of a command stay until its process ends."""
+    gc.set_threshold(_GC_THRESHOLD)
+    atexit.register(gc.freeze)
 
 
 def _run_command_line(arguments: list[str]) -> int:

@@ -88,7 +88,7 @@ def create_control(prepared: PreparedRun, link: Connection, speed: float | None)
         "name": prepared.spec.name,
         "description": prepared.spec.description,
         "scene": build_scene({"scenario": value, "scenario_file": str(prepared.document.file.resolve())}),
-        "rows": plan.grid.count // plan.record_every + 1,
+        "rows": plan.row_count,
         "stop_time": float(plan.settings.stop_time),
     }
     return LiveControl(link, plan.system, plan.grid, speed or _DEFAULT_SPEED, about)

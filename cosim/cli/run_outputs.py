@@ -18,6 +18,7 @@ from .unfinished_runs import writing_results
 if TYPE_CHECKING:
     from ..api import Execution
     from ..engine.pacer import LatePolicy
+    from ..report.drawing_process import DrawingProcess
     from ..results import Result
     from ..results.checks import CheckOutcome
     from ..scenario import PreparedRun
@@ -56,6 +57,7 @@ class RunOutcome:
         prepared: the run as it was prepared.
         execution: its result or failure.
         began: `time.perf_counter()` before the scenario was loaded (s).
+        drawing: process that draws the figures; None to draw them in this process.
         pictures: SVG text of each figure, by figure name.
         files: names of the files that the summary lists.
     """
@@ -64,6 +66,7 @@ class RunOutcome:
     prepared: PreparedRun
     execution: Execution
     began: float
+    drawing: DrawingProcess | None = None
     pictures: dict[str, str] = field(default_factory=dict)
     files: list[str] = field(default_factory=list)
 
@@ -131,8 +134,13 @@ def _write_result_files(outcome: RunOutcome) -> None:
     from ..process.run_files.folder import remove_run_files, run_folder
     from ..results.result import write_run
 
-    with writing_results(outcome.result, run_folder(), outcome.shown_folder):
+    drawing, rows = outcome.drawing, run_folder()
+    if drawing and rows:
+        drawing.start(outcome.result, rows, outcome.folder)
+    with writing_results(outcome.result, rows, outcome.shown_folder):
         write_run(outcome.result, outcome.folder)
+    if drawing and rows:
+        drawing.wait_until_read()
     remove_run_files()
     outcome.files.extend(("result.csv", "kpis.json", "run.json"))
 
@@ -148,13 +156,14 @@ def _print_kpis(outcome: RunOutcome) -> None:
 def _write_figures(outcome: RunOutcome) -> None:
     if outcome.options.no_report:
         return
-    from ..report.figures import draw_figure, figure_to_svg, save_figure
+    if outcome.drawing:
+        outcome.pictures.update(outcome.drawing.pictures())
+    else:
+        from ..report.figures import draw_picture
 
-    for name, function, arguments in outcome.prepared.figures():
-        figure = draw_figure(outcome.result, name, function, arguments)
-        save_figure(figure, outcome.folder / f"{name}.png")
-        outcome.pictures[name] = figure_to_svg(figure)
-        outcome.files.append(f"{name}.png")
+        for name, function, arguments in outcome.prepared.figures():
+            outcome.pictures[name] = draw_picture(outcome.result, name, function, arguments, outcome.folder)
+    outcome.files.extend(f"{name}.png" for name in outcome.pictures)
 
 
 def _write_report(outcome: RunOutcome) -> None:

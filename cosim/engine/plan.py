@@ -81,6 +81,11 @@ class Plan:
     phases: Sequence[Phase]
 
     @property
+    def row_count(self) -> int:
+        """Number of recorded communication points."""
+        return self.grid.count // self.record_every + 1
+
+    @property
     def all_phases(self) -> Iterator[Phase]:
         """All phases, each followed by the phases of its loop."""
         return _flatten_phases(self.phases)

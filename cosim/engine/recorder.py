@@ -49,8 +49,7 @@ class Recorder:
         self.whole_buffer = 2 * sum(position.dtype.itemsize for position in numeric) >= plan.outputs.buffer.nbytes > 0
         #: the parts of a row otherwise
         self.row_parts: Sequence[RowPart] = () if self.whole_buffer else list(self._pack_row(numeric))
-        dtype, expected_rows = self._row_dtype(numeric), plan.grid.count // self.every + 1
-        self.row_store = open_row_store(dtype, expected_rows, file)
+        self.row_store = open_row_store(self._row_dtype(numeric), plan.row_count, file)
         #: number of rows recorded so far
         self.row_count = 0
         self._string_columns = {

@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import shutil
 from collections import Counter
 from collections.abc import Iterable, Iterator, Set
 from math import inf
-from pathlib import Path
 
 from ..core.component import Variable
-from ..core.csv_text import BYTES_PER_NUMBER
 from ..core.errors import InputError, Problem
 from ..core.size_limits import MAX_DELAYED_VALUES, format_count
 from ..core.system import Endpoint, System
 from ..core.time_grid import TimeGrid
 from .settings import Event, Settings
-
-#: size of a number in the rows (bytes), approximately
-_BYTES_PER_VALUE = 8
-#: size of the recording (bytes) from which the free disk space is checked
-_SIZE_CHECK_THRESHOLD = 1_000_000_000
 
 
 def check_run(system: System, settings: Settings) -> TimeGrid:
@@ -111,22 +103,3 @@ def _find_recording_problems(settings: Settings, grid: TimeGrid) -> Iterator[Pro
     if interval < grid.step or (interval / grid.step).denominator != 1:
         text = f"recording interval {float(interval)!r} s is no multiple of the step size {float(grid.step)!r} s"
         yield Problem(text, subject=("record", "interval"))
-
-
-def find_space_problems(settings: Settings, folder: Path, csv: bool, replaced: int = 0) -> list[Problem]:
-    """Return a problem if the recording is larger than the free disk space; empty if it fits.
-
-    Args:
-        settings: Settings without problems.
-        folder: Folder of the rows.
-        csv: A CSV file is written there, too.
-        replaced: Size of the files there that are removed before (bytes).
-    """
-    grid = TimeGrid.from_times(settings.start_time, settings.stop_time, settings.step_size)
-    rows = grid.count // int((settings.record_interval or grid.step) / grid.step) + 1
-    size = rows * (len(settings.columns) + 1) * (_BYTES_PER_VALUE + csv * BYTES_PER_NUMBER)
-    if size < _SIZE_CHECK_THRESHOLD or size <= (free := shutil.disk_usage(folder).free + replaced):
-        return []
-    signals = f"{len(settings.columns)} signal{'' if len(settings.columns) == 1 else 's'}"
-    text = f"{rows} rows of {signals} take about {size / 1e9:.3g} GB, {free / 1e9:.3g} GB are free in {folder}"
-    return [Problem(f'{text}; make the step longer, or set "record": {{"interval": ...}}', subject=("step_size",))]

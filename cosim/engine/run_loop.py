@@ -22,9 +22,9 @@ from ..process.forks import attributing_forks, report_forks
 from ..process.journal import MARKER_SIZE, Phase, calling_component, current_journal, suspending_deadline
 from ..process.process_state import restoring_process_state
 from . import Executor, Plan, Recorder, Termination, compile_plan, executor_class
+from .disk_space import find_space_problems
 from .initialization import instantiate_components
 from .pacer import Pacer
-from .run_checks import find_space_problems
 from .saving_recorder import SavingRecorder
 from .settings import Event, Settings
 
@@ -118,7 +118,7 @@ def simulating(plan: Plan, observers: Sequence[Observer] = (), step_hook: StepHo
     completed = False
     with default_float_mode():
         try:
-            if problems := _space_problems(plan.settings):
+            if problems := _space_problems(plan):
                 raise InputError(problems)
             outcome = _run(_create_executor(plan), observers, step_hook)
             yield outcome
@@ -152,10 +152,10 @@ def free_components(components: Mapping[str, Component]) -> None:
             stack.callback(component.free)
 
 
-def _space_problems(settings: Settings) -> list[Problem]:
-    journal = current_journal()
+def _space_problems(plan: Plan) -> list[Problem]:
+    journal, settings = current_journal(), plan.settings
     rows = (journal and journal.folder) or (settings.rows_file and settings.rows_file.parent)
-    return find_space_problems(settings, rows or Path(tempfile.gettempdir()), csv=bool(journal and journal.csv_path))
+    return find_space_problems(plan, rows or Path(tempfile.gettempdir()), csv=bool(journal and journal.csv_path))
 
 
 def _create_executor(plan: Plan) -> Executor:

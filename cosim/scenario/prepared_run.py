@@ -29,6 +29,7 @@ from .named_functions import load_function, signal_problems
 from .nested_systems import Node, load_scenario
 from .overview import describe_software, describe_system
 from .schema import FunctionSpec, ScenarioSpec
+from .schema_types import accepted
 from .system_builder import PROFILE_PREFIX, SystemBuilder
 
 IsolationMode = Literal["fmu", "none"]
@@ -75,11 +76,11 @@ class PreparedRun:
 
     def kpis(self) -> list[NamedCall]:
         """Import the KPI functions and return (name, function, arguments) of each."""
-        return self._load_functions(self.spec.kpis)
+        return _load_functions(self.spec.kpis, self.root.folder)
 
     def figures(self) -> list[NamedCall]:
         """Import the figure functions and return (name, function, arguments) of each."""
-        return self._load_functions(self.spec.figures)
+        return _load_functions(self.spec.figures, self.root.folder)
 
     def figure_problems(self) -> list[Problem]:
         """Return a problem for every figure argument that names no recorded signal.
@@ -87,9 +88,6 @@ class PreparedRun:
         These are no problems of the run itself, because sweeps draw no figures.
         """
         return list(signal_problems(self.root, "figures", self.settings.columns))
-
-    def _load_functions(self, specs: Sequence[FunctionSpec]) -> list[NamedCall]:
-        return [(spec.name, load_function(spec.python, self.root.folder), spec.arguments) for spec in specs]
 
     @cached_property
     def metadata(self) -> dict[str, Any]:
@@ -182,3 +180,24 @@ def load(
             free_components(builder.components)
             raise
     return PreparedRun(loaded.root, loaded.spec, plan, builder.component_factory, watch.seconds)
+
+
+def import_figures(scenario: str | Path, parameters: Mapping[str, Any] | None = None) -> list[NamedCall]:
+    """Import the figure functions of a scenario without loading its components.
+
+    Args:
+        scenario: See `load`.
+        parameters: See `load`.
+
+    Returns:
+        (name, function, arguments) of each figure.
+
+    Raises:
+        InputError: The scenario cannot be read, or a function cannot be imported.
+    """
+    loaded = load_scenario(scenario, parameters)
+    return _load_functions([spec for _, spec in accepted(loaded.spec.figures)], loaded.root.folder)
+
+
+def _load_functions(specs: Sequence[FunctionSpec], folder: Path) -> list[NamedCall]:
+    return [(spec.name, load_function(spec.python, folder), spec.arguments) for spec in specs]

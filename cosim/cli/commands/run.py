@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from ...engine.run_loop import Observer
     from ...process.supervisor import SupervisedOutcome
+    from ...report.drawing_process import DrawingProcess
     from ...scenario import PreparedRun
 
 RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run.json", "report.html", "replay.html")
@@ -107,23 +108,41 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
     warnings = messages.print_log()
     _require_packages(options)
     began = time.perf_counter()
-    prepared = _load(options, None if link else options.real_time)
-    folder = options.output_folder(prepared.spec.name).absolute()
-    try:
-        _prepare_folder(prepared, options, locks)
-        control = live.create_control(prepared, link, options.real_time) if link else None
-    except CosimError:
-        prepared.free()  # from here on `executing` frees the components
-        raise
-    with (
-        keeping_run_files(OutputFiles.of_folder(folder).unfinished, folder / "result.csv", prepared.metadata),
-        _progress_observers(prepared) as observers,
-        executing(prepared, observers, control) as execution,
-    ):
-        execution.result.metadata["warnings"] = warnings
-        if control:
-            execution.result.metadata["live_events"] = control.finish()
-        return supervision.results_written(write_outputs(RunOutcome(options, prepared, execution, began)))
+    with _drawing_process(options) as drawing:
+        prepared = _load(options, None if link else options.real_time)
+        folder = options.output_folder(prepared.spec.name).absolute()
+        try:
+            _prepare_folder(prepared, options, locks)
+            control = live.create_control(prepared, link, options.real_time) if link else None
+        except CosimError:
+            prepared.free()  # from here on `executing` frees the components
+            raise
+        with (
+            keeping_run_files(OutputFiles.of_folder(folder).unfinished, folder / "result.csv", prepared.metadata),
+            _progress_observers(prepared) as observers,
+            executing(prepared, observers, control) as execution,
+        ):
+            execution.result.metadata["warnings"] = warnings
+            if control:
+                execution.result.metadata["live_events"] = control.finish()
+            return supervision.results_written(write_outputs(RunOutcome(options, prepared, execution, began, drawing)))
+
+
+@contextmanager
+def _drawing_process(options: RunOptions) -> Iterator[DrawingProcess | None]:
+    """Yield a process that prepares to draw the figures of the scenario; None without a report or a supervisor."""
+    from ...process.journal import current_journal
+
+    if options.no_report or current_journal() is None:
+        yield None
+        return
+    from ...report.drawing_process import DrawingProcess
+    from ...scenario import import_figures
+    from ...scenario.nested_systems import parse_settings
+
+    settings = parse_settings(options.settings)
+    with DrawingProcess(lambda: import_figures(options.scenario, settings)) as process:
+        yield process
 
 
 def _require_packages(options: RunOptions) -> None:
@@ -180,7 +199,7 @@ def _save_after_crash(outcome: SupervisedOutcome) -> None:
 
 def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeeper) -> None:
     """Check the figures and that results can be written, lock the output directory, and remove results of an earlier run."""
-    from ...engine.run_checks import find_space_problems
+    from ...engine.disk_space import find_space_problems
     from ...results.files import check_writable, remove_files
 
     if not options.no_report and (problems := prepared.figure_problems()):
@@ -191,7 +210,7 @@ def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeepe
     locks.lock(OutputFiles.of_folder(folder).lock, shown)
     _warn_overwriting(shown, prepared.document.file.resolve())
     replaced = sum((folder / name).stat().st_size for name in RESULT_FILES if (folder / name).is_file())
-    if problems := find_space_problems(prepared.settings, folder, csv=True, replaced=replaced):
+    if problems := find_space_problems(prepared.plan, folder, csv=True, replaced=replaced):
         raise InputError([Problem(problem.message, prepared.root.where(*problem.subject)) for problem in problems])
     figures = (f"{figure.name}{suffix}" for figure in prepared.spec.figures for suffix in (".png", ".svg", ".csv"))
     remove_files(folder, *RESULT_FILES, *figures)

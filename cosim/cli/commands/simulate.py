@@ -69,7 +69,7 @@ def _simulate(
     input_file: Path | None,
 ) -> int:
     from ...core.errors import InputError
-    from ...engine.run_checks import find_space_problems
+    from ...engine.disk_space import find_space_problems
     from ...engine.run_loop import simulating
     from ...process.run_files.folder import keeping_run_files, remove_run_files, run_folder
     from ...results.files import check_writable, remove_files
@@ -85,7 +85,7 @@ def _simulate(
     if output and shown:
         locks.lock(OutputFiles.of_file(output).lock, shown)
         replaced = output.stat().st_size if output.is_file() else 0
-        if problems := find_space_problems(plan.settings, output.parent, csv=True, replaced=replaced):
+        if problems := find_space_problems(plan, output.parent, csv=True, replaced=replaced):
             raise InputError(problems)
         remove_files(output.parent, output.name)
     with keeping_run_files(folder, output), simulating(plan) as run:
