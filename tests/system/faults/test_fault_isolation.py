@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +18,7 @@ from test_fault_crashes import ALL, CRASHES, DEADLINES, EXIT, FAILED, LATE, SIGN
 
 from cosim.process.sandbox import find_available_sandboxes
 
+ROOT = Path(__file__).parents[3]
 needs_sandbox = pytest.mark.skipif(not find_available_sandboxes().confines_fmus, reason="this system cannot confine FMUs")
 needs_bubblewrap = pytest.mark.skipif(not find_available_sandboxes().bubblewrap, reason="no bubblewrap that works")
 
@@ -172,6 +176,14 @@ class TestSandbox:
         done = confined("DoStep 6 write_temporary", "--sandbox")
         assert "fault_was_here 1" in done.err
         assert (done.code, done.temporary_files) == (0, [])
+
+    def test_a_folder_in_pythonpath_with_other_files_is_refused(self, fmus, tmp_path):
+        (tmp_path / "diary.txt").touch()
+        command = [sys.executable, "-m", "cosim", "simulate", fmus(2), "--sandbox"]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(tmp_path)])}
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+        assert f'"{tmp_path}" in PYTHONPATH holds "diary.txt"' in done.stderr
 
     @needs_bubblewrap
     @pytest.mark.parametrize(
