@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..core.processors import available_processors
+from ..core.size_limits import MAX_RUNS
 
 if TYPE_CHECKING:
     from ..studies.execution.job import Record
@@ -27,12 +28,15 @@ _workers = click.option(
 _scheduler = click.option(
     "--scheduler", metavar="tcp://HOST:PORT", help="Run on the Dask cluster with this scheduler (extra `cluster`)."
 )
+_max_runs = click.option(
+    "--max-runs", type=click.IntRange(min=1), default=MAX_RUNS, show_default=True, help="Refuse a study of more runs."
+)
 _retry = click.option("--retry-failed", is_flag=True, help="Repeat the runs that failed in an earlier call.")
 
 
 def study_options(command: Callable[..., int]) -> Callable[..., int]:
-    """Add the options `--workers`, `--scheduler` and `--retry-failed` to a command."""
-    return _workers(_scheduler(_retry(command)))
+    """Add the options `--workers`, `--scheduler`, `--max-runs` and `--retry-failed` to a command."""
+    return _workers(_scheduler(_max_runs(_retry(command))))
 
 
 def open_run_store(folder: Path, retry: bool) -> RunStore:
