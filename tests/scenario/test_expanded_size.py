@@ -11,7 +11,6 @@ import cosim
 from cosim.cli.commands import check
 from cosim.core import size_limits
 from cosim.scenario import nested_systems
-from cosim.scenario.overview import describe_system
 
 ARRAYS = """
 from cosim.core.component import Component, Variable
@@ -191,7 +190,7 @@ def ring(folder, groups):
     [
         lambda file: cosim.load(file).free(),
         lambda file: check.command.main([str(file), "--isolation", "none"], standalone_mode=False),
-        lambda file: describe_system(cosim.load(file)),
+        lambda file: cosim.load(file).metadata,
         lambda file: cosim.run(file),
     ],
     ids=["load", "check", "description", "run"],
