@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -58,7 +58,6 @@ class RunOutcome:
         execution: its result or failure.
         began: `time.perf_counter()` before the scenario was loaded (s).
         drawing: process that draws the figures; None to draw them in this process.
-        pictures: SVG text of each figure, by figure name.
         files: names of the files that the summary lists.
     """
 
@@ -67,7 +66,6 @@ class RunOutcome:
     execution: Execution
     began: float
     drawing: DrawingProcess | None = None
-    pictures: dict[str, str] = field(default_factory=dict)
     files: list[str] = field(default_factory=list)
 
     @property
@@ -153,25 +151,28 @@ def _print_kpis(outcome: RunOutcome) -> None:
     print_kpis(result.kpis, outcome.checks, kpi_units(outcome.prepared.kpis(), result.kpis, result.units))
 
 
-def _write_figures(outcome: RunOutcome) -> None:
+def _write_report(outcome: RunOutcome) -> None:
+    """Write the figures and the report that shows them."""
     if outcome.options.no_report:
         return
-    if outcome.drawing:
-        outcome.pictures.update(outcome.drawing.pictures())
-    else:
-        from ..report.figures import draw_picture
+    from ..report.run_page import write_report
 
-        for name, function, arguments in outcome.prepared.figures():
-            outcome.pictures[name] = draw_picture(outcome.result, name, function, arguments, outcome.folder)
-    outcome.files.extend(f"{name}.png" for name in outcome.pictures)
+    write_report(outcome.result, outcome.checks, _write_figures(outcome), outcome.folder / "report.html")
+    outcome.files.append("report.html")
 
 
-def _write_report(outcome: RunOutcome) -> None:
-    if not outcome.options.no_report:
-        from ..report.run_page import write_report
+def _write_figures(outcome: RunOutcome) -> Iterator[tuple[str, str]]:
+    """Write the figures, and yield name and SVG text of each."""
+    for name, picture in outcome.drawing.pictures() if outcome.drawing else _draw_figures(outcome):
+        outcome.files.append(f"{name}.png")
+        yield name, picture
 
-        write_report(outcome.result, outcome.checks, outcome.pictures, outcome.folder / "report.html")
-        outcome.files.append("report.html")
+
+def _draw_figures(outcome: RunOutcome) -> Iterator[tuple[str, str]]:
+    from ..report.figures import draw_picture
+
+    for name, function, arguments in outcome.prepared.figures():
+        yield name, draw_picture(outcome.result, name, function, arguments, outcome.folder)
 
 
 def _print_summary(outcome: RunOutcome) -> None:
@@ -216,7 +217,6 @@ def _write_mcap(outcome: RunOutcome) -> None:
 _COMPLETE_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (
     _write_result_files,
     _print_kpis,
-    _write_figures,
     _write_report,
     _print_summary,
 )

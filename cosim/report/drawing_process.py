@@ -6,7 +6,7 @@ import os
 import pickle
 import signal
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +18,7 @@ from ..process.failure_attribution import describe_exit_status
 from ..process.journal import set_current_journal
 from ..process.run_files.folder import recover_recording
 from ..results import Result
+from .figures import draw_nothing, draw_picture
 
 #: name, function and keyword arguments of a figure
 Figure = tuple[str, Callable[..., Any], Mapping[str, Any]]
@@ -83,17 +84,15 @@ class DrawingProcess:
         """Wait until the process has opened the recorded rows."""
         self._answer()
 
-    def pictures(self) -> dict[str, str]:
-        """Wait until all figures are drawn, and return the SVG text of each by its name.
+    def pictures(self) -> Iterator[tuple[str, str]]:
+        """Wait for the figures, and yield name and SVG text of each.
 
         Raises:
             InputError: A figure function cannot be imported, or the result lacks a signal that it needs.
             ComponentError: A figure function failed, or its process crashed.
         """
-        pictures: dict[str, str] = {}
         for name in self._answer():
-            pictures[name] = self._answer()
-        return pictures
+            yield name, self._answer()
 
     def _answer(self) -> Any:
         try:
@@ -119,15 +118,13 @@ def _run_process(load_figures: Callable[[], Iterable[Figure]], requests: IO[byte
 
 
 def _load(load_figures: Callable[[], Iterable[Figure]]) -> Sequence[Figure] | Exception:
-    """Import the figure functions, and what matplotlib imports on first use; return the error if a function has one."""
+    """Import the figure functions and what drawing needs; return the error if a function has one."""
     try:
         figures = list(load_figures())
     except Exception as error:
         return error
     if figures:
-        from matplotlib.backends import backend_agg, backend_svg  # noqa: F401
-
-        from . import figures as _  # noqa: F401
+        draw_nothing()
     return figures
 
 
@@ -170,8 +167,6 @@ def _fork_drawing(result: Result, figure: Figure, folder: Path) -> tuple[int, in
 
 def _draw(result: Result, figure: Figure, folder: Path) -> str | BaseException:
     """Draw a figure to a PNG file and return its SVG text, or the error."""
-    from .figures import draw_picture
-
     try:
         return draw_picture(result, *figure, folder)
     except Exception as error:
