@@ -83,6 +83,7 @@ CLASSES: dict[str, list[Attack]] = {
         Attack("change_times", "change the times of a file (`utimes`)", "file"),
         Attack("change_times_at", "change the times of a file (`utimensat`)", "file"),
         Attack("set_attribute", "set an extended attribute of a file", "file", needs="system"),
+        Attack("read_attribute", "read an extended attribute of a file", "file", needs="system"),
         Attack("watch_folder", "watch who uses the files of a folder", "folder"),
         Attack("create_device", "create a device as root", needs="root"),
         Attack("open_by_handle", "make a handle of a file, which needs no path", "file", needs="system"),

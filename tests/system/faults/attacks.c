@@ -88,6 +88,10 @@ ATTACK(change_owner) { return CALL(chown(target, getuid(), getgid())); }
 ATTACK(change_times) { return CALL(utimes(target, (struct timeval[2]){{1, 0}, {1, 0}})); }
 ATTACK(change_times_at) { return CALL(utimensat(AT_FDCWD, target, (struct timespec[2]){{1, 0}, {1, 0}}, 0)); }
 ATTACK(set_attribute) { return CALL(setxattr(target, "user.attack", "x", 1, 0)); }
+ATTACK(read_attribute) {
+    char value[8] = "";
+    return getxattr(target, "user.attack", value, sizeof value) < 0 ? errno : strcmp(value, "secret") ? EIO : 0;
+}
 ATTACK(watch_folder) {
     int watch = inotify_init();
     return watch < 0 ? errno : CALL(inotify_add_watch(watch, target, IN_ALL_EVENTS));
@@ -276,6 +280,7 @@ static const struct { const char *name; int (*act)(const char *); } ATTACKS[] = 
     ENTRY(truncate_file), ENTRY(truncate_by_reading), ENTRY(delete_file), ENTRY(rename_file), ENTRY(link_file),
     ENTRY(create_symlink), ENTRY(create_folder), ENTRY(create_fifo), ENTRY(create_socket_file), ENTRY(change_mode),
     ENTRY(change_mode_at), ENTRY(change_owner), ENTRY(change_times), ENTRY(change_times_at), ENTRY(set_attribute),
+    ENTRY(read_attribute),
     ENTRY(watch_folder), ENTRY(create_device), ENTRY(open_by_handle), ENTRY(environment), ENTRY(environment_file),
     ENTRY(environment_memory), ENTRY(fork_process), ENTRY(fork_by_clone), ENTRY(run_program), ENTRY(leave_process),
     ENTRY(kill_process), ENTRY(kill_importer), ENTRY(signal_thread), ENTRY(queue_signal), ENTRY(signal_by_descriptor),

@@ -1,5 +1,6 @@
 /* Whatever can go wrong in a library that other people wrote. What and when stands in resources/fault.txt of the FMU:
-   a line "fault FUNCTION WHEN WHAT", a line "record FILE", lines "attack NAME TARGET" for the fault "attack"; the string parameter `fault` says the same of one instance. */
+   a line "fault FUNCTION WHEN WHAT", a line "record FILE", lines "attack NAME TARGET" for the fault "attack";
+   the string parameter `fault` says the same of one instance. */
 #define _GNU_SOURCE
 #include <arpa/inet.h>
 #include <dlfcn.h>

@@ -105,6 +105,8 @@ def make_targets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[object]:
             for attack in ATTACKS:
                 if attack.target == "file":
                     (folder / attack.name).write_text("secret")
+            with suppress(OSError):  # file systems without attributes
+                os.setxattr(folder / "read_attribute", "user.attack", b"secret")
             process = stack.enter_context(subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"]))
             stack.callback(process.kill)
             port, datagrams = (stack.enter_context(socket.socket(type=kind)) for kind in (socket.SOCK_STREAM, socket.SOCK_DGRAM))
