@@ -6,6 +6,8 @@ import re
 
 #: longest text that is accepted (characters)
 MAX_TEXT_LENGTH = 1 << 20
+#: stands for each forbidden character
+REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 #: longest quotation of a value in a message (characters)
 _MAX_QUOTATION_LENGTH = 200
 
@@ -27,7 +29,7 @@ def text_problem(text: str) -> str:
 
 def acceptable_text(text: str) -> str:
     """Return a text without the characters and the length that `text_problem` refuses."""
-    return _FORBIDDEN_CHARACTERS.sub("\N{REPLACEMENT CHARACTER}", text[:MAX_TEXT_LENGTH])
+    return _FORBIDDEN_CHARACTERS.sub(REPLACEMENT, text[:MAX_TEXT_LENGTH])
 
 
 def shorten(text: str) -> str:

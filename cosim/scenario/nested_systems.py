@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +21,8 @@ from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, p
 from .schema_types import accepted
 from .validation import validate_document
 
+_LEGAL_NAME = re.compile("[A-Za-z_][A-Za-z0-9_]*")
+
 
 @dataclass
 class Node:
@@ -33,6 +36,8 @@ class Node:
     invalid_components: set[str] = field(default_factory=set)
     #: keys of the file that are invalid or missing; problems that only follow from that are not reported
     invalid_keys: set[str] = field(default_factory=set)
+    #: output ports that name no output; likewise
+    invalid_ports: set[str] = field(default_factory=set)
 
     @property
     def folder(self) -> Path:
@@ -43,6 +48,12 @@ class Node:
     def ports(self) -> PortsSpec:
         """Ports of a nested system; the scenario itself has none."""
         return ports_of(self.spec)
+
+    @property
+    def has_wrong_names(self) -> bool:
+        """True if names of components are illegal or occur twice, so that an unknown name may mean one of them."""
+        repeated = any(path[:1] == ("components",) and len(path) == 2 for path in self.document.invalid_paths)
+        return repeated or not all(map(_LEGAL_NAME.fullmatch, self.invalid_components))
 
     def full_name(self, component: str) -> str:
         """Return the name of a component from the scenario's point of view, such as "uav.vtol"."""
@@ -167,11 +178,11 @@ class _SystemReader:
         """Validate a document and read its nested systems; `ancestors` are the resolved files that it is nested in."""
         spec, problems, invalid_keys = validate_document(document, kind)
         self.problems += problems
-        if not spec.components and "components" not in invalid_keys:
-            self.problems.append(Problem("expected at least one component, found none", document.where(("components",))))
-            invalid_keys.add("components")
         raw = document.value.get("components") if isinstance(document.value, dict) else None
         invalid_components = set(raw if isinstance(raw, dict) else {}) - set(spec.components)
+        if not spec.components and not invalid_components and "components" not in invalid_keys:
+            self.problems.append(Problem("expected at least one component, found none", document.where(("components",))))
+            invalid_keys.add("components")
         file = SystemFile(document, spec, invalid_keys, invalid_components, {})
         ancestors = (*ancestors, paths.resolve_path(document.file))
         for name, component in spec.components.items():

@@ -28,7 +28,7 @@ EXPECTATION_KEYS = ("checks", "reference")
 def has_keys(file: Path, *groups: Sequence[str]) -> bool:
     """Return whether a JSON file has at least one key of each group; an unreadable file counts, since its run reports why."""
     try:
-        with open_text(file, encoding="utf-8") as stream:
+        with open_text(file, encoding="utf-8-sig") as stream:
             content = json.load(stream)
     except (OSError, ValueError, RecursionError):
         return True
