@@ -163,16 +163,21 @@ def _write_report(outcome: RunOutcome) -> None:
 
 def _write_figures(outcome: RunOutcome) -> Iterator[tuple[str, str]]:
     """Write the figures, and yield name and SVG text of each."""
-    for name, picture in outcome.drawing.pictures() if outcome.drawing else _draw_figures(outcome):
-        outcome.files.append(f"{name}.png")
-        yield name, picture
+    for i, spec in enumerate(outcome.prepared.spec.figures):
+        picture = outcome.drawing.picture(spec.name, spec.python.rpartition(":")[2]) if outcome.drawing else None
+        picture = picture or _draw_figure(outcome, i)
+        outcome.files.append(f"{spec.name}.png")
+        yield spec.name, picture
 
 
-def _draw_figures(outcome: RunOutcome) -> Iterator[tuple[str, str]]:
-    from ..report.figures import draw_picture
+def _draw_figure(outcome: RunOutcome, i: int) -> str:
+    """Write a figure in this process, and return its SVG text."""
+    from ..report.figures import draw_figure, figure_to_svg, save_figure
 
-    for name, function, arguments in outcome.prepared.figures():
-        yield name, draw_picture(outcome.result, name, function, arguments, outcome.folder)
+    name, function, arguments = outcome.prepared.figures()[i]
+    figure = draw_figure(outcome.result, name, function, arguments)
+    save_figure(figure, outcome.folder / f"{name}.png")
+    return figure_to_svg(figure)
 
 
 def _print_summary(outcome: RunOutcome) -> None:

@@ -2,35 +2,29 @@
 
 from __future__ import annotations
 
+import json
 import os
-import pickle
 import signal
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
-from typing import IO, Any, NamedTuple, NoReturn
+from tempfile import TemporaryDirectory
+from typing import IO, Any, NoReturn
 
 from ..core.errors import ComponentError
-from ..core.recording import Recording
 from ..process.failure_attribution import describe_exit_status
 from ..process.journal import set_current_journal
 from ..process.run_files.folder import recover_recording
-from ..results import Result
-from .figures import draw_nothing, draw_picture
+from ..results import Kpis, Result
+from ..results.checks import CheckOutcome
+from .figures import draw_figure, draw_nothing, save_figure
 
 #: name, function and keyword arguments of a figure
 Figure = tuple[str, Callable[..., Any], Mapping[str, Any]]
 
-
-class _Request(NamedTuple):
-    """Result without its recording, folder and number of the recorded rows, and folder of the figures."""
-
-    result: Result
-    run_folder: Path
-    rows: int
-    folder: Path
+#: exit code of the process of a figure that raised an exception
+_EXCEPTION = 1
 
 
 class DrawingProcess:
@@ -45,13 +39,15 @@ class DrawingProcess:
 
     def __init__(self, load_figures: Callable[[], Iterable[Figure]]):
         requests, answers = os.pipe(), os.pipe()
+        self._pictures = TemporaryDirectory(prefix="figures-")
+        self._statuses: dict[str, int] | None = None
         sys.stdout.flush()
         sys.stderr.flush()
         self._process = os.fork()
         if self._process == 0:
             os.close(requests[1])
             os.close(answers[0])
-            _run_process(load_figures, os.fdopen(requests[0], "rb"), os.fdopen(answers[1], "wb"))
+            _run_process(load_figures, os.fdopen(requests[0], "rb"), os.fdopen(answers[1], "wb", buffering=0))
         os.close(requests[0])
         os.close(answers[1])
         self._requests, self._answers = os.fdopen(requests[1], "wb"), os.fdopen(answers[0], "rb")
@@ -60,12 +56,13 @@ class DrawingProcess:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for file in (self._requests, self._answers):
-            with suppress(OSError):
-                file.close()
         with suppress(ProcessLookupError, ChildProcessError):
             os.kill(self._process, signal.SIGKILL)
             os.waitpid(self._process, 0)
+        for file in (self._requests, self._answers):
+            with suppress(OSError):
+                file.close()
+        self._pictures.cleanup()
 
     def start(self, result: Result, run_folder: Path, folder: Path) -> None:
         """Begin to draw the figures of a result.
@@ -73,35 +70,36 @@ class DrawingProcess:
         Args:
             result: The result.
             run_folder: Folder with its recorded rows, until `wait_until_read` has returned.
-            folder: Folder of the figures.
+            folder: Folder of the PNG files.
         """
-        request = _Request(replace(result, recording=Recording.empty()), run_folder, len(result.time), folder)
-        with suppress(OSError):  # the process has ended: there will be no answer
-            pickle.dump(request, self._requests)
+        content = {"kpis": result.kpis, "timing": result.timing, "metadata": result.metadata, "checks": result.checks}
+        request = {"run_folder": str(run_folder), "rows": len(result.time), "folder": str(folder), "result": content}
+        with suppress(OSError):  # the process has ended
+            self._requests.write(json.dumps({**request, "pictures": self._pictures.name}, default=str).encode() + b"\n")
             self._requests.flush()
 
     def wait_until_read(self) -> None:
         """Wait until the process has opened the recorded rows."""
-        self._answer()
+        self._answers.readline()
 
-    def pictures(self) -> Iterator[tuple[str, str]]:
-        """Wait for the figures, and yield name and SVG text of each.
+    def picture(self, name: str, function: str) -> str | None:
+        """Wait until all figures are drawn, and return one as SVG text; None if drawing it raised an exception.
+
+        Args:
+            name: Name of the figure.
+            function: Name of its function, for the message.
 
         Raises:
-            InputError: A figure function cannot be imported, or the result lacks a signal that it needs.
-            ComponentError: A figure function failed, or its process crashed.
+            ComponentError: The process that drew the figure has ended early.
         """
-        for name in self._answer():
-            yield name, self._answer()
-
-    def _answer(self) -> Any:
-        try:
-            answer = pickle.load(self._answers)  # noqa: S301  # from this process's own child
-        except (OSError, EOFError):
-            raise ComponentError("figures", "drawing", "the process that draws them has ended") from None
-        if isinstance(answer, BaseException):
-            raise answer
-        return answer
+        if self._statuses is None:
+            self._statuses = json.loads(self._answers.readline() or b"{}")
+        status, file = self._statuses.get(name), Path(self._pictures.name, f"{name}.svg")
+        if status is None or (os.WIFEXITED(status) and os.WEXITSTATUS(status) == _EXCEPTION):
+            return None
+        if not file.is_file():
+            raise ComponentError(f'figure "{name}"', function, describe_exit_status(status))
+        return file.read_text(encoding="utf-8")
 
 
 def _run_process(load_figures: Callable[[], Iterable[Figure]], requests: IO[bytes], answers: IO[bytes]) -> NoReturn:
@@ -110,69 +108,45 @@ def _run_process(load_figures: Callable[[], Iterable[Figure]], requests: IO[byte
         set_current_journal(None)
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the simulation process reports an interrupt
         figures = _load(load_figures)
-        with suppress(EOFError):  # the simulation failed
-            request: _Request = pickle.load(requests)  # noqa: S301  # from this process's own parent
-            _serve(request, figures, answers)
+        if line := requests.readline():  # else the simulation failed
+            _serve(json.loads(line), figures, answers)
     finally:
         os._exit(0)
 
 
-def _load(load_figures: Callable[[], Iterable[Figure]]) -> Sequence[Figure] | Exception:
-    """Import the figure functions and what drawing needs; return the error if a function has one."""
-    try:
-        figures = list(load_figures())
-    except Exception as error:
-        return error
-    if figures:
-        draw_nothing()
-    return figures
+def _load(load_figures: Callable[[], Iterable[Figure]]) -> Sequence[Figure]:
+    """Import the figure functions and what drawing needs; without success, the simulation process draws and reports why."""
+    with suppress(Exception):
+        if figures := list(load_figures()):
+            draw_nothing()
+            return figures
+    return []
 
 
-def _serve(request: _Request, figures: Sequence[Figure] | Exception, answers: IO[bytes]) -> None:
-    result = replace(request.result, recording=recover_recording(request.run_folder, request.rows))
-    _send(answers, None)
-    if isinstance(figures, Exception):
-        _send(answers, figures)
-        return
-    _send(answers, [name for name, _, _ in figures])
-    drawings = [_fork_drawing(result, figure, request.folder) for figure in figures]
-    for figure, (process, reader) in zip(figures, drawings, strict=True):
-        with os.fdopen(reader, "rb") as file:
-            answer = file.read()
-        _, status = os.waitpid(process, 0)
-        answers.write(answer or pickle.dumps(_crash(figure, status)))
-        answers.flush()
+def _serve(request: Mapping[str, Any], figures: Sequence[Figure], answers: IO[bytes]) -> None:
+    content, recording = request["result"], recover_recording(Path(request["run_folder"]), request["rows"])
+    checks = [CheckOutcome(*outcome) for outcome in content["checks"]]
+    result = Result(recording, Kpis(content["kpis"]), content["timing"], content["metadata"], checks)
+    answers.write(b"\n")
+    folders = Path(request["folder"]), Path(request["pictures"])
+    processes = {figure[0]: _fork_drawing(result, figure, *folders) for figure in figures}
+    statuses = {name: os.waitpid(process, 0)[1] for name, process in processes.items()}
+    answers.write(json.dumps(statuses).encode() + b"\n")
 
 
-def _crash(figure: Figure, status: int) -> ComponentError:
-    name, function, _ = figure
-    return ComponentError(f'figure "{name}"', function.__name__, describe_exit_status(status))
-
-
-def _fork_drawing(result: Result, figure: Figure, folder: Path) -> tuple[int, int]:
-    """Draw a figure in a process of its own; return its id and the descriptor of the pipe with its answer."""
-    reader, writer = os.pipe()
+def _fork_drawing(result: Result, figure: Figure, folder: Path, pictures: Path) -> int:
+    """Draw a figure to NAME.png and NAME.svg in a process of its own; return its id."""
     process = os.fork()
     if process:
-        os.close(writer)
-        return process, reader
+        return process
+    code = _EXCEPTION
     try:
-        with os.fdopen(writer, "wb") as answers:
-            _send(answers, _draw(result, figure, folder))
+        name, function, arguments = figure
+        drawn = draw_figure(result, name, function, arguments)
+        save_figure(drawn, folder / f"{name}.png")
+        save_figure(drawn, pictures / f"{name}.svg")
         sys.stdout.flush()
         sys.stderr.flush()
+        code = 0
     finally:
-        os._exit(0)
-
-
-def _draw(result: Result, figure: Figure, folder: Path) -> str | BaseException:
-    """Draw a figure to a PNG file and return its SVG text, or the error."""
-    try:
-        return draw_picture(result, *figure, folder)
-    except Exception as error:
-        return error
-
-
-def _send(answers: IO[bytes], answer: object) -> None:
-    pickle.dump(answer, answers)
-    answers.flush()
+        os._exit(code)

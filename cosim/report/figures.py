@@ -111,13 +111,6 @@ def draw_nothing() -> None:
     figure_to_svg(figure)
 
 
-def draw_picture(result: Result, name: str, function: Callable[..., Figure], arguments: Mapping[str, Any], folder: Path) -> str:
-    """Draw a figure to NAME.png in a folder and return it as SVG text; see `draw_figure`."""
-    figure = draw_figure(result, name, function, arguments)
-    save_figure(figure, folder / f"{name}.png")
-    return figure_to_svg(figure)
-
-
 def draw_figures(
     result: Result,
     figures: Iterable[tuple[str, Callable[..., Figure], Mapping[str, Any]]],
