@@ -31,7 +31,8 @@ _sandbox = click.option(
     "--sandbox",
     type=click.Choice(SANDBOX_KINDS),
     metavar="[strict]",
-    help="Run each FMU in its own process that reads only its own files, writes only to a temporary folder and has no network. "
+    help="Run each FMU in its own process that reads only its own files, writes only to a temporary folder, has no network and "
+    "starts no programs. "
     "strict: also confine the whole command to the files it needs and to its output directory (requires bubblewrap).",
 )
 
@@ -78,13 +79,16 @@ def run_supervised_command(
 
 
 def _save_partial(outcome: SupervisedOutcome, save_partial: Callable[[SupervisedOutcome], None], folder: Path) -> None:
-    """Save the rows of an unfinished run; errors that the child has reported itself, such as a full disk, are not repeated."""
+    """Save the rows of an unfinished run and remove its folder, unless the rows cannot be written or the child kept them."""
+    from ..process.run_files.folder import find_kept_rows
+
+    if find_kept_rows(folder):
+        return
     try:
         save_partial(outcome)
     except CosimError as error:
-        if outcome.failure or outcome.interrupted:
-            click.echo(str(error), err=True)
-    finally:
+        click.echo(str(error), err=True)
+    else:
         rmtree(folder, ignore_errors=True)
 
 

@@ -27,6 +27,7 @@ static uint32_t float_control(void) {
 static uint32_t float_control(void) { return 0; }
 #endif
 
+enum { INTERFACE = 2 };                              /* also in native_executor.py, where it is described */
 enum { WARNING = 1, DISCARD = 2 };                   /* FMI statuses; 0 is OK, everything but OK and WARNING is bad */
 /* Codes passed to `on_status` like an FMI status. They exceed 32 bits, so no FMU can return them. */
 #define FLOAT_MODE_CHANGED (INT64_C(1) << 33)
@@ -815,8 +816,9 @@ static PyType_Spec specification = {
 static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "_native", "The native executor.", 0, NULL, NULL, NULL, NULL, NULL};
 
 static const struct { const char *name; int64_t value; } constants[] = {
-    {"FLOAT_MODE_CHANGED", FLOAT_MODE_CHANGED}, {"FLOAT_TRAPS_ENABLED", FLOAT_TRAPS_ENABLED}, {"NOT_FINITE", NOT_FINITE},
-    {"CONTINUE", CONTINUE}, {"END_AFTER_STEP", END_AFTER_STEP}, {"END_BEFORE_STEP", END_BEFORE_STEP}, {"MARKER_CALL", MARKER_CALL},
+    {"INTERFACE", INTERFACE}, {"FLOAT_MODE_CHANGED", FLOAT_MODE_CHANGED}, {"FLOAT_TRAPS_ENABLED", FLOAT_TRAPS_ENABLED},
+    {"NOT_FINITE", NOT_FINITE}, {"CONTINUE", CONTINUE}, {"END_AFTER_STEP", END_AFTER_STEP},
+    {"END_BEFORE_STEP", END_BEFORE_STEP}, {"MARKER_CALL", MARKER_CALL},
     {"MARKER_STEPS", MARKER_STEPS}, {"MARKER_ROWS", MARKER_ROWS}, {"MEASURED_STEPS", MEASURED_STEPS},
 };
 

@@ -1,6 +1,7 @@
 from collections.abc import Callable
 from typing import Any, Final
 
+INTERFACE: Final[int]
 #: codes that `on_status` receives beside FMI statuses; they exceed 32 bits
 FLOAT_MODE_CHANGED: Final[int]
 FLOAT_TRAPS_ENABLED: Final[int]

@@ -50,8 +50,8 @@ class _DueSteps:
 class PythonExecutor(Executor):
     """Executor in pure Python."""
 
-    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None, require_finite: bool = True):
-        super().__init__(plan, recorder, marker, require_finite)
+    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None):
+        super().__init__(plan, recorder, marker)
         self._shortest_durations: dict[int, float] = {}
 
     def _prepare(self) -> None:

@@ -114,12 +114,13 @@ class StepRunner:
         time = self.current_time.value
         if not isinstance(result, StepResult):
             raise ComponentError(step.name, "do_step", f"returned {result!r}, expected None or a StepResult", time)
-        complete = result.time_reached >= time + step.step_size
+        end = time + step.step_size
+        complete = result.time_reached >= end
         if result.terminate_requested:
             if not self.termination or (self.termination.complete and not complete):
-                self.termination = Termination(step.name, result.time_reached, complete)
+                self.termination = Termination(step.name, min(result.time_reached, end), complete)
         elif not complete:
-            reached = f"reached only t = {result.time_reached!r} s of {time + step.step_size!r} s"
+            reached = f"reached only t = {result.time_reached!r} s of {end!r} s"
             raise ComponentError(step.name, "do_step", f"{reached}; early return is not supported", time)
 
     def restore_float_mode(self, component: str) -> None:

@@ -21,6 +21,7 @@ from pathlib import Path
 
 from ..core.errors import ComponentError
 from .failure_attribution import attribute_failure, describe_exit_status, unattributed_failure
+from .foreign_output import ForeignOutput
 from .journal import CALL_NUMBER, CHANGE_COUNT, EXIT_CODE, JOURNAL_SIZE, ROW_COUNT, STEP_COUNT, Journal, Phase
 from .run_files.live_csv_writer import LiveCsvWriter
 from .supervised_child import run_child
@@ -31,9 +32,6 @@ POLL_INTERVAL = 0.05
 
 #: time after an interrupt until the child is killed (s)
 INTERRUPT_TIMEOUT = 3.0
-
-#: output of foreign code that is forwarded (bytes)
-MAX_OUTPUT_SIZE = 1 << 16
 
 #: number of searches for orphaned processes; each one may find children of the processes killed before
 _MAX_ORPHAN_SCANS = 10
@@ -126,17 +124,17 @@ class _Supervisor:
     child: int
     journal: Journal
     reader: int
+    _output: ForeignOutput = field(init=False)
     _progress: tuple[int, ...] = ()
     _progress_time: float = field(default_factory=time.monotonic)
     _interrupt_time: float = 0.0
-    _output_size: int = 0
     _timeout_reason: str = ""
     #: content of the journal at the last check
     _last_contents: bytes = b""
 
     def wait_for_child(self) -> SupervisedOutcome:
         """Wait for the end of the child and return its outcome."""
-        os.set_blocking(self.reader, False)
+        self._output = ForeignOutput(self.reader)
         process = os.pidfd_open(self.child) if hasattr(os, "pidfd_open") else -1
         poll = select.poll()
         for descriptor in (self.reader, process):
@@ -147,7 +145,7 @@ class _Supervisor:
             status = self._poll_child(poll, csv)
         finally:
             self._kill_descendants()
-            self._forward_output()
+            self._output.forward()
             os.close(self.reader)
             if process >= 0:
                 os.close(process)
@@ -158,7 +156,9 @@ class _Supervisor:
         while True:
             try:
                 poll.poll(POLL_INTERVAL * 1000)
-                self._forward_output()
+                if not self._output.forward():
+                    with suppress(KeyError):
+                        poll.unregister(self.reader)  # a closed pipe is always ready
                 pid, status = os.waitpid(self.child, os.WNOHANG)
                 if pid:
                     return status
@@ -203,25 +203,10 @@ class _Supervisor:
                     os.kill(orphan, signal.SIGKILL)
                     os.waitpid(orphan, 0)
 
-    def _forward_output(self) -> None:
-        """Write the output of foreign code to standard error, up to `MAX_OUTPUT_SIZE`."""
-        for _ in range(64):
-            try:
-                data = os.read(self.reader, 1 << 16)
-            except BlockingIOError:
-                return
-            if not data:
-                return
-            remaining = MAX_OUTPUT_SIZE - self._output_size
-            self._output_size += len(data)
-            if remaining > 0:
-                sys.stderr.write(data[:remaining].decode("utf-8", "replace"))
-                sys.stderr.flush()
-
     def _outcome(self, status: int) -> SupervisedOutcome:
         """Return the outcome of a child that ended with `status`."""
-        if (dropped := self._output_size - MAX_OUTPUT_SIZE) > 0:
-            sys.stderr.write(f"\n... components printed {dropped} bytes more\n")
+        if self._output.dropped:
+            sys.stderr.write(f"\n... components printed {self._output.dropped} bytes more\n")
         journal = self.journal
         if not journal.is_valid:
             journal.restore(self._last_contents)

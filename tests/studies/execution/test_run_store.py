@@ -79,7 +79,7 @@ def test_failed_runs_are_unfinished_with_retry_failed(tmp_path):
 
 
 def test_a_folder_is_locked_against_a_second_sweep(tmp_path):
-    with RunStore(tmp_path), pytest.raises(InputError, match="another sweep or tuning is writing to"):
+    with RunStore(tmp_path), pytest.raises(InputError, match="is in use by process"):
         RunStore(tmp_path)
     RunStore(tmp_path).__enter__().__exit__()
 
