@@ -73,7 +73,7 @@ def writing_atomically(path: str | Path) -> Iterator[Path]:
 
 
 def check_writable(directory: Path) -> None:
-    """Create a folder if necessary and raise the errors of `writing_atomically` if no file can be written there."""
+    """Create a folder if necessary; raise OutputError or InputError if no file can be written there."""
     try:
         directory.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=directory):
@@ -83,11 +83,15 @@ def check_writable(directory: Path) -> None:
 
 
 def remove_files(directory: Path, *names: str) -> None:
-    """Remove files of earlier runs and their temporary files; raise the errors of `writing_atomically`.
+    """Remove files of earlier runs and their temporary files.
 
     Args:
         directory: Folder of the files.
         *names: Names of the files.
+
+    Raises:
+        OutputError: The disk failed or is full.
+        InputError: A file cannot be removed.
     """
     try:
         for name in names:

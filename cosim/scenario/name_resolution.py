@@ -175,7 +175,7 @@ def _enumeration_value(variable: Variable, value: Any) -> Any:
 
 
 def _scalar_value(variable: Variable, value: Any) -> Any:
-    """Return the value in the variable's type; raise ValueError if it has another type or is out of range."""
+    """Return a scalar in the type of the variable; raise ValueError if its type does not fit or it is out of range."""
     if isinstance(value, str) and (problem := text_problem(value)):
         raise ValueError(f'"{variable.name}": {problem}')
     if variable.items:

@@ -86,7 +86,7 @@ def _matching_output(end: Endpoint, variable: Variable, outputs: dict[str, Varia
 
 
 def _lookup_names(slot: str) -> list[str]:
-    """Return a scalar's name and its name without the vehicle: "uav.position.x" and "position.x"."""
+    """Return the names of a scalar with and without the name of the vehicle: "uav.position.x" and "position.x"."""
     rest = slot.partition(".")[2]
     return [slot, rest] if rest else [slot]
 

@@ -63,7 +63,7 @@ class Regression:
     update: bool
 
     def run(self) -> RegressionOutcome:
-        """Run the scenario by `cosim run` in a process of its own and check its results, or update the reference."""
+        """Run the scenario by `cosim run` in a separate process and check its results, or update the reference."""
         began = time.perf_counter()
         return replace(self._run(), seconds=time.perf_counter() - began)
 

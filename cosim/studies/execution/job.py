@@ -80,5 +80,5 @@ class Runner(Protocol):
 
 
 def run_key(digest: str, settings: Mapping[str, Any]) -> RunKey:
-    """Return the key of the run of a scenario, whose files have this digest, with these settings."""
+    """Return the key of a run: a hash of its settings and of the `digest` of all files that it depends on."""
     return RunKey(sha256(json.dumps([digest, settings], sort_keys=True).encode()).hexdigest()[:32])
