@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 import time
 
+from .text import shorten
+
 INFO, WARNING, ERROR = logging.INFO, logging.WARNING, logging.ERROR
 
 #: maximum number of messages per second, and of characters per message
@@ -23,8 +25,7 @@ def log_message(component: str, level: int, text: str) -> None:
     """
     if not _is_within_rate_limit():
         return
-    if len(text) > MAX_MESSAGE_LENGTH:
-        text = f"{text[:MAX_MESSAGE_LENGTH]} ... and {len(text) - MAX_MESSAGE_LENGTH} characters more"
+    text = shorten(text, MAX_MESSAGE_LENGTH)
     printable = "".join(c if c.isprintable() or c in "\n\t" else "\N{REPLACEMENT CHARACTER}" for c in text).rstrip()
     logging.getLogger("cosim.component").log(level, "%s: %s", component, printable)
 
