@@ -18,7 +18,7 @@ from typing import Any
 
 from ..core.errors import InputError, Problem
 from ..core.paths import open_text
-from ..core.text import acceptable_text, text_problem
+from ..core.text import acceptable_text, shorten, text_problem
 
 #: keys and indices from the root of a document to a value
 JsonPath = tuple["str | int", ...]
@@ -68,7 +68,7 @@ def json_path(path: Sequence[str | int]) -> str:
 def _format_key(key: str | int) -> str:
     if isinstance(key, int):
         return f"[{key}]"
-    return f".{key}" if _IDENTIFIER.fullmatch(key) else f"[{json.dumps(key)}]"
+    return f".{shorten(key)}" if _IDENTIFIER.fullmatch(key) else f"[{json.dumps(shorten(key))}]"
 
 
 def read_document(file: Path) -> Document:
