@@ -214,6 +214,9 @@ def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
             continue
         try:
             parsed[name] = json.loads(value)
+        except RecursionError:
+            problems.append(Problem("nested too deeply", name))
+            continue
         except ValueError:
             parsed[name] = value
         if not _is_finite(parsed[name]):
