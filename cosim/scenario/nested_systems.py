@@ -280,7 +280,7 @@ def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
             if not _is_finite(parsed[name]):
                 problems.append(Problem(f"expected finite numbers, found {shorten(value)}", name))
         except RecursionError:
-            problems.append(Problem("nested too deep", name))
+            problems.append(Problem("nested too deeply", name))
     if problems:
         raise InputError(problems)
     return parsed

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.errors import CosimError, InputError
+from ..core.json_values import parse_object
 from ..core.paths import open_text
 
 if TYPE_CHECKING:
@@ -162,7 +163,7 @@ class _FinishedRun:
         from ..results.comparison.reference import describe_provenance_changes
 
         try:
-            made_by = json.loads(self.reference_path.with_suffix(".json").read_text(encoding="utf-8"))
+            made_by = parse_object(self.reference_path.with_suffix(".json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return
         if changes := describe_provenance_changes(made_by, self.result.metadata):
