@@ -16,7 +16,8 @@ Values are exchanged in typed arrays ("ports") that belong to the engine. A step
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, Literal, NamedTuple, Protocol
@@ -97,6 +98,11 @@ class Variable:
             return (self.name,)
         indices = product(*(range(1, n + 1) for n in self.shape))
         return tuple(f"{self.name}[{','.join(map(str, index))}]" for index in indices)
+
+
+def count_scalars(variables: Iterable[Variable]) -> int:
+    """Return the number of scalars of variables, without making their names; an array counts with all its elements."""
+    return sum(math.prod(variable.shape) for variable in variables)
 
 
 class StepResult(NamedTuple):

@@ -6,8 +6,10 @@ import re
 
 #: longest text that is accepted (characters)
 MAX_TEXT_LENGTH = 1 << 20
+#: stands for each forbidden character
+REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 #: longest quotation of a value in a message (characters)
-_MAX_QUOTATION_LENGTH = 200
+MAX_QUOTATION_LENGTH = 200
 
 #: NUL ends a text in C and is not allowed in file names; surrogates are not allowed in UTF-8
 _FORBIDDEN_CHARACTERS = re.compile("[\0\ud800-\udfff]")
@@ -26,14 +28,15 @@ def text_problem(text: str) -> str:
 
 
 def acceptable_text(text: str) -> str:
-    """Return a text without the characters and the length that `text_problem` refuses."""
-    return _FORBIDDEN_CHARACTERS.sub("\N{REPLACEMENT CHARACTER}", text[:MAX_TEXT_LENGTH])
+    """Return a text, or what replaces it in further messages if `text_problem` refuses it."""
+    return _FORBIDDEN_CHARACTERS.sub(REPLACEMENT, text if len(text) <= MAX_TEXT_LENGTH else shorten(text))
 
 
-def shorten(text: str) -> str:
-    """Return the begin of a text that is long, for messages.
+def shorten(text: str, length: int = MAX_QUOTATION_LENGTH) -> str:
+    """Return the first `length` characters of a text, and the number of the others.
 
-    >>> shorten("short")
-    'short'
+    >>> shorten("abcdef", 4), shorten("abcd", 4)
+    ('abcd ... and 2 characters more', 'abcd')
     """
-    return text if len(text) <= _MAX_QUOTATION_LENGTH else f"{text[:_MAX_QUOTATION_LENGTH]} ... ({len(text)} characters)"
+    rest = len(text) - length
+    return text if rest <= 0 else f"{text[:length]} ... and {rest} character{'' if rest == 1 else 's'} more"

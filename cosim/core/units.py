@@ -80,9 +80,21 @@ KNOWN_UNITS = {
     )
 }
 #: common spellings -> Modelica syntax, after Unicode compatibility normalization, which converts superscripts
-_SPELLINGS = {"**": "", "^": "", "°C": "degC", "°": "deg", "Ω": "Ohm", "−": "-", **dict.fromkeys("·⋅∙•*×", ".")}
+_SPELLINGS = {
+    "**": "",
+    "^": "",
+    "°C": "degC",
+    "°": "deg",
+    "Ω": "Ohm",
+    "−": "-",
+    **dict.fromkeys("·⋅∙•*×", "."),
+    " .": ".",
+    ". ": ".",
+    " /": "/",
+    "/ ": "/",
+}
 #: symbol (a unit, or the name of a placeholder in braces) and power
-_FACTOR_PATTERN = re.compile(r"(1(?!\d)|\{\w+\}|[^\s\d./(){}+-]+)([+-]?\d+)?")
+_FACTOR_PATTERN = re.compile(r"(1(?!\d)|\{\w+\}|[^\s\d./(){}+-]+)([+-]?\d{1,3})?")
 
 
 def named_unit(text: str) -> Unit:
@@ -110,18 +122,26 @@ def parse_unit(text: str) -> Unit:
         unit = KNOWN_UNITS.get(symbol)
         if unit is None or unit.offset:
             raise ValueError(f'unknown unit "{symbol}" in "{text}"')
-        scale *= unit.factor**power
+        scale *= _power(unit.factor, power)
         exponents = [e + power * k for e, k in zip(exponents, unit.exponents, strict=True)]
+    if not 0 < scale < math.inf:
+        raise ValueError(f'the unit "{text}" is too small or too large')
     return Unit(text, tuple(exponents), scale)
+
+
+def _power(factor: float, power: int) -> float:
+    try:
+        return factor**power
+    except OverflowError:
+        return math.inf
 
 
 def _normalize(text: str) -> str:
     """Return the spelling of a unit in Modelica syntax; "1" for a dash."""
-    normalized = unicodedata.normalize("NFKC", text).strip()
+    normalized = " ".join(unicodedata.normalize("NFKC", text).split())
     for spelling, replacement in _SPELLINGS.items():
         normalized = normalized.replace(spelling, replacement)
-    normalized = re.sub(r"\s*([./])\s*", r"\1", normalized)
-    return "1" if normalized in ("-", "–", "—") else re.sub(r"\s+", ".", normalized)
+    return "1" if normalized in ("-", "–", "—") else normalized.replace(" ", ".")
 
 
 def _split_factors(text: str) -> list[tuple[str, int]]:

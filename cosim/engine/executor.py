@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.errors import ComponentError
 from ..process.float_mode import enabled_traps
-from ..process.journal import MARKER_SIZE, ROW_COUNT
+from ..process.journal import CALL_NUMBER, MARKER_SIZE, ROW_COUNT
 from .finite_check import FiniteCheck
 from .initialization import initialize_components
 from .parallel import MEASURED_STEPS, ParallelSteps
@@ -49,6 +49,11 @@ class Executor(ABC):
     def termination(self) -> Termination | None:
         """A component's request to end the simulation, if there was one."""
         return self._runner.termination
+
+    def describe_call(self) -> tuple[str, str]:
+        """Return component and function of the present call of the stepping loop."""
+        number, names = int(self.marker[CALL_NUMBER]), self._schedule.call_names
+        return names[number] if 0 <= number < len(names) else ("the run", "moving values")
 
     def initialize(self) -> None:
         """Bring the components from instantiated to step mode, and record the initial outputs as row 0.

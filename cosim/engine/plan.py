@@ -174,7 +174,8 @@ def _phases_of_stages(
     """
     for stage in stages:
         groups = [member for member in stage if isinstance(member, Group)]
-        own_group = {name: frozenset(component_names(group.stages)) for group in groups for name in component_names(group.stages)}
+        members = [frozenset(component_names(group.stages)) for group in groups]
+        own_group = {name: names for names in members for name in names}
         connections = [connection for name in component_names([stage]) for connection in incoming.get(name, ())]
         yield _PhaseDraft(
             [
@@ -185,8 +186,8 @@ def _phases_of_stages(
             [member for member in stage if not isinstance(member, Group)],
             parallel,
         )
-        for group in groups:
-            inner = _phases_of_stages(group.stages, group.parallel, frozenset(component_names(group.stages)), incoming)
+        for group, names in zip(groups, members, strict=True):
+            inner = _phases_of_stages(group.stages, group.parallel, names, incoming)
             if group.iteration:
                 yield _PhaseDraft([], [], group=group, inner=list(inner))
             else:

@@ -48,7 +48,7 @@ class _DueSteps:
 
 
 class PythonExecutor(Executor):
-    """Executor without native code of its own."""
+    """Executor in pure Python."""
 
     def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None):
         super().__init__(plan, recorder, marker)

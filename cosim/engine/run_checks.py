@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Set
 from math import inf
 
 from ..core.component import Variable
 from ..core.errors import InputError, Problem
+from ..core.size_limits import MAX_DELAYED_VALUES, format_count
 from ..core.system import Endpoint, System
 from ..core.time_grid import TimeGrid
 from .settings import Event, Settings
@@ -30,6 +32,7 @@ def check_run(system: System, settings: Settings) -> TimeGrid:
             raise InputError(problems) from None
         grid = TimeGrid.from_times(settings.start_time, settings.start_time, settings.step_size)
     problems += _find_period_problems(system, grid)
+    problems += _find_delay_problems(system)
     problems += _find_recording_problems(settings, grid)
     problems += _find_event_time_problems(settings.events, grid)
     if problems:
@@ -82,6 +85,17 @@ def _find_period_problems(system: System, grid: TimeGrid) -> Iterator[Problem]:
             yield Problem(f"period {float(period)!r} s is no multiple of the step size {step!r} s", subject=subject)
         elif grid.count % int(ratio):
             yield Problem(f"the duration {duration!r} s is no multiple of the period {float(period)!r} s", subject=subject)
+
+
+def _find_delay_problems(system: System) -> Iterator[Problem]:
+    """Yield a problem if the delays store too many values; it has the location of the connections with the most of them."""
+    stored: Counter[str] = Counter()
+    for connection in system.connections:
+        stored[connection.where] += connection.delay
+    total = stored.total()
+    if total > MAX_DELAYED_VALUES:
+        text = f"the delays store {format_count(total)} values, expected at most {format_count(MAX_DELAYED_VALUES)}"
+        yield Problem(text, max(stored, key=lambda where: stored[where]), subject=("connections",))
 
 
 def _find_recording_problems(settings: Settings, grid: TimeGrid) -> Iterator[Problem]:

@@ -18,6 +18,7 @@ from ..core.recording import Recording
 from ..core.stopwatch import Stopwatch
 from ..core.system import System
 from ..process.float_mode import default_float_mode
+from ..process.forks import attributing_forks, report_forks
 from ..process.journal import MARKER_SIZE, Phase, calling_component, current_journal, suspending_deadline
 from ..process.process_state import restoring_process_state
 from . import Executor, Plan, Recorder, Termination, compile_plan, executor_class
@@ -123,8 +124,11 @@ def simulating(plan: Plan, observers: Sequence[Observer] = (), step_hook: StepHo
             yield outcome
             completed = outcome.failure is None
         finally:
-            with restoring_process_state(join_alternatives(components)):
-                _end_components(components, terminate=completed)
+            try:
+                with restoring_process_state(join_alternatives(components)):
+                    _end_components(components, terminate=completed)
+            finally:
+                report_forks()
 
 
 def _end_components(components: Mapping[str, Component], terminate: bool) -> None:
@@ -178,7 +182,8 @@ def _run(executor: Executor, observers: Sequence[Observer], step_hook: StepHook 
                 executor.initialize()
         if journal:
             journal.enter_phase(Phase.STEPPING, journal.deadlines.step)
-        with restoring_process_state(names) if runs_foreign_code else nullcontext(), watch.measure("loop_seconds"):
+        loop_state = restoring_process_state(names) if runs_foreign_code else nullcontext()
+        with loop_state, attributing_forks(executor.describe_call), watch.measure("loop_seconds"):
             _step_to_end(executor, observers, pacer, step_hook)
     except (Exception, KeyboardInterrupt) as error:
         failure = error
@@ -186,6 +191,7 @@ def _run(executor: Executor, observers: Sequence[Observer], step_hook: StepHook 
         executor.close()
     if journal:
         journal.enter_phase(Phase.IDLE)
+    report_forks()
     component_log.report_dropped_messages()
     recording, lateness = executor.recorder.recording(), pacer.statistics() if pacer else None
     return SimulationOutcome(recording, watch.seconds, executor.completed_steps, executor.termination, failure, lateness)

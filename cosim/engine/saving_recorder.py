@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,8 @@ class SavingRecorder(Recorder):
         positions = self._positions.items()
         self._strings = [(name, plan.outputs.arrays[p.dtype], p.offset) for name, p in positions if p.dtype.hasobject]
         self._saved_strings: dict[str, Any] = dict.fromkeys((name for name, _, _ in self._strings), "")
-        self._file = (folder / TEXTS_FILE).open("wb", buffering=0)
+        self._path = folder / TEXTS_FILE
+        self._path.write_bytes(b"")
         if self._strings:
             self._string_writers.append(self._save_changed_strings)
 
@@ -59,8 +59,12 @@ class SavingRecorder(Recorder):
         self._header_file.write_text(json.dumps(header), encoding="utf-8")
 
     def _save_changed_strings(self, row: int) -> None:
-        """Write a line in one unbuffered call, so that it is complete even if this process is killed."""
+        """Write a line in one unbuffered call, so that it is complete even if this process is killed.
+
+        The file is not left open, because foreign code could truncate it.
+        """
         strings = {name: array[index] for name, array, index in self._strings}
         if changed := {name: value for name, value in strings.items() if value != self._saved_strings[name]}:
             self._saved_strings |= changed
-            os.write(self._file.fileno(), json.dumps([row, changed], default=encode_value).encode() + b"\n")
+            with self._path.open("ab", buffering=0) as file:
+                file.write(json.dumps([row, changed], default=encode_value).encode() + b"\n")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import InputError, Problem, did_you_mean
+from ..core.json_values import parse_object
 from ..core.resources import cache_directory
 from ..process.output_lock import LOCK_FILE, waiting_for_lock
 from ..results.files import remove_files, writing_atomically
@@ -169,8 +170,8 @@ def read_manifest(root: Path) -> dict[str, Any]:
     """
     path = root / MANIFEST
     try:
-        manifest: dict[str, Any] = json.loads(path.read_text()) if path.is_file() else {}
-    except json.JSONDecodeError as error:
+        manifest = parse_object(path.read_text()) if path.is_file() else {}
+    except ValueError as error:
         raise InputError(Problem(f"is not valid JSON: {error}; remove it and run `cosim build`", str(path))) from None
     return manifest
 

@@ -16,6 +16,7 @@ from datetime import datetime
 from pathlib import Path
 
 from ..core.errors import InputError, write_error
+from ..core.json_values import parse_object
 
 #: lock file of an output directory
 LOCK_FILE = ".cosim-lock"
@@ -151,9 +152,9 @@ def _host() -> str:
 def _read_holder(path: Path) -> str:
     """Return a description of the process that holds a lock."""
     try:
-        holder = json.loads(path.read_bytes())
+        holder = parse_object(path.read_bytes())
         return f"process {holder['process']} on {holder['host']}, started at {holder['start']}"
-    except (OSError, ValueError, TypeError, LookupError, RecursionError):  # it has not written the file yet
+    except (OSError, ValueError, LookupError):  # it has not written the file yet
         return "another process"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import locale
 import os
 import resource
@@ -22,6 +23,8 @@ from .journal import Phase, current_journal
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGSEGV, signal.SIGFPE, signal.SIGABRT, signal.SIGPIPE, signal.SIGCHLD)
 _TIMERS = (signal.ITIMER_REAL, signal.ITIMER_VIRTUAL, signal.ITIMER_PROF)
 _LIMITS = (resource.RLIMIT_AS, resource.RLIMIT_CPU, resource.RLIMIT_DATA, resource.RLIMIT_FSIZE, resource.RLIMIT_NOFILE)
+#: descriptors that foreign code cannot use up (see `reserve_descriptors`)
+_RESERVED_DESCRIPTORS = 32
 _SIGACTION_SIZE = 512  # more than any platform's struct sigaction, which begins with the handler
 _POINTER_SIZE = ctypes.sizeof(ctypes.c_void_p)
 
@@ -219,6 +222,31 @@ def _restore_resource_limits(saved: dict[int, tuple[int, int]]) -> str | None:
     return "" if _resource_limits() == saved else " (what was lowered for good stays so)"
 
 
+def reserve_descriptors() -> None:
+    """Lower the soft limit of open files, so that there are descriptors for results when foreign code has used up all others."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft > 2 * _RESERVED_DESCRIPTORS:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft - _RESERVED_DESCRIPTORS, hard))
+
+
+def _has_free_descriptor() -> bool:
+    try:
+        os.close(os.dup(2))
+    except OSError as error:
+        return error.errno != errno.EMFILE
+    return True
+
+
+def _release_descriptors(had_free: bool) -> str | None:
+    """Release the reserved descriptors if there are no others."""
+    if not had_free or _has_free_descriptor():
+        return None
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with suppress(ValueError, OSError):
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft + _RESERVED_DESCRIPTORS, hard))
+    return " (none was left)"
+
+
 class _Attribute(NamedTuple):
     """One attribute of the process.
 
@@ -253,4 +281,5 @@ _ATTRIBUTES = (
     _compared("which signals are blocked", _signal_mask, _set_signal_mask),
     _Attribute("the timers", _running_timers, _stop_new_timers),
     _Attribute("the limits", _resource_limits, _restore_resource_limits),
+    _Attribute("the number of free descriptors", _has_free_descriptor, _release_descriptors),
 )

@@ -10,8 +10,10 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from . import journal as journals
+from .forks import watch_forks
 from .journal import EXIT_CODE, Journal, Phase
 from .limits import detach, lower_limit
+from .process_state import reserve_descriptors
 from .standard_streams import protected_stream
 
 #: limit of the private memory of a supervised run (bytes); mapped files of rows do not count
@@ -32,6 +34,8 @@ def run_child(entry: Callable[[], int], journal: Journal, output: int, temporary
     try:
         _isolate(output, supervisor)
         tempfile.tempdir = os.environ["TMPDIR"] = temporary_folder
+        journal.exclude_from_forks()
+        watch_forks()
         journals.set_current_journal(journal)
         code = entry()
         sys.stdout.flush()
@@ -46,11 +50,12 @@ def _isolate(output: int, supervisor: int) -> None:
     """Enter a new session that ends with the supervisor, limit memory, and connect descriptors 1 and 2 to the pipe `output`.
 
     Python's own output goes to duplicates of the former descriptors. The limit keeps a component that allocates without end from
-    affecting other processes. Core files are not written.
+    affecting other processes. Core files are not written. Some descriptors are reserved for results.
     """
     detach(supervisor)
     lower_limit(resource.RLIMIT_DATA, MEMORY_LIMIT)
     lower_limit(resource.RLIMIT_CORE, 0)
+    reserve_descriptors()
     sys.stdout, sys.stderr = protected_stream(sys.stdout, duplicate=True), protected_stream(sys.stderr, duplicate=True)
     os.dup2(output, 1)
     os.dup2(output, 2)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import write_error
+from ..process.run_files.row_store import FileMapping
 
 #: suffix of files that are being written
 _PART_SUFFIX = ".part"
@@ -37,9 +38,9 @@ def iterate_chunks(arrays: Sequence[np.ndarray], size: int) -> Iterator[slice]:
             file.madvise(mmap.MADV_DONTNEED)
 
 
-def _memory_map(array: Any) -> mmap.mmap | None:
+def _memory_map(array: Any) -> mmap.mmap | FileMapping | None:
     """Return the file mapping behind an array; None if it is not mapped to a file."""
-    while array is not None and not isinstance(array, mmap.mmap):
+    while array is not None and not isinstance(array, mmap.mmap | FileMapping):
         array = getattr(array, "base", None)
     return array if hasattr(mmap, "MADV_DONTNEED") else None
 
@@ -72,7 +73,7 @@ def writing_atomically(path: str | Path) -> Iterator[Path]:
 
 
 def check_writable(directory: Path) -> None:
-    """Create a folder if necessary and raise the errors of `writing_atomically` if no file can be written there."""
+    """Create a folder if necessary; raise OutputError or InputError if no file can be written there."""
     try:
         directory.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=directory):
@@ -82,11 +83,15 @@ def check_writable(directory: Path) -> None:
 
 
 def remove_files(directory: Path, *names: str) -> None:
-    """Remove files of earlier runs and their temporary files; raise the errors of `writing_atomically`.
+    """Remove files of earlier runs and their temporary files.
 
     Args:
         directory: Folder of the files.
         *names: Names of the files.
+
+    Raises:
+        OutputError: The disk failed or is full.
+        InputError: A file cannot be removed.
     """
     try:
         for name in names:

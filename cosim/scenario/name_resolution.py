@@ -46,6 +46,8 @@ def resolve_name(node: Node, text: str, ports: Sequence[str], include_inner: boo
     if component in node.invalid_components or "components" in node.invalid_keys:
         raise UnknownNameError
     if component not in node.spec.components:
+        if node.has_wrong_names:
+            raise UnknownNameError
         raise UnknownNameError(f'unknown component "{component}"{did_you_mean(component, node.spec.components)}')
     child = node.children.get(component)
     if child is None:
@@ -55,12 +57,16 @@ def resolve_name(node: Node, text: str, ports: Sequence[str], include_inner: boo
             f'"{text}" names a nested system, expected one of its ports{did_you_mean("", _port_targets(child, ports))}'
         )
     port = re.split(r"[.\[]", rest, maxsplit=1)[0]
+    if port in child.invalid_ports and "outputs" in ports:
+        raise UnknownNameError
     inner_names = _port_targets(child, ports)
     if port in inner_names:
         suffix = rest[len(port) :]
         return [target for inner in inner_names[port] for target in resolve_name(child, inner + suffix, ports, include_inner)]
     if include_inner and port in {*child.spec.components, *child.invalid_components}:
         return resolve_name(child, rest, ports, include_inner)
+    if "ports" in child.invalid_keys:
+        raise UnknownNameError
     valid = [*inner_names, *(child.spec.components if include_inner else ())]
     raise UnknownNameError(f'nested system "{component}" has no {ports[0].rstrip("s")} port "{port}"{did_you_mean(port, valid)}')
 
@@ -169,7 +175,7 @@ def _enumeration_value(variable: Variable, value: Any) -> Any:
 
 
 def _scalar_value(variable: Variable, value: Any) -> Any:
-    """Return the value in the variable's type; raise ValueError if it has another type or is out of range."""
+    """Return a scalar in the type of the variable; raise ValueError if its type does not fit or it is out of range."""
     if isinstance(value, str) and (problem := text_problem(value)):
         raise ValueError(f'"{variable.name}": {problem}')
     if variable.items:

@@ -54,7 +54,21 @@ def test_a_common_spelling_means_what_it_says(text, like):
     )
 
 
-@pytest.mark.parametrize("text", ["bar_g", "bar(g)", "€/kWh", "$/MWh", "10^3 m", "people", "{", "/", "m//", "a" * 10_000])
+#: texts that would take very long, or overflow
+HOSTILE = [
+    "a" * 10_000,
+    "x" + " " * 100_000 + "x",
+    "km999",
+    "mm999",
+    "km-999",
+    "m" + "9" * 5000,
+    "m9999",
+    "h99.h99",
+    "/" * 10_000,
+]
+
+
+@pytest.mark.parametrize("text", ["bar_g", "bar(g)", "€/kWh", "$/MWh", "10^3 m", "people", "{", "/", "m//", *HOSTILE])
 def test_a_text_that_is_no_known_unit_is_a_unit_by_its_name(text):
     unit, metre = named_unit(text), parse_unit("m")
     assert unit == Unit(text, ())
@@ -127,3 +141,8 @@ def test_products_of_units(factors, expected):
 )
 def test_products_of_units_of_any_spelling(factors, expected):
     assert multiply_units(factors) == expected
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_products_with_any_text_are_texts(text):
+    assert isinstance(multiply_units([(text, 2), ("s", 1)]), str)

@@ -11,7 +11,7 @@ from cosim.core.errors import did_you_mean
 def test_all_problems_are_reported_at_once(folder):
     gain = folder.block("Gain")["python"]
     file = folder.write(
-        f"""{{"name": "bad", "stop_time": 3, "stop_time": 3.5, "step_size": 1, "colour": "red",
+        f"""{{"name": "bad", "stop_time": 3.5, "description": "", "description": "", "step_size": 1, "colour": "red",
  "components": {{
   "a": {{"parameters": {{"kk": 1, "k": "x", "u": NaN}}, "python": "{gain}"}},
   "b": {{"python": "{gain}"}},
@@ -25,11 +25,10 @@ def test_all_problems_are_reported_at_once(folder):
  "events": [{{"time": 0.5, "set": {{"a.q": 1}}}}]}}"""
     )
     assert [line.removeprefix("scenario.json:") for line in folder.problems_of(file)] == [
-        "1:33: $.stop_time: duplicate key",
+        "1:54: $.description: duplicate key",
         "3:48: $.components.a.parameters.u: NaN is not allowed, expected a finite number",
-        '9:3: $.connections[4].to: the key "to" is missing',
         '9:19: $.connections[4].too: unknown key; did you mean "to"?',
-        "1:67: $.colour: unknown key",
+        "1:89: $.colour: unknown key",
         '5:3: $.components.c: FMU "missing.fmu" does not exist',
         '3:24: $.components.a.parameters.kk: component "a" has no variable "kk"; did you mean "k"?',
         '3:33: $.components.a.parameters.k: "k" is of type Float64, found "x"',
@@ -39,8 +38,7 @@ def test_all_problems_are_reported_at_once(folder):
         '10:64: $.record.signals[0]: no output matches "a.z"; did you mean "a.y"?',
         '12:35: $.events[0].set["a.q"]: component "a" has no variable "q"; valid: u, k',
         '10:16: $.algorithm.stages: unknown component "e"; valid: a, b',
-        '10:16: $.algorithm.stages: component "b" is in no stage, so it would never step',
-        "1:33: $.stop_time: 3.5 s is no multiple of the step size 1.0 s",
+        "1:17: $.stop_time: 3.5 s is no multiple of the step size 1.0 s",
         "12:13: $.events[0]: event time 0.5 s lies between two communication points (1.0 s apart)",
         '11:11: $.kpis[0]: file "none.py" does not exist',
         '11:62: $.checks[0].kpi: no KPI "kk.x"; did you mean "k"?',

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...core.errors import CosimError, InputError, Problem
+from ...core.json_values import parse_object
 from ...process.journal import STEP_COUNT
 from ...process.output_lock import LockKeeper
 from .. import live, strict_sandbox, supervision
@@ -161,7 +161,7 @@ def _load(options: RunOptions, real_time: float | None) -> PreparedRun:
     """Load the scenario, announce its deadlines to the supervisor and print warnings about it."""
     from ...api import load
     from ...scenario.nested_systems import parse_settings
-    from ...scenario.plausibility import missing_connections
+    from ...scenario.plausibility import find_run_warnings
     from .. import messages
 
     prepared = load(
@@ -175,7 +175,7 @@ def _load(options: RunOptions, real_time: float | None) -> PreparedRun:
         sandbox=options.sandbox,
     )
     supervision.set_deadlines(prepared.spec.deadlines)
-    messages.log_problems(missing_connections(prepared))
+    messages.log_problems(find_run_warnings(prepared))
     return prepared
 
 
@@ -219,8 +219,8 @@ def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeepe
 def _warn_overwriting(folder: Path, scenario: Path) -> None:
     """Warn if results of another scenario file in this folder are replaced: a copy may have kept its name."""
     try:
-        former = json.loads((folder / "run.json").read_text(encoding="utf-8"))["scenario_file"]
-    except (OSError, ValueError, LookupError, TypeError):  # no earlier run, or an unreadable run.json
+        former = parse_object((folder / "run.json").read_text(encoding="utf-8"))["scenario_file"]
+    except (OSError, ValueError, LookupError):  # no earlier run, or an unreadable run.json
         return
     if former != str(scenario):
         text = f'replaces the results of {former} in {folder}; another "name" in the scenario or --output-dir keeps both'

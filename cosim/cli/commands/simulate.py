@@ -145,11 +145,14 @@ def _compile_system(
 ) -> Plan:
     """Compile the system of the FMU, and of the input file if there is one."""
     from ...components.fmi import FmuFile, create_component
+    from ...core.errors import Problem
     from ...core.system import Connection, Endpoint, System
     from ...engine.plan import compile_plan
     from ...engine.settings import Settings
+    from .. import messages
 
     file = FmuFile(fmu)
+    messages.log_problems([Problem(file.run_warning)] if file.run_warning else [])
     experiment = file.description.default_experiment
     start = experiment.start_time or Fraction(0)
     stop = _parse_seconds(stop_time) if stop_time else experiment.stop_time or start + 1

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core import component_log
 from ...core.component import SUCCESS_STATUSES, Component, Ports, PreparedCall, StepResult
 from ...core.errors import ComponentError
 from ...process.journal import calling_component
@@ -24,6 +25,8 @@ from .c_functions import as_double, as_pointer
 from .file import FmuFile
 from .fmpy_library import load_library
 from .function_calls import OK, FunctionCaller
+from .preflight.binary import version_deviations
+from .preflight.library import EXPECTED_TEXTS
 
 
 class FmuInstance(FunctionCaller, Component):
@@ -86,8 +89,12 @@ class FmuInstance(FunctionCaller, Component):
         """
         folder = self._file.acquire()
         self._has_acquired_file = True
-        with restoring_process_state(self.name), calling_component(self.name, "loading the binary", "load"):
-            self._fmu = self._copy_fmpy_slave(folder)
+        is_loaded = self._file.library is not None
+        with restoring_process_state(self.name):
+            with calling_component(self.name, "loading the binary", "load"):
+                self._fmu = self._copy_fmpy_slave(folder)
+            if not is_loaded:
+                self._check_version()
         with restoring_process_state(self.name), calling_component(self.name, self._instantiate_function, "load"):
             self._instantiate_fmu()
         self._is_instantiated = True
@@ -108,6 +115,17 @@ class FmuInstance(FunctionCaller, Component):
         slave = copy(self._file.library)
         slave.instanceName = self.name
         return slave
+
+    def _check_version(self) -> None:
+        """Log a warning for each function of the FMI version and platform that returns an unexpected text."""
+        texts = {}
+        for name in (name for name in EXPECTED_TEXTS if name.startswith(self.prefix)):
+            function = self._fmu.dll[name]
+            function.restype = ctypes.c_char_p
+            with calling_component(self.name, name, "load"):
+                texts[name] = function()
+        for text in version_deviations(texts):
+            component_log.log_message(self.name, component_log.WARNING, text)
 
     def _instantiation_error(self) -> ComponentError:
         return ComponentError(self.name, self._instantiate_function, self._last_message or "the FMU gave no reason")

@@ -21,7 +21,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ...core.json_values import decode_object
+from ...core.json_values import decode_object, parse_object
 from ..journal import current_journal
 
 if TYPE_CHECKING:
@@ -117,12 +117,12 @@ def read_header(folder: Path | None) -> RowsHeader | None:
     if folder is None:
         return None
     try:
-        data: dict[str, Any] = json.loads((folder / HEADER_FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        data = parse_object((folder / HEADER_FILE).read_text(encoding="utf-8"))
+        columns = [Column(**column) for column in data.pop("columns")]
+        pairs = {key: [tuple(pair) for pair in data[key]] for key in ("calls", "texts")}
+        return RowsHeader(**data | {"columns": columns} | pairs)
+    except (OSError, ValueError, TypeError, LookupError):
         return None
-    columns = [Column(**column) for column in data.pop("columns")]
-    pairs = {key: [tuple(pair) for pair in data[key]] for key in ("calls", "texts")}
-    return RowsHeader(**data | {"columns": columns} | pairs)
 
 
 class TextReader:
@@ -151,9 +151,16 @@ class TextReader:
                 self._file.seek(-len(line), os.SEEK_CUR)
                 self._pending_change = (-1, {})
                 break
-            first, texts = json.loads(line, object_hook=decode_object)
-            self._pending_change = (first, texts)
+            self._pending_change = self._parse_change(line)
         return list(self._texts.values())
+
+    def _parse_change(self, line: bytes) -> tuple[int, dict[str, Any]]:
+        """Return the row of a change and its texts; a line that foreign code has damaged changes nothing."""
+        try:
+            row, texts = json.loads(line, object_hook=decode_object)
+            return int(row), {name: text for name, text in texts.items() if name in self._texts}
+        except (ValueError, TypeError, AttributeError, RecursionError):
+            return self._pending_change[0], {}
 
 
 def write_metadata(folder: Path, metadata: Mapping[str, Any]) -> None:
@@ -164,7 +171,7 @@ def write_metadata(folder: Path, metadata: Mapping[str, Any]) -> None:
 def read_metadata(folder: Path) -> dict[str, Any]:
     """Read the description of a run; empty if it was not written."""
     try:
-        return dict(json.loads((folder / METADATA_FILE).read_text(encoding="utf-8")))
+        return parse_object((folder / METADATA_FILE).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
 

@@ -56,7 +56,7 @@ class RequestRefusedError(Exception):
 
 
 class LiveServer(ThreadingHTTPServer):
-    """Server in the supervising process: it accepts connections in a thread of its own and handles each request in another.
+    """Server in the supervising process: it accepts connections in one thread and handles each request in another.
 
     It listens as soon as it is created, and serves requests once `session` is set.
 
@@ -149,7 +149,7 @@ class _HeadReader:
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """Handler of one request, in a thread of its own."""
+    """Handler of one request, in a separate thread."""
 
     server: LiveServer
     protocol_version = "HTTP/1.1"

@@ -112,6 +112,7 @@ def _redirect_output() -> None:
 
 
 def _serve_requests(client: socket.socket, context: StudyContext, fmu_files: FmuFiles) -> None:
+    client.sendall(f"{os.getpid()}\n".encode())
     with client.makefile("rb") as requests:
         for line in requests:
             client.sendall((_handle_request(json.loads(line), context, fmu_files) + "\n").encode())

@@ -15,6 +15,7 @@ from typing import IO, Any, NamedTuple
 
 from ...components.fmi import FmuFile
 from ...core.errors import ComponentError, CosimError, InputError, Problem
+from ...core.json_values import parse_object
 from ...engine.run_loop import simulating
 from ...process.journal import EXIT_CODE, Deadlines, Phase, current_journal
 from ...process.run_files.folder import keeping_run_files
@@ -158,8 +159,12 @@ def _make_record(context: StudyContext, job: Job, outcome: SupervisedOutcome, re
     if outcome.failure:
         return Record(job.key, failure=_without_root(context, _failure_cause(context, outcome.failure)))
     reply.seek(0)
-    answer = json.load(reply)
-    return Record(job.key, answer.get("kpis", {}), _without_root(context, answer.get("failure", "")))
+    try:
+        answer = parse_object(reply.read())
+        record = Record.from_json(json.dumps({"key": job.key, **answer}))
+    except ValueError:  # foreign code has written to the file
+        return Record(job.key, failure="the process of the run left no valid result")
+    return replace(record, failure=_without_root(context, record.failure))
 
 
 def _failure_cause(context: StudyContext, failure: ComponentError) -> str:

@@ -1,5 +1,6 @@
 /* Whatever can go wrong in a library that other people wrote. What and when stands in resources/fault.txt of the FMU:
-   a line "fault FUNCTION WHEN WHAT", a line "record FILE"; the string parameter `fault` says the same of one instance. */
+   a line "fault FUNCTION WHEN WHAT", a line "record FILE", lines "attack NAME TARGET" for the fault "attack";
+   the string parameter `fault` says the same of one instance. */
 #define _GNU_SOURCE
 #include <arpa/inet.h>
 #include <dlfcn.h>
@@ -18,13 +19,17 @@
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/time.h>
+#include <sys/wait.h>
 #include <unistd.h>
 #include <xmmintrin.h>
 #include "fault_actions.h"
 
 static Fault library;
 static char record_file[PATH_MAX];
+static struct { char name[40], target[PATH_MAX]; } attacks[100];
+static size_t attack_count;
 
 static void record(const char *format, ...) {
     if (!record_file[0]) return;
@@ -167,6 +172,25 @@ static int linger(int own_session) {
 }
 static int fork_(Lag *m) { return linger(0); }
 static int daemon_(Lag *m) { return linger(1); }
+static int fork_return(Lag *m) { return fork() < 0; } /* the copy returns, too */
+static int fork_silently(Lag *m) { return syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0) < 0; } /* unknown to the C library */
+static int fork_program(Lag *m) {
+    pid_t child = fork();
+    int status = 1;
+    if (child == 0) {
+        execl("/bin/true", "true", (char *)NULL);
+        _exit(1);
+    }
+    return waitpid(child, &status, 0) != child || status;
+}
+/* Write the bytes of the environment variable FAULT_ANSWER to all pipes, as a worker process answers its importer. */
+static int answer(Lag *m) {
+    const char *text = getenv("FAULT_ANSWER");
+    struct stat status;
+    for (int file = 3; text && file < 1024; file++)
+        if (!fstat(file, &status) && S_ISFIFO(status.st_mode) && write(file, text, strlen(text)) < 0) continue;
+    return OK;
+}
 static void *for_ever(void *m) { for (;;) usleep(1000); }
 static int thread(Lag *m) {
     Dl_info here;
@@ -196,6 +220,8 @@ static int connect_(int kind) {
 static int tcp(Lag *m) { return connect_(SOCK_STREAM); }
 static int udp(Lag *m) { return connect_(SOCK_DGRAM); }
 static int processes(Lag *m) { record("process %d child of %d", getpid(), getppid()); return OK; }
+
+static int attack_all(Lag *m) { for (size_t i = 0; i < attack_count; i++) attack(attacks[i].name, attacks[i].target); return OK; }
 
 /* -- values and statuses -- */
 static int put(Lag *m, double y) { if (m) m->x[Y] = y; return OK; }
@@ -230,7 +256,9 @@ static const struct { const char *name; int (*act)(Lag *); } FAULTS[] = {
     {"change_folder", change_folder}, {"change_locale", change_locale}, {"change_umask", change_umask},
     {"limit_files", limit_files}, {"limit_size", limit_size}, {"set_alarm", set_alarm}, {"block_signals", block_signals},
     {"change_environment", change_environment}, {"ignore_interrupts", ignore_interrupts}, {"close_output", close_output},
-    {"truncate_all", truncate_all}, {"close_all", close_all}, {"fork", fork_}, {"daemon", daemon_}, {"thread", thread}, {"write_here", write_here},
+    {"truncate_all", truncate_all}, {"close_all", close_all}, {"fork", fork_}, {"daemon", daemon_}, {"answer", answer},
+    {"fork_return", fork_return}, {"fork_silently", fork_silently}, {"fork_program", fork_program},
+    {"thread", thread}, {"write_here", write_here}, {"attack", attack_all},
     {"write_temporary", write_temporary}, {"tcp", tcp}, {"udp", udp}, {"processes", processes},
 };
 
@@ -291,6 +319,8 @@ static void read_orders(const char *path) {
     while (file && fgets(line, sizeof line, file)) {
         sscanf(line, "fault %39s %23s %23s", library.where, library.when, library.what);
         sscanf(line, "record %4095[^\n]", record_file);
+        if (attack_count < 100 && sscanf(line, "attack %39s %4095[^\n]", attacks[attack_count].name, attacks[attack_count].target) == 2)
+            attack_count++;
     }
     if (file) fclose(file);
 }

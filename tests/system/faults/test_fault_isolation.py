@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +18,7 @@ from test_fault_crashes import ALL, CRASHES, DEADLINES, EXIT, FAILED, LATE, SIGN
 
 from cosim.process.sandbox import find_available_sandboxes
 
+ROOT = Path(__file__).parents[3]
 needs_sandbox = pytest.mark.skipif(not find_available_sandboxes().confines_fmus, reason="this system cannot confine FMUs")
 needs_bubblewrap = pytest.mark.skipif(not find_available_sandboxes().bubblewrap, reason="no bubblewrap that works")
 
@@ -173,6 +177,14 @@ class TestSandbox:
         assert "fault_was_here 1" in done.err
         assert (done.code, done.temporary_files) == (0, [])
 
+    def test_a_folder_in_pythonpath_with_other_files_is_refused(self, fmus, tmp_path):
+        (tmp_path / "diary.txt").touch()
+        command = [sys.executable, "-m", "cosim", "simulate", fmus(2), "--sandbox"]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(tmp_path)])}
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+        assert f'"{tmp_path}" in PYTHONPATH holds "diary.txt"' in done.stderr
+
     @needs_bubblewrap
     @pytest.mark.parametrize(
         ("order", "words"),
@@ -196,3 +208,21 @@ class TestSandbox:
         done = confined("DoStep 6 segv", "--sandbox", "strict", "--isolation", "run")
         assert f"lag: fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.err
         assert (done.code, len(done.rows), done.processes, done.temporary_files) == (1, 6, [], [])
+
+
+ANSWERS = ["[" * 100_000 + "\n", "\n\n", '{"value": ["a", false, false]}\n', '{"component_error": ["other", "f", "r", "x"]}\n']
+ANSWERS += ['{"input_error": 3}\n', '{"log": ["x", "y"]}\n', '{"log": 3}\n{"value": 1}\n', "\xff\n", "unfinished"]
+
+
+@pytest.mark.parametrize("moment", ["DoStep 6", "Instantiate 1"])
+@pytest.mark.parametrize("answer", ANSWERS, ids=range(len(ANSWERS)))
+def test_an_fmu_that_answers_for_its_worker_process_is_named(fmus, runner, tmp_path, answer, moment):
+    components = {"lag": {"fmu": str(fmus(2, f"{moment} answer"))}, "other": {"fmu": str(fmus(2, name="other"))}}
+    file = scenario(tmp_path, fmus.folder, components=components)
+    words = ("run", file, "--output-dir", "out", "--no-report", "--isolation", "fmu")
+    done = runner.cosim(tmp_path, *words, environment={"FAULT_ANSWER": answer}, limit=20)
+    assert done.code == 1, done.err
+    assert done.err.splitlines()[-1].startswith("lag: "), done.err
+    assert done.err.endswith(": its worker process sent an invalid answer\n")
+    assert len(done.rows) >= (6 if moment == "DoStep 6" else 0)
+    assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
