@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 
-from .printable_text import escape_control_characters
+from .printable_text import SPACES, escape_control_characters
 
 INFO, WARNING, ERROR = logging.INFO, logging.WARNING, logging.ERROR
 
@@ -27,7 +27,7 @@ def log_message(component: str, level: int, text: str) -> None:
         return
     if len(text) > MAX_MESSAGE_LENGTH:
         text = f"{text[:MAX_MESSAGE_LENGTH]} ... and {len(text) - MAX_MESSAGE_LENGTH} characters more"
-    logging.getLogger("cosim.component").log(level, "%s: %s", component, escape_control_characters(text.rstrip(), keep="\t"))
+    logging.getLogger("cosim.component").log(level, "%s: %s", component, escape_control_characters(text.rstrip(), keep=SPACES))
 
 
 def _is_within_rate_limit() -> bool:
