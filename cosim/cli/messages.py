@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import click
 
 from ..core.errors import Problem
-from ..core.printable_text import escape_control_characters
+from ..core.printable_text import SPACES, escape_control_characters
 from ..process.standard_streams import unescaped
 
 #: number of warnings collected for the report
@@ -41,7 +41,7 @@ def print_log(level: int = logging.INFO) -> list[str]:
 
 def print_line(text: str) -> None:
     """Print a text with foreign parts as one line of standard output; line breaks in it are escaped."""
-    click.echo(escape_control_characters(text))
+    click.echo(escape_control_characters(text, keep=SPACES))
 
 
 def print_verdict(passed: bool) -> None:

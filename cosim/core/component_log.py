@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 
-from .printable_text import escape_control_characters
+from .printable_text import SPACES, escape_control_characters
 from .text import shorten
 
 INFO, WARNING, ERROR = logging.INFO, logging.WARNING, logging.ERROR
@@ -26,7 +26,7 @@ def log_message(component: str, level: int, text: str) -> None:
     """
     if not _is_within_rate_limit():
         return
-    text = escape_control_characters(shorten(text, MAX_MESSAGE_LENGTH).rstrip(), keep="\t")
+    text = escape_control_characters(shorten(text, MAX_MESSAGE_LENGTH).rstrip(), keep=SPACES)
     logging.getLogger("cosim.component").log(level, "%s: %s", component, text)
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from unicodedata import category
+#: spaces of texts in any language: tab, no-break spaces and the ideographic space
+SPACES = "\t\u00a0\u202f\u3000"
 
 
 def escape_control_characters(text: str, keep: str = "") -> str:
     r"""Return a text with line breaks, control and direction characters as escape sequences such as \x1b.
 
-    These characters could move the cursor of a terminal, change its title, reorder text or fake lines of a log. Spaces of any
-    width (category Zs) stay.
+    These characters could move the cursor of a terminal, change its title, reorder text or fake lines of a log.
 
     Args:
         text: The text.
@@ -17,7 +17,7 @@ def escape_control_characters(text: str, keep: str = "") -> str:
     """
     if text.isprintable():
         return text
-    return "".join(c if c.isprintable() or c in keep or category(c) == "Zs" else _escape(c) for c in text)
+    return "".join(c if c.isprintable() or c in keep else _escape(c) for c in text)
 
 
 def _escape(character: str) -> str:

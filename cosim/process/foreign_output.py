@@ -6,7 +6,7 @@ import codecs
 import os
 import sys
 
-from ..core.printable_text import escape_control_characters
+from ..core.printable_text import SPACES, escape_control_characters
 
 #: output of foreign code that is forwarded (bytes)
 MAX_OUTPUT_SIZE = 1 << 16
@@ -42,6 +42,6 @@ class ForeignOutput:
             remaining = max(0, MAX_OUTPUT_SIZE - self._size)
             self._size += len(data)
             if remaining:
-                sys.stderr.write(escape_control_characters(self._decode(data[:remaining]), keep="\n\t"))
+                sys.stderr.write(escape_control_characters(self._decode(data[:remaining]), keep=f"\n{SPACES}"))
                 sys.stderr.flush()
         return True

@@ -6,7 +6,7 @@ import io
 import os
 from typing import Any, TextIO
 
-from ..core.printable_text import escape_control_characters
+from ..core.printable_text import SPACES, escape_control_characters
 
 
 class _BrokenPipeIgnoringFile(io.FileIO):
@@ -31,7 +31,7 @@ class _EscapingStream(io.TextIOWrapper):
         self.unescaped = io.TextIOWrapper(buffer, encoding=encoding, errors="replace", write_through=True)
 
     def write(self, text: str) -> int:
-        return super().write(escape_control_characters(text, keep="\n\t"))
+        return super().write(escape_control_characters(text, keep=f"\n{SPACES}"))
 
 
 def protected_stream(stream: TextIO, duplicate: bool = False) -> TextIO:
