@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ..report.tables import MAX_LINE_WIDTH, format_number
+from ..report.tables import cell_text, format_number, table_console
 
 if TYPE_CHECKING:
     from ..results.checks import Number
@@ -23,8 +22,6 @@ def print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:
         candidate: name of the candidate.
     """
     from rich import box
-    from rich.console import Console
-    from rich.markup import escape
     from rich.table import Table
 
     if not rows:
@@ -41,16 +38,15 @@ def print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:
         *(("check",) if with_checks else ()),
     ):
         table.add_column(
-            escape(header), justify="right" if header in (candidate, "shipped", "last run") else "left", no_wrap=True
+            cell_text(header), justify="right" if header in (candidate, "shipped", "last run") else "left", no_wrap=True
         )
     for row in rows:
         cells = [row.name, row.unit, _format_value(row.candidate), _format_value(row.shipped)]
         last = [_format_value(row.last), _COLOURS[row.against_last]] if with_last else []
-        table.add_row(*map(escape, cells), _COLOURS[row.against_shipped], *last, *([_format_checks(row)] if with_checks else []))
-    console = Console(file=sys.stdout, highlight=False)
-    if not console.is_terminal:
-        console.width = MAX_LINE_WIDTH
-    console.print(table)
+        table.add_row(
+            *map(cell_text, cells), _COLOURS[row.against_shipped], *last, *([_format_checks(row)] if with_checks else [])
+        )
+    table_console().print(table)
 
 
 def _format_value(value: Number | None) -> str:

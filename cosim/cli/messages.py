@@ -6,7 +6,11 @@ import logging
 import sys
 from collections.abc import Iterable
 
+import click
+
 from ..core.errors import Problem
+from ..core.printable_text import escape_control_characters
+from ..process.standard_streams import unescaped
 
 #: number of warnings collected for the report
 MAX_WARNINGS = 200
@@ -33,6 +37,17 @@ def print_log(level: int = logging.INFO) -> list[str]:
     logger.handlers[:] = [handler, collector]
     logger.setLevel(level)
     return collector.texts
+
+
+def print_line(text: str) -> None:
+    """Print a text with foreign parts as one line of standard output; line breaks in it are escaped."""
+    click.echo(escape_control_characters(text))
+
+
+def print_verdict(passed: bool) -> None:
+    """Print the word "passed" or "FAILED", coloured on a terminal, without a line break."""
+    word = click.style("passed", fg="green") if passed else click.style("FAILED", fg="red", bold=True)
+    click.echo(word, nl=False, file=unescaped(sys.stdout))
 
 
 def log_problems(problems: Iterable[Problem]) -> None:

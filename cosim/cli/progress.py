@@ -16,7 +16,10 @@ def progress_bar(description: str) -> Iterator[Callable[[int, int], None] | None
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+    from ..process.standard_streams import unescaped
+    from ..report.tables import cell_text
+
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task(description)
+    with Progress(*columns, console=Console(file=unescaped(sys.stderr)), transient=True) as progress:
+        task = progress.add_task(cell_text(description))
         yield lambda finished, total: progress.update(task, completed=finished, total=total)

@@ -25,6 +25,9 @@ _INSIDE_VARIABLE = "COSIM_INSIDE_STRICT_SANDBOX"
 #: variables that name folders for a program's own files
 _HOME_VARIABLES = ("TMPDIR", "HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME")
 
+#: variables that the command inside keeps besides those of a sandboxed FMU: programs, modules, compiler and terminal
+_COMMAND_VARIABLES = ("PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "PYTHONHASHSEED", "CC", "TERM", "COLUMNS", "LINES", "NO_COLOR")
+
 #: programs (compilers for Modelica sources), shared libraries and fonts; without private files and sockets
 _SYSTEM_PATHS = ("/usr", "/bin", "/lib", "/lib64", "/etc/ld.so.cache", "/etc/alternatives", "/etc/fonts")
 
@@ -55,13 +58,15 @@ def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
         output: the only folder that the command may write, apart from a temporary one; None: no other.
 
     Raises:
-        InputError: if bubblewrap is missing or cannot start the command.
+        InputError: if bubblewrap is missing or cannot start the command, or a folder contains the home folder.
     """
     from ..core.errors import InputError
-    from ..process.sandbox import bubblewrap_command
+    from ..process.sandbox import KEPT_VARIABLES, bubblewrap_command
     from ..process.supervisor import interrupt_on_termination
     from ..process.temporary_folders import temporary_run_folder
 
+    folders = _named_folders(files)
+    _refuse_home_folder([*folders, *([output] if output else [])])
     with ExitStack() as stack:
         temporary = Path(stack.enter_context(temporary_run_folder()))
         stack.enter_context(interrupt_on_termination())
@@ -70,17 +75,36 @@ def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
         with os.fdopen(writer):
             python = [sys.executable, "-P", "-m", "cosim", *current_command_line().arguments]
             writable = [temporary, *([output] if output else [])]
-            words = bubblewrap_command(python, _readable_folders(files), writable, status=writer)
+            words = bubblewrap_command(python, [*_readable_folders(), *folders], writable, status=writer)
             if output:
                 stack.enter_context(_output_folder(output))
+            kept = {name: os.environ[name] for name in (*KEPT_VARIABLES, *_COMMAND_VARIABLES) if name in os.environ}
             homes = dict.fromkeys(_HOME_VARIABLES, str(temporary))
             process = subprocess.Popen(  # noqa: S603
-                words, pass_fds=[writer], env={**os.environ, **homes, _INSIDE_VARIABLE: "1"}, start_new_session=True
+                words, pass_fds=[writer], env={**kept, **homes, _INSIDE_VARIABLE: "1"}, start_new_session=True
             )
         report = _wait_for_exit(process, status)
     if "exit-code" not in report:
         raise InputError(f"bubblewrap could not start the command (exit code {process.returncode})")
     return int(report["exit-code"])
+
+
+def _named_folders(files: Iterable[Path]) -> list[Path]:
+    """Return the existing folders of the files, also of link targets."""
+    paths = [Path(path) for file in files for path in (os.path.abspath(file), os.path.realpath(file))]  # noqa: PTH100
+    return [path.parent for path in paths if path.parent.exists()]
+
+
+def _refuse_home_folder(folders: Iterable[Path]) -> None:
+    """Raise InputError if one of the folders is the home folder or contains it."""
+    from ..core.errors import InputError
+
+    home = Path.home().resolve()
+    if found := next((folder for folder in folders if home.is_relative_to(folder.resolve())), None):
+        raise InputError(
+            f'--sandbox strict: "{found}" holds a file or the results of this run, but contains the home folder, '
+            f"all of which would be visible inside; expected a folder of the project"
+        )
 
 
 @contextmanager
@@ -110,11 +134,9 @@ def _wait_for_exit(process: subprocess.Popen[bytes], status: IO[str]) -> dict[st
                 os.kill(report.get("child-pid", process.pid), SIGINT)
 
 
-def _readable_folders(files: Iterable[Path]) -> list[Path]:
-    """Return the folders of the files, also of link targets, and those of Python, of the system and of cosim."""
+def _readable_folders() -> list[Path]:
+    """Return the existing folders of Python, of the system and of cosim."""
     from ..core import resources
     from ..process.sandbox import interpreter_folders
 
-    named = [Path(path) for file in files for path in (os.path.abspath(file), os.path.realpath(file))]  # noqa: PTH100
-    system = [*map(Path, _SYSTEM_PATHS), resources.root()]
-    return [path for path in (*interpreter_folders(), *system, *(file.parent for file in named)) if path.exists()]
+    return [path for path in (*interpreter_folders(), *map(Path, _SYSTEM_PATHS), resources.root()) if path.exists()]

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import click
 
 from ..core.processors import available_processors
+from ..core.size_limits import MAX_RUNS
+from .csv_options import csv_options
 
 if TYPE_CHECKING:
     from ..studies.execution.job import Record
@@ -25,14 +27,20 @@ _workers = click.option(
     "--workers", type=click.IntRange(min=1), help="Number of runs at a time on this machine; default: one per processor."
 )
 _scheduler = click.option(
-    "--scheduler", metavar="tcp://HOST:PORT", help="Run on the Dask cluster with this scheduler (extra `cluster`)."
+    "--scheduler",
+    metavar="tcp://HOST:PORT",
+    help="Run on the Dask cluster with this scheduler (extra `cluster`). Only for a cluster that you trust: Dask unpickles its "
+    "answers, so that it can run code here as you run code there.",
+)
+_max_runs = click.option(
+    "--max-runs", type=click.IntRange(min=1), default=MAX_RUNS, show_default=True, help="Refuse a study of more runs."
 )
 _retry = click.option("--retry-failed", is_flag=True, help="Repeat the runs that failed in an earlier call.")
 
 
 def study_options(command: Callable[..., int]) -> Callable[..., int]:
-    """Add the options `--workers`, `--scheduler` and `--retry-failed` to a command."""
-    return _workers(_scheduler(_retry(command)))
+    """Add the options `--workers`, `--scheduler`, `--max-runs`, `--retry-failed` and `--excel-safe` to a command."""
+    return _workers(_scheduler(_max_runs(_retry(csv_options(command)))))
 
 
 def open_run_store(folder: Path, retry: bool) -> RunStore:
@@ -118,7 +126,9 @@ def show_progress(total: int) -> Iterator[StudyProgress]:
     from rich.progress import BarColumn, TextColumn
     from rich.progress import Progress as Bar
 
-    with Bar(BarColumn(), TextColumn("{task.description}"), console=Console(stderr=True), transient=True) as bar:
+    from ..process.standard_streams import unescaped
+
+    with Bar(BarColumn(), TextColumn("{task.description}"), console=Console(file=unescaped(sys.stderr)), transient=True) as bar:
         task = bar.add_task("", total=total)
         yield StudyProgress(total, lambda text, done: bar.update(task, completed=done, description=text))
 
@@ -138,16 +148,13 @@ class _ProgressLines:
 def print_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """Print a table whose first column is text; the others are numbers."""
     from rich import box
-    from rich.console import Console
-    from rich.markup import escape
     from rich.table import Table
+
+    from ..report.tables import cell_text, table_console
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for i, name in enumerate(header):
-        table.add_column(name, justify="right" if i else "left", overflow="fold")
+        table.add_column(cell_text(name), justify="right" if i else "left", overflow="fold")
     for row in rows:
-        table.add_row(*map(escape, row))
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console.width = 200
-    console.print(table, "")
+        table.add_row(*map(cell_text, row))
+    table_console(width=200).print(table, "")

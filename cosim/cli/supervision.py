@@ -31,7 +31,8 @@ _sandbox = click.option(
     "--sandbox",
     type=click.Choice(SANDBOX_KINDS),
     metavar="[strict]",
-    help="Run each FMU in its own process that reads only its own files, writes only to a temporary folder and has no network. "
+    help="Run each FMU in its own process that reads only its own files, writes only to a temporary folder, has no network and "
+    "starts no programs. "
     "strict: also confine the whole command to the files it needs and to its output directory (requires bubblewrap).",
 )
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 import time
 
+from .printable_text import escape_control_characters
+
 INFO, WARNING, ERROR = logging.INFO, logging.WARNING, logging.ERROR
 
 #: maximum number of messages per second, and of characters per message
@@ -14,7 +16,7 @@ _current_second, _passed_count, _dropped_count = 0, 0, 0
 
 
 def log_message(component: str, level: int, text: str) -> None:
-    """Log a message of a component; characters that cannot be printed are replaced.
+    """Log a message of a component as one line; line breaks and control characters are escaped.
 
     Args:
         component: Name of the component.
@@ -25,8 +27,7 @@ def log_message(component: str, level: int, text: str) -> None:
         return
     if len(text) > MAX_MESSAGE_LENGTH:
         text = f"{text[:MAX_MESSAGE_LENGTH]} ... and {len(text) - MAX_MESSAGE_LENGTH} characters more"
-    printable = "".join(c if c.isprintable() or c in "\n\t" else "\N{REPLACEMENT CHARACTER}" for c in text).rstrip()
-    logging.getLogger("cosim.component").log(level, "%s: %s", component, printable)
+    logging.getLogger("cosim.component").log(level, "%s: %s", component, escape_control_characters(text.rstrip(), keep="\t"))
 
 
 def _is_within_rate_limit() -> bool:

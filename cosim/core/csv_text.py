@@ -6,11 +6,25 @@ from collections.abc import Iterable
 
 #: size of a number in a CSV file (bytes), approximately
 BYTES_PER_NUMBER = 20
+#: first characters of a text that spreadsheet programs take for a formula
+_FORMULA_STARTS = ("=", "+", "-", "@")
+_excel_safe = False
+
+
+def set_excel_safe(enabled: bool) -> None:
+    """Set whether CSV files of this process are safe for spreadsheet programs (see `text_cell`)."""
+    global _excel_safe
+    _excel_safe = enabled
+
+
+def text_cell(text: str) -> str:
+    """Return a text for a cell; with `set_excel_safe`, an apostrophe precedes texts that would be formulas."""
+    return f"'{text}" if _excel_safe and text.startswith(_FORMULA_STARTS) else text
 
 
 def quote_cell(text: object) -> str:
     """Return a text as a quoted cell."""
-    return '"' + str(text).replace('"', '""') + '"'
+    return '"' + text_cell(str(text)).replace('"', '""') + '"'
 
 
 def format_header(signals: Iterable[str]) -> str:

@@ -19,6 +19,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from .printable_text import escape_control_characters
+
 #: exceptions that are not a failure of the foreign code they pass through; all others are, even if not derived from Exception
 PASS_THROUGH_EXCEPTIONS = (KeyboardInterrupt, GeneratorExit)
 #: errors of the disk, not of the path
@@ -56,12 +58,7 @@ class Problem:
 
     def __str__(self) -> str:
         text = f"{self.where}: {self.message}" if self.where else self.message
-        return _escape_unprintable(text)
-
-
-def _escape_unprintable(text: str) -> str:
-    """Return a text with line breaks and control characters, which might control a terminal, as escape sequences."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
+        return escape_control_characters(text)
 
 
 class InputError(CosimError):
@@ -98,7 +95,7 @@ class ComponentError(CosimError):
 
     def __str__(self) -> str:
         when = "" if self.time is None else f" at t = {self.time:.12g} s"
-        return _escape_unprintable(f"{self.component}: {self.function} failed{when}: {self.reason}")
+        return escape_control_characters(f"{self.component}: {self.function} failed{when}: {self.reason}")
 
 
 class LateError(CosimError):

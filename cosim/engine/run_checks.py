@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-import shutil
+from collections import Counter
 from collections.abc import Iterable, Iterator, Set
 from math import inf
-from pathlib import Path
 
 from ..core.component import Variable
-from ..core.csv_text import BYTES_PER_NUMBER
-from ..core.errors import Problem
+from ..core.errors import InputError, Problem
+from ..core.size_limits import MAX_DELAYED_VALUES, format_count
 from ..core.system import Endpoint, System
 from ..core.time_grid import TimeGrid
 from .settings import Event, Settings
 
-#: size of a number in the rows (bytes), approximately
-_BYTES_PER_VALUE = 8
-#: size of the recording (bytes) from which the free disk space is checked
-_SIZE_CHECK_THRESHOLD = 1_000_000_000
 
+def check_run(system: System, settings: Settings) -> TimeGrid:
+    """Check that the system can be simulated with these settings, and return its communication points.
 
-def find_problems(system: System, settings: Settings) -> list[Problem]:
-    """Return all reasons why the system cannot be simulated with these settings; empty if it can.
-
-    The `subject` of a problem names the setting: ("stop_time",), ("components", NAME, "period"), ("events", "time"), ...
+    Raises:
+        InputError: it cannot. The `subject` of each problem names the setting: ("stop_time",), ("components", NAME, "period"),
+            ("events", "time"), ...
     """
     problems = [*system.problems(), *_find_event_problems(system, settings.events)]
     if settings.real_time is not None and not 0 < settings.real_time < inf:
@@ -33,12 +29,15 @@ def find_problems(system: System, settings: Settings) -> list[Problem]:
     except ValueError as error:
         problems.append(Problem(str(error), subject=("stop_time",)))
         if settings.step_size <= 0:
-            return problems
+            raise InputError(problems) from None
         grid = TimeGrid.from_times(settings.start_time, settings.start_time, settings.step_size)
     problems += _find_period_problems(system, grid)
+    problems += _find_delay_problems(system)
     problems += _find_recording_problems(settings, grid)
     problems += _find_event_time_problems(settings.events, grid)
-    return problems
+    if problems:
+        raise InputError(problems)
+    return grid
 
 
 def settable_variables(system: System) -> Iterator[tuple[str, Variable]]:
@@ -88,27 +87,19 @@ def _find_period_problems(system: System, grid: TimeGrid) -> Iterator[Problem]:
             yield Problem(f"the duration {duration!r} s is no multiple of the period {float(period)!r} s", subject=subject)
 
 
+def _find_delay_problems(system: System) -> Iterator[Problem]:
+    """Yield a problem if the delays store too many values; it has the location of the connections with the most of them."""
+    stored: Counter[str] = Counter()
+    for connection in system.connections:
+        stored[connection.where] += connection.delay
+    total = stored.total()
+    if total > MAX_DELAYED_VALUES:
+        text = f"the delays store {format_count(total)} values, expected at most {format_count(MAX_DELAYED_VALUES)}"
+        yield Problem(text, max(stored, key=lambda where: stored[where]), subject=("connections",))
+
+
 def _find_recording_problems(settings: Settings, grid: TimeGrid) -> Iterator[Problem]:
     interval = settings.record_interval or grid.step
     if interval < grid.step or (interval / grid.step).denominator != 1:
         text = f"recording interval {float(interval)!r} s is no multiple of the step size {float(grid.step)!r} s"
         yield Problem(text, subject=("record", "interval"))
-
-
-def find_space_problems(settings: Settings, folder: Path, csv: bool, replaced: int = 0) -> list[Problem]:
-    """Return a problem if the recording is larger than the free disk space; empty if it fits.
-
-    Args:
-        settings: Settings without problems.
-        folder: Folder of the rows.
-        csv: A CSV file is written there, too.
-        replaced: Size of the files there that are removed before (bytes).
-    """
-    grid = TimeGrid.from_times(settings.start_time, settings.stop_time, settings.step_size)
-    rows = grid.count // int((settings.record_interval or grid.step) / grid.step) + 1
-    size = rows * (len(settings.columns) + 1) * (_BYTES_PER_VALUE + csv * BYTES_PER_NUMBER)
-    if size < _SIZE_CHECK_THRESHOLD or size <= (free := shutil.disk_usage(folder).free + replaced):
-        return []
-    signals = f"{len(settings.columns)} signal{'' if len(settings.columns) == 1 else 's'}"
-    text = f"{rows} rows of {signals} take about {size / 1e9:.3g} GB, {free / 1e9:.3g} GB are free in {folder}"
-    return [Problem(f'{text}; make the step longer, or set "record": {{"interval": ...}}', subject=("step_size",))]

@@ -1,10 +1,12 @@
-"""Standard streams that survive a closed pipe (`cosim run ... | head`)."""
+"""Standard streams that survive a closed pipe (`cosim run ... | head`) and escape control characters."""
 
 from __future__ import annotations
 
 import io
 import os
 from typing import Any, TextIO
+
+from ..core.printable_text import escape_control_characters
 
 
 class _BrokenPipeIgnoringFile(io.FileIO):
@@ -17,8 +19,23 @@ class _BrokenPipeIgnoringFile(io.FileIO):
             return memoryview(data).nbytes
 
 
-def ignoring_broken_pipe(stream: TextIO, duplicate: bool = False) -> TextIO:
-    """Return a text stream to the same file that ignores a closed pipe.
+class _EscapingStream(io.TextIOWrapper):
+    """Text stream that escapes control characters.
+
+    Attributes:
+        unescaped: Text stream to the same file, for colours and cursor movements.
+    """
+
+    def __init__(self, buffer: io.BufferedWriter, encoding: str):
+        super().__init__(buffer, encoding=encoding, errors="replace", line_buffering=True)
+        self.unescaped = io.TextIOWrapper(buffer, encoding=encoding, errors="replace", write_through=True)
+
+    def write(self, text: str) -> int:
+        return super().write(escape_control_characters(text, keep="\n\t"))
+
+
+def protected_stream(stream: TextIO, duplicate: bool = False) -> TextIO:
+    """Return a text stream to the same file that ignores a closed pipe and escapes control characters.
 
     Args:
         stream: The stream to replace.
@@ -33,4 +50,9 @@ def ignoring_broken_pipe(stream: TextIO, duplicate: bool = False) -> TextIO:
     except (OSError, AttributeError):
         return stream
     raw = _BrokenPipeIgnoringFile(os.dup(descriptor) if duplicate else descriptor, "w", closefd=duplicate)
-    return io.TextIOWrapper(io.BufferedWriter(raw), encoding=stream.encoding, errors="replace", line_buffering=True)
+    return _EscapingStream(io.BufferedWriter(raw), stream.encoding)
+
+
+def unescaped(stream: TextIO) -> TextIO:
+    """Return a stream to the same file that writes control characters, for text without foreign parts."""
+    return getattr(stream, "unescaped", stream)

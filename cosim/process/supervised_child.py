@@ -12,8 +12,9 @@ from typing import NoReturn
 from . import journal as journals
 from .forks import watch_forks
 from .journal import EXIT_CODE, Journal, Phase
-from .sandbox.limits import detach, lower_limit
-from .standard_streams import ignoring_broken_pipe
+from .limits import detach, lower_limit
+from .process_state import reserve_descriptors
+from .standard_streams import protected_stream
 
 #: limit of the private memory of a supervised run (bytes); mapped files of rows do not count
 MEMORY_LIMIT = 4 << 30
@@ -49,12 +50,13 @@ def _isolate(output: int, supervisor: int) -> None:
     """Enter a new session that ends with the supervisor, limit memory, and connect descriptors 1 and 2 to the pipe `output`.
 
     Python's own output goes to duplicates of the former descriptors. The limit keeps a component that allocates without end from
-    affecting other processes. Core files are not written.
+    affecting other processes. Core files are not written. Some descriptors are reserved for results.
     """
     detach(supervisor)
     lower_limit(resource.RLIMIT_DATA, MEMORY_LIMIT)
     lower_limit(resource.RLIMIT_CORE, 0)
-    sys.stdout, sys.stderr = ignoring_broken_pipe(sys.stdout, duplicate=True), ignoring_broken_pipe(sys.stderr, duplicate=True)
+    reserve_descriptors()
+    sys.stdout, sys.stderr = protected_stream(sys.stdout, duplicate=True), protected_stream(sys.stderr, duplicate=True)
     os.dup2(output, 1)
     os.dup2(output, 2)
     os.close(output)

@@ -21,6 +21,7 @@ from pathlib import Path
 
 from ..core.errors import ComponentError
 from .failure_attribution import attribute_failure, describe_exit_status, unattributed_failure
+from .foreign_output import ForeignOutput
 from .journal import CALL_NUMBER, CHANGE_COUNT, EXIT_CODE, JOURNAL_SIZE, ROW_COUNT, STEP_COUNT, Journal, Phase
 from .run_files.live_csv_writer import LiveCsvWriter
 from .supervised_child import run_child
@@ -34,9 +35,6 @@ INTERRUPT_TIMEOUT = 3.0
 
 #: time after which a process that was stopped from outside (SIGSTOP) is killed (s)
 STOP_TIMEOUT = 5.0
-
-#: output of foreign code that is forwarded (bytes)
-MAX_OUTPUT_SIZE = 1 << 16
 
 #: number of searches for orphaned processes; each one may find children of the processes killed before
 _MAX_ORPHAN_SCANS = 10
@@ -129,12 +127,12 @@ class _Supervisor:
     child: int
     journal: Journal
     reader: int
+    _output: ForeignOutput = field(init=False)
     _progress: tuple[int, ...] = ()
     _progress_time: float = field(default_factory=time.monotonic)
     _interrupt_time: float = 0.0
     #: time at which the child was stopped from outside; 0 while it runs
     _stop_time: float = 0.0
-    _output_size: int = 0
     _timeout_reason: str = ""
     _stop_failure: ComponentError | None = None
     #: content of the journal at the last check
@@ -142,7 +140,7 @@ class _Supervisor:
 
     def wait_for_child(self) -> SupervisedOutcome:
         """Wait for the end of the child and return its outcome."""
-        os.set_blocking(self.reader, False)
+        self._output = ForeignOutput(self.reader)
         process = os.pidfd_open(self.child) if hasattr(os, "pidfd_open") else -1
         poll = select.poll()
         for descriptor in (self.reader, process):
@@ -153,7 +151,7 @@ class _Supervisor:
             status = self._poll_child(poll, csv)
         finally:
             self._kill_descendants()
-            self._forward_output()
+            self._output.forward()
             os.close(self.reader)
             if process >= 0:
                 os.close(process)
@@ -164,7 +162,9 @@ class _Supervisor:
         while True:
             try:
                 poll.poll(POLL_INTERVAL * 1000)
-                self._forward_output()
+                if not self._output.forward():
+                    with suppress(KeyError):
+                        poll.unregister(self.reader)  # a closed pipe is always ready
                 pid, status = os.waitpid(self.child, os.WNOHANG | os.WUNTRACED | os.WCONTINUED)
                 if pid and (os.WIFEXITED(status) or os.WIFSIGNALED(status)):
                     return status
@@ -216,25 +216,10 @@ class _Supervisor:
                     os.kill(orphan, signal.SIGKILL)
                     os.waitpid(orphan, 0)
 
-    def _forward_output(self) -> None:
-        """Write the output of foreign code to standard error, up to `MAX_OUTPUT_SIZE`."""
-        for _ in range(64):
-            try:
-                data = os.read(self.reader, 1 << 16)
-            except BlockingIOError:
-                return
-            if not data:
-                return
-            remaining = MAX_OUTPUT_SIZE - self._output_size
-            self._output_size += len(data)
-            if remaining > 0:
-                sys.stderr.write(data[:remaining].decode("utf-8", "replace"))
-                sys.stderr.flush()
-
     def _outcome(self, status: int) -> SupervisedOutcome:
         """Return the outcome of a child that ended with `status`."""
-        if (dropped := self._output_size - MAX_OUTPUT_SIZE) > 0:
-            sys.stderr.write(f"\n... components printed {dropped} bytes more\n")
+        if self._output.dropped:
+            sys.stderr.write(f"\n... components printed {self._output.dropped} bytes more\n")
         journal = self.journal
         if not journal.is_valid:
             journal.restore(self._last_contents)

@@ -63,11 +63,10 @@ def _create_locked_folder(prefix: str) -> tuple[str, int]:
     while True:
         folder = tempfile.mkdtemp(prefix=prefix)
         lock = _lock_folder(folder, wait=True)
-        if lock is None:
-            return folder, -1
         if Path(folder).is_dir():  # else another process removed it before it was locked
-            return folder, lock
-        os.close(lock)
+            return folder, -1 if lock is None else lock
+        if lock is not None:
+            os.close(lock)
 
 
 @cache

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..core.csv_text import text_cell
 from ..results.files import writing_atomically
 
 if TYPE_CHECKING:
@@ -33,7 +34,8 @@ def write_figure_data(figure: Figure, path: Path) -> bool:
         return False
     header = ("panel", "curve", figure.axes[-1].get_xlabel() or "x", "value")
     with writing_atomically(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows([header, *rows])
+        lines = ([text_cell(cell) if isinstance(cell, str) else cell for cell in row] for row in (header, *rows))
+        csv.writer(file, lineterminator="\n").writerows(lines)
     return True
 
 

@@ -41,7 +41,7 @@ def find_function_problems(root: Node, spec: ScenarioSpec, signals: Collection[s
     if signals is not None:
         yield from signal_problems(root, "kpis", signals)
     kpis = [kpi for _, kpi in accepted(spec.kpis)]
-    for i, check in accepted(spec.checks):
+    for i, check in accepted(spec.checks) if "kpis" not in root.invalid_keys else ():
         if text := _kpi_name_problem(check.kpi, kpis, root.folder):
             yield Problem(text, root.where("checks", i, "kpi"))
 

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints, model_validator
 
+from ..engine.settings import NonFinitePolicy
 from .schema_types import INVALID, AutoOrBool, Name, NameList, Period, Seconds, Spec, Value
 
 #: keys of the sources of a component
@@ -207,9 +208,16 @@ class ScenarioSpec(SystemSpec):
     scene: CallSpec | None = Field(default=None, description="function that returns the scene of the 3-D replay")
     reference: ReferenceSpec | None = Field(default=None, description="recorded trajectory for comparisons")
     deadlines: DeadlinesSpec = Field(default=DeadlinesSpec(), description="time limits of calls in supervised runs")
-    non_finite: Literal["error", "allow"] = Field(
-        default="error", description="treatment of NaN or infinity on a connected output"
+    non_finite: NonFinitePolicy = Field(
+        default="error",
+        description="treatment of NaN and infinity. error: on a connected output they end the run, on a recorded one they give a "
+        "warning; fail: on a connected or recorded output they end the run; allow: neither",
     )
+
+
+def ports_of(spec: SystemSpec) -> PortsSpec:
+    """Return the ports of a nested system; a scenario has none."""
+    return spec.ports if isinstance(spec, NestedSpec) else PortsSpec()
 
 
 def json_schema(nested: bool = False) -> dict[str, Any]:

@@ -29,7 +29,7 @@ EXPECTATION_KEYS = ("checks", "reference")
 def has_keys(file: Path, *groups: Sequence[str]) -> bool:
     """Return whether a JSON file has at least one key of each group; an unreadable file counts, since its run reports why."""
     try:
-        with open_text(file, encoding="utf-8") as stream:
+        with open_text(file, encoding="utf-8-sig") as stream:
             content = json.load(stream)
     except (OSError, ValueError, RecursionError):
         return True
@@ -79,9 +79,10 @@ class Regression:
             return RegressionOutcome(self.file.stem, done.returncode, "did not run to its end", tuple(done.stderr.splitlines()))
         try:
             run = _FinishedRun.read(self.file, self.directory)
-            return self._update_reference(run) if self.update else self._compare(run)
+            outcome = self._update_reference(run) if self.update else self._compare(run)
         except CosimError as error:
             return RegressionOutcome(self.file.stem, error.exit_code, "cannot be compared", tuple(str(error).splitlines()))
+        return replace(outcome, summary="; ".join(filter(None, (outcome.summary, run.result.termination))))
 
     def _compare(self, run: _FinishedRun) -> RegressionOutcome:
         failed, summary = run.failed_checks(), f"{len(run.checks)} checks"

@@ -6,6 +6,7 @@ import shutil
 import time
 
 import pytest
+from cosim_command import run_cosim
 from dask_cluster import DaskCluster, running_cluster
 from lag_project import SEGV_ORDER, descendants, is_alive
 
@@ -23,7 +24,19 @@ SLOW = {
 }
 
 
-@pytest.fixture(scope="session")
+@pytest.mark.parametrize("command", ["sweep", "tune"])
+def test_the_option_says_that_a_cluster_is_trusted(command):
+    """Dask unpickles answers; no test can make that safe."""
+    text = " ".join(run_cosim(command, "--help").stdout.split())
+    assert "Only for a cluster that you trust: Dask unpickles its answers" in text
+
+
+@pytest.mark.parametrize("document", ["SECURITY.md", "docs/sweeps.md"])
+def test_documents_say_that_a_cluster_is_trusted_in_both_directions(document):
+    assert "trusted in both directions" in (root() / document).read_text()
+
+
+@pytest.fixture(scope="module")  # its processes are busy also when nobody uses them
 def two_workers(tmp_path_factory):
     with running_cluster(tmp_path_factory.mktemp("cluster")) as made:
         yield made

@@ -13,9 +13,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-#: `limit`: time limit of a command (s); `sandbox`: settings of `cosim.process.sandbox`; `executor`: its kind;
+#: `limit`: time limit of a command (s); `executor`: its kind;
 #: `observe`: report what the command changed in its process
-CONDITIONS = {"limit": 120, "stdin": os.devnull, "sandbox": None, "executor": "auto", "observe": False}
+CONDITIONS = {"limit": 120, "stdin": os.devnull, "executor": "auto", "observe": False}
 
 
 class ForkServer:

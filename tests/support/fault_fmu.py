@@ -33,9 +33,9 @@ def build_library(version: int, folder: Path) -> Path:
     """The misbehaving lag of an FMI version as shared library."""
     compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
     library = folder / f"fault{version}.so"
-    sources = [HERE / f"fault{version}.c", HERE / "fault_actions.c"]
+    sources = [HERE / f"fault{version}.c", HERE / "fault_actions.c", HERE / "attacks.c"]
     options = ["-shared", "-fPIC", "-O1", "-Wl,-Bsymbolic", f"-I{HEADERS}"]
-    subprocess.run([compiler, *options, *sources, "-o", library, "-lm", "-lpthread"], check=True)
+    subprocess.run([compiler, *options, *sources, "-o", library, "-lm", "-lpthread", "-lrt"], check=True)
     return library
 
 
@@ -49,7 +49,8 @@ def changed(text: str, changes: Mapping[str, str]) -> str:
 @dataclass(frozen=True)
 class FaultFmus:
     """`fmus(2, "DoStep 6 segv")` is an FMI 2.0 FMU that crashes in its sixth step; the orders stand in fault_actions.h, with
-    the names of FMI 2.0 for both versions. `changes` replaces words of its description.
+    the names of FMI 2.0 for both versions. `changes` replaces words of its description; `attacks` are lines for the order
+    "attack".
 
     Each of its calls, and what became of an order, is a line in the file `calls`.
     """
@@ -57,14 +58,16 @@ class FaultFmus:
     libraries: dict[int, Path]
     folder: Path
 
-    def __call__(self, version: int, order: str = "", name: str = "lag", changes: Mapping[str, str] = NO_CHANGES) -> Path:
+    def __call__(
+        self, version: int, order: str = "", name: str = "lag", changes: Mapping[str, str] = NO_CHANGES, attacks: str = ""
+    ) -> Path:
         target = self.folder / f"{name}.fmu"
         where, _, rest = order.partition(" ")
         order = f"{IN_FMI3.get(where, where) if version == 3 else where} {rest}"
         with ZipFile(target, "w") as archive:
             archive.writestr("modelDescription.xml", changed((HERE / f"fault{version}.xml").read_text(), changes))
             archive.write(self.libraries[version], f"binaries/{PLATFORMS[version]}/fault.so")
-            archive.writestr("resources/fault.txt", f"fault {order}\nrecord {self.calls}\n")
+            archive.writestr("resources/fault.txt", f"fault {order}\nrecord {self.calls}\n{attacks}")
         return target
 
     @property

@@ -23,7 +23,6 @@ from typing import Any
 
 from cosim.cli import main
 from cosim.engine import ExecutorKind, executor_class, run_loop
-from cosim.process.sandbox import SandboxSettings, enter_sandbox, interpreter_folders
 
 PRELOADED = (
     "api",
@@ -37,6 +36,11 @@ PRELOADED = (
     "cli.commands.regress",
     "cli.commands.run",
     "cli.commands.simulate",
+    "cli.messages",
+    "components.fmi.isolated.isolated_fmu",
+    "process.supervised_child",
+    "process.supervisor",
+    "scenario.plausibility",
 )
 PR_SET_CHILD_SUBREAPER = 36
 
@@ -102,9 +106,7 @@ def run_and_exit(request: dict[str, Any]) -> None:
     """Run the command and end like an interpreter, but for taking its modules apart, which takes longer than the command."""
     code = 0
     try:
-        if request["sandbox"]:
-            run_sandboxed(**request)
-        elif request["observe"]:
+        if request["observe"]:
             run_observed(request["arguments"])
         else:
             main(request["arguments"])
@@ -134,13 +136,6 @@ def process_state() -> dict[str, Any]:
         "descriptors": sorted(path.name for path in Path("/proc/self/fd").iterdir()),
         "threads": len(list(Path("/proc/self/task").iterdir())),
     }
-
-
-def run_sandboxed(arguments: list[str], sandbox: dict[str, Any], **_: Any) -> None:
-    """The command in a process that reads what Python needs and the folder, and writes only to the listed folders."""
-    places = {"readable": (*interpreter_folders(), Path.cwd()), "writable": tuple(map(Path, sandbox.pop("writable")))}
-    enter_sandbox(SandboxSettings(**places, **sandbox, confine="required"))
-    main(arguments)
 
 
 def run_observed(arguments: list[str]) -> None:

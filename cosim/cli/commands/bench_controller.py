@@ -15,6 +15,7 @@ from ...core.errors import InputError, Problem
 from ...core.processors import available_processors
 from .. import supervision
 from ..bench_trial import ControllerTrial, TrialResult, run_trials
+from ..messages import print_verdict
 from .regress import EXIT_CODE_SEVERITY, check_unique_names, default_folder, find_scenario_files
 
 if TYPE_CHECKING:
@@ -123,8 +124,9 @@ def _read_trials(folder: Path, shipped: Path) -> tuple[list[ControllerTrial], li
 def _print_trial(result: TrialResult, candidate: str) -> None:
     from ..bench_table import print_comparison
 
-    word = click.style("passed", fg="green") if result.outcome.code == 0 else click.style("FAILED", fg="red", bold=True)
-    click.echo(f"\n{word}  {result.name}  {result.outcome.seconds:.1f} s")
+    click.echo()
+    print_verdict(result.outcome.code == 0)
+    click.echo(f"  {result.name}  {result.outcome.seconds:.1f} s")
     for line in result.outcome.details:
         click.echo(f"        {line}")
     print_comparison(result.rows(), candidate)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from ...core.errors import InputError
 from ...core.processors import available_processors
 
 if TYPE_CHECKING:
@@ -76,7 +77,11 @@ def _executor_finding() -> Finding:
         from ...engine import native_available
     except ImportError as error:
         return Finding("cosim", "executor", f"the engine cannot be imported: {error}", "broken")
-    if native_available():
+    try:
+        available = native_available()
+    except InputError as error:
+        return Finding("cosim", "executor", str(error), "broken")
+    if available:
         return Finding("cosim", "executor", "native")
     return Finding("cosim", "executor", "Python only: the native one was not built", "missing")
 
@@ -144,14 +149,17 @@ def _program_finding(name: str, program: str, option: str) -> Finding:
 
 
 def _sandbox_findings() -> Iterator[Finding]:
-    from ...process.sandbox import find_available_sandboxes, landlock, probe_restrictions
+    from ...process.sandbox import find_available_sandboxes, probe_restrictions
 
     available = find_available_sandboxes()
     if available.landlock:
-        kinds = ["files", *(["TCP"] if available.landlock >= landlock.NETWORK_ABI else [])]
-        yield Finding("sandbox", "Landlock", f"version {available.landlock}: can confine {', '.join(kinds)}; not UDP")
+        yield Finding("sandbox", "Landlock", f"version {available.landlock}: can confine files")
     else:
         yield Finding("sandbox", "Landlock", "not in this kernel (Linux 5.13 or newer)", "missing")
+    if available.system_call_filter:
+        yield Finding("sandbox", "system call filter", "can close the network and all other processes")
+    else:
+        yield Finding("sandbox", "system call filter", "needs Linux with seccomp on x86_64 or aarch64", "missing")
     if available.bubblewrap:
         yield Finding("sandbox", "bubblewrap", f"{available.bubblewrap} works: --sandbox strict can be used")
     else:

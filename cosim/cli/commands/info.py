@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from ...core.component import Variable
+from ..messages import print_line
 
 
 @click.command()
@@ -37,7 +38,7 @@ def command(fmu: Path, with_locals: bool) -> None:
     }
     for name, value in rows.items():
         if value:
-            click.echo(f"{name:13} {value}")
+            print_line(f"{name:13} {value}")
     groups = ["input", "output", "structuralParameter", "parameter", "calculatedParameter", *(["local"] if with_locals else [])]
     for causality in groups:
         _print_variables(causality, [v for v in about.variables if v.causality == causality])
@@ -53,7 +54,7 @@ def _print_variables(causality: str, variables: list[Variable]) -> None:
         unit = variable.unit.name if variable.unit else "-"
         start = "" if variable.start is None else f" = {_shorten(variable.start)}"
         start += "".join(f", {number}: {name}" for name, number in variable.items).replace(", ", "; ", 1)
-        click.echo(f"  {variable.name:{width}} {variable.type + dimensions:12} {unit:8} {variable.description}{start}".rstrip())
+        print_line(f"  {variable.name:{width}} {variable.type + dimensions:12} {unit:8} {variable.description}{start}".rstrip())
 
 
 def _shorten(start: object) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from ..csv_options import csv_options
 from ..progress import progress_bar
 
 FORMATS = ("png", "svg")
@@ -24,6 +25,7 @@ FORMATS = ("png", "svg")
 )
 @click.option("--timings", is_flag=True, help="Also draw a comparison of the real-time factors of all RESULTs.")
 @click.option("--video", is_flag=True, help='Also render a video of each run, CAMERA.mp4 (extra "video").')
+@csv_options
 @click.option("--camera", default="chase", help="Camera of the video: overview, chase (default), deck or landing.")
 def command(
     results: tuple[Path, ...], output_dir: Path | None, formats: tuple[str, ...], timings: bool, video: bool, camera: str

@@ -13,6 +13,7 @@ from ...core import resources
 from ...core.errors import InputError
 from ...core.processors import available_processors
 from ...studies.regression import EXPECTATION_KEYS, Regression, RegressionOutcome, has_keys
+from ..messages import print_verdict
 
 if TYPE_CHECKING:
     from ...report.junit import JUnitCase
@@ -106,8 +107,8 @@ def run_in_parallel(work: Sequence[Callable[[], T]], jobs: int) -> Iterator[T]:
 
 
 def _print_outcome(outcome: RegressionOutcome) -> None:
-    word = click.style("passed", fg="green") if outcome.code == 0 else click.style("FAILED", fg="red", bold=True)
-    click.echo(f"{word}  {outcome.name:<28} {outcome.summary:<24} {outcome.seconds:5.1f} s")
+    print_verdict(outcome.code == 0)
+    click.echo(f"  {outcome.name:<28} {outcome.summary:<24} {outcome.seconds:5.1f} s")
     for line in outcome.details:
         click.echo(f"        {line}")
 

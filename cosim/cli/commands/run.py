@@ -15,6 +15,7 @@ from ...core.json_values import parse_object
 from ...process.journal import STEP_COUNT
 from ...process.output_lock import LockKeeper
 from .. import live, strict_sandbox, supervision
+from ..csv_options import csv_options
 from ..progress import progress_bar
 from ..run_outputs import RunOptions, RunOutcome, write_outputs, write_partial_result
 from ..unfinished_runs import OutputFiles
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
     from ...engine.run_loop import Observer
     from ...process.supervisor import SupervisedOutcome
+    from ...report.drawing_process import DrawingProcess
     from ...scenario import PreparedRun
 
 RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run.json", "report.html", "replay.html")
@@ -59,6 +61,7 @@ RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run
 @click.option("--parquet", is_flag=True, help="Also write result.parquet (extra `parquet`).")
 @click.option("--mcap", is_flag=True, help="Also write result.mcap, for Foxglove and ROS 2 (extra `mcap`).")
 @click.option("--no-report", is_flag=True, help="Write neither figures nor report.html.")
+@csv_options
 @live.view_options
 @supervision.supervision_options
 def command(isolation: str, sandbox: str | None, view: bool, view_port: int, **options: Any) -> int:
@@ -105,41 +108,60 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
     warnings = messages.print_log()
     _require_packages(options)
     began = time.perf_counter()
-    prepared = _load(options)
-    folder = options.output_folder(prepared.spec.name).absolute()
-    try:
-        _prepare_folder(prepared, options, locks)
-        control = live.create_control(prepared, link) if link else None
-    except CosimError:
-        prepared.free()  # from here on `executing` frees the components
-        raise
-    with (
-        keeping_run_files(OutputFiles.of_folder(folder).unfinished, folder / "result.csv"),
-        _progress_observers(prepared) as observers,
-        executing(live.with_control(prepared, control), observers) as execution,
-    ):
-        execution.result.metadata["warnings"] = warnings
-        if control:
-            execution.result.metadata["live_events"] = control.finish()
-        return supervision.results_written(write_outputs(RunOutcome(options, prepared, execution, began)))
+    with _drawing_process(options) as drawing:
+        prepared = _load(options, None if link else options.real_time)
+        folder = options.output_folder(prepared.spec.name).absolute()
+        try:
+            _prepare_folder(prepared, options, locks)
+            control = live.create_control(prepared, link, options.real_time) if link else None
+        except CosimError:
+            prepared.free()  # from here on `executing` frees the components
+            raise
+        with (
+            keeping_run_files(OutputFiles.of_folder(folder).unfinished, folder / "result.csv", prepared.metadata),
+            _progress_observers(prepared) as observers,
+            executing(prepared, observers, control) as execution,
+        ):
+            execution.result.metadata["warnings"] = warnings
+            if control:
+                execution.result.metadata["live_events"] = control.finish()
+            return supervision.results_written(write_outputs(RunOutcome(options, prepared, execution, began, drawing)))
+
+
+@contextmanager
+def _drawing_process(options: RunOptions) -> Iterator[DrawingProcess | None]:
+    """Yield a process that prepares to draw the figures of the scenario; None without a report or a supervisor."""
+    from ...process.journal import current_journal
+
+    if options.no_report or current_journal() is None:
+        yield None
+        return
+    from ...report.drawing_process import DrawingProcess
+    from ...scenario import import_figures
+    from ...scenario.nested_systems import parse_settings
+
+    settings = parse_settings(options.settings)
+    with DrawingProcess(lambda: import_figures(options.scenario, settings)) as process:
+        yield process
 
 
 def _require_packages(options: RunOptions) -> None:
     """Raise InputError if an optional package for one of the output files is not installed."""
-    from ...results.mcap_files import require_mcap
-    from ...results.parquet_files import require_parquet
-
     if options.parquet:
+        from ...results.parquet_files import require_parquet
+
         require_parquet()
     if options.mcap:
+        from ...results.mcap_files import require_mcap
+
         require_mcap()
 
 
-def _load(options: RunOptions) -> PreparedRun:
+def _load(options: RunOptions, real_time: float | None) -> PreparedRun:
     """Load the scenario, announce its deadlines to the supervisor and print warnings about it."""
     from ...api import load
     from ...scenario.nested_systems import parse_settings
-    from ...scenario.plausibility import missing_connections
+    from ...scenario.plausibility import find_run_warnings
     from .. import messages
 
     prepared = load(
@@ -147,13 +169,13 @@ def _load(options: RunOptions) -> PreparedRun:
         parse_settings(options.settings),
         stop_time=options.stop_time,
         step_size=options.step_size,
-        real_time=options.real_time,
+        real_time=real_time,
         late=options.late,
         isolation=options.isolation,
         sandbox=options.sandbox,
     )
     supervision.set_deadlines(prepared.spec.deadlines)
-    messages.log_problems(missing_connections(prepared))
+    messages.log_problems(find_run_warnings(prepared))
     return prepared
 
 
@@ -161,18 +183,23 @@ def _save_after_crash(outcome: SupervisedOutcome) -> None:
     """Write the rows of a child process that crashed, was killed or was interrupted."""
     from ...process.run_files.folder import read_metadata
     from ...results import Result
+    from ...results.non_finite import warn_non_finite
+    from .. import messages
 
     folder = outcome.journal.folder
     if folder is not None:
         failure = "interrupted" if outcome.interrupted else str(outcome.failure)
         metadata = {**read_metadata(folder), "macro_steps": outcome.journal[STEP_COUNT], "failure": failure}
-        result = Result(supervision.recover_outcome_recording(outcome), metadata=metadata)
-        write_partial_result(result, folder.parent, folder.parent, folder)
+        recording = supervision.recover_outcome_recording(outcome)
+        if metadata.get("scenario", {}).get("non_finite") != "allow":
+            messages.print_log()
+            metadata["non_finite"] = warn_non_finite(recording)
+        write_partial_result(Result(recording, metadata=metadata), folder.parent, folder.parent, folder)
 
 
 def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeeper) -> None:
     """Check the figures and that results can be written, lock the output directory, and remove results of an earlier run."""
-    from ...engine.run_checks import find_space_problems
+    from ...engine.disk_space import find_space_problems
     from ...results.files import check_writable, remove_files
 
     if not options.no_report and (problems := prepared.figure_problems()):
@@ -183,7 +210,7 @@ def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeepe
     locks.lock(OutputFiles.of_folder(folder).lock, shown)
     _warn_overwriting(shown, prepared.document.file.resolve())
     replaced = sum((folder / name).stat().st_size for name in RESULT_FILES if (folder / name).is_file())
-    if problems := find_space_problems(prepared.settings, folder, csv=True, replaced=replaced):
+    if problems := find_space_problems(prepared.plan, folder, csv=True, replaced=replaced):
         raise InputError([Problem(problem.message, prepared.root.where(*problem.subject)) for problem in problems])
     figures = (f"{figure.name}{suffix}" for figure in prepared.spec.figures for suffix in (".png", ".svg", ".csv"))
     remove_files(folder, *RESULT_FILES, *figures)

@@ -163,10 +163,9 @@ class TextReader:
             return self._pending_change[0], {}
 
 
-def write_metadata(metadata: dict[str, Any]) -> None:
-    """Write the description of the run to its folder, if this process has a supervisor."""
-    if folder := run_folder():
-        (folder / METADATA_FILE).write_text(json.dumps(metadata, default=str), encoding="utf-8")
+def write_metadata(folder: Path, metadata: Mapping[str, Any]) -> None:
+    """Write the description of the run to its folder."""
+    (folder / METADATA_FILE).write_text(json.dumps(metadata, default=str), encoding="utf-8")
 
 
 def read_metadata(folder: Path) -> dict[str, Any]:
@@ -178,12 +177,13 @@ def read_metadata(folder: Path) -> dict[str, Any]:
 
 
 @contextmanager
-def keeping_run_files(folder: Path, csv: Path | None = None) -> Iterator[None]:
+def keeping_run_files(folder: Path, csv: Path | None = None, metadata: Mapping[str, Any] | None = None) -> Iterator[None]:
     """Keep the files of a run in `folder` during the block, if this process has a supervisor; remove them if it succeeds.
 
     Args:
         folder: Folder that is created; an existing one is replaced.
         csv: CSV file that the supervisor updates during the run; None for none.
+        metadata: Description of the run; None for none.
     """
     journal = current_journal()
     if journal is None:
@@ -192,6 +192,8 @@ def keeping_run_files(folder: Path, csv: Path | None = None) -> Iterator[None]:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     journal.set_run_files(folder, csv)
+    if metadata:
+        write_metadata(folder, metadata)
     yield
     remove_run_files()
 

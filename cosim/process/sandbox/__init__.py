@@ -9,34 +9,38 @@ Always in force:
 - empty standard input
 - no way to gain privileges
 
-With `confine` (Landlock, Linux 5.13):
+With `confine` (Landlock, Linux 5.13, and a system call filter):
 
-- files are read and programs executed only below `readable`
+- files are read only below `readable`
 - files are written only below `writable`
-- TCP is closed unless `network` is set (Linux 6.7)
+- no network, no sockets, no new processes and programs, no signals to other processes
+- owners, modes, times and attributes of files, shared objects, keys, priorities and mounts stay as they are
+- all environment variables but a few are removed
 
-Not prevented: Landlock does not block UDP, raw sockets and named Unix sockets, nor reading names, sizes and modes of files, nor
-changing the modes of the user's files. `bubblewrap_command` (strict mode) hides all other files, all processes and the network. A
-worker can exhaust its limits, leave children in other sessions, which the parent has to kill, and return wrong outputs.
+Not prevented: names, sizes and modes of files can be read. A worker can exhaust its limits and return wrong outputs.
+`bubblewrap_command` (strict mode) hides all other files and processes from a whole command.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from ...core.errors import InputError
-from . import landlock, limits
+from .. import limits
+from . import landlock, system_call_filter
 from .bubblewrap import bubblewrap_command, find_bubblewrap
+from .environment import KEPT_VARIABLES, clear_environment
 from .folders import interpreter_folders
 from .status import ActiveRestrictions, AvailableSandboxes, find_available_sandboxes, probe_restrictions
 
 __all__ = [
+    "KEPT_VARIABLES",
     "ActiveRestrictions",
     "AvailableSandboxes",
     "SandboxSettings",
     "bubblewrap_command",
+    "clear_environment",
     "enter_sandbox",
     "find_available_sandboxes",
     "find_bubblewrap",
@@ -58,8 +62,7 @@ class SandboxSettings:
         cpu_seconds: Processor time of the process (s); None for no limit.
         readable: Existing folders and files that may be read.
         writable: Existing folders and files that may be read and written.
-        network: Permit TCP.
-        confine: Confine access to the listed files: "never", if "available", or "required".
+        confine: Confine the process to the listed files and to itself.
         parent: Process id of the parent, with which the worker ends; None for no check that it still exists.
     """
 
@@ -69,8 +72,7 @@ class SandboxSettings:
     cpu_seconds: int | None = None
     readable: tuple[Path, ...] = ()
     writable: tuple[Path, ...] = ()
-    network: bool = False
-    confine: Literal["never", "available", "required"] = "available"
+    confine: bool = True
     parent: int | None = None
 
 
@@ -81,16 +83,17 @@ def enter_sandbox(settings: SandboxSettings) -> None:
         settings: The restrictions.
 
     Raises:
-        InputError: The process is to be confined, but a listed path does not exist, the process has several threads, or the
-            kernel does not support the required confinement. Nothing was changed.
+        InputError: The process is to be confined, but a listed path does not exist, the process has several threads, or this
+            system does not support the confinement. Nothing was changed.
     """
-    confined = settings.confine == "required" or (settings.confine == "available" and landlock.abi_version() > 0)
-    if confined and (reason := _unmet_requirement(settings)):
+    if settings.confine and (reason := _unmet_requirement(settings)):
         raise InputError(f"the sandbox cannot be entered: {reason}")
     limits.detach(settings.parent)
     limits.set_limits(settings.memory, settings.open_files, settings.file_size, settings.cpu_seconds)
-    if confined:
-        landlock.confine(settings.readable, settings.writable, network=settings.network)
+    if settings.confine:
+        clear_environment()
+        landlock.confine(settings.readable, settings.writable)
+        system_call_filter.enter_filter()
 
 
 def _unmet_requirement(settings: SandboxSettings) -> str:
@@ -98,11 +101,10 @@ def _unmet_requirement(settings: SandboxSettings) -> str:
     missing = [str(path) for path in (*settings.readable, *settings.writable) if not path.exists()]
     if missing:
         return f"{', '.join(missing)} does not exist"
-    available = landlock.abi_version()
-    if not available:
+    if not landlock.abi_version():
         return "Landlock is needed (Linux 5.13 or newer, enabled); this kernel has none"
-    if settings.confine == "required" and not settings.network and available < landlock.NETWORK_ABI:
-        return f"closing the network needs Landlock {landlock.NETWORK_ABI} (Linux 6.7); this kernel has {available}"
+    if not system_call_filter.is_available():
+        return "a system call filter is needed (Linux with seccomp, on x86_64 or aarch64); this system has none"
     if limits.thread_count() > 1:
         return "the process has more than one thread, and the others would not be confined"
     return ""

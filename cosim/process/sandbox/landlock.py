@@ -1,4 +1,4 @@
-"""Landlock: a Linux process restricts its own and its children's access to files and TCP, without root privileges.
+"""Landlock: a Linux process restricts its own and its children's access to files, without root privileges.
 
 Three system calls, by number (the same on every architecture); constants from linux/landlock.h.
 """
@@ -14,8 +14,6 @@ from pathlib import Path
 
 CREATE_RULESET, ADD_RULE, RESTRICT_SELF = 444, 445, 446
 CREATE_RULESET_VERSION, RULE_PATH_BENEATH = 1, 1
-#: first versions with rules for TCP, and for signals and abstract sockets
-NETWORK_ABI, SCOPE_ABI = 4, 6
 
 EXECUTE, WRITE_FILE, READ_FILE, READ_DIR = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 TRUNCATE, IOCTL_DEV = 1 << 14, 1 << 15
@@ -23,14 +21,12 @@ TRUNCATE, IOCTL_DEV = 1 << 14, 1 << 15
 FILE_ACCESS_RIGHTS = EXECUTE | WRITE_FILE | READ_FILE | TRUNCATE | IOCTL_DEV
 #: number of file system rights in each version
 FILE_RIGHT_COUNTS = {1: 13, 2: 14, 3: 15, 4: 15, 5: 16}
-TCP_RIGHTS = 1 << 0 | 1 << 1
-SCOPED_SIGNALS_AND_SOCKETS = 1 << 0 | 1 << 1
 
 _LIBC = ctypes.CDLL(None, use_errno=True)
 
 
 class _Ruleset(ctypes.Structure):
-    _fields_ = [("files", ctypes.c_uint64), ("network", ctypes.c_uint64), ("scoped", ctypes.c_uint64)]
+    _fields_ = [("files", ctypes.c_uint64)]
 
 
 class _PathBeneath(ctypes.Structure):
@@ -46,27 +42,22 @@ def abi_version() -> int:
     return max(version, 0)
 
 
-def confine(readable: Iterable[Path], writable: Iterable[Path], *, network: bool) -> None:
+def confine(readable: Iterable[Path], writable: Iterable[Path]) -> None:
     """Confine this thread and its children to the listed files, irrevocably.
 
-    Open files stay open. The process must have set no_new_privs (see `limits.detach`) or be privileged. From version 6 on,
-    signals and abstract sockets do not reach processes outside.
+    Open files stay open. The process must have set no_new_privs (see `limits.detach`) or be privileged.
 
     Args:
         readable: Folders and files that may be read and executed.
         writable: Folders and files that may be read and written, not executed.
-        network: Permit TCP; it is closed from version 4 on otherwise.
 
     Raises:
         OSError: The kernel refused, or a path does not exist.
     """
-    version = abi_version()
-    rights = (1 << FILE_RIGHT_COUNTS[min(version, max(FILE_RIGHT_COUNTS))]) - 1
-    tcp = TCP_RIGHTS if version >= NETWORK_ABI and not network else 0
-    scoped = SCOPED_SIGNALS_AND_SOCKETS if version >= SCOPE_ABI else 0
-    attributes = _Ruleset(rights, tcp, scoped)
-    size = 8 if version < NETWORK_ABI else 16 if version < SCOPE_ABI else 24
-    ruleset = _system_call(CREATE_RULESET, ctypes.byref(attributes), ctypes.c_size_t(size), ctypes.c_uint32(0))
+    rights = (1 << FILE_RIGHT_COUNTS[min(abi_version(), max(FILE_RIGHT_COUNTS))]) - 1
+    attributes = _Ruleset(rights)
+    size = ctypes.c_size_t(ctypes.sizeof(attributes))
+    ruleset = _system_call(CREATE_RULESET, ctypes.byref(attributes), size, ctypes.c_uint32(0))
     try:
         for path in readable:
             _add_path_rule(ruleset, path, rights & (EXECUTE | READ_FILE | READ_DIR))

@@ -2,25 +2,34 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import resource
 import socket
 from dataclasses import dataclass
 
-from . import landlock, limits
+from .. import limits
+from . import landlock, system_call_filter
 from .bubblewrap import find_bubblewrap
-
-#: port 9 (discard), which is normally closed: a permitted connection is refused at once
-_DISCARD_ADDRESS = ("127.0.0.1", 9)
 
 
 @dataclass(frozen=True)
 class AvailableSandboxes:
-    """Supported sandboxes: Landlock version (0: none) and path of a working bubblewrap ("": none)."""
+    """Supported sandboxes.
+
+    Attributes:
+        landlock: Version of Landlock (0: none).
+        system_call_filter: The system call filter is supported.
+        bubblewrap: Path of a working bubblewrap ("": none).
+    """
 
     landlock: int
+    system_call_filter: bool
     bubblewrap: str
+
+    @property
+    def confines_fmus(self) -> bool:
+        """Support of the confinement of FMUs (`--sandbox`)."""
+        return self.landlock > 0 and self.system_call_filter
 
 
 @dataclass(frozen=True)
@@ -29,7 +38,7 @@ class ActiveRestrictions:
 
     Attributes:
         files_confined: Landlock confines access to files; False in bubblewrap, which hides files instead.
-        tcp_closed: TCP connections are not permitted.
+        network_closed: No socket can be opened.
         own_session: The process leads a session.
         no_new_privileges: The process cannot gain privileges.
         memory: Limit of the address space (bytes); None for no limit.
@@ -39,7 +48,7 @@ class ActiveRestrictions:
     """
 
     files_confined: bool
-    tcp_closed: bool
+    network_closed: bool
     own_session: bool
     no_new_privileges: bool
     memory: int | None
@@ -50,14 +59,14 @@ class ActiveRestrictions:
 
 def find_available_sandboxes() -> AvailableSandboxes:
     """Return the sandboxes that this machine supports."""
-    return AvailableSandboxes(landlock.abi_version(), find_bubblewrap())
+    return AvailableSandboxes(landlock.abi_version(), system_call_filter.is_available(), find_bubblewrap())
 
 
 def probe_restrictions() -> ActiveRestrictions:
-    """Determine the restrictions in force by trying to open the root folder and to connect to a port of this machine."""
+    """Determine the restrictions in force by trying to open the root folder and a socket."""
     return ActiveRestrictions(
         files_confined=_is_root_unreadable(),
-        tcp_closed=_is_tcp_denied(),
+        network_closed=_is_socket_denied(),
         own_session=os.getsid(0) == os.getpid(),
         no_new_privileges=limits.no_new_privileges(),
         memory=_soft_limit(resource.RLIMIT_AS),
@@ -76,10 +85,12 @@ def _is_root_unreadable() -> bool:
     return False
 
 
-def _is_tcp_denied() -> bool:
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as connection:
-        connection.settimeout(0.5)
-        return connection.connect_ex(_DISCARD_ADDRESS) in (errno.EACCES, errno.EPERM, errno.ENETUNREACH)
+def _is_socket_denied() -> bool:
+    try:
+        socket.socket().close()
+    except PermissionError:
+        return True
+    return False
 
 
 def _soft_limit(kind: int) -> int | None:

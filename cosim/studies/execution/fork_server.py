@@ -23,7 +23,7 @@ from typing import Any
 from ...components.fmi import FmuFile
 from ...components.python_import import load_object
 from ...core.errors import CosimError
-from ...process.sandbox.limits import detach, thread_count
+from ...process.limits import detach, thread_count
 from ...process.temporary_folders import temporary_run_folder
 from ...scenario import load_scenario
 from ...scenario.named_functions import function_problem, load_function

@@ -22,7 +22,7 @@ from ...process.run_files.folder import keeping_run_files
 from ...process.supervisor import SupervisedOutcome, run_supervised
 from ...results import Result
 from ...results.kpi import evaluate_kpis
-from ...scenario import PreparedRun, prepare
+from ...scenario import PreparedRun, load
 from .job import Job, Record, StudyContext
 
 #: length kept of the text that components printed in a failed run (bytes)
@@ -100,7 +100,7 @@ def _write_reply(reply: IO[str], value: Any) -> None:
 def _run_job(context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[str]) -> None:
     _set_deadline(context)
     prepared = _prepare_job(context, job, fmu_files)
-    with keeping_run_files(Path(tempfile.gettempdir()) / "run"), simulating(prepared.system, prepared.settings) as outcome:
+    with keeping_run_files(Path(tempfile.gettempdir()) / "run"), simulating(prepared.plan) as outcome:
         if outcome.failure:
             raise outcome.failure
         kpis = evaluate_kpis(Result(outcome.recording), prepared.kpis())
@@ -129,7 +129,7 @@ def _set_deadline(context: StudyContext) -> None:
 
 
 def _prepare_job(context: StudyContext, job: Job, fmu_files: FmuFiles) -> PreparedRun:
-    prepared = prepare(context.scenario, job.settings, loaded_fmus={path: file.share() for path, file in fmu_files.items()})
+    prepared = load(context.scenario, job.settings, loaded_fmus={path: file.share() for path, file in fmu_files.items()})
     if journal := current_journal():
         journal.deadlines = Deadlines(**prepared.spec.deadlines.model_dump())
     return prepared

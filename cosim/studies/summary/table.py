@@ -9,6 +9,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from ...core.csv_text import text_cell
 from ...results.files import writing_atomically
 from ..sweep import SweepRow
 
@@ -51,7 +52,7 @@ def write_csv_rows(names: Sequence[str], lines: Iterable[Sequence[Any]], path: P
     """
     with writing_atomically(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(names)
+        writer.writerow(map(text_cell, names))
         writer.writerows([csv_value(value) for value in line] for line in lines)
 
 
@@ -59,6 +60,8 @@ def csv_value(value: Any) -> Any:
     """Return a value as it is written to a CSV file."""
     if isinstance(value, bool):
         return int(value)
+    if isinstance(value, str):
+        return text_cell(value)
     return json.dumps(value) if isinstance(value, list | dict) else value
 
 

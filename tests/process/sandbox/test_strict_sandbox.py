@@ -19,9 +19,7 @@ from cosim.process.sandbox import find_available_sandboxes
 
 pytestmark = [
     pytest.mark.skipif(not find_available_sandboxes().bubblewrap, reason="no bubblewrap that works"),
-    pytest.mark.skipif(
-        not find_available_sandboxes().landlock, reason="this kernel has no Landlock, which FMUs in a sandbox need"
-    ),
+    pytest.mark.skipif(not find_available_sandboxes().confines_fmus, reason="this system cannot confine FMUs"),
 ]
 
 
@@ -29,9 +27,8 @@ def words(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "cosim", *map(str, arguments)]
 
 
-def cosim(folder: Path, *arguments: object, **variables: str) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "TMPDIR": str(folder / "tmp"), **variables}
-    (folder / "tmp").mkdir(exist_ok=True)
+def cosim(folder: Path, *arguments: object, **more: str) -> subprocess.CompletedProcess[str]:
+    environment = variables(folder) | more
     return subprocess.run(
         words(*arguments), cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=100
     )
@@ -55,6 +52,12 @@ def home(tmp_path):
     (tmp_path / "private.txt").write_text("secret")
     shutil.copy(Path(__file__).with_name("sandbox_probe.py"), tmp_path / "project")
     return tmp_path
+
+
+def variables(folder: Path) -> dict[str, str]:
+    """Environment with temporary files in a folder."""
+    (folder / "tmp").mkdir(exist_ok=True)
+    return {**os.environ, "TMPDIR": str(folder / "tmp")}
 
 
 def prowling(home: Path, port: int = 9, **more: Any) -> Path:
@@ -138,6 +141,30 @@ def test_a_bubblewrap_that_does_not_start_the_command_is_a_failure(home):
     assert not (home / "runs").exists()
 
 
+@pytest.mark.parametrize("place", ["project", "."], ids=["folder of the scenario", "folder above"])
+def test_the_home_folder_is_not_opened(home, place):
+    done = cosim(home, "run", prowling(home), "--output-dir", "out", "--sandbox", "strict", HOME=str((home / place).resolve()))
+    assert (done.returncode, (home / "out").exists()) == ((2, False) if place == "project" else (0, True)), done.stderr
+    assert ("contains the home folder" in done.stderr) is (place == "project")
+
+
+def test_results_are_not_written_to_the_home_folder(home):
+    done = cosim(home, "run", prowling(home), "--output-dir", ".", "--sandbox", "strict", HOME=str(home))
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert f'"{home}" holds a file or the results of this run' in done.stderr
+
+
+def test_the_environment_inside_is_a_listed_one(home):
+    probe = (home / "project/sandbox_probe.py").read_text()
+    (home / "project/sandbox_probe.py").write_text(probe + "\nprint(sorted(os.environ))\n")
+    done = cosim(
+        home, "run", prowling(home), "--output-dir", "out", "--no-report", "--sandbox", "strict", PRIVATE="x", LC_ALL="C"
+    )
+    assert done.returncode == 0, done.stderr
+    assert "PRIVATE" not in done.stdout + done.stderr
+    assert "'LC_ALL'" in done.stdout + done.stderr
+
+
 def test_strict_sandbox_of_a_single_fmu(home, probe):
     done = cosim(home, "simulate", probe, "--output-file", "out/x.csv", "--sandbox", "strict")
     assert done.returncode == 0, done.stderr
@@ -149,9 +176,7 @@ def test_strict_sandbox_of_a_single_fmu(home, probe):
 def slow(home: Path) -> subprocess.Popen[str]:
     """Long real-time run that has written rows."""
     order = ("run", prowling(home, stop_time=1000), "--output-dir", "out", "--no-report", "--sandbox", "strict", "--real-time")
-    (home / "tmp").mkdir()
-    environment = {**os.environ, "TMPDIR": str(home / "tmp"), "MARK": str(home)}
-    process = subprocess.Popen(words(*order), cwd=home, env=environment, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(words(*order), cwd=home, env=variables(home), stderr=subprocess.PIPE, text=True)
     latest = time.monotonic() + 60
     while not (home / "out/result.csv").exists() and time.monotonic() < latest:
         time.sleep(0.02)
@@ -163,7 +188,7 @@ def marked(home: Path) -> list[str]:
     found = []
     for entry in Path("/proc").iterdir():
         try:
-            if entry.name.isdigit() and f"MARK={home}\0".encode() in (entry / "environ").read_bytes():
+            if entry.name.isdigit() and f"TMPDIR={home / 'tmp'}".encode() in (entry / "environ").read_bytes():
                 found.append(entry.name)
         except OSError:
             continue

@@ -1,5 +1,6 @@
 /* Whatever can go wrong in a library that other people wrote. What and when stands in resources/fault.txt of the FMU:
-   a line "fault FUNCTION WHEN WHAT", a line "record FILE"; the string parameter `fault` says the same of one instance. */
+   a line "fault FUNCTION WHEN WHAT", a line "record FILE", lines "attack NAME TARGET" for the fault "attack";
+   the string parameter `fault` says the same of one instance. */
 #define _GNU_SOURCE
 #include <arpa/inet.h>
 #include <dlfcn.h>
@@ -27,6 +28,8 @@
 
 static Fault library;
 static char record_file[PATH_MAX];
+static struct { char name[40], target[PATH_MAX]; } attacks[100];
+static size_t attack_count;
 
 static void record(const char *format, ...) {
     if (!record_file[0]) return;
@@ -112,6 +115,9 @@ static int open_files(Lag *m) {
 static int log_directives(Lag *m) { say(WARNING, "info", "%s%s%n%d%f 100%"); return OK; }
 static int log_null(Lag *m) { say(WARNING, NULL, NULL); return OK; }
 static int log_bytes(Lag *m) { say(WARNING, "\xff", "bad \xff\xfe\x80 bytes \x1b[31m red"); return OK; }
+#define CONTROL "\x1b[31mred\x1b]0;title\a\xc2\x9b" "31m \xe2\x80\xae" "rtl\r"
+static int log_control(Lag *m) { say(WARNING, "info", CONTROL "\nERROR other: faked"); return OK; }
+static int print_control(Lag *m) { printf(CONTROL "\n"); fflush(stdout); fprintf(stderr, CONTROL "\n"); return OK; }
 static int log_long(Lag *m) {
     char *text = malloc(1 << 20);
     memset(text, 'y', 1 << 20);
@@ -215,6 +221,8 @@ static int tcp(Lag *m) { return connect_(SOCK_STREAM); }
 static int udp(Lag *m) { return connect_(SOCK_DGRAM); }
 static int processes(Lag *m) { record("process %d child of %d", getpid(), getppid()); return OK; }
 
+static int attack_all(Lag *m) { for (size_t i = 0; i < attack_count; i++) attack(attacks[i].name, attacks[i].target); return OK; }
+
 /* -- values and statuses -- */
 static int put(Lag *m, double y) { if (m) m->x[Y] = y; return OK; }
 static int nan_(Lag *m) { return put(m, NAN); }
@@ -243,14 +251,14 @@ static const struct { const char *name; int (*act)(Lag *); } FAULTS[] = {
     {"abort", abort_}, {"overwrite", overwrite}, {"free_twice", free_twice}, {"exit_0", exit_0}, {"exit_3", exit_3}, {"exit_at_once", exit_at_once},
     {"kill", kill_}, {"loop", loop}, {"sleep", sleep_}, {"read_stdin", read_stdin}, {"memory", memory},
     {"flood_stdout", flood_stdout}, {"flood_stderr", flood_stderr}, {"flood_log", flood_log}, {"open_files", open_files},
-    {"log_directives", log_directives}, {"log_null", log_null}, {"log_bytes", log_bytes}, {"log_long", log_long},
+    {"log_directives", log_directives}, {"log_null", log_null}, {"log_bytes", log_bytes}, {"log_long", log_long}, {"log_control", log_control}, {"print_control", print_control},
     {"log_thread", log_thread}, {"log_20000", log_20000}, {"round_up", round_up}, {"flush_to_zero", flush_to_zero}, {"fp_traps", fp_traps},
     {"change_folder", change_folder}, {"change_locale", change_locale}, {"change_umask", change_umask},
     {"limit_files", limit_files}, {"limit_size", limit_size}, {"set_alarm", set_alarm}, {"block_signals", block_signals},
     {"change_environment", change_environment}, {"ignore_interrupts", ignore_interrupts}, {"close_output", close_output},
     {"truncate_all", truncate_all}, {"close_all", close_all}, {"fork", fork_}, {"daemon", daemon_}, {"answer", answer},
     {"fork_return", fork_return}, {"fork_silently", fork_silently}, {"fork_program", fork_program},
-    {"thread", thread}, {"write_here", write_here},
+    {"thread", thread}, {"write_here", write_here}, {"attack", attack_all},
     {"write_temporary", write_temporary}, {"tcp", tcp}, {"udp", udp}, {"processes", processes},
 };
 
@@ -311,6 +319,8 @@ static void read_orders(const char *path) {
     while (file && fgets(line, sizeof line, file)) {
         sscanf(line, "fault %39s %23s %23s", library.where, library.when, library.what);
         sscanf(line, "record %4095[^\n]", record_file);
+        if (attack_count < 100 && sscanf(line, "attack %39s %4095[^\n]", attacks[attack_count].name, attacks[attack_count].target) == 2)
+            attack_count++;
     }
     if (file) fclose(file);
 }

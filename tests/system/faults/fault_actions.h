@@ -30,6 +30,9 @@ void lag_step(Lag *m, double t, double h);
 int enter(Lag *m, const char *function, const char *format, ...) __attribute__((format(printf, 3, 4)));
 void record_values(char *line, size_t room, const unsigned *references, size_t count, const double *values);
 
+/* Execute an attack of attacks.c and print its outcome. */
+void attack(const char *name, const char *target);
+
 /* of each FMI version: the prefix of its functions, and its log callback (any thread may call it) */
 extern const char PREFIX[];
 void say(int status, const char *category, const char *text);

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import re
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,10 @@ from fault_fmu import STEP_COUNT, FaultFmus, lag_output, scenario
 from fmi_call_rules import calls, violations
 from test_fault_crashes import ALL, CRASHES, DEADLINES, EXIT, FAILED, LATE, SIGNAL, SLACK, T5, Case, check, table
 
-from cosim.process.sandbox import find_available_sandboxes, landlock
+from cosim.process.sandbox import find_available_sandboxes
 
-needs_landlock = pytest.mark.skipif(
-    find_available_sandboxes().landlock < landlock.NETWORK_ABI, reason="this kernel cannot confine files and network (Linux 6.7)"
-)
+ROOT = Path(__file__).parents[3]
+needs_sandbox = pytest.mark.skipif(not find_available_sandboxes().confines_fmus, reason="this system cannot confine FMUs")
 needs_bubblewrap = pytest.mark.skipif(not find_available_sandboxes().bubblewrap, reason="no bubblewrap that works")
 
 
@@ -56,9 +56,9 @@ def test_a_hang_ends_at_its_deadline(fmus, runner, tmp_path, case, version):
     Case("DoStep 6 change_folder", code=0, rows=ALL),
     Case("DoStep 6 change_environment", code=0, rows=ALL),
     Case("DoStep 6 ignore_interrupts", code=0, rows=ALL),
-    Case("DoStep 6 round_up", T5 + "changed the floating-point mode"),
-    Case("DoStep 6 flush_to_zero", T5 + "changed the floating-point mode"),
-    Case("DoStep 6 fp_traps", T5 + "changed the floating-point mode"),
+    Case("DoStep 6 round_up", "lag: {f} changed the floating-point mode", code=0, rows=ALL),
+    Case("DoStep 6 flush_to_zero", "lag: {f} changed the floating-point mode", code=0, rows=ALL),
+    Case("DoStep 6 fp_traps", "lag: {f} changed the floating-point mode", code=0, rows=ALL),
     Case("DoStep 6 thread", code=0, rows=ALL),
     Case("DoStep 6 close_output", code=0, rows=ALL),
     Case("DoStep 6 log_thread", code=0, rows=ALL),
@@ -143,14 +143,6 @@ def test_one_fmu_alone(fmus, runner, tmp_path, version):
     assert f"fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.err
 
 
-def may_leave_network() -> bool:
-    """Return True if a process may have a network namespace of its own."""
-    child = os.fork()
-    if child == 0:
-        os._exit(min(1, abs(ctypes.CDLL(None).unshare(0x50000000))))
-    return os.waitpid(child, 0)[1] == 0
-
-
 @dataclass(frozen=True)
 class Loud(FaultFmus):
     """FMUs that record their calls where a sandbox lets them: on what they print."""
@@ -160,7 +152,7 @@ class Loud(FaultFmus):
         return Path("/dev/stderr")
 
 
-@needs_landlock
+@needs_sandbox
 class TestSandbox:
     @pytest.fixture
     def confined(self, fmus, runner, tmp_path, version):
@@ -185,11 +177,13 @@ class TestSandbox:
         assert "fault_was_here 1" in done.err
         assert (done.code, done.temporary_files) == (0, [])
 
-    @pytest.mark.parametrize(("words", "answer"), [((), "Connection refused"), (("--sandbox",), "Permission denied")])
-    def test_it_opens_no_connection(self, confined, words, answer):
-        done = confined("DoStep 6 tcp", *words)
-        assert f"connect -1 {answer}" in done.err
-        assert done.code == 0
+    def test_a_folder_in_pythonpath_with_other_files_is_refused(self, fmus, tmp_path):
+        (tmp_path / "diary.txt").touch()
+        command = [sys.executable, "-m", "cosim", "simulate", fmus(2), "--sandbox"]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(tmp_path)])}
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+        assert f'"{tmp_path}" in PYTHONPATH holds "diary.txt"' in done.stderr
 
     @needs_bubblewrap
     @pytest.mark.parametrize(
@@ -197,9 +191,9 @@ class TestSandbox:
         [
             ("DoStep 6 write_here", "file fault_was_here 0"),
             ("DoStep 6 write_temporary", "fault_was_here 1"),
-            ("DoStep 6 tcp", "connect -1 Permission denied"),
-            ("DoStep 6 udp", "connect -1 Network is unreachable"),
-            ("DoStep 6 daemon", "child "),
+            ("DoStep 6 tcp", "connect -1 Bad file descriptor"),
+            ("DoStep 6 udp", "connect -1 Bad file descriptor"),
+            ("DoStep 6 daemon", "child -1"),
             ("DoStep 6 processes", "process [1-9] child of [1-9]\n"),
         ],
     )
@@ -214,13 +208,6 @@ class TestSandbox:
         done = confined("DoStep 6 segv", "--sandbox", "strict", "--isolation", "run")
         assert f"lag: fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.err
         assert (done.code, len(done.rows), done.processes, done.temporary_files) == (1, 6, [], [])
-
-    @pytest.mark.skipif(not may_leave_network(), reason="user namespaces are forbidden here")
-    @pytest.mark.parametrize(("words", "answer"), [((), "0 Success"), (("--sandbox",), "-1 Network is unreachable")])
-    def test_it_sends_nothing_by_udp(self, confined, words, answer):
-        done = confined("DoStep 6 udp", *words)
-        assert f"connect {answer}" in done.err
-        assert done.code == 0
 
 
 ANSWERS = ["[" * 100_000 + "\n", "\n\n", '{"value": ["a", false, false]}\n', '{"component_error": ["other", "f", "r", "x"]}\n']

@@ -32,6 +32,7 @@ class IsolatedFmu(WorkerClient, Component):
     """
 
     binds_everything = False
+    runs_foreign_code = False
 
     def __init__(
         self, instance_class: type[FmuInstance], file: FmuFile, instance_name: str, logging_on: bool, isolation: Isolation

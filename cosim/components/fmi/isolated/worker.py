@@ -156,7 +156,7 @@ class Worker:
             if status and status not in SUCCESS_STATUSES:
                 result = self._instance.interpret_status(call.name, status)
             if one + tiny != one - tiny or not subnormal + subnormal or (is_do_step and traps()):
-                raise ComponentError(self._instance.name, call.name, float_mode.CHANGE_REASON, self._block.current_time.value)
+                self._instance.restore_float_mode(call.name)
         return result
 
     # -- FMU states, which stay in the worker process ------------------------------------------------------------------

@@ -14,9 +14,10 @@ from typing import NoReturn
 
 from ....core import component_log
 from ....process.failure_attribution import describe_exit_status
+from ....process.foreign_output import ForeignOutput
 from ....process.forks import attributing_forks
 from ....process.journal import CALL_NUMBER, CHANGE_COUNT, Journal, suspending_deadline
-from ....process.supervisor import MAX_OUTPUT_SIZE, POLL_INTERVAL
+from ....process.supervisor import POLL_INTERVAL
 from .answers import INVALID_ANSWER_ERRORS
 from .pipes import READ_SIZE, STEP_DONE, SpinningPoller, decode_line, write_line
 
@@ -63,12 +64,12 @@ class WorkerProcess:
                 _run_worker(serve, commands, answers, output_writer)
         for descriptor in (commands, answers, output_writer):
             os.close(descriptor)
-        os.set_blocking(self._output, False)
+        self._foreign_output = ForeignOutput(self._output)
         self._pidfd = os.pidfd_open(self._pid) if hasattr(os, "pidfd_open") else -1
         self._poller = SpinningPoller(descriptor for descriptor in (self._reader, self._output, self._pidfd) if descriptor >= 0)
         self._descriptors = [d for d in (self._writer, self._reader, self._output, self._pidfd) if d >= 0]
         self._answer_event = [(self._reader, select.POLLIN)]
-        self._received, self._output_size = b"", 0
+        self._received = b""
 
     def request(self, line: bytes, deadline: float) -> bytes:
         """Send a command and wait for its answer.
@@ -154,14 +155,8 @@ class WorkerProcess:
         return WorkerLostError(describe_exit_status(status))
 
     def _forward_output(self) -> None:
-        with suppress(BlockingIOError):
-            while data := os.read(self._output, READ_SIZE):
-                remaining = MAX_OUTPUT_SIZE - self._output_size
-                self._output_size += len(data)
-                if remaining > 0:
-                    sys.stderr.write(data[:remaining].decode("utf-8", "replace"))
-                    sys.stderr.flush()
-            self._poller.unregister(self._output)  # an empty read means that the worker process closed the pipe
+        if not self._foreign_output.forward():
+            self._poller.unregister(self._output)
 
     def _reap(self, timeout: float) -> int | None:
         """Wait up to `timeout` s for the process to end, then kill its process group; return its status or None."""
@@ -191,7 +186,7 @@ class WorkerProcess:
             return
         with suppress(KeyError):
             self._forward_output()
-        if (dropped := self._output_size - MAX_OUTPUT_SIZE) > 0:
+        if dropped := self._foreign_output.dropped:
             component_log.log_message(self._name, component_log.WARNING, f"printed {dropped} bytes more")
         while self._descriptors:
             os.close(self._descriptors.pop())

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from ....core.errors import InputError
+from ....core.printable_text import escape_control_characters
 
 Severity = Literal["error", "warning"]
 DESCRIPTION_FILE = "modelDescription.xml"
@@ -22,7 +23,8 @@ class Rule:
     Attributes:
         name: Rule id, such as "archive.name".
         source: Section of the standard, or another reason.
-        severity: "error" for an FMU that is not run, "warning" for one that `cosim validate` only reports.
+        severity: "error" for an FMU that is not run, "warning" for one that is run, with a message if the
+            rule is one of `RUN_WARNINGS`.
     """
 
     name: str
@@ -87,6 +89,5 @@ def raise_errors(path: Path, findings: Iterable[Finding]) -> None:
 
 def escape_unprintable(text: str, length: int = 300) -> str:
     """Return text of an FMU as one line of at most `length` characters, with control characters escaped."""
-    text = text[: length + 1]
-    escaped = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+    escaped = escape_control_characters(text[: length + 1])
     return escaped if len(escaped) <= length else escaped[: length - 3] + "..."

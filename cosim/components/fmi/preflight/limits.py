@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ....core.size_limits import MAX_SCALARS
+
 
 @dataclass(frozen=True, slots=True)
 class PreflightLimits:
@@ -23,6 +25,8 @@ class PreflightLimits:
     max_xml_tags: int = 500_000
     #: number of elements of one array variable
     max_array_size: int = 1_000_000
+    #: number of variables, an array counted with all its elements
+    max_scalars: int = MAX_SCALARS
 
 
 DEFAULT_LIMITS = PreflightLimits()

@@ -78,10 +78,11 @@ def listener():
     """Yield the port of a server and the list of its connections."""
     server = socket.create_server(("127.0.0.1", 0))
     connections = []
-    threading.Thread(target=lambda: connections.append(server.accept()), daemon=True).start()
+    accepting = threading.Thread(target=lambda: connections.append(server.accept()), daemon=True)
+    accepting.start()
     yield server.getsockname()[1], connections
     with socket.create_connection(server.getsockname()):
-        pass
+        accepting.join()
     server.close()
 
 
