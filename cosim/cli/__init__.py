@@ -13,7 +13,7 @@ import click
 
 from ..core.errors import CosimError
 from ..core.version import __version__
-from ..process.standard_streams import ignoring_broken_pipe
+from ..process.standard_streams import ignoring_broken_pipe, open_closed_streams
 
 #: module in `commands` and description of each command
 COMMANDS = {
@@ -85,6 +85,7 @@ def main(arguments: list[str] | None = None) -> None:
     Args:
         arguments: words after the program's name; default: those of this process.
     """
+    open_closed_streams()
     sys.stdout, sys.stderr = ignoring_broken_pipe(sys.stdout), ignoring_broken_pipe(sys.stderr)
     sys.exit(_run_command_line(sys.argv[1:] if arguments is None else arguments))
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Set
-from math import inf
+from fractions import Fraction
+from math import inf, ulp
 from pathlib import Path
 
 from ..core.component import Variable
@@ -17,6 +18,10 @@ from .settings import Event, Settings
 
 #: bytes of a recorded number in the rows and in the CSV file, approximately
 _BYTES_PER_VALUE = 8 + 20
+#: longest wall time of a step of a run in real time (s)
+MAX_STEP_DURATION = 1_000_000
+#: smallest step in units in the last place of the times; its length is then exact to 1 %
+MIN_ULPS_PER_STEP = 100
 #: size of the recording (bytes) from which the free disk space is checked
 _SIZE_CHECK_THRESHOLD = 1_000_000_000
 
@@ -27,8 +32,7 @@ def find_problems(system: System, settings: Settings) -> list[Problem]:
     The `subject` of a problem names the setting: ("stop_time",), ("components", NAME, "period"), ("events", "time"), ...
     """
     problems = [*system.problems(), *_find_event_problems(system, settings.events)]
-    if settings.real_time is not None and not 0 < settings.real_time < inf:
-        problems.append(Problem(f"expected a positive factor for real time, found {settings.real_time!r}"))
+    problems += _find_real_time_problems(settings)
     try:
         grid = TimeGrid.from_times(settings.start_time, settings.stop_time, settings.step_size)
     except ValueError as error:
@@ -36,10 +40,31 @@ def find_problems(system: System, settings: Settings) -> list[Problem]:
         if settings.step_size <= 0:
             return problems
         grid = TimeGrid.from_times(settings.start_time, settings.start_time, settings.step_size)
+    problems += _find_resolution_problems(settings)
     problems += _find_period_problems(system, grid)
     problems += _find_recording_problems(settings, grid)
     problems += _find_event_time_problems(settings.events, grid)
     return problems
+
+
+def _find_real_time_problems(settings: Settings) -> Iterator[Problem]:
+    factor = settings.real_time
+    if factor is None:
+        return
+    if not 0 < factor < inf:
+        yield Problem(f"expected a positive factor for real time, found {factor!r}")
+    elif settings.step_size > MAX_STEP_DURATION * Fraction(factor):
+        text = f"a step of {float(settings.step_size)!r} s takes more than {MAX_STEP_DURATION} s of wall time"
+        yield Problem(f"{text} with the factor {factor!r} for real time")
+
+
+def _find_resolution_problems(settings: Settings) -> Iterator[Problem]:
+    """Find a step that is too short for the float64 numbers that are the times of the components."""
+    largest = max(abs(float(settings.start_time)), abs(float(settings.stop_time)))
+    if settings.step_size < MIN_ULPS_PER_STEP * Fraction(ulp(largest)):
+        step = f"a step of {float(settings.step_size)!r} s is not resolved at t = {largest!r} s"
+        text = f"{step}, where the times of components are {ulp(largest):.3g} s apart"
+        yield Problem(f"{text}; make the step longer, or move the times towards 0", subject=("step_size",))
 
 
 def settable_variables(system: System) -> Iterator[tuple[str, Variable]]:
