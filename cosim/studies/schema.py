@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, StringConstraints, model_validator
 
 from ..core.errors import did_you_mean
-from ..scenario.schema import CheckSpec
+from ..scenario.schema import CheckSpec, complete_schema
 from ..scenario.schema_types import NameList, Spec
 from .factor_schema import TRIAL_COLUMNS, FactorSpec, Scale, SettingPaths, check_log_scale, check_order, reject_column_names
 from .setting_conflicts import check_conflicts
@@ -214,4 +214,4 @@ def _has_labels(factor: FactorSpec, sampled: bool) -> bool:
 
 def study_json_schema(kind: type[BaseModel]) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of a sweep or tuning file."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **kind.model_json_schema(by_alias=True)}
+    return complete_schema(kind.model_json_schema(by_alias=True))
