@@ -9,8 +9,8 @@ from math import lcm
 
 import numpy as np
 
-#: all integers up to this one are exact as float64
-_MAX_EXACT_INTEGER = 2**53
+#: largest magnitude of a time (s); all integers up to this one are exact as float64
+MAX_TIME = 2**53
 
 #: a decimal number or a fraction; the number of digits is limited because Fraction expands 1e999999999
 _SECONDS_PATTERN = re.compile(r"[-+]?(\d{1,400}/\d{1,400}|(\d{1,400}\.?\d{0,400}|\.\d{1,400})([eE][-+]?\d{1,3})?)", re.ASCII)
@@ -29,8 +29,8 @@ def exact_fraction(value: float | int | str | Fraction) -> Fraction:
     if isinstance(value, str) and not _SECONDS_PATTERN.fullmatch(value.strip()):
         raise ValueError(f'expected a number or a fraction, found "{value:.40}"')
     number = Fraction(repr(value)) if isinstance(value, float) else Fraction(value)
-    if abs(number) > _MAX_EXACT_INTEGER:
-        raise ValueError(f"expected at most {_MAX_EXACT_INTEGER}")
+    if abs(number) > MAX_TIME:
+        raise ValueError(f"expected at most {MAX_TIME}")
     return number
 
 
@@ -62,8 +62,8 @@ class TimeGrid:
         if stop < start:
             raise ValueError(f"the stop time {float(stop)!r} lies before the start time {float(start)!r}")
         count = (stop - start) / step
-        if count > _MAX_EXACT_INTEGER:
-            raise ValueError(f"{float(stop - start)!r} s are more than {_MAX_EXACT_INTEGER} steps of {float(step)!r} s")
+        if count > MAX_TIME:
+            raise ValueError(f"{float(stop - start)!r} s are more than {MAX_TIME} steps of {float(step)!r} s")
         if count.denominator != 1:
             raise ValueError(f"{float(stop - start)!r} s is no multiple of the step size {float(step)!r} s")
         denominator = lcm(start.denominator, step.denominator)
@@ -95,7 +95,7 @@ class TimeGrid:
             None if some operation other than the division would be inexact up to `last`.
         """
         largest = max(abs(self._origin), abs(self._origin + last * self._stride), last * self._stride, self._denominator)
-        return (self._origin, self._stride, self._denominator) if largest <= _MAX_EXACT_INTEGER else None
+        return (self._origin, self._stride, self._denominator) if largest <= MAX_TIME else None
 
     def index(self, time: Fraction) -> int:
         """Return the communication point at exactly `time` (s); it exceeds `count` after the end.

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 from ..components.python_import import load_object
 from ..core.errors import CosimError
+from ..core.processors import available_processors
 from ..results import Result
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def render_frames(job: RenderJob, processes: int | None = None) -> Generator[np.
         CosimError: A process ended without an error message, for example by a crash.
     """
     if processes is None:
-        processes = min(os.cpu_count() or 1, MAX_PROCESSES, len(job.times) // MIN_FRAMES_PER_PROCESS)
+        processes = min(available_processors(), MAX_PROCESSES, len(job.times) // MIN_FRAMES_PER_PROCESS)
     if processes < 2:
         yield from job.frames()
         return

@@ -8,17 +8,43 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, StringConstraints, model_validator
+from pydantic import ConfigDict, Field, StringConstraints, model_validator
 
 from ..engine.settings import NonFinitePolicy
-from .schema_types import INVALID, AutoOrBool, Name, NameList, Period, Seconds, Spec, Value
+from .schema_types import INVALID, AutoOrBool, BoolOrNumber, Integer, Name, NameList, Period, Seconds, Spec, Value
 
 #: keys of the sources of a component
 SOURCES = ("fmu", "python", "modelica", "system")
 
 
+def _has_text(key: str) -> dict[str, Any]:
+    """Return the JSON Schema of objects with a text under `key`."""
+    return {"required": [key], "properties": {key: {"type": "string"}}}
+
+
+#: the rules of `ComponentSpec._one_source` and `CheckSpec._check_bounds` that JSON Schema can express
+_COMPONENT_RULES: dict[str, Any] = {
+    "oneOf": [_has_text(source) for source in SOURCES],
+    "allOf": [
+        {
+            "if": {"required": ["arguments"], "properties": {"arguments": {"minProperties": 1}}},
+            "then": _has_text("python"),
+        },
+        {
+            "if": _has_text("isolation"),
+            "then": {"anyOf": [_has_text("fmu"), _has_text("modelica")]},
+        },
+    ],
+}
+_CHECK_RULES: dict[str, Any] = {
+    "anyOf": [{"required": [bound], "properties": {bound: {"not": {"type": "null"}}}} for bound in ("min", "max", "equals")]
+}
+
+
 class ComponentSpec(Spec):
     """A component with exactly one source: fmu, python, modelica or system. Paths start from the folder of this file."""
+
+    model_config = ConfigDict(json_schema_extra=_COMPONENT_RULES)
 
     fmu: str | None = Field(default=None, description="path of an FMU")
     python: str | None = Field(default=None, description='"file.py:Class": a PythonFMU class or a component class of cosim')
@@ -46,7 +72,7 @@ class ConnectionSpec(Spec):
 
     source: str = Field(alias="from", description='output "component.variable", or a prefix of outputs')
     target: str = Field(alias="to", description='input "component.variable", or a prefix of inputs')
-    delay: int = Field(
+    delay: Integer = Field(
         default=0, ge=0, le=1_000_000, description="delay in macro steps; the input keeps the initial output until then"
     )
 
@@ -57,7 +83,7 @@ class IterationSpec(Spec):
     tolerance: float = Field(
         default=1e-9, gt=0, description="an output y has converged if it changes by at most tolerance * (1 + |y|)"
     )
-    limit: int = Field(default=50, ge=2, description="largest number of iterations in a macro step; more are an error")
+    limit: Integer = Field(default=50, ge=2, description="largest number of iterations in a macro step; more are an error")
 
 
 class AlgorithmSpec(Spec):
@@ -119,10 +145,12 @@ class FunctionSpec(CallSpec):
 class CheckSpec(Spec):
     """A requirement on a KPI value; a run passes if it meets all checks."""
 
+    model_config = ConfigDict(json_schema_extra=_CHECK_RULES)
+
     kpi: str = Field(description='name of a KPI value, such as "landing.lateral_error"')
     min: float | None = Field(default=None, description="smallest value that passes")
     max: float | None = Field(default=None, description="largest value that passes")
-    equals: bool | int | float | None = Field(default=None, description="the only value that passes")
+    equals: BoolOrNumber | None = Field(default=None, description="the only value that passes")
 
     @model_validator(mode="after")
     def _bounded(self) -> CheckSpec:
@@ -223,4 +251,21 @@ def ports_of(spec: SystemSpec) -> PortsSpec:
 def json_schema(nested: bool = False) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of scenario files, or of nested-system files."""
     schema = (NestedSpec if nested else ScenarioSpec).model_json_schema(by_alias=True)
+    return complete_schema(schema)
+
+
+def complete_schema(schema: dict[str, Any]) -> dict[str, Any]:
+    """Add the version to a JSON Schema, and refuse names that do not match the patterns of names."""
+    _refuse_other_names(schema)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _refuse_other_names(schema: Any) -> None:
+    if isinstance(schema, dict):
+        if "patternProperties" in schema:
+            schema["additionalProperties"] = False
+        for value in schema.values():
+            _refuse_other_names(value)
+    elif isinstance(schema, list):
+        for value in schema:
+            _refuse_other_names(value)

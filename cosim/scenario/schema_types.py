@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, StringConstraints, WithJsonSchema, model_validator
 
-from ..core.time_grid import exact_fraction
+from ..core.time_grid import MAX_TIME, exact_fraction
 
 S = TypeVar("S")
 
+_UNSIGNED_TIME = r"([0-9]{1,400}/0{0,399}[1-9][0-9]{0,399}|([0-9]{1,400}\.?[0-9]{0,400}|\.[0-9]{1,400})([eE][-+]?[0-9]{1,3})?)$"
+#: text of a time: a decimal number or a fraction; as regular expression of Python and of JSON Schema
+_TIME_PATTERN = rf"^[-+]?{_UNSIGNED_TIME}"
+_POSITIVE_TIME_PATTERN = rf"^\+?(?=[0-9.]*[1-9]){_UNSIGNED_TIME}"
+
 
 def _parse_time(value: Any) -> Fraction:
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
+    is_time = re.fullmatch(_TIME_PATTERN, value) if isinstance(value, str) else isinstance(value, int | float)
+    if isinstance(value, bool) or not is_time:
         raise ValueError('expected seconds as a number or as a fraction in text such as "1/60"')
     try:
         return exact_fraction(value)
@@ -35,6 +42,17 @@ def _check_value(value: Any) -> Any:
     return value
 
 
+def _check_bool_or_number(value: Any) -> Any:
+    if not isinstance(value, bool | int | float):
+        raise ValueError("expected a number, true or false")
+    return value
+
+
+def _as_integer(value: Any) -> Any:
+    """Return an integral float such as 1.0 as integer, which it is in JSON Schema."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
 def _check_auto_or_bool(value: Any) -> Any:
     if value != "auto" and not isinstance(value, bool):
         raise ValueError('expected "auto", true or false')
@@ -49,9 +67,26 @@ Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 Seconds = Annotated[
     Fraction,
     BeforeValidator(_parse_time),
-    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^\d+/\d+$"}]}),
+    WithJsonSchema(
+        {"anyOf": [{"type": "number", "minimum": -MAX_TIME, "maximum": MAX_TIME}, {"type": "string", "pattern": _TIME_PATTERN}]}
+    ),
 ]
-Period = Annotated[Seconds, AfterValidator(_check_positive)]
+Period = Annotated[
+    Seconds,
+    AfterValidator(_check_positive),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "exclusiveMinimum": 0, "maximum": MAX_TIME},
+                {"type": "string", "pattern": _POSITIVE_TIME_PATTERN},
+            ]
+        }
+    ),
+]
+Integer = Annotated[int, BeforeValidator(_as_integer)]
+BoolOrNumber = Annotated[
+    bool | int | float, BeforeValidator(_check_bool_or_number), WithJsonSchema({"type": ["number", "boolean"]})
+]
 _SCALAR_SCHEMAS = [{"type": kind} for kind in ("number", "boolean", "string")]
 Value = Annotated[
     Any,

@@ -10,6 +10,7 @@ import json
 import types
 import typing
 from collections.abc import Iterable, Sequence
+from itertools import count
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -24,6 +25,8 @@ S = TypeVar("S", bound=SystemSpec)
 
 #: values that replace missing or invalid required keys of the root
 _PLACEHOLDERS: dict[str, Any] = {"name": "unnamed", "stop_time": 1, "step_size": 1, "components": {}}
+#: number of passes that remove only invalid parts; later ones remove whole keys of the root
+_MAX_ATTEMPTS = 10
 #: keys of the root with names that other parts refer to
 _LISTS_OF_NAMES = ("record", "kpis", "ports")
 
@@ -51,7 +54,9 @@ def validate_document(document: Document, kind: type[S]) -> Validated[S]:
     invalid_keys = _remove_invalid(kind, value, document.invalid_paths)
     if document.invalid_paths:
         result = _validate(kind, value)
-    while isinstance(result, ValidationError):  # errors of later passes are consequences of the removals
+    for attempt in count():  # errors of later passes are consequences of the removals
+        if not isinstance(result, ValidationError):
+            return Validated(result, problems, invalid_keys)
         for detail in result.errors(include_url=False):
             path = _error_path(detail)
             if detail["type"] == "extra_forbidden":
@@ -59,9 +64,9 @@ def validate_document(document: Document, kind: type[S]) -> Validated[S]:
                 invalid_keys |= {key for key in kind.model_fields if len(path) == 1 and _may_mean(str(path[0]), key)}
             else:
                 part = path[:-1] if detail["type"] == "missing" and len(path) > 1 else path
-                invalid_keys |= _remove_invalid(kind, value, [part])
+                invalid_keys |= _remove_invalid(kind, value, [part if attempt < _MAX_ATTEMPTS else part[:1]])
         result = _validate(kind, value)
-    return Validated(result, problems, invalid_keys)
+    raise AssertionError
 
 
 def _validate(kind: type[S], value: Any) -> S | ValidationError:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
 from ..core.errors import did_you_mean
-from ..scenario.schema_types import NameList, Spec
+from ..scenario.schema_types import Integer, NameList, Spec
 
 #: arguments of each distribution; `min` and `max` of truncated_normal are optional
 DISTRIBUTIONS = {
@@ -70,7 +70,7 @@ class RangeSpec(Spec):
 
     min: float
     max: float
-    count: int | None = Field(None, ge=2)
+    count: Integer | None = Field(None, ge=2)
     scale: Scale = "linear"
 
     @model_validator(mode="after")
@@ -93,7 +93,7 @@ class DistributionSpec(Spec):
     mode: float | None = None
     shape: float | None = None
     scale: float | None = None
-    count: int | None = Field(None, ge=1)
+    count: Integer | None = Field(None, ge=1)
 
     @model_validator(mode="after")
     def _complete(self) -> DistributionSpec:

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, StringConstraints, model_validator
 
 from ..core.errors import did_you_mean
-from ..scenario.schema import CheckSpec
-from ..scenario.schema_types import NameList, Spec
+from ..scenario.schema import CheckSpec, complete_schema
+from ..scenario.schema_types import Integer, NameList, Spec
 from .factor_schema import TRIAL_COLUMNS, FactorSpec, Scale, SettingPaths, check_log_scale, check_order, reject_column_names
 from .setting_conflicts import check_conflicts
 
@@ -19,8 +19,8 @@ class SeedsSpec(Spec):
     """Replications: every point is run with the same `count` seeds."""
 
     set: SettingPaths
-    first: int = 1
-    count: int = Field(ge=1)
+    first: Integer = 1
+    count: Integer = Field(ge=1)
 
 
 class MapSpec(Spec):
@@ -47,8 +47,8 @@ class DesignSpec(Spec):
     """Choice of the points: all combinations of levels, or `runs` samples."""
 
     kind: Literal["full_factorial", "latin_hypercube", "sobol"] = "full_factorial"
-    runs: int | None = Field(None, ge=1)
-    seed: int = Field(1, ge=0)
+    runs: Integer | None = Field(None, ge=1)
+    seed: Integer = Field(1, ge=0)
 
     @model_validator(mode="after")
     def _sized(self) -> DesignSpec:
@@ -157,10 +157,10 @@ class MethodSpec(Spec):
     """An optimization method and its limits."""
 
     kind: Literal["differential_evolution", "nelder_mead", "powell"] = "differential_evolution"
-    population: int = Field(16, ge=5, description="points per generation (differential_evolution)")
-    generations: int = Field(20, ge=1, description="generations after the first (differential_evolution)")
-    evaluations: int = Field(200, ge=1, description="points at most (nelder_mead, powell)")
-    seed: int = Field(1, ge=0)
+    population: Integer = Field(16, ge=5, description="points per generation (differential_evolution)")
+    generations: Integer = Field(20, ge=1, description="generations after the first (differential_evolution)")
+    evaluations: Integer = Field(200, ge=1, description="points at most (nelder_mead, powell)")
+    seed: Integer = Field(1, ge=0)
 
 
 class TuneSpec(StudySpec):
@@ -214,4 +214,4 @@ def _has_labels(factor: FactorSpec, sampled: bool) -> bool:
 
 def study_json_schema(kind: type[BaseModel]) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of a sweep or tuning file."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **kind.model_json_schema(by_alias=True)}
+    return complete_schema(kind.model_json_schema(by_alias=True))

@@ -72,6 +72,11 @@ def test_samples_are_stratified_in_every_factor(kind):
     assert all(p.settings["a.v"] == (1 if p.labels["l"] == "slow" else 2) for p in points)
 
 
+def test_an_integral_number_with_a_decimal_point_is_a_count():
+    assert len(sampled("sobol", 8.0, RANGE, seed=1.0)) == 8
+    assert len(made(RANGE | {"range": {"min": 0.1, "max": 0.7, "count": 4.0}}, seeds={"set": "a.s", "count": 2.0})) == 8
+
+
 @pytest.mark.parametrize("kind", ["latin_hypercube", "sobol"])
 def test_the_same_seed_gives_the_same_points(kind):
     first, again, other = (list(sampled(kind, 8, RANGE, seed=seed)) for seed in (1, 1, 2))
