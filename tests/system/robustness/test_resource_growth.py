@@ -47,7 +47,7 @@ def judge(growth: dict[str, int], memory: float) -> None:
 
 
 def test_many_runs_leave_nothing(tmp_path, probes):
-    judge(grown(tmp_path, pair(tmp_path, probes), "runs", 50), PLAIN / 4)
+    judge(grown(tmp_path, pair(tmp_path, probes), "runs", 50), PLAIN / 2)
 
 
 def test_some_runs_with_bullet_leave_nothing(tmp_path):
