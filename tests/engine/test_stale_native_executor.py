@@ -58,7 +58,9 @@ def message(stale, monkeypatch):
 
 
 def test_a_run_says_to_build_it_again(message, probes, capfd):
-    code = run_guarded(lambda: cli.main(["simulate", str(probes[2])], standalone_mode=False), CommandLine())
+    code = run_guarded(
+        lambda: cli.main(["simulate", str(probes[2]), "--isolation", "none"], standalone_mode=False), CommandLine()
+    )
     assert (code, *capfd.readouterr()) == (2, "", message)
 
 

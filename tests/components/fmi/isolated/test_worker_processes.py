@@ -122,11 +122,11 @@ def test_the_deadline_applies_to_each_call_in_the_journal(worker):
 
     def ten_calls(line: bytes) -> bytes:
         for _ in range(10):
-            time.sleep(0.1)
+            time.sleep(0.12)
             shared.journal[CHANGE_COUNT] += 1
         return line
 
-    assert worker(ten_calls, shared).request(STEP_COMMAND, 0.5) == STEP_DONE
+    assert worker(ten_calls, shared).request(STEP_COMMAND, 1.0) == STEP_DONE
 
 
 def test_the_exit_code_of_a_process_is_reported(worker):
