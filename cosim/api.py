@@ -2,31 +2,23 @@
 
 from __future__ import annotations
 
-import platform
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from hashlib import sha256
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, Literal, TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 from .core.errors import ComponentError, CosimError, InputError, Problem
-from .core.version import __version__
 from .engine.pacer import LatePolicy
-from .engine.run_loop import Observer, SimulationOutcome, simulating
-from .process.run_files.folder import write_metadata
+from .engine.run_loop import Observer, SimulationOutcome, StepHook, simulating
 from .results import Kpis, Result
 from .results.checks import CheckOutcome, evaluate_all_checks, evaluate_checks
 from .results.kpi import evaluate_kpis, kpi_senses, kpi_units
-from .scenario import PreparedRun, prepare
-from .scenario.overview import describe_system
+from .results.non_finite import warn_non_finite
+from .scenario import IsolationMode, PreparedRun, load
 
-IsolationMode = Literal["fmu", "none"]
-
-#: packages whose versions can change a result
-_PACKAGES = ("numpy", "scipy", "fmpy", "pybullet", "pybullet-arm64", "pythonfmu")
+__all__ = ["Execution", "evaluate_scenario_checks", "execute", "executing", "load", "run"]
 
 
 class LoadOptions(TypedDict, total=False):
@@ -40,44 +32,6 @@ class LoadOptions(TypedDict, total=False):
     sandbox: bool
 
 
-def load(
-    scenario: str | Path,
-    parameters: Mapping[str, Any] | None = None,
-    *,
-    stop_time: float | str | None = None,
-    step_size: float | str | None = None,
-    real_time: float | None = None,
-    late: LatePolicy = "warn",
-    isolation: IsolationMode = "none",
-    sandbox: bool = False,
-) -> PreparedRun:
-    """Read, connect and check a scenario.
-
-    Args:
-        scenario: Path of a scenario file, or the name of a shipped scenario.
-        parameters: Values that replace those of the file. A key is the name of a variable ("uav.vtol.landing_time") or the JSON
-            pointer of any entry ("/components/plant/arguments/environment/seed").
-        stop_time: End of the simulation (s), a number or a fraction such as "1/3"; None: as in the file.
-        step_size: Macro step (s), a number or a fraction such as "1/60"; None: as in the file.
-        real_time: Simulated seconds per second of wall time; None: as fast as possible.
-        late: Reaction to a real-time run that falls more than one step behind: "warn", or "fail" for a LateError.
-        isolation: "fmu" runs every FMU in a separate process; "none" does so only where the scenario sets `isolation`, or where
-            an FMU that allows one instance per process is used again.
-        sandbox: Run every FMU in a separate process that reads and writes only its own files, has no network and starts no
-            programs.
-
-    Returns:
-        A prepared run, which can be executed once.
-
-    Raises:
-        InputError: The scenario cannot be run; `problems` lists all reasons.
-    """
-    times = {"/stop_time": stop_time, "/step_size": step_size}
-    settings = {**{key: value for key, value in times.items() if value is not None}, **(parameters or {})}
-    prepared = prepare(scenario, settings, isolate_fmus=isolation == "fmu", sandbox=sandbox)
-    return replace(prepared, settings=replace(prepared.settings, real_time=real_time, late=late))
-
-
 def run(
     scenario: str | Path,
     parameters: Mapping[str, Any] | None = None,
@@ -86,6 +40,11 @@ def run(
     **options: Unpack[LoadOptions],
 ) -> Result:
     """Run a scenario in this process and evaluate its KPIs and checks.
+
+    Runs in several threads of one process are safe, also in an event loop (`asyncio.to_thread(cosim.run, ...)`) and after a fork.
+    They load and step in turns, because FMUs may change the state of the whole process. This state (working directory,
+    environment, locale and others) is restored after each turn. So an observer must not wait for a run of another thread. Runs
+    whose components are all isolated FMUs step at the same time.
 
     Args:
         scenario: Path of a scenario file, or the name of a shipped scenario.
@@ -119,26 +78,27 @@ class Execution:
 
 
 @contextmanager
-def executing(prepared: PreparedRun, observers: Sequence[Observer] = ()) -> Iterator[Execution]:
+def executing(
+    prepared: PreparedRun, observers: Sequence[Observer] = (), step_hook: StepHook | None = None
+) -> Iterator[Execution]:
     """Simulate a prepared run and evaluate its KPIs; terminate and free the components when the block ends.
 
     Args:
         prepared: A run that was not executed before.
         observers: See `run`.
+        step_hook: Called with n before the macro step that starts at communication point n.
 
     Yields:
         The result, and the failure that ended the run early.
 
     Raises:
-        InputError: The system cannot be simulated.
         ComponentError: A component failed to terminate; raised at the end of the block.
     """
     began = time.perf_counter()
-    metadata = _run_metadata(prepared)
-    write_metadata(metadata)
-    with simulating(prepared.system, prepared.settings, observers) as outcome:
+    with simulating(prepared.plan, observers, step_hook) as outcome:
         timing = {**_add_timings(prepared.timing, outcome.timing), "simulate_seconds": time.perf_counter() - began}
-        result = Result(outcome.recording, timing=timing, metadata={**metadata, **_outcome_metadata(outcome)})
+        metadata = {**prepared.metadata, **_outcome_metadata(prepared, outcome)}
+        result = Result(outcome.recording, timing=timing, metadata=metadata)
         yield Execution(result, outcome.failure) if outcome.failure else _evaluate_run(result, prepared)
 
 
@@ -208,25 +168,13 @@ def _adding_location(prepared: PreparedRun, *path: str | int) -> Iterator[None]:
         raise InputError([Problem(str(problem), prepared.root.where(*path)) for problem in error.problems]) from error
 
 
-def _run_metadata(prepared: PreparedRun) -> dict[str, Any]:
-    """Return the metadata that is known before the run: scenario, versions, hashes."""
-    return {
-        "name": prepared.spec.name,
-        "scenario": prepared.document.value,
-        "scenario_file": str(prepared.document.file.resolve()),
-        "system": describe_system(prepared),
-        "versions": {"cosim": __version__, "python": platform.python_version(), **_package_versions()},
-        "machine": {"system": platform.system(), "machine": platform.machine()},
-        "sha256": {name: sha256(file.read_bytes()).hexdigest() for name, file in prepared.files().items()},
-    }
-
-
-def _outcome_metadata(outcome: SimulationOutcome) -> dict[str, Any]:
-    """Return the metadata that is known after the run: steps, timing, termination, failure."""
+def _outcome_metadata(prepared: PreparedRun, outcome: SimulationOutcome) -> dict[str, Any]:
+    """Return the metadata that is known after the run: steps, timing, signals that are not finite, termination, failure."""
     termination = outcome.termination
     return {
         "macro_steps": outcome.macro_steps,
         "real_time": outcome.real_time,
+        "non_finite": {} if prepared.spec.non_finite == "allow" else warn_non_finite(outcome.recording),
         "terminated_by": {"component": termination.component, "time": termination.time} if termination else None,
         "failure": "interrupted" if isinstance(outcome.failure, KeyboardInterrupt) else _failure_text(outcome.failure),
     }
@@ -235,14 +183,3 @@ def _outcome_metadata(outcome: SimulationOutcome) -> dict[str, Any]:
 def _failure_text(failure: BaseException | None) -> str | None:
     """Return the text of a failure, its class name if the text is empty."""
     return None if failure is None else str(failure) or type(failure).__name__
-
-
-def _package_versions() -> dict[str, str]:
-    """Return the versions of those of `_PACKAGES` that are installed."""
-    versions = {}
-    for package in _PACKAGES:
-        try:
-            versions[package] = version(package)
-        except PackageNotFoundError:
-            continue
-    return versions

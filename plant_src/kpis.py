@@ -216,8 +216,8 @@ def cross_track(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence
     """Evaluate the cross-track error of a vehicle on the straight legs between waypoints.
 
     The first leg starts at the position in the first row. A leg begins when the previous waypoint is reached (see
-    `waypoints`) and ends when its own is reached or with the last row. The error is the horizontal distance from the infinite
-    line through both ends of the leg (Fossen (2021), chapter 12).
+    `waypoints`) and ends when the next waypoint is reached, or with the last row. The error is the horizontal distance from
+    the infinite line through both ends of the leg (Fossen (2021), chapter 12).
 
     Args:
         result: Recorded mission.

@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -68,6 +69,11 @@ def sources(package):
     )
 
 
+@cache
+def syntax_tree(path):
+    return ast.parse(path.read_text())
+
+
 MODULES = {
     module_name(path): path for package in ("cosim", "plant_src") for path in sources(package) if path.suffix in (".py", ".pyi")
 }
@@ -86,7 +92,7 @@ def imported(name):
     """Yield the modules that a module imports, also inside functions, or names in a string such as "cosim.kpis:rms"."""
     path = MODULES[name]
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
-    for node in runtime_nodes(ast.parse(path.read_text())):
+    for node in runtime_nodes(syntax_tree(path)):
         if isinstance(node, ast.ImportFrom):
             base = package[: len(package) - node.level + 1] if node.level else []
             module = ".".join([*base, *(node.module or "").split(".")]).strip(".")
@@ -98,7 +104,10 @@ def imported(name):
             yield module
 
 
-GRAPH = {name: {other for other in imported(name) if other in MODULES} - {name} for name in MODULES}
+@cache
+def import_graph():
+    """Return the modules that each module imports."""
+    return {name: {other for other in imported(name) if other in MODULES} - {name} for name in MODULES}
 
 
 def layer(name):
@@ -109,7 +118,7 @@ def layer(name):
 def test_imports_between_folders_point_down(package, layers):
     upward = [
         f"{name} imports {other}"
-        for name, others in GRAPH.items()
+        for name, others in import_graph().items()
         for other in sorted(others)
         if name.startswith(f"{package}.") and other.startswith(f"{package}.") and layer(name) != layer(other)
         if layers.index(layer(name)) < layers.index(layer(other))
@@ -118,7 +127,7 @@ def test_imports_between_folders_point_down(package, layers):
 
 
 def test_no_files_import_each_other_in_a_cycle():
-    graph = {name: others for name, others in GRAPH.items() if name != "cosim"}
+    graph = {name: others for name, others in import_graph().items() if name != "cosim"}
     try:
         list(TopologicalSorter(graph).static_order())
     except CycleError as error:
@@ -127,7 +136,7 @@ def test_no_files_import_each_other_in_a_cycle():
 
 def test_cosim_knows_no_vehicle_and_no_bullet():
     for path in sources("cosim"):
-        tree = ast.parse(path.read_text())
+        tree = syntax_tree(path)
         modules = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
         modules |= {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
         assert not {"pybullet", "plant_src"} & {module.split(".")[0] for module in modules}, path
@@ -144,14 +153,14 @@ def test_only_fmi_components_and_export_use_fmpy():
 
 
 def imports(path, package):
-    nodes = list(ast.walk(ast.parse(path.read_text())))
+    nodes = list(ast.walk(syntax_tree(path)))
     plain = any(a.name.split(".")[0] == package for n in nodes if isinstance(n, ast.Import) for a in n.names)
     return plain or any((n.module or "").split(".")[0] == package for n in nodes if isinstance(n, ast.ImportFrom) and not n.level)
 
 
 def test_only_cli_and_report_print():
     for path in sources("cosim"):
-        calls = [n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Call)]
+        calls = [n for n in ast.walk(syntax_tree(path)) if isinstance(n, ast.Call)]
         if any(getattr(call.func, "id", "") == "print" for call in calls):
             assert layer(module_name(path)) in ("cli", "report"), path
 

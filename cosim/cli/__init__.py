@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import sys
 import traceback
 from collections.abc import Callable
@@ -19,6 +21,7 @@ from ..process.standard_streams import protected_stream
 COMMANDS = {
     "run": ("run", "Run a scenario and write results, figures and a report."),
     "check": ("check", "Check a scenario without running it and print the expanded system."),
+    "recover": ("recover", "Write the results of a run that could not be written when it ended."),
     "simulate": ("simulate", "Simulate a single FMU."),
     "compare": ("compare", "Compare a result with a reference, signal by signal."),
     "regress": ("regress", "Run all scenarios that have checks or a reference, and compare their results with these."),
@@ -36,6 +39,10 @@ COMMANDS = {
     "schema": ("schema", "Print the JSON Schema of scenarios, sweeps or tunings."),
     "doctor": ("doctor", "Print which packages, tools and sandboxes are available on this machine."),
 }
+
+
+#: new objects after which Python searches for reference cycles
+_GC_THRESHOLD = 100_000
 
 
 class _LazyGroup(click.Group):
@@ -85,8 +92,16 @@ def main(arguments: list[str] | None = None) -> None:
     Args:
         arguments: words after the program's name; default: those of this process.
     """
+    if arguments is None:
+        _avoid_useless_collections()
     sys.stdout, sys.stderr = protected_stream(sys.stdout), protected_stream(sys.stderr)
     sys.exit(_run_command_line(sys.argv[1:] if arguments is None else arguments))
+
+
+def _avoid_useless_collections() -> None:
+    """Search for reference cycles rarely, and not at the end: almost all objects of a command stay until its process ends."""
+    gc.set_threshold(_GC_THRESHOLD)
+    atexit.register(gc.freeze)
 
 
 def _run_command_line(arguments: list[str]) -> int:

@@ -57,7 +57,7 @@ class TrialResult:
         from ..studies.controller_bench.score import RunKpis, compare_kpis
 
         kpis = RunKpis.read(self.trial.candidate_folder) if self.outcome.code in (0, 3) else None
-        checks = json.loads(self.trial.file.read_text(encoding="utf-8"))["checks"]
+        checks = json.loads(self.trial.file.read_text(encoding="utf-8-sig"))["checks"]
         return compare_kpis(kpis, RunKpis.read(self.trial.shipped_folder), self.previous, checks) if kpis else []
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -73,27 +72,23 @@ def run_with_view(
         return supervision.run_supervised_command(lambda: run(view.open_in_child()), isolation, save_partial, view.serve)
 
 
-def create_control(prepared: PreparedRun, link: Connection) -> LiveControl:
-    """Return the control that executes the page's commands, which arrive through `link`."""
-    from ..core.time_grid import TimeGrid
+def create_control(prepared: PreparedRun, link: Connection, speed: float | None) -> LiveControl:
+    """Return the control that paces the run and executes the page's commands, which arrive through `link`.
+
+    Args:
+        prepared: the run; it must not be paced itself.
+        link: connection to the page.
+        speed: simulated seconds per second at the start; None: in real time.
+    """
     from ..report.live.control import LiveControl
     from ..report.scene import build_scene
 
-    settings, value = prepared.settings, prepared.document.value
-    grid = TimeGrid.from_times(settings.start_time, settings.stop_time, settings.step_size)
-    every = int((settings.record_interval or grid.step) / grid.step)
+    plan, value = prepared.plan, prepared.document.value
     about = {
         "name": prepared.spec.name,
         "description": prepared.spec.description,
         "scene": build_scene({"scenario": value, "scenario_file": str(prepared.document.file.resolve())}),
-        "rows": grid.count // every + 1,
-        "stop_time": float(settings.stop_time),
+        "rows": plan.row_count,
+        "stop_time": float(plan.settings.stop_time),
     }
-    return LiveControl(link, prepared.system, grid, settings.real_time or _DEFAULT_SPEED, about)
-
-
-def with_control(prepared: PreparedRun, control: LiveControl | None) -> PreparedRun:
-    """Return the run with `control` as step hook; the control also paces the run, in place of `real_time`."""
-    if control is None:
-        return prepared
-    return replace(prepared, settings=replace(prepared.settings, real_time=None, step_hook=control))
+    return LiveControl(link, plan.system, plan.grid, speed or _DEFAULT_SPEED, about)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from ..core.errors import CosimError, OutputError
 from . import current_command_line, report_error
+from .unfinished_runs import writing_results
 
 if TYPE_CHECKING:
     from ..api import Execution
     from ..engine.pacer import LatePolicy
+    from ..report.drawing_process import DrawingProcess
     from ..results import Result
     from ..results.checks import CheckOutcome
     from ..scenario import PreparedRun
@@ -54,7 +57,7 @@ class RunOutcome:
         prepared: the run as it was prepared.
         execution: its result or failure.
         began: `time.perf_counter()` before the scenario was loaded (s).
-        pictures: SVG text of each figure, by figure name.
+        drawing: process that draws the figures; None to draw them in this process.
         files: names of the files that the summary lists.
     """
 
@@ -62,7 +65,7 @@ class RunOutcome:
     prepared: PreparedRun
     execution: Execution
     began: float
-    pictures: dict[str, str] = field(default_factory=dict)
+    drawing: DrawingProcess | None = None
     files: list[str] = field(default_factory=list)
 
     @property
@@ -101,29 +104,41 @@ def write_outputs(outcome: RunOutcome) -> int:
     return code
 
 
-def write_partial_result(partial: Result, folder: Path, shown_folder: Path) -> None:
-    """Write the rows recorded before a failure, if there are any."""
+def write_partial_result(partial: Result, folder: Path, shown_folder: Path, unfinished: Path | None) -> None:
+    """Write the rows recorded before a failure, if there are any; see `writing_results`."""
     from ..results.result import write_run
 
     if len(partial.time):
-        write_run(partial, folder)
+        with writing_results(partial, unfinished, shown_folder):
+            write_run(partial, folder)
         click.echo(f"{len(partial.time)} rows until t = {partial.time[-1]:g} s kept in {shown_folder}", err=True)
 
 
 def _report_failed_run(outcome: RunOutcome, failure: BaseException) -> int:
-    from ..process.run_files.folder import remove_run_files
+    from ..process.run_files.folder import remove_run_files, run_folder
 
-    write_partial_result(outcome.result, outcome.folder, outcome.shown_folder)
-    remove_run_files()
+    try:
+        write_partial_result(outcome.result, outcome.folder, outcome.shown_folder, run_folder())
+        remove_run_files()
+    except CosimError as error:
+        if isinstance(failure, OSError | OutputError):  # most likely the same cause
+            raise
+        report_error(error, current_command_line())
     return report_error(failure, current_command_line())
 
 
 def _write_result_files(outcome: RunOutcome) -> None:
     """Write result.csv, kpis.json and run.json in place of the files of the unfinished run."""
-    from ..process.run_files.folder import remove_run_files
+    from ..process.run_files.folder import remove_run_files, run_folder
     from ..results.result import write_run
 
-    write_run(outcome.result, outcome.folder)
+    drawing, rows = outcome.drawing, run_folder()
+    if drawing and rows:
+        drawing.start(outcome.result, rows, outcome.folder)
+    with writing_results(outcome.result, rows, outcome.shown_folder):
+        write_run(outcome.result, outcome.folder)
+    if drawing and rows:
+        drawing.wait_until_read()
     remove_run_files()
     outcome.files.extend(("result.csv", "kpis.json", "run.json"))
 
@@ -136,24 +151,33 @@ def _print_kpis(outcome: RunOutcome) -> None:
     print_kpis(result.kpis, outcome.checks, kpi_units(outcome.prepared.kpis(), result.kpis, result.units))
 
 
-def _write_figures(outcome: RunOutcome) -> None:
-    from ..report.figures import draw_figure, figure_to_svg, save_figure
-
+def _write_report(outcome: RunOutcome) -> None:
+    """Write the figures and the report that shows them."""
     if outcome.options.no_report:
         return
-    for name, function, arguments in outcome.prepared.figures():
-        figure = draw_figure(outcome.result, name, function, arguments)
-        save_figure(figure, outcome.folder / f"{name}.png")
-        outcome.pictures[name] = figure_to_svg(figure)
-        outcome.files.append(f"{name}.png")
-
-
-def _write_report(outcome: RunOutcome) -> None:
     from ..report.run_page import write_report
 
-    if not outcome.options.no_report:
-        write_report(outcome.result, outcome.checks, outcome.pictures, outcome.folder / "report.html")
-        outcome.files.append("report.html")
+    write_report(outcome.result, outcome.checks, _write_figures(outcome), outcome.folder / "report.html")
+    outcome.files.append("report.html")
+
+
+def _write_figures(outcome: RunOutcome) -> Iterator[tuple[str, str]]:
+    """Write the figures, and yield name and SVG text of each."""
+    for i, spec in enumerate(outcome.prepared.spec.figures):
+        picture = outcome.drawing.picture(spec.name, spec.python.rpartition(":")[2]) if outcome.drawing else None
+        picture = picture or _draw_figure(outcome, i)
+        outcome.files.append(f"{spec.name}.png")
+        yield spec.name, picture
+
+
+def _draw_figure(outcome: RunOutcome, i: int) -> str:
+    """Write a figure in this process, and return its SVG text."""
+    from ..report.figures import draw_figure, figure_to_svg, save_figure
+
+    name, function, arguments = outcome.prepared.figures()[i]
+    figure = draw_figure(outcome.result, name, function, arguments)
+    save_figure(figure, outcome.folder / f"{name}.png")
+    return figure_to_svg(figure)
 
 
 def _print_summary(outcome: RunOutcome) -> None:
@@ -169,8 +193,11 @@ def _print_summary(outcome: RunOutcome) -> None:
         click.echo(
             f"values were set {times} while it ran: copy live_events of run.json into the scenario's events to repeat the run"
         )
-    if termination := result.metadata["terminated_by"]:
-        click.echo(f"{termination['component']} requested the end of the simulation at t = {termination['time']:g} s")
+
+
+def _print_termination(outcome: RunOutcome) -> None:
+    if outcome.result.termination:
+        click.echo(outcome.result.termination)
 
 
 def _format_pacing(pacing: Mapping[str, Any]) -> str:
@@ -195,9 +222,8 @@ def _write_mcap(outcome: RunOutcome) -> None:
 _COMPLETE_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (
     _write_result_files,
     _print_kpis,
-    _write_figures,
     _write_report,
     _print_summary,
 )
 #: outputs of every run, also of one that failed
-_EVERY_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (_write_parquet, _write_mcap)
+_EVERY_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (_print_termination, _write_parquet, _write_mcap)

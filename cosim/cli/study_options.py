@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..core.processors import available_processors
+from ..core.size_limits import MAX_RUNS
 from .csv_options import csv_options
 
 if TYPE_CHECKING:
@@ -31,12 +32,15 @@ _scheduler = click.option(
     help="Run on the Dask cluster with this scheduler (extra `cluster`). Only for a cluster that you trust: Dask unpickles its "
     "answers, so that it can run code here as you run code there.",
 )
+_max_runs = click.option(
+    "--max-runs", type=click.IntRange(min=1), default=MAX_RUNS, show_default=True, help="Refuse a study of more runs."
+)
 _retry = click.option("--retry-failed", is_flag=True, help="Repeat the runs that failed in an earlier call.")
 
 
 def study_options(command: Callable[..., int]) -> Callable[..., int]:
-    """Add the options `--workers`, `--scheduler`, `--retry-failed` and `--excel-safe` to a command."""
-    return _workers(_scheduler(_retry(csv_options(command))))
+    """Add the options `--workers`, `--scheduler`, `--max-runs`, `--retry-failed` and `--excel-safe` to a command."""
+    return _workers(_scheduler(_max_runs(_retry(csv_options(command)))))
 
 
 def open_run_store(folder: Path, retry: bool) -> RunStore:

@@ -79,13 +79,16 @@ def run_supervised_command(
 
 
 def _save_partial(outcome: SupervisedOutcome, save_partial: Callable[[SupervisedOutcome], None], folder: Path) -> None:
-    """Save the rows of an unfinished run; errors that the child has reported itself, such as a full disk, are not repeated."""
+    """Save the rows of an unfinished run and remove its folder, unless the rows cannot be written or the child kept them."""
+    from ..process.run_files.folder import find_kept_rows
+
+    if find_kept_rows(folder):
+        return
     try:
         save_partial(outcome)
     except CosimError as error:
-        if outcome.failure or outcome.interrupted:
-            click.echo(str(error), err=True)
-    finally:
+        click.echo(str(error), err=True)
+    else:
         rmtree(folder, ignore_errors=True)
 
 

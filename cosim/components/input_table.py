@@ -30,6 +30,7 @@ class InputTable(Component):
     """
 
     binds_everything = False
+    runs_foreign_code = False
     has_state = True
 
     def __init__(self, time: np.ndarray, columns: Mapping[str, np.ndarray], interpolation: Interpolation = "linear"):

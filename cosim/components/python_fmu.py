@@ -14,7 +14,8 @@ from pythonfmu.variables import Boolean, Integer, Real, ScalarVariable, String
 from ..core import component_log
 from ..core.component import Component, Ports, Variable
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, describe_exception
-from ..core.units import parse_unit
+from ..core.text import shorten, text_problem
+from ..core.units import named_unit
 from .object_state import snapshot
 
 _TYPES = {Real: "Float64", Integer: "Int32", Boolean: "Boolean", String: "String"}
@@ -38,6 +39,8 @@ def _to_bool(value: Any) -> bool:
 def _to_str(value: Any) -> str:
     if not isinstance(value, str):
         raise TypeError
+    if text_problem(value):
+        raise ValueError
     return value
 
 
@@ -46,7 +49,7 @@ _OUTPUT_TYPES: Mapping[str, tuple[type, Callable[[Any], Any]]] = {
     "Float64": (float, _to_float),
     "Int32": (int, operator.index),
     "Boolean": (bool, _to_bool),
-    "String": (str, _to_str),
+    "String": (object, _to_str),  # of no type without a check of its characters
 }
 
 
@@ -122,7 +125,9 @@ class PythonFmuComponent(Component):
             try:
                 array[index] = value if value.__class__ is usual_type else convert(value)
             except (TypeError, ValueError, OverflowError):
-                raise TypeError(f'output "{name}" is {value!r}, expected a value of type {self._types[name]}') from None
+                raise TypeError(
+                    f'output "{name}" is {shorten(repr(value))}, expected a value of type {self._types[name]}'
+                ) from None
 
     def get_state(self) -> Any:
         """Return the slave's own state, or a snapshot of its attributes."""
@@ -176,7 +181,7 @@ def _to_variable(registered: ScalarVariable) -> Variable:
         causality,
         registered.variability.name if registered.variability else "continuous",
         registered.getter() if causality in ("parameter", "input") else None,
-        parse_unit(unit) if unit else None,
+        named_unit(unit) if unit else None,
         description=registered.description or "",
     )
 

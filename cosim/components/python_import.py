@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from collections.abc import Iterable
 from hashlib import sha256
 from pathlib import Path
 from types import ModuleType
@@ -44,11 +45,11 @@ def package_root(path: Path) -> Path:
     return root
 
 
-def package_files(path: Path) -> list[Path]:
-    """Return a Python file and all modules that it can import relatively, which are those of its outermost package."""
-    root = package_root(path.resolve())
-    parts = path.resolve().relative_to(root).parts
-    return [path] if len(parts) == 1 else sorted((root / parts[0]).rglob("*.py"))
+def package_files(paths: Iterable[Path]) -> set[Path]:
+    """Return Python files and all modules that they can import relatively, which are those of their outermost packages."""
+    files = {path.resolve() for path in paths}
+    packages = {root / path.relative_to(root).parts[0] for path in files if (root := package_root(path)) != path.parent}
+    return files.union(*(package.rglob("*.py") for package in packages))
 
 
 def _import_file(path: Path) -> ModuleType:

@@ -16,7 +16,8 @@ Values are exchanged in typed arrays ("ports") that belong to the engine. A step
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, Literal, NamedTuple, Protocol
@@ -99,6 +100,11 @@ class Variable:
         return tuple(f"{self.name}[{','.join(map(str, index))}]" for index in indices)
 
 
+def count_scalars(variables: Iterable[Variable]) -> int:
+    """Return the number of scalars of variables, without making their names; an array counts with all its elements."""
+    return sum(math.prod(variable.shape) for variable in variables)
+
+
 class StepResult(NamedTuple):
     """Outcome of a step that did not simply reach its end time; `time_reached` in s."""
 
@@ -177,12 +183,14 @@ class Component(Protocol):
         binds_everything: `bind` gets all inputs and outputs, not only those that are connected or recorded.
         shared_code: Components with an equal value other than None never step at the same time, because their common code may
             have static variables.
+        runs_foreign_code: Code that is not cosim's runs in this process, where it may change the state of the process.
         has_state: `get_state` and `set_state` are supported (FMI: canGetAndSetFMUState).
     """
 
     variables: Sequence[Variable]
     binds_everything: bool
     shared_code: object = None
+    runs_foreign_code: bool = True
     has_state: bool
 
     def set(self, name: str, value: Any) -> None:

@@ -6,6 +6,7 @@ import logging
 import time
 
 from .printable_text import SPACES, escape_control_characters
+from .text import shorten
 
 INFO, WARNING, ERROR = logging.INFO, logging.WARNING, logging.ERROR
 
@@ -25,9 +26,8 @@ def log_message(component: str, level: int, text: str) -> None:
     """
     if not _is_within_rate_limit():
         return
-    if len(text) > MAX_MESSAGE_LENGTH:
-        text = f"{text[:MAX_MESSAGE_LENGTH]} ... and {len(text) - MAX_MESSAGE_LENGTH} characters more"
-    logging.getLogger("cosim.component").log(level, "%s: %s", component, escape_control_characters(text.rstrip(), keep=SPACES))
+    text = escape_control_characters(shorten(text, MAX_MESSAGE_LENGTH).rstrip(), keep=SPACES)
+    logging.getLogger("cosim.component").log(level, "%s: %s", component, text)
 
 
 def _is_within_rate_limit() -> bool:

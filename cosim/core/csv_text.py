@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+#: size of a number in a CSV file (bytes), approximately
+BYTES_PER_NUMBER = 20
 #: first characters of a text that spreadsheet programs take for a formula
 _FORMULA_STARTS = ("=", "+", "-", "@")
 _excel_safe = False

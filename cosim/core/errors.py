@@ -11,6 +11,7 @@ CosimError
 from __future__ import annotations
 
 import difflib
+import errno
 import traceback
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -19,11 +20,16 @@ from pathlib import Path
 from typing import Any
 
 from .printable_text import escape_control_characters
+from .text import MAX_QUOTATION_LENGTH, shorten
 
 #: exceptions that are not a failure of the foreign code they pass through; all others are, even if not derived from Exception
 PASS_THROUGH_EXCEPTIONS = (KeyboardInterrupt, GeneratorExit)
+#: errors of the disk, not of the path
+_DISK_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 #: maximum number of characters shown of an exception's text
-_MAX_TEXT_LENGTH = 2000
+_MAX_EXCEPTION_LENGTH = 2000
+#: maximum number of characters of the line of an error
+_MAX_LINE_LENGTH = 8000
 
 
 class CosimError(Exception):
@@ -55,7 +61,7 @@ class Problem:
 
     def __str__(self) -> str:
         text = f"{self.where}: {self.message}" if self.where else self.message
-        return escape_control_characters(text)
+        return escape_control_characters(shorten(text, _MAX_LINE_LENGTH))
 
 
 class InputError(CosimError):
@@ -113,6 +119,11 @@ class CheckError(CosimError):
     exit_code = 3
 
 
+def write_error(text: str, error: OSError) -> CosimError:
+    """Return the error for a file that cannot be written: OutputError if the disk is full or defective, else InputError."""
+    return OutputError(text) if error.errno in _DISK_ERRORS else InputError(text)
+
+
 def describe_exception(error: BaseException) -> str:
     """Return class, text, file and line of an exception that foreign code raised.
 
@@ -123,11 +134,9 @@ def describe_exception(error: BaseException) -> str:
         text = str(error)
     except Exception:
         text = "(its text cannot be made)"
-    if len(text) > _MAX_TEXT_LENGTH:
-        text = f"{text[:_MAX_TEXT_LENGTH]} ... and {len(text) - _MAX_TEXT_LENGTH} characters more"
     frames = traceback.extract_tb(error.__traceback__)
     where = f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
-    return f"{type(error).__name__}: {text}{where}"
+    return f"{type(error).__name__}: {shorten(text, _MAX_EXCEPTION_LENGTH)}{where}"
 
 
 def abbreviate_names(names: Iterable[str], limit: int = 8) -> str:
@@ -165,6 +174,8 @@ def did_you_mean(name: str, valid: Iterable[str]) -> str:
 
 @lru_cache(16)  # the same wrong name often occurs several times
 def _did_you_mean(name: str, names: tuple[str, ...]) -> str:
+    if len(name) > MAX_QUOTATION_LENGTH:  # no slip of the pen, and the search takes quadratic time
+        return ""
     swapped = {name[:i] + name[i + 1] + name[i] + name[i + 2 :] for i in range(len(name) - 1)}
     if near := [other for other in names if other in swapped] or difflib.get_close_matches(name, names, n=1):
         return f'; did you mean "{near[0]}"?'

@@ -1,7 +1,13 @@
-"""Values that JSON does not have: bytes become {"bytes": hexadecimal digits}, NumPy values become lists and numbers."""
+"""Conversion of values from and to JSON.
+
+Values that JSON does not have are written as others: bytes become {"bytes": hexadecimal digits}, NumPy values become lists and
+numbers.
+"""
 
 from __future__ import annotations
 
+import json
+import sys
 from typing import Any
 
 
@@ -13,3 +19,23 @@ def encode_value(value: Any) -> Any:
 def decode_object(value: dict[str, Any]) -> Any:
     """Return the bytes that `encode_value` encoded, and any other object unchanged; the `object_hook` of `json.loads`."""
     return bytes.fromhex(value["bytes"]) if value.keys() == {"bytes"} else value
+
+
+def parse_object(text: str | bytes) -> dict[str, Any]:
+    """Return the JSON object in a text that a program has written, but another one may have changed.
+
+    Raises:
+        ValueError: The text is not JSON, nested too deeply, or not an object.
+    """
+    try:
+        value = json.loads(text)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+    if not isinstance(value, dict):
+        raise ValueError("expected an object")
+    return value
+
+
+def is_number(value: Any) -> bool:
+    """Return whether a value is a Boolean, a float, or an integer in the range of a double."""
+    return isinstance(value, float) or (isinstance(value, int) and abs(value) <= sys.float_info.max)

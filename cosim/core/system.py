@@ -143,9 +143,11 @@ class System:
 
     def _find_stage_problems(self) -> Iterator[Problem]:
         seen: set[str] = set()
+        unknown = 0
         subject = ("algorithm", "stages")
         for name in component_names(self.stages):
             if name not in self.components:
+                unknown += 1
                 yield Problem(f'unknown component "{name}"{did_you_mean(name, self.components)}', subject=subject)
             elif name in seen:
                 yield Problem(f'component "{name}" is in the stages twice', subject=subject)
@@ -153,8 +155,9 @@ class System:
         for group in iterate_groups(self.stages):
             if group.iteration:
                 yield from self._find_iteration_problems(group)
-        for name in self.components:
-            if name not in seen:
+        missing = [name for name in self.components if name not in seen]
+        if len(missing) > unknown:  # otherwise the unknown names probably stand for them
+            for name in missing:
                 yield Problem(f'component "{name}" is in no stage, so it would never step', subject=subject)
 
     def _find_iteration_problems(self, group: Group) -> Iterator[Problem]:

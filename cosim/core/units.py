@@ -1,15 +1,17 @@
 """Physical units as FMI defines them: exponents of the SI base units, a factor and an offset.
 
 A value is converted to SI by `si = factor * value + offset` (FMI 2.0 section 2.2.2, FMI 3.0 section 2.4.3).
-FMUs define their own units; `parse_unit` reads the Modelica/FMI unit syntax ("kg.m2/s3") of other texts.
+FMUs define their own units; `parse_unit` reads the Modelica/FMI unit syntax ("kg.m2/s3") of other texts, and common spellings
+such as "W/m²" or "°C". `named_unit` accepts any text.
 """
 
 from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
@@ -19,8 +21,9 @@ class Unit:
     """Named unit.
 
     Attributes:
-        name: Name in Modelica syntax.
-        exponents: Exponents of `BASE_UNITS`; units with equal exponents can be converted into each other.
+        name: Name, usually in Modelica syntax.
+        exponents: Exponents of `BASE_UNITS`; units with equal exponents can be converted into each other. Empty if the quantity
+            is unknown; such a unit is compatible with all others, and values are not converted.
         factor: Factor of the conversion to SI.
         offset: Offset of the conversion to SI, in SI units.
     """
@@ -31,11 +34,13 @@ class Unit:
     offset: float = 0.0
 
     def converts_to(self, other: Unit) -> bool:
-        """Return whether both units measure the same quantity."""
-        return self.exponents == other.exponents
+        """Return whether both units measure the same quantity, or one of them an unknown quantity."""
+        return self.exponents == other.exponents or not (self.exponents and other.exponents)
 
     def conversion(self, other: Unit) -> tuple[float, float]:
-        """Return (factor, offset) of other = factor * self + offset; exactly (1.0, 0.0) for equal units."""
+        """Return (factor, offset) of other = factor * self + offset; exactly (1.0, 0.0) for equal units and unknown ones."""
+        if not (self.exponents and other.exponents):
+            return 1.0, 0.0
         return self.factor / other.factor, (self.offset - other.offset) / other.factor
 
 
@@ -74,33 +79,100 @@ KNOWN_UNITS = {
         _define_unit("T", kg=1, s=-2, A=-1),
     )
 }
-_FACTOR_PATTERN = re.compile(r"(1|[A-Za-z%]+)([+-]?\d+)?")
+#: common spellings -> Modelica syntax, after Unicode compatibility normalization, which converts superscripts
+_SPELLINGS = {
+    "**": "",
+    "^": "",
+    "°C": "degC",
+    "°": "deg",
+    "Ω": "Ohm",
+    "−": "-",
+    **dict.fromkeys("·⋅∙•*×", "."),
+    " .": ".",
+    ". ": ".",
+    " /": "/",
+    "/ ": "/",
+}
+#: symbol (a unit, or the name of a placeholder in braces) and power
+_FACTOR_PATTERN = re.compile(r"(1(?!\d)|\{\w+\}|[^\s\d./(){}+-]+)([+-]?\d{1,3})?")
+
+
+def named_unit(text: str) -> Unit:
+    """Return the unit that a text means; a text that `parse_unit` cannot read is a unit of an unknown quantity."""
+    try:
+        return parse_unit(text)
+    except ValueError:
+        return Unit(text, ())
 
 
 def parse_unit(text: str) -> Unit:
-    """Parse a unit in Modelica syntax such as "kg.m/s2", "m.s-1" or "W/(m2.K)".
+    """Parse a unit in Modelica syntax such as "kg.m/s2", "m.s-1" or "W/(m2.K)", or in a common spelling such as "N·m" or "-".
 
     Args:
-        text: The unit.
+        text: The unit; it becomes the name of the result.
 
     Raises:
         ValueError: The syntax is wrong or a unit is unknown.
     """
-    if text in KNOWN_UNITS:
-        return KNOWN_UNITS[text]
+    normalized = _normalize(text)
+    if normalized in KNOWN_UNITS:
+        return replace(KNOWN_UNITS[normalized], name=text)
     exponents, scale = [0] * len(BASE_UNITS), 1.0
-    for (unit, power), sign in ((_parse_factor(part, text), sign) for part, sign in _split_factors(text)):
-        scale *= unit.factor ** (sign * power)
-        exponents = [e + sign * power * k for e, k in zip(exponents, unit.exponents, strict=True)]
+    for symbol, power in _split_factors(text):
+        unit = KNOWN_UNITS.get(symbol)
+        if unit is None or unit.offset:
+            raise ValueError(f'unknown unit "{symbol}" in "{text}"')
+        scale *= _power(unit.factor, power)
+        exponents = [e + power * k for e, k in zip(exponents, unit.exponents, strict=True)]
+    if not 0 < scale < math.inf:
+        raise ValueError(f'the unit "{text}" is too small or too large')
     return Unit(text, tuple(exponents), scale)
 
 
+def _power(factor: float, power: int) -> float:
+    try:
+        return factor**power
+    except OverflowError:
+        return math.inf
+
+
+def _normalize(text: str) -> str:
+    """Return the spelling of a unit in Modelica syntax; "1" for a dash."""
+    normalized = " ".join(unicodedata.normalize("NFKC", text).split())
+    for spelling, replacement in _SPELLINGS.items():
+        normalized = normalized.replace(spelling, replacement)
+    return "1" if normalized in ("-", "–", "—") else normalized.replace(" ", ".")
+
+
 def _split_factors(text: str) -> list[tuple[str, int]]:
-    """Return the factors of a unit, each with 1 for the numerator or -1 for the denominator."""
-    numerator, slash, denominator = text.partition("/")
-    if slash and denominator.startswith("(") and denominator.endswith(")"):
-        denominator = denominator[1:-1]
-    return [(part, 1) for part in numerator.split(".")] + [(part, -1) for part in denominator.split(".") if slash]
+    """Return the factors of a unit as pairs of symbol and power.
+
+    Raises:
+        ValueError: The syntax is wrong.
+    """
+    numerator, *denominators = _normalize(text).split("/")
+    factors = []
+    for product, sign in ((numerator, 1), *((denominator, -1) for denominator in denominators)):
+        if product.startswith("(") and product.endswith(")"):
+            product = product[1:-1]
+        for factor in product.split("."):
+            match = _FACTOR_PATTERN.fullmatch(factor)
+            if match is None:
+                raise ValueError(f'cannot read the unit "{text}" at "{factor}"')
+            factors.append((match[1], sign * int(match[2] or 1)))
+    return factors
+
+
+def split_unit(text: str) -> list[tuple[str, int]]:
+    """Return the factors of a unit as pairs of symbol and power; a text that cannot be read is one factor.
+
+    >>> split_unit("kg.m2/s3")
+    [('kg', 1), ('m', 2), ('s', -3)]
+    """
+    try:
+        return _split_factors(text)
+    except ValueError:
+        return [(text, 1)]
 
 
 def multiply_units(units: Iterable[tuple[str, int]]) -> str:
@@ -110,35 +182,19 @@ def multiply_units(units: Iterable[tuple[str, int]]) -> str:
     'm2/s'
 
     Args:
-        units: Pairs of unit and power.
+        units: Pairs of unit and power. A unit that cannot be read is a factor of its own, in parentheses.
 
     Returns:
         The product, "1" if all factors cancel out.
-
-    Raises:
-        ValueError: The syntax of a unit is wrong.
     """
     powers: dict[str, int] = {}
     for text, power in units:
-        for part, sign in _split_factors(text):
-            match = _FACTOR_PATTERN.fullmatch(part)
-            if match is None:
-                raise ValueError(f'cannot read the unit "{text}" at "{part}"')
-            powers[match.group(1)] = powers.get(match.group(1), 0) + sign * power * int(match.group(2) or 1)
+        for symbol, own in split_unit(text):
+            name = symbol if _FACTOR_PATTERN.fullmatch(symbol) else f"({symbol})"
+            powers[name] = powers.get(name, 0) + power * own
     powers.pop("1", None)
     numerator, denominator = (
         [f"{unit}{abs(n) if abs(n) > 1 else ''}" for unit, n in powers.items() if sign * n > 0] for sign in (1, -1)
     )
     divisor = f"({'.'.join(denominator)})" if len(denominator) > 1 else "".join(denominator)
     return (".".join(numerator) or "1") + (f"/{divisor}" if denominator else "")
-
-
-def _parse_factor(text: str, whole: str) -> tuple[Unit, int]:
-    """Return known unit and power of one factor such as "m2"; `whole` is the unit it belongs to, for messages."""
-    match = _FACTOR_PATTERN.fullmatch(text)
-    if match is None:
-        raise ValueError(f'cannot read the unit "{whole}" at "{text}"')
-    unit = KNOWN_UNITS.get(match.group(1))
-    if unit is None or unit.offset:
-        raise ValueError(f'unknown unit "{match.group(1)}" in "{whole}"')
-    return unit, int(match.group(2) or 1)

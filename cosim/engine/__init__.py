@@ -1,15 +1,12 @@
 """The flat plan of a system and the executors that run it."""
 
-from typing import Literal
-
 from .executor import Executor
 from .native_executor import NativeExecutor, native_available
 from .plan import Plan, compile_plan
 from .python_executor import PythonExecutor
 from .recorder import Recorder
+from .settings import ExecutorKind
 from .step_runner import Termination
-
-ExecutorKind = Literal["auto", "native", "python"]
 
 EXECUTORS: dict[str, type[Executor]] = {"native": NativeExecutor, "python": PythonExecutor}
 
@@ -19,6 +16,7 @@ def executor_class(kind: ExecutorKind) -> type[Executor]:
 
     Raises:
         ValueError: the native executor is required but was not built.
+        InputError: the native executor was built from other sources.
     """
     if kind == "native" and not native_available():
         raise ValueError("the native executor was not built: install cosim on a machine with a C compiler")

@@ -14,19 +14,25 @@
 
 #if defined(__x86_64__) || defined(_M_X64)
 #include <xmmintrin.h>
-#define FLOAT_CONTROL_MASK 0xFFC0u /* MXCSR: rounding, flush to zero, denormals are zero, traps; not the sticky flags */
-static unsigned float_mode(void) { return _mm_getcsr() & FLOAT_CONTROL_MASK; }
-static void set_float_mode(unsigned mode) { _mm_setcsr((_mm_getcsr() & ~FLOAT_CONTROL_MASK) | mode); }
+#define MXCSR_CONTROL 0xFFC0u /* rounding, flush to zero, denormals are zero, traps; not the sticky flags */
+/* Control bits of both floating-point units. */
+static uint32_t float_control(void) {
+    uint16_t x87 = 0;
+#ifdef __GNUC__
+    __asm__ volatile("fnstcw %0" : "=m"(x87));
+#endif
+    return (uint32_t)x87 << 16 | (_mm_getcsr() & MXCSR_CONTROL);
+}
 #else
-#include <fenv.h>
-static unsigned float_mode(void) { return (unsigned)fegetround(); }
-static void set_float_mode(unsigned mode) { fesetround((int)mode); }
+static uint32_t float_control(void) { return 0; }
 #endif
 
+enum { INTERFACE = 2 };                              /* also in native_executor.py, where it is described */
 enum { WARNING = 1, DISCARD = 2 };                   /* FMI statuses; 0 is OK, everything but OK and WARNING is bad */
 /* Codes passed to `on_status` like an FMI status. They exceed 32 bits, so no FMU can return them. */
 #define FLOAT_MODE_CHANGED (INT64_C(1) << 33)
-#define NOT_FINITE (INT64_C(1) << 34)
+#define FLOAT_TRAPS_ENABLED (INT64_C(1) << 34)
+#define NOT_FINITE (INT64_C(1) << 35)
 #define PYTHON_EXCEPTION INT64_MIN
 enum { CONTINUE = 0, END_AFTER_STEP = 1, END_BEFORE_STEP = 2 }; /* answers of `on_status`; the last one discards the macro step */
 enum { MARKER_CALL = 0, MARKER_STEPS = 1, MARKER_ROWS = 2 };    /* marker: number of the current call, completed steps, rows */
@@ -61,14 +67,21 @@ typedef enum {
     INDEXED_COPY, TRANSFER, STEP_BEGIN, PACKED_STEPS, GET_SET2, GET_SET3, DO_STEP2, DO_STEP3, FLAG_CHECK, PYTHON_CALL
 } OperationKind;
 
-/* The most frequent step in compact form: set, doStep and get of one FMU. */
+/* The most frequent step in compact form: set, doStep and get of one FMU. Consecutive instances of an FMU whose variables are the
+   same share their `StepCalls`, which then stay in the cache. */
 typedef struct {
-    void *instance, *set, *do_step, *get, *set_values, *get_values;
+    void *set, *do_step, *get;
     const uint32_t *set_references, *get_references;
-    uint32_t set_reference_count, get_reference_count, set_value_count, get_value_count;
+    size_t set_reference_count, get_reference_count, set_value_count, get_value_count;
     double step_size;
+    int fmi_version;
+} StepCalls;
+
+typedef struct {
+    const StepCalls *calls;
+    void *instance, *set_values, *get_values;
     const DoStepData *data;
-    int fmi_version, first_call;
+    int first_call;
 } PackedStep;
 
 typedef struct {
@@ -96,7 +109,8 @@ typedef struct {
     double *current_time;
     volatile int64_t *marker;
     PyObject *on_status, *record;
-    unsigned float_mode;
+    uint32_t float_control;     /* in the usual floating-point mode */
+    double one, tiny, smallest; /* see `rounds_as_usual` */
     const uint64_t *doubles;    /* bit patterns of the monitored floats */
     const uint32_t *singles;
     Py_ssize_t double_count, single_count;
@@ -106,7 +120,8 @@ typedef struct {
     Py_ssize_t row_part_count;
     char *row;                  /* address of the next row */
     PackedStep *packed_steps;
-    uint32_t *references;       /* value references of the packed steps */
+    StepCalls *step_calls;
+    uint32_t *references;       /* value references of the step calls */
     int is_packed;
     PyThreadState *thread_state; /* saved while the interpreter lock is released */
     long end_request;           /* highest answer of `on_status` so far */
@@ -195,13 +210,23 @@ static void run_transfer(Transfer *transfer) {
     transfer->oldest = (transfer->oldest + 1) % transfer->delay;
 }
 
+/* A number is infinite or NaN if all bits of its exponent are set; one unit more then carries into the sign. Four accumulators,
+   because the processor adds four numbers at a time. */
 static bool all_finite(const Program *p) {
-    const uint64_t exponent = UINT64_C(0x7FF0000000000000);
-    const uint32_t exponent_single = UINT32_C(0x7F800000);
-    uint64_t not_finite = 0;
-    for (Py_ssize_t i = 0; i < p->double_count; i++) not_finite |= (p->doubles[i] & exponent) == exponent;
-    for (Py_ssize_t i = 0; i < p->single_count; i++) not_finite |= (p->singles[i] & exponent_single) == exponent_single;
-    return !not_finite;
+    const uint64_t exponent = UINT64_C(0x7FF0000000000000), unit = UINT64_C(0x0010000000000000);
+    const uint64_t *x = p->doubles, *end = x + p->double_count;
+    uint64_t a = 0, b = 0, c = 0, d = 0;
+    for (; end - x >= 4; x += 4) {
+        a |= (x[0] & exponent) + unit;
+        b |= (x[1] & exponent) + unit;
+        c |= (x[2] & exponent) + unit;
+        d |= (x[3] & exponent) + unit;
+    }
+    for (; x < end; x++) a |= (*x & exponent) + unit;
+    uint32_t singles = 0;
+    for (Py_ssize_t i = 0; i < p->single_count; i++)
+        singles |= (p->singles[i] & UINT32_C(0x7F800000)) + UINT32_C(0x00800000);
+    return !((a | b | c | d) >> 63 | singles >> 31);
 }
 
 /* ---- running --------------------------------------------------------------------------------------------------------- */
@@ -282,10 +307,13 @@ static int64_t run_operation(Program *p, const Operation *op, double time) {
     }
 }
 
-static int report_float_mode_changed(Program *p, int call_number) {
-    set_float_mode(p->float_mode);
-    return report_status(p, call_number, FLOAT_MODE_CHANGED);
+/* Whether sums are rounded to nearest and subnormal numbers are kept. This costs less than reading the control register. */
+static inline bool rounds_as_usual(const Program *p) {
+    return p->smallest + p->smallest > (p->one + p->tiny) - (p->one - p->tiny);
 }
+
+/* `on_status` restores the usual mode. */
+static int report_float_mode(Program *p, int call_number) { return report_status(p, call_number, FLOAT_MODE_CHANGED); }
 
 /* Run the operations of one step, in order. */
 static int run_step(Program *p, Operation *op, const Operation *end, double time) {
@@ -293,44 +321,44 @@ static int run_step(Program *p, Operation *op, const Operation *end, double time
         p->marker[MARKER_CALL] = op->call_number;
         int64_t status = run_operation(p, op, time);
         if (status == PYTHON_EXCEPTION) return -1;
-        if (float_mode() != p->float_mode && report_float_mode_changed(p, op->call_number) < 0) return -1;
+        if (!rounds_as_usual(p) && report_float_mode(p, op->call_number) < 0) return -1;
         if (is_bad(status) && report_status(p, op->call_number, status) < 0) return -1;
     }
     return 0;
 }
 
 static int report_bad_status(Program *p, int call_number, int64_t status) {
-    if (float_mode() != p->float_mode && report_float_mode_changed(p, call_number) < 0) return -1;
+    if (!rounds_as_usual(p) && report_float_mode(p, call_number) < 0) return -1;
     return report_status(p, call_number, status);
 }
 
 /* Like `run_step`, but without a switch per operation, and with one check of the floating-point mode per step. */
 static inline int run_packed_step(Program *p, const PackedStep *s, double time) {
     volatile int64_t *marker = p->marker;
-    const int fmi2 = s->fmi_version == 2;
-    marker[MARKER_CALL] = s->first_call;
-    int status = fmi2 ? ((Fmi2GetSet *)s->set)(s->instance, s->set_references, s->set_reference_count, s->set_values)
-                      : ((Fmi3GetSet *)s->set)(s->instance, s->set_references, s->set_reference_count, s->set_values,
-                                               s->set_value_count);
-    if (is_bad(status) && report_bad_status(p, s->first_call, status) < 0) return -1;
-    marker[MARKER_CALL] = s->first_call + 1;
+    const StepCalls *c = s->calls;
+    const int fmi2 = c->fmi_version == 2, first_call = s->first_call;
+    marker[MARKER_CALL] = first_call;
+    int status = fmi2 ? ((Fmi2GetSet *)c->set)(s->instance, c->set_references, c->set_reference_count, s->set_values)
+                      : ((Fmi3GetSet *)c->set)(s->instance, c->set_references, c->set_reference_count, s->set_values,
+                                               c->set_value_count);
+    if (is_bad(status) && report_bad_status(p, first_call, status) < 0) return -1;
+    marker[MARKER_CALL] = first_call + 1;
     if (fmi2) {
-        status = ((Fmi2DoStep *)s->do_step)(s->instance, time, s->step_size, 1);
+        status = ((Fmi2DoStep *)c->do_step)(s->instance, time, c->step_size, 1);
     } else {
         bool *flags = s->data->flags;
-        status = ((Fmi3DoStep *)s->do_step)(s->instance, time, s->step_size, true, flags, flags + 1, flags + 2,
+        status = ((Fmi3DoStep *)c->do_step)(s->instance, time, c->step_size, true, flags, flags + 1, flags + 2,
                                             s->data->last_successful_time);
-        if (!is_bad(status) && (flags[0] | flags[1] | flags[2]) && report_bad_status(p, s->first_call + 2, DISCARD) < 0)
-            return -1;
+        if (!is_bad(status) && (flags[0] | flags[1] | flags[2]) && report_bad_status(p, first_call + 2, DISCARD) < 0) return -1;
     }
-    if (is_bad(status) && report_bad_status(p, s->first_call + 1, status) < 0) return -1;
-    const int last_call = s->first_call + (fmi2 ? 2 : 3);
+    if (is_bad(status) && report_bad_status(p, first_call + 1, status) < 0) return -1;
+    const int last_call = first_call + (fmi2 ? 2 : 3);
     marker[MARKER_CALL] = last_call;
-    status = fmi2 ? ((Fmi2GetSet *)s->get)(s->instance, s->get_references, s->get_reference_count, s->get_values)
-                  : ((Fmi3GetSet *)s->get)(s->instance, s->get_references, s->get_reference_count, s->get_values,
-                                           s->get_value_count);
+    status = fmi2 ? ((Fmi2GetSet *)c->get)(s->instance, c->get_references, c->get_reference_count, s->get_values)
+                  : ((Fmi3GetSet *)c->get)(s->instance, c->get_references, c->get_reference_count, s->get_values,
+                                           c->get_value_count);
     if (is_bad(status) && report_bad_status(p, last_call, status) < 0) return -1;
-    return float_mode() == p->float_mode ? 0 : report_float_mode_changed(p, s->first_call + 1);
+    return rounds_as_usual(p) ? 0 : report_float_mode(p, first_call + 1);
 }
 
 static inline void copy_indexed(const Transfer *transfer) {
@@ -399,25 +427,51 @@ static int is_packable(const Program *p, const Operation *op) {
     return 0;
 }
 
-/* Copy the value references of a get or set into the pool and advance the pool; returns their new address. */
-static const uint32_t *append_references(uint32_t **pool, const Operation *op) {
+static StepCalls step_calls(const Operation *op) {
+    const Operation *set = op + 1, *do_step = op + 2, *get = get_operation(op);
+    return (StepCalls){
+        .set = set->function, .do_step = do_step->function, .get = get->function,
+        .set_references = set->get_set.references, .get_references = get->get_set.references,
+        .set_reference_count = set->get_set.reference_count, .get_reference_count = get->get_set.reference_count,
+        .set_value_count = set->get_set.value_count, .get_value_count = get->get_set.value_count,
+        .step_size = do_step->do_step.step_size, .fmi_version = do_step->kind == DO_STEP2 ? 2 : 3,
+    };
+}
+
+static bool is_same_list(const uint32_t *a, size_t a_count, const uint32_t *b, size_t b_count) {
+    return a_count == b_count && !memcmp(a, b, a_count * sizeof *a);
+}
+
+static bool are_same_calls(const StepCalls *a, const StepCalls *b) {
+    return a->set == b->set && a->do_step == b->do_step && a->get == b->get && a->step_size == b->step_size &&
+           a->set_value_count == b->set_value_count && a->get_value_count == b->get_value_count &&
+           is_same_list(a->set_references, a->set_reference_count, b->set_references, b->set_reference_count) &&
+           is_same_list(a->get_references, a->get_reference_count, b->get_references, b->get_reference_count);
+}
+
+/* Copy value references into the pool and advance it; returns their new address. */
+static const uint32_t *append_references(uint32_t **pool, const uint32_t *references, size_t count) {
     uint32_t *copied = *pool;
-    memcpy(copied, op->get_set.references, op->get_set.reference_count * sizeof *copied);
-    *pool += op->get_set.reference_count;
+    memcpy(copied, references, count * sizeof *copied);
+    *pool += count;
     return copied;
 }
 
-static PackedStep pack_step(const Operation *op, uint32_t **pool) {
+/* Return the calls of a packable step: the latest ones, `*next - 1`, if they are the same, else new ones. */
+static const StepCalls *append_step_calls(const Program *p, StepCalls **next, uint32_t **pool, const Operation *op) {
+    StepCalls calls = step_calls(op);
+    if (*next > p->step_calls && are_same_calls(*next - 1, &calls)) return *next - 1;
+    calls.set_references = append_references(pool, calls.set_references, calls.set_reference_count);
+    calls.get_references = append_references(pool, calls.get_references, calls.get_reference_count);
+    **next = calls;
+    return (*next)++;
+}
+
+static PackedStep pack_step(const Operation *op, const StepCalls *calls) {
     const Operation *set = op + 1, *do_step = op + 2, *get = get_operation(op);
     return (PackedStep){
-        .instance = do_step->instance, .set = set->function, .do_step = do_step->function, .get = get->function,
-        .set_values = set->get_set.values, .get_values = get->get_set.values,
-        .set_references = append_references(pool, set), .get_references = append_references(pool, get),
-        .set_reference_count = (uint32_t)set->get_set.reference_count,
-        .get_reference_count = (uint32_t)get->get_set.reference_count,
-        .set_value_count = (uint32_t)set->get_set.value_count, .get_value_count = (uint32_t)get->get_set.value_count,
-        .step_size = do_step->do_step.step_size, .data = do_step->do_step.data,
-        .fmi_version = do_step->kind == DO_STEP2 ? 2 : 3, .first_call = set->call_number,
+        .calls = calls, .instance = do_step->instance, .set_values = set->get_set.values, .get_values = get->get_set.values,
+        .data = do_step->do_step.data, .first_call = set->call_number,
     };
 }
 
@@ -437,14 +491,17 @@ static int pack_steps(Program *p) {
             reference_count += op[1].get_set.reference_count + get_operation(op)->get_set.reference_count;
         }
     p->packed_steps = PyMem_Calloc(step_count + 1, sizeof *p->packed_steps);
+    p->step_calls = PyMem_Calloc(step_count + 1, sizeof *p->step_calls);
     p->references = PyMem_Calloc(reference_count + 1, sizeof *p->references);
-    if (!p->packed_steps || !p->references) return PyErr_NoMemory(), -1;
+    if (!p->packed_steps || !p->step_calls || !p->references) return PyErr_NoMemory(), -1;
     PackedStep *next = p->packed_steps;
+    StepCalls *next_calls = p->step_calls;
     uint32_t *pool = p->references;
     for (op = p->operations; op < end;) {
         Operation *first = op;
         PackedStep *begin = next;
-        for (; op < end && is_packable(p, op); op = p->operations + op->end) *next++ = pack_step(op, &pool);
+        for (; op < end && is_packable(p, op); op = p->operations + op->end)
+            *next++ = pack_step(op, append_step_calls(p, &next_calls, &pool, op));
         if (next > begin) {
             first->kind = PACKED_STEPS;
             first->end = op - p->operations;
@@ -481,6 +538,7 @@ static int run_macro_steps(Program *p, int64_t first, int64_t count, double orig
         *p->current_time = time;
         if (run_macro_step(p, n, time) < 0) return -1;
         if (p->end_request == END_BEFORE_STEP) return 0;
+        if (float_control() != p->float_control && report_status(p, -1, FLOAT_TRAPS_ENABLED) < 0) return -1;
         if (!all_finite(p) && report_status(p, -1, NOT_FINITE) < 0) return -1;
         if (record_row(p, n + 1) < 0) return -1;
         p->marker[MARKER_STEPS] = n + 1;
@@ -499,7 +557,7 @@ static PyObject *run(Program *p, PyObject *arguments) {
     double origin, stride, denominator;
     if (!PyArg_ParseTuple(arguments, "LLddd", &first, &count, &origin, &stride, &denominator)) return NULL;
     p->end_request = CONTINUE;
-    p->float_mode = float_mode();
+    p->float_control = float_control();
     if (!p->is_packed && all_steps_measured(p) && pack_steps(p) < 0) return NULL;
     release_gil(p);
     int failed = run_macro_steps(p, first, count, origin, stride, denominator);
@@ -670,6 +728,9 @@ static int initialize(Program *p, PyObject *arguments, PyObject *named) {
     p->marker = pointer(marker);
     p->on_status = Py_NewRef(on_status);
     p->record_every = 1;
+    p->one = 1;
+    p->tiny = 0x1p-54;
+    p->smallest = 0x1p-1074;
     return 0;
 }
 
@@ -713,6 +774,7 @@ static void deallocate(Program *p) {
     PyMem_Free(p->operations);
     PyMem_Free(p->row_parts);
     PyMem_Free(p->packed_steps);
+    PyMem_Free(p->step_calls);
     PyMem_Free(p->references);
     ((freefunc)PyType_GetSlot(type, Py_tp_free))(p);
     Py_DECREF(type);
@@ -754,8 +816,9 @@ static PyType_Spec specification = {
 static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "_native", "The native executor.", 0, NULL, NULL, NULL, NULL, NULL};
 
 static const struct { const char *name; int64_t value; } constants[] = {
-    {"FLOAT_MODE_CHANGED", FLOAT_MODE_CHANGED}, {"NOT_FINITE", NOT_FINITE}, {"CONTINUE", CONTINUE},
-    {"END_AFTER_STEP", END_AFTER_STEP}, {"END_BEFORE_STEP", END_BEFORE_STEP}, {"MARKER_CALL", MARKER_CALL},
+    {"INTERFACE", INTERFACE}, {"FLOAT_MODE_CHANGED", FLOAT_MODE_CHANGED}, {"FLOAT_TRAPS_ENABLED", FLOAT_TRAPS_ENABLED},
+    {"NOT_FINITE", NOT_FINITE}, {"CONTINUE", CONTINUE}, {"END_AFTER_STEP", END_AFTER_STEP},
+    {"END_BEFORE_STEP", END_BEFORE_STEP}, {"MARKER_CALL", MARKER_CALL},
     {"MARKER_STEPS", MARKER_STEPS}, {"MARKER_ROWS", MARKER_ROWS}, {"MEASURED_STEPS", MEASURED_STEPS},
 };
 

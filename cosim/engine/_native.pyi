@@ -1,8 +1,10 @@
 from collections.abc import Callable
 from typing import Any, Final
 
+INTERFACE: Final[int]
 #: codes that `on_status` receives beside FMI statuses; they exceed 32 bits
 FLOAT_MODE_CHANGED: Final[int]
+FLOAT_TRAPS_ENABLED: Final[int]
 NOT_FINITE: Final[int]
 #: answers of `on_status`: continue, or end the simulation with this macro step or with the one before
 CONTINUE: Final[int]

@@ -19,7 +19,7 @@ class ScheduledStep(NamedTuple):
 
 
 class StepFailure(NamedTuple):
-    """A step that stopped at call `call_index` with `status`; None: the floating-point mode was changed."""
+    """A step that stopped at call `call_index` with `status`; None: it did not stop, but changed the floating-point mode."""
 
     step: ScheduledStep
     call_index: int
@@ -42,5 +42,6 @@ def _run_calls(step: ScheduledStep) -> Iterator[StepFailure]:
         if status not in SUCCESS_STATUSES:
             yield StepFailure(step, index, status)
             break
-    if float_mode.is_changed():
+    if float_mode.is_changed() or float_mode.enabled_traps():
+        float_mode.set_default()
         yield StepFailure(step, -1, None)

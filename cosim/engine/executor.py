@@ -8,7 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..core.errors import ComponentError
-from ..process.journal import MARKER_SIZE, ROW_COUNT
+from ..process.float_mode import enabled_traps
+from ..process.journal import CALL_NUMBER, MARKER_SIZE, ROW_COUNT
 from .finite_check import FiniteCheck
 from .initialization import initialize_components
 from .parallel import MEASURED_STEPS, ParallelSteps
@@ -28,14 +29,13 @@ class Executor(ABC):
         recorder: stores the recorded outputs.
         marker: int64 array, shape (MARKER_SIZE,), updated before every call, so that a process which shares its memory can see
             the current call; see CALL_NUMBER, STEP_COUNT and ROW_COUNT in `process.journal`.
-        require_finite: a connected output that is NaN or infinite ends the run.
     """
 
-    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None, require_finite: bool = True):
+    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None):
         self.plan, self.recorder = plan, recorder
         self.marker = np.zeros(MARKER_SIZE, np.int64) if marker is None else marker
         self._runner = StepRunner(self.marker)
-        self._finite_check = FiniteCheck(plan, self._runner.current_time, require_finite)
+        self._finite_check = FiniteCheck(plan, self._runner)
         self._delay_lines = {t: DelayLine(t) for phase in plan.all_phases for t in phase.transfers if t.delay}
         self._schedule = Schedule(plan, self._runner, self._delay_lines)
         self._parallel_steps = ParallelSteps(self._runner)
@@ -50,16 +50,16 @@ class Executor(ABC):
         """A component's request to end the simulation, if there was one."""
         return self._runner.termination
 
-    @property
-    def call_names(self) -> list[tuple[str, str]]:
-        """(component, function) of every call, by its number in the marker."""
-        return self._schedule.call_names
+    def describe_call(self) -> tuple[str, str]:
+        """Return component and function of the present call of the stepping loop."""
+        number, names = int(self.marker[CALL_NUMBER]), self._schedule.call_names
+        return names[number] if 0 <= number < len(names) else ("the run", "moving values")
 
     def initialize(self) -> None:
         """Bring the components from instantiated to step mode, and record the initial outputs as row 0.
 
         Raises:
-            ComponentError: a component failed, an algebraic loop did not converge, or a connected output is not finite.
+            ComponentError: a component failed, an algebraic loop did not converge, or a checked output is not finite.
         """
         self._runner.current_time.value = self.plan.grid.time_at(0)
         initialize_components(self.plan)
@@ -69,6 +69,7 @@ class Executor(ABC):
         self._schedule.prepare()
         self._parallel_steps.find_candidates(self.plan.phases, self._schedule)
         self._prepare()
+        self.recorder.write_header(self._schedule.call_names)
         self.recorder.record(0)
         self.marker[ROW_COUNT] = self.recorder.row_count
 
@@ -76,7 +77,7 @@ class Executor(ABC):
         """Run macro steps until communication point `end` is reached or a component requests termination.
 
         Raises:
-            ComponentError: a component failed, or a connected output is not finite.
+            ComponentError: a component failed, or a checked output is not finite.
         """
         try:
             if self._parallel_steps.has_candidates and self.completed_steps < MEASURED_STEPS:
@@ -94,12 +95,23 @@ class Executor(ABC):
         while self.completed_steps < end and not self.termination:
             try:
                 self._run_macro_steps(self.completed_steps, min(end, self.recorder.last_point_in_chunk(self.completed_steps)))
+                if enabled_traps():
+                    self._restore_float_traps(self.completed_steps)
             finally:
                 self.recorder.set_row_count(int(self.marker[ROW_COUNT]))
 
     def close(self) -> None:
         """End the threads; no step may be run afterwards."""
         self._parallel_steps.close()
+
+    def _restore_float_mode(self, call_number: int) -> None:
+        """Set the default floating-point mode again after the step of this call changed it."""
+        step, _ = self._schedule.find_call(call_number)
+        self._runner.restore_float_mode(step.step.name)
+
+    def _restore_float_traps(self, n: int) -> None:
+        """Disable floating-point traps again that a step before communication point `n` enabled."""
+        self._runner.restore_float_traps(self.plan.system.components, self.plan.grid.time_at(n))
 
     def _transfer_call(self, transfer: Transfer) -> TransferCall:
         return self._delay_lines[transfer].apply if transfer.delay else compile_transfer(transfer)

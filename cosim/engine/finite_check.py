@@ -1,43 +1,55 @@
-"""Check that connected outputs are finite."""
+"""Check that outputs are finite."""
 
 from __future__ import annotations
-
-import ctypes
 
 import numpy as np
 
 from ..core.errors import ComponentError
 from .plan import Plan
+from .step_runner import StepRunner
 
 _FLOAT_DTYPES = (np.dtype(np.float64), np.dtype(np.float32))
 
 
 class FiniteCheck:
-    """Check of the connected float outputs for NaN and infinity; does nothing unless `enabled`."""
+    """Check of float outputs for NaN and infinity, according to `non_finite` of the settings.
 
-    def __init__(self, plan: Plan, current_time: ctypes.c_double, enabled: bool):
-        self._plan, self._current_time, self._enabled = plan, current_time, enabled
+    Args:
+        plan: the compiled system.
+        runner: knows the present time.
+    """
+
+    def __init__(self, plan: Plan, runner: StepRunner):
+        self._plan, self._runner = plan, runner
+        policy, recorded = plan.settings.non_finite, plan.settings.columns.values()
+        connections = plan.system.connections if policy != "allow" else ()
+        reader_of = {connection.source: connection.target for connection in reversed(connections)}
+        checked = [*dict.fromkeys(connection.source for connection in connections), *(recorded if policy == "fail" else ())]
+        positions = [(endpoint, plan.outputs.positions[endpoint], reader_of.get(endpoint)) for endpoint in dict.fromkeys(checked)]
+        self._checked = [each for each in positions if each[1].dtype in _FLOAT_DTYPES]
 
     @property
     def monitored_floats(self) -> list[np.ndarray]:
         """Arrays to monitor after each macro step; a value in them that is not finite requires a call of `run`."""
-        arrays = self._plan.outputs.arrays
-        return [arrays[dtype] for dtype in _FLOAT_DTYPES if dtype in arrays and self._enabled]
+        arrays = []
+        for dtype in _FLOAT_DTYPES:
+            if offsets := [position.offset for _, position, _ in self._checked if position.dtype == dtype]:
+                arrays.append(self._plan.outputs.arrays[dtype][min(offsets) : max(offsets) + 1])
+        return arrays
 
     def run(self, function: str = "do_step") -> None:
-        """Check the source of every connection.
+        """Check the present value of every checked output.
 
         Args:
             function: the function that computed the outputs, for the message.
 
         Raises:
-            ComponentError: a connected output is NaN or infinite.
+            ComponentError: a checked output is NaN or infinite.
         """
-        if not self._enabled:
-            return
-        outputs = self._plan.outputs
-        for connection in self._plan.system.connections:
-            position = outputs.positions[connection.source]
-            if position.dtype in _FLOAT_DTYPES and not np.isfinite(value := outputs.arrays[position.dtype][position.offset]):
-                text = f'the output "{connection.source.scalar}" is {value}, and {connection.target} reads it'
-                raise ComponentError(connection.source.component, function, text, self._current_time.value)
+        for endpoint, position, reader in self._checked:
+            value = self._plan.outputs.arrays[position.dtype][position.offset]
+            if not np.isfinite(value):
+                time = self._plan.grid.time_at(self._runner.completed_steps + (function == "do_step"))
+                use = f"and {reader} reads it" if reader else f"and is recorded for t = {time!r} s"
+                text = f'the output "{endpoint.scalar}" is {value}, {use}'
+                raise ComponentError(endpoint.component, function, text, self._runner.current_time.value)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..core.component import NativeDoStep, NativeFlagCheck, NativeGetSet, PreparedCall
+from ..core.errors import InputError
 from ..process.journal import ROW_COUNT
 from .component_step import ScheduledStep
 from .executor import Executor
@@ -18,13 +19,27 @@ try:
 except ImportError:  # installed without a C compiler
     _native = None  # type: ignore[assignment]  # a module cannot be declared optional
 
+#: number of the interface of `_native.c`; raised with every change of a function, an argument, a code or the marker
+INTERFACE = 2
 #: most macro steps per call; the first call is shorter, because it measures the durations of the steps
 MAX_STEPS_PER_CALL = 1 << 16
 
 
 def native_available() -> bool:
-    """Return whether the native executor was built."""
-    return _native is not None
+    """Return whether the native executor was built.
+
+    Raises:
+        InputError: it was built from older or newer sources than this module, as happens in an editable installation.
+    """
+    if _native is None:
+        return False
+    found = getattr(_native, "INTERFACE", 0)
+    if found != INTERFACE:
+        raise InputError(
+            f"the native executor {_native.__file__} has interface {found}, expected {INTERFACE}: build it again with "
+            "`python setup.py build_ext --inplace` in the checkout"
+        )
+    return True
 
 
 class NativeExecutor(Executor):
@@ -129,10 +144,13 @@ class NativeExecutor(Executor):
         if status == _native.NOT_FINITE:
             self._finite_check.run()
             return _native.CONTINUE
-        step, call = self._schedule.find_call(number)
         if status == _native.FLOAT_MODE_CHANGED:
-            self._runner.raise_float_mode_changed(step, call)
-        self._runner.handle_status(step, call, status)
+            self._restore_float_mode(number)
+            return _native.CONTINUE
+        if status == _native.FLOAT_TRAPS_ENABLED:
+            self._restore_float_traps(self.completed_steps + 1)
+            return _native.CONTINUE
+        self._runner.handle_status(*self._schedule.find_call(number), status)
         if self.termination is None:
             return _native.CONTINUE
         return _native.END_AFTER_STEP if self.termination.complete else _native.END_BEFORE_STEP

@@ -128,7 +128,8 @@ class ParallelSteps:
         failures = [failure for found in self._threads.map(run_partition, group.partitions) for failure in found]
         for failure in sorted(failures, key=lambda failure: failure.step.first_call):
             if failure.status is None:
-                self._runner.raise_float_mode_changed(failure.step, failure.call)
+                self._runner.restore_float_mode(failure.step.step.name)
+                continue
             self._runner.handle_status(failure.step, failure.call, failure.status)
             self._runner.run_step(failure.step, failure.call_index + 1)
         return self._runner.termination_status

@@ -16,6 +16,8 @@ from ..core.component import Causality, Component, Variable
 from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System, component_names
 from ..core.time_grid import TimeGrid
 from .layout import Layout, build_layout
+from .run_checks import check_run
+from .settings import Event, Settings
 from .transfer_plan import Transfer, TransferPlanner
 
 
@@ -56,21 +58,32 @@ class Loop:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A compiled system.
+    """A system and its settings, checked and compiled; it can be simulated once.
 
     Attributes:
         system: the components and their connections.
+        settings: when and how to simulate.
         grid: the communication points.
+        record_every: recording interval (macro steps).
+        events: events by communication point.
         inputs: layout of the connected inputs.
         outputs: layout of the connected and recorded outputs.
         phases: the phases of a macro step, in order.
     """
 
     system: System
+    settings: Settings
     grid: TimeGrid
+    record_every: int
+    events: Mapping[int, Sequence[Event]]
     inputs: Layout
     outputs: Layout
     phases: Sequence[Phase]
+
+    @property
+    def row_count(self) -> int:
+        """Number of recorded communication points."""
+        return self.grid.count // self.record_every + 1
 
     @property
     def all_phases(self) -> Iterator[Phase]:
@@ -78,17 +91,20 @@ class Plan:
         return _flatten_phases(self.phases)
 
 
-def compile_plan(system: System, grid: TimeGrid, recorded_outputs: Iterable[Endpoint] = ()) -> Plan:
-    """Compile a system into a plan.
+def compile_plan(system: System, settings: Settings) -> Plan:
+    """Check a system and compile it into a plan.
 
     Args:
-        system: a system without problems; its periods must be multiples of the step size.
-        grid: the communication points.
-        recorded_outputs: outputs that are read by the recorder.
+        system: the components must not have been used before.
+        settings: when and how to simulate.
+
+    Raises:
+        InputError: the system cannot be simulated with these settings; `problems` lists all reasons, see `check_run`.
     """
+    grid = check_run(system, settings)
     phases = list(_split_into_phases(system))
     connections = [connection for phase in phases for connection in _connections_of(phase)]
-    inputs, outputs = _input_layout(system, connections), _output_layout(system, connections, recorded_outputs)
+    inputs, outputs = _input_layout(system, connections), _output_layout(system, connections, settings.columns.values())
     planner = TransferPlanner(system, inputs, outputs)
 
     def make_phase(draft: _PhaseDraft) -> Phase:
@@ -101,7 +117,16 @@ def compile_plan(system: System, grid: TimeGrid, recorded_outputs: Iterable[Endp
         connections = [connection for phase in inner for connection in _connections_of(phase)]
         return Loop(group.name, group.iteration, tuple(map(make_phase, inner)), connections)
 
-    return Plan(system, grid, inputs, outputs, list(map(make_phase, phases)))
+    record_every = int((settings.record_interval or grid.step) / grid.step)
+    events = _events_by_point(settings.events, grid)
+    return Plan(system, settings, grid, record_every, events, inputs, outputs, list(map(make_phase, phases)))
+
+
+def _events_by_point(events: Iterable[Event], grid: TimeGrid) -> dict[int, list[Event]]:
+    points: dict[int, list[Event]] = defaultdict(list)
+    for event in events:
+        points[grid.index(event.time)].append(event)
+    return points
 
 
 def _flatten_phases(phases: Iterable[Phase]) -> Iterator[Phase]:
@@ -149,7 +174,8 @@ def _phases_of_stages(
     """
     for stage in stages:
         groups = [member for member in stage if isinstance(member, Group)]
-        own_group = {name: frozenset(component_names(group.stages)) for group in groups for name in component_names(group.stages)}
+        members = [frozenset(component_names(group.stages)) for group in groups]
+        own_group = {name: names for names in members for name in names}
         connections = [connection for name in component_names([stage]) for connection in incoming.get(name, ())]
         yield _PhaseDraft(
             [
@@ -160,8 +186,8 @@ def _phases_of_stages(
             [member for member in stage if not isinstance(member, Group)],
             parallel,
         )
-        for group in groups:
-            inner = _phases_of_stages(group.stages, group.parallel, frozenset(component_names(group.stages)), incoming)
+        for group, names in zip(groups, members, strict=True):
+            inner = _phases_of_stages(group.stages, group.parallel, names, incoming)
             if group.iteration:
                 yield _PhaseDraft([], [], group=group, inner=list(inner))
             else:

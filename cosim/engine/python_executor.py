@@ -48,10 +48,10 @@ class _DueSteps:
 
 
 class PythonExecutor(Executor):
-    """Executor without native code of its own."""
+    """Executor in pure Python."""
 
-    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None, require_finite: bool = True):
-        super().__init__(plan, recorder, marker, require_finite)
+    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None):
+        super().__init__(plan, recorder, marker)
         self._shortest_durations: dict[int, float] = {}
 
     def _prepare(self) -> None:
@@ -107,7 +107,7 @@ class PythonExecutor(Executor):
                         if (status := function(*arguments)) and status not in SUCCESS_STATUSES:
                             runner.handle_status(*find_call(marker[CALL_NUMBER]), status)
                     if one + little != one - little or not least + least:
-                        runner.raise_float_mode_changed(*find_call(calls[-1][0]))
+                        self._restore_float_mode(calls[-1][0])
             if (termination := runner.termination) and not termination.complete:
                 return
             for get_bytes, exponent_bytes in exponents:

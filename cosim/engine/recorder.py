@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.recording import Recording
-from ..core.system import Endpoint
 from ..process.run_files.row_store import compute_in_chunks, open_row_store
 from .layout import ArrayPosition
 from .plan import Plan
@@ -29,20 +28,19 @@ class RowPart(NamedTuple):
 
 
 class Recorder:
-    """Stores the values of outputs at every `every`-th communication point.
+    """Stores the values of the recorded outputs at every `every`-th communication point.
 
     A row is a copy of the whole output buffer if at least half of it is recorded; otherwise it contains only the recorded values.
     Strings and binaries are stored in memory, apart from the rows.
 
     Args:
         plan: the compiled system.
-        columns: recorded name -> output.
-        every: recording interval (macro steps).
         file: file for the rows; by default they are in memory, or in a temporary file if there are very many.
     """
 
-    def __init__(self, plan: Plan, columns: Mapping[str, Endpoint], every: int = 1, file: Path | None = None):
-        self._plan, self.every = plan, every
+    def __init__(self, plan: Plan, file: Path | None = None):
+        self._plan, self.every = plan, plan.record_every
+        columns = plan.settings.columns
         #: recorded name -> its variable
         self.variables = {name: plan.system.find_element(endpoint).variable for name, endpoint in columns.items()}
         self._positions = {name: plan.outputs.positions[endpoint] for name, endpoint in columns.items()}
@@ -51,8 +49,7 @@ class Recorder:
         self.whole_buffer = 2 * sum(position.dtype.itemsize for position in numeric) >= plan.outputs.buffer.nbytes > 0
         #: the parts of a row otherwise
         self.row_parts: Sequence[RowPart] = () if self.whole_buffer else list(self._pack_row(numeric))
-        dtype, expected_rows = self._row_dtype(numeric), plan.grid.count // every + 1
-        self.row_store = open_row_store(dtype, expected_rows, file)
+        self.row_store = open_row_store(self._row_dtype(numeric), plan.row_count, file)
         #: number of rows recorded so far
         self.row_count = 0
         self._string_columns = {
@@ -90,6 +87,9 @@ class Recorder:
                 "itemsize": size,
             }
         )
+
+    def write_header(self, call_names: Sequence[tuple[str, str]]) -> None:
+        """Describe the rows for other processes; only rows that are saved for them need that."""
 
     def start_chunk(self) -> None:
         """Add a chunk to the row store; call it when the current chunk is full."""

@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
+from collections import Counter
 from collections.abc import Iterable, Iterator, Set
 from math import inf
-from pathlib import Path
 
 from ..core.component import Variable
-from ..core.errors import Problem
+from ..core.errors import InputError, Problem
+from ..core.size_limits import MAX_DELAYED_VALUES, format_count
 from ..core.system import Endpoint, System
 from ..core.time_grid import TimeGrid
-from ..process.journal import current_journal
 from .settings import Event, Settings
 
-#: bytes of a recorded number in the rows and in the CSV file, approximately
-_BYTES_PER_VALUE = 8 + 20
-#: size of the recording (bytes) from which the free disk space is checked
-_SIZE_CHECK_THRESHOLD = 1_000_000_000
 
+def check_run(system: System, settings: Settings) -> TimeGrid:
+    """Check that the system can be simulated with these settings, and return its communication points.
 
-def find_problems(system: System, settings: Settings) -> list[Problem]:
-    """Return all reasons why the system cannot be simulated with these settings; empty if it can.
-
-    The `subject` of a problem names the setting: ("stop_time",), ("components", NAME, "period"), ("events", "time"), ...
+    Raises:
+        InputError: it cannot. The `subject` of each problem names the setting: ("stop_time",), ("components", NAME, "period"),
+            ("events", "time"), ...
     """
     problems = [*system.problems(), *_find_event_problems(system, settings.events)]
     if settings.real_time is not None and not 0 < settings.real_time < inf:
@@ -34,12 +29,15 @@ def find_problems(system: System, settings: Settings) -> list[Problem]:
     except ValueError as error:
         problems.append(Problem(str(error), subject=("stop_time",)))
         if settings.step_size <= 0:
-            return problems
+            raise InputError(problems) from None
         grid = TimeGrid.from_times(settings.start_time, settings.start_time, settings.step_size)
     problems += _find_period_problems(system, grid)
+    problems += _find_delay_problems(system)
     problems += _find_recording_problems(settings, grid)
     problems += _find_event_time_problems(settings.events, grid)
-    return problems
+    if problems:
+        raise InputError(problems)
+    return grid
 
 
 def settable_variables(system: System) -> Iterator[tuple[str, Variable]]:
@@ -89,24 +87,19 @@ def _find_period_problems(system: System, grid: TimeGrid) -> Iterator[Problem]:
             yield Problem(f"the duration {duration!r} s is no multiple of the period {float(period)!r} s", subject=subject)
 
 
+def _find_delay_problems(system: System) -> Iterator[Problem]:
+    """Yield a problem if the delays store too many values; it has the location of the connections with the most of them."""
+    stored: Counter[str] = Counter()
+    for connection in system.connections:
+        stored[connection.where] += connection.delay
+    total = stored.total()
+    if total > MAX_DELAYED_VALUES:
+        text = f"the delays store {format_count(total)} values, expected at most {format_count(MAX_DELAYED_VALUES)}"
+        yield Problem(text, max(stored, key=lambda where: stored[where]), subject=("connections",))
+
+
 def _find_recording_problems(settings: Settings, grid: TimeGrid) -> Iterator[Problem]:
     interval = settings.record_interval or grid.step
     if interval < grid.step or (interval / grid.step).denominator != 1:
         text = f"recording interval {float(interval)!r} s is no multiple of the step size {float(grid.step)!r} s"
         yield Problem(text, subject=("record", "interval"))
-    elif text := _disk_space_problem(settings, grid, int(interval / grid.step)):
-        yield Problem(text, subject=("step_size",))
-
-
-def _disk_space_problem(settings: Settings, grid: TimeGrid, every: int) -> str:
-    """Return a message if the recording is larger than the free disk space, else ""."""
-    rows = grid.count // every + 1
-    size = rows * (len(settings.columns) + 1) * _BYTES_PER_VALUE
-    if size < _SIZE_CHECK_THRESHOLD:
-        return ""
-    journal = current_journal()
-    folder = (journal and journal.folder) or Path(tempfile.gettempdir())
-    free = shutil.disk_usage(folder).free
-    signals = f"{len(settings.columns)} signal{'' if len(settings.columns) == 1 else 's'}"
-    text = f"{rows} rows of {signals} take about {size / 1e9:.3g} GB, {free / 1e9:.3g} GB are free in {folder}"
-    return f'{text}; make the step longer, or set "record": {{"interval": ...}}' if size > free else ""

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from ..core.system import Endpoint
-from . import ExecutorKind
 from .pacer import LatePolicy
 
-#: called with n before the macro step that starts at communication point n; may wait, and may set variables like an event
-StepHook = Callable[[int], None]
+ExecutorKind = Literal["auto", "native", "python"]
+NonFinitePolicy = Literal["error", "allow", "fail"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +42,10 @@ class Settings:
         record_interval: time between recorded points (s, exact); None: every macro step.
         events: values to set during the run.
         executor: kind of the executor.
-        require_finite: a connected output that is NaN or infinite ends the run.
+        non_finite: treatment of NaN and infinity; "error": a connected output ends the run; "fail": a recorded output ends it
+            too; "allow": no output ends it.
         real_time: simulated seconds per second of wall time; None: as fast as possible.
         late: reaction to a step that is more than one step late in real time.
-        step_hook: called before every macro step.
         rows_file: file for the recorded rows; None: in memory, or in a temporary file if there are very many.
     """
 
@@ -57,8 +56,7 @@ class Settings:
     record_interval: Fraction | None = None
     events: Sequence[Event] = ()
     executor: ExecutorKind = "auto"
-    require_finite: bool = True
+    non_finite: NonFinitePolicy = "error"
     real_time: float | None = None
     late: LatePolicy = "warn"
-    step_hook: StepHook | None = None
     rows_file: Path | None = None

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import ctypes
-from typing import NamedTuple, NoReturn
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core.component import SUCCESS_STATUSES, PreparedCall, StepResult
-from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, describe_exception
+from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, describe_exception, join_alternatives
 from ..process import float_mode
 from ..process.journal import CALL_NUMBER, STEP_COUNT
 from .component_step import ScheduledStep
@@ -42,6 +43,7 @@ class StepRunner:
         self.current_time = ctypes.c_double()
         self.termination: Termination | None = None
         self._marker = marker
+        self._float_mode = float_mode.FloatModeGuard()
 
     @property
     def completed_steps(self) -> int:
@@ -57,14 +59,14 @@ class StepRunner:
         """Run the calls of a step, beginning with the call at index `first`.
 
         Raises:
-            ComponentError: a call failed or changed the floating-point mode.
+            ComponentError: a call failed.
         """
         for number, call in enumerate(step.calls[first:], start=step.first_call + first):
             self._marker[CALL_NUMBER] = number
             if (status := call.function(*call.arguments)) not in SUCCESS_STATUSES:
                 self.handle_status(step, call, status)
-        if float_mode.is_changed():
-            self.raise_float_mode_changed(step, step.calls[-1])
+        if float_mode.is_changed() or float_mode.enabled_traps():
+            self.restore_float_mode(step.step.name)
 
     def run_python_component(self, step: Step) -> int:
         """Run set_inputs, do_step and get_outputs of a component without prepared calls; returns a status.
@@ -112,14 +114,19 @@ class StepRunner:
         time = self.current_time.value
         if not isinstance(result, StepResult):
             raise ComponentError(step.name, "do_step", f"returned {result!r}, expected None or a StepResult", time)
-        complete = result.time_reached >= time + step.step_size
+        end = time + step.step_size
+        complete = result.time_reached >= end
         if result.terminate_requested:
             if not self.termination or (self.termination.complete and not complete):
-                self.termination = Termination(step.name, result.time_reached, complete)
+                self.termination = Termination(step.name, min(result.time_reached, end), complete)
         elif not complete:
-            reached = f"reached only t = {result.time_reached!r} s of {time + step.step_size!r} s"
+            reached = f"reached only t = {result.time_reached!r} s of {end!r} s"
             raise ComponentError(step.name, "do_step", f"{reached}; early return is not supported", time)
 
-    def raise_float_mode_changed(self, step: ScheduledStep, call: PreparedCall) -> NoReturn:
-        """Raise a ComponentError: `call` changed the floating-point mode."""
-        raise ComponentError(step.step.name, call.name, float_mode.CHANGE_REASON, self.current_time.value)
+    def restore_float_mode(self, component: str) -> None:
+        """Set the default floating-point mode again after a step of `component` changed it."""
+        self._float_mode.restore(component, "the step", self.current_time.value)
+
+    def restore_float_traps(self, components: Iterable[str], end: float) -> None:
+        """Disable floating-point traps again that one of the components enabled before time `end` (s)."""
+        self._float_mode.restore(join_alternatives(components), "a step", end, "before")

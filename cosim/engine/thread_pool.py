@@ -1,4 +1,4 @@
-"""Concurrent calls on a pool of threads; in a module of its own, since importing `concurrent.futures` takes milliseconds."""
+"""Concurrent calls on a pool of threads; a separate module, since importing `concurrent.futures` takes milliseconds."""
 
 from __future__ import annotations
 

@@ -10,7 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import InputError, Problem, did_you_mean
+from ..core.json_values import parse_object
 from ..core.resources import cache_directory
+from ..process.output_lock import LOCK_FILE, waiting_for_lock
+from ..results.files import remove_files, writing_atomically
 from .sources import SOURCE_KINDS, Source, classify_source, export_source, find_sources, resolve_source_path, tool_versions
 
 #: FMI version -> folder of the FMUs
@@ -96,7 +99,8 @@ def cached_fmu(source: Path, model: str | None) -> Path:
         model: Name of the model. None selects the model with the name of the file.
 
     Raises:
-        InputError: The model cannot be exported.
+        InputError: The model cannot be exported, or the cache cannot be written.
+        OutputError: The disk is full or defective.
     """
     classified = classify_source(source, model)
     files = sorted(source.resolve().parent.rglob("*.mo"))
@@ -104,7 +108,31 @@ def cached_fmu(source: Path, model: str | None) -> Path:
     contents = [(str(path), file_hash(path)) for path in [*files, *exporter]]
     key = sha256(json.dumps([str(source.resolve()), model, tool_versions(classified), contents]).encode())
     target = cache_directory() / "fmus" / key.hexdigest()[:24] / f"{classified.name}.fmu"
-    return target if target.is_file() else build_to(source, model, target)
+    if not _is_intact(target):
+        _build_in_cache(source, model, target)
+    return target
+
+
+def _build_in_cache(source: Path, model: str | None, target: Path) -> None:
+    """Build a cached FMU and its digest, unless another process does it while this one waits."""
+    with waiting_for_lock(target.parent / LOCK_FILE):
+        if not _is_intact(target):
+            remove_files(target.parent, target.name)
+            build_to(source, model, target)
+            with writing_atomically(_digest_file(target)) as temporary:
+                temporary.write_text(file_hash(target))
+
+
+def _is_intact(fmu: Path) -> bool:
+    """Return whether a cached FMU exists and has the digest with which it was written."""
+    try:
+        return file_hash(fmu).encode() == _digest_file(fmu).read_bytes()
+    except OSError:
+        return False
+
+
+def _digest_file(fmu: Path) -> Path:
+    return fmu.with_suffix(".sha256")
 
 
 def fmu_files(source: Source, root: Path) -> dict[int, Path]:
@@ -142,14 +170,15 @@ def read_manifest(root: Path) -> dict[str, Any]:
     """
     path = root / MANIFEST
     try:
-        manifest: dict[str, Any] = json.loads(path.read_text()) if path.is_file() else {}
-    except json.JSONDecodeError as error:
+        manifest = parse_object(path.read_text()) if path.is_file() else {}
+    except ValueError as error:
         raise InputError(Problem(f"is not valid JSON: {error}; remove it and run `cosim build`", str(path))) from None
     return manifest
 
 
 def _write_manifest(manifest: Mapping[str, Any], root: Path) -> None:
-    (root / MANIFEST).write_text(json.dumps(manifest, indent=1, sort_keys=True) + "\n")
+    with writing_atomically(root / MANIFEST) as temporary:
+        temporary.write_text(json.dumps(manifest, indent=1, sort_keys=True) + "\n")
 
 
 def _manifest_entry(source: Source, files: Iterable[Path], fmus: Mapping[int, Path], root: Path) -> dict[str, Any]:

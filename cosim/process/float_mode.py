@@ -8,9 +8,10 @@ import struct
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
-CHANGE_REASON = "changed the floating-point mode (rounding, flush to zero or traps) and did not restore it"
+from ..core import component_log
 
 #: 1, a number too small to change 1 when rounding to nearest, and the smallest subnormal number, which flush to zero makes 0 (a
 #: literal could already be flushed when it is parsed)
@@ -68,13 +69,42 @@ def default_float_mode() -> Iterator[None]:
         yield
         return
     outer = FloatEnvironment()
-    ctypes.PyDLL(None).fesetenv(_default_environment())
+    set_default()
     try:
         yield
     finally:
         outer.reinstate()
 
 
+def set_default() -> None:
+    """Set the mode of a new process in this thread."""
+    ctypes.PyDLL(None).fesetenv(_default_environment())
+
+
+class FloatModeGuard:
+    """Restorer of the default mode after calls of components; it warns of the first change by each component."""
+
+    def __init__(self) -> None:
+        self._reported: set[str] = set()
+
+    def restore(self, component: str, function: str, time: float, preposition: str = "at") -> None:
+        """Set the default mode, and warn unless the component has been reported before.
+
+        Args:
+            component: Name of the component that changed the mode.
+            function: Function or action that did so, for the message.
+            time: Time of the call (s).
+            preposition: "at", or "before" if the change is noticed later than in the call.
+        """
+        set_default()
+        if component not in self._reported:
+            self._reported.add(component)
+            change = f"{function} changed the floating-point mode (rounding, flush to zero or traps)"
+            text = f"{change} {preposition} t = {time:.12g} s; it is restored after every such call, which is reported once"
+            component_log.log_message(component, component_log.WARNING, text)
+
+
+@cache
 def _default_environment() -> Any:
     """Return FE_DFL_ENV of <fenv.h>, on x86-64 without flush to zero, which FE_DFL_ENV does not reset there."""
     if sys.platform == "darwin":

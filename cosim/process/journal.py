@@ -7,6 +7,7 @@ stepping loop with its deadline. A process without a supervisor has no journal.
 from __future__ import annotations
 
 import math
+import mmap
 import struct
 import time as clock
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, describe_exception
+from .forks import attributing_forks
 
 #: size of a journal (bytes)
 JOURNAL_SIZE = 5 * 4096
@@ -102,6 +104,11 @@ class Journal:
         """True if the content is plausible; foreign code in the process can overwrite it."""
         deadline, counts = self[DEADLINE], (self[STEP_COUNT], self[ROW_COUNT], self[CHANGE_COUNT])
         return self[PHASE] in _PHASES and self[CSV_UPDATE] in (0, 1) and -1 <= deadline <= _MAX_DEADLINE and min(counts) >= 0
+
+    def exclude_from_forks(self) -> None:
+        """Let each later copy of this process end at its first access (Linux); see `process.forks`."""
+        if hasattr(mmap, "MADV_DONTFORK"):
+            self.memory.madvise(mmap.MADV_DONTFORK)
 
     def to_bytes(self) -> bytes:
         """Return a copy of the whole content."""
@@ -203,7 +210,7 @@ def calling_component(component: str, function: str, deadline_name: str, time: f
     """
     journal = _current
     if journal is None:
-        with as_component_error(component, function, time):
+        with attributing_forks(lambda: (component, function)), as_component_error(component, function, time):
             yield
         return
     phase, deadline, before = journal.phase, journal.deadline, journal.activity()
@@ -212,7 +219,7 @@ def calling_component(component: str, function: str, deadline_name: str, time: f
         Phase.RESULTS_WRITTEN if phase == Phase.RESULTS_WRITTEN else Phase.CALLING, getattr(journal.deadlines, deadline_name)
     )
     try:
-        with as_component_error(component, function, time):
+        with attributing_forks(lambda: (component, function)), as_component_error(component, function, time):
             yield
     finally:
         journal.record_call(before.component, before.function, before.time)

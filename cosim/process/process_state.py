@@ -9,6 +9,7 @@ import os
 import resource
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -27,6 +28,11 @@ _RESERVED_DESCRIPTORS = 32
 _SIGACTION_SIZE = 512  # more than any platform's struct sigaction, which begins with the handler
 _POINTER_SIZE = ctypes.sizeof(ctypes.c_void_p)
 
+#: held while foreign code may change the state of the process, so that threads run foreign code in turns
+_lock = threading.RLock()
+#: states at the begin of the nested blocks of the thread that holds the lock
+_saved_states: list[ProcessState] = []
+
 
 class ProcessState:
     """Values of all attributes in `_ATTRIBUTES` at the time of construction."""
@@ -42,7 +48,7 @@ class ProcessState:
 
 @contextmanager
 def restoring_process_state(component: str) -> Iterator[None]:
-    """Restore the process state at the end of the block and warn of each change.
+    """Restore the process state at the end of the block and warn of each change; other threads wait before such a block.
 
     A supervised process whose standard output or standard error was closed ends here: only its supervisor can still report the
     component and save the rows.
@@ -50,17 +56,46 @@ def restoring_process_state(component: str) -> Iterator[None]:
     Args:
         component: Name of the component or components that may change the state, for messages.
     """
-    state, output_files = ProcessState(), _output_files()
-    try:
+    with _lock:
+        state, output_files = ProcessState(), _output_files()
+        _saved_states.append(state)
+        try:
+            yield
+        finally:
+            _saved_states.pop()
+            journal = current_journal()
+            if journal and output_files != _output_files():
+                journal.record_call(component, "a call that closed the files of the process")
+                journal.enter_phase(journal.phase if journal.phase == Phase.RESULTS_WRITTEN else Phase.CALLING)
+                os._exit(70)
+            for change in state.restore():
+                text = f"changed {change} of the process; it was changed back"
+                component_log.log_message(component, component_log.WARNING, text)
+
+
+@contextmanager
+def exclusive_process_state() -> Iterator[None]:
+    """Wait until no other thread is in such a block or in `restoring_process_state`, and keep other threads out."""
+    with _lock:
         yield
-    finally:
-        journal = current_journal()
-        if journal and output_files != _output_files():
-            journal.record_call(component, "a call that closed the files of the process")
-            journal.enter_phase(Phase.CALLING)
-            os._exit(70)
-        for change in state.restore():
-            component_log.log_message(component, component_log.WARNING, f"changed {change} of the process; it was changed back")
+
+
+def _release_after_fork() -> None:
+    """In a child forked while another thread held the lock, replace the lock and restore what that thread would restore."""
+    global _lock
+    if _lock.acquire(blocking=False):
+        _lock.release()
+        return
+    _lock = threading.RLock()
+    if _saved_states:
+        mask = _signal_mask()
+        _saved_states[0].restore()
+        _set_signal_mask(mask)  # that of this thread, not of the other one
+        _saved_states.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_release_after_fork)
 
 
 def _output_files() -> list[tuple[int, int]]:
@@ -86,8 +121,13 @@ def _working_directory() -> str:
     return ""
 
 
+def _set_working_directory(path: str) -> None:
+    with suppress(OSError):  # the folder was removed meanwhile
+        os.chdir(path)
+
+
 def _umask() -> int:
-    mask = os.umask(0)
+    mask = os.umask(0o077)  # safe for a file that another thread creates now
     os.umask(mask)
     return mask
 
@@ -114,9 +154,14 @@ def _c_environment() -> dict[bytes, bytes]:
 
 
 def _set_c_environment(variables: dict[bytes, bytes]) -> None:
-    for name in {*_c_environment(), *variables}:
-        value = variables.get(name)
-        _c_library().unsetenv(name) if value is None else _c_library().setenv(name, value, 1)
+    current = _c_environment()
+    for name in (name for name in {*current, *variables} if current.get(name) != variables.get(name)):
+        with suppress(OSError, ValueError):  # a name that is not permitted
+            if (value := variables.get(name)) is None:
+                os.environb.pop(name, None)
+                _c_library().unsetenv(name)  # a variable that `os.environ` does not know
+            else:
+                os.environb[name] = value
 
 
 def _signal_mask() -> set[int]:
@@ -228,7 +273,7 @@ def _compared(name: str, read: Callable[[], Any], write: Callable[[Any], object]
 
 _ATTRIBUTES = (
     _Attribute("the floating-point mode", FloatEnvironment, _restore_float_mode),
-    _compared("the working directory", _working_directory, os.chdir),
+    _compared("the working directory", _working_directory, _set_working_directory),
     _compared("the file mode mask", _umask, os.umask),
     _compared("the locale", _locale, _set_locale),
     _compared("the environment", _c_environment, _set_c_environment),

@@ -10,9 +10,10 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from . import journal as journals
+from .forks import watch_forks
 from .journal import EXIT_CODE, Journal, Phase
+from .limits import detach, lower_limit
 from .process_state import reserve_descriptors
-from .sandbox.limits import detach, lower_limit
 from .standard_streams import protected_stream
 
 #: limit of the private memory of a supervised run (bytes); mapped files of rows do not count
@@ -33,6 +34,8 @@ def run_child(entry: Callable[[], int], journal: Journal, output: int, temporary
     try:
         _isolate(output, supervisor)
         tempfile.tempdir = os.environ["TMPDIR"] = temporary_folder
+        journal.exclude_from_forks()
+        watch_forks()
         journals.set_current_journal(journal)
         code = entry()
         sys.stdout.flush()

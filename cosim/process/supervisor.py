@@ -33,6 +33,9 @@ POLL_INTERVAL = 0.05
 #: time after an interrupt until the child is killed (s)
 INTERRUPT_TIMEOUT = 3.0
 
+#: time after which a process that was stopped from outside (SIGSTOP) is killed (s)
+STOP_TIMEOUT = 5.0
+
 #: number of searches for orphaned processes; each one may find children of the processes killed before
 _MAX_ORPHAN_SCANS = 10
 
@@ -128,7 +131,10 @@ class _Supervisor:
     _progress: tuple[int, ...] = ()
     _progress_time: float = field(default_factory=time.monotonic)
     _interrupt_time: float = 0.0
+    #: time at which the child was stopped from outside; 0 while it runs
+    _stop_time: float = 0.0
     _timeout_reason: str = ""
+    _stop_failure: ComponentError | None = None
     #: content of the journal at the last check
     _last_contents: bytes = b""
 
@@ -156,17 +162,21 @@ class _Supervisor:
         while True:
             try:
                 poll.poll(POLL_INTERVAL * 1000)
-                self._output.forward()
-                pid, status = os.waitpid(self.child, os.WNOHANG)
-                if pid:
+                if not self._output.forward():
+                    with suppress(KeyError):
+                        poll.unregister(self.reader)  # a closed pipe is always ready
+                pid, status = os.waitpid(self.child, os.WNOHANG | os.WUNTRACED | os.WCONTINUED)
+                if pid and (os.WIFEXITED(status) or os.WIFSIGNALED(status)):
                     return status
+                if pid:
+                    self._stop_time = time.monotonic() if os.WIFSTOPPED(status) else 0.0
                 self._check_deadline()
                 csv.update()
             except KeyboardInterrupt:
                 self._forward_interrupt()
 
     def _check_deadline(self) -> None:
-        """Kill the child if its call exceeds the deadline, its journal was overwritten, or it ignores an interrupt."""
+        """Kill a child that exceeds a deadline, has overwritten its journal, ignores an interrupt or was stopped from outside."""
         journal, now = self.journal, time.monotonic()
         if not journal.is_valid:
             os.kill(self.child, signal.SIGKILL)
@@ -178,6 +188,11 @@ class _Supervisor:
             self._progress, self._progress_time = progress, now
         elif now - self._progress_time > deadline:
             self._timeout_reason = f"did not return within {deadline:g} s"
+            os.kill(self.child, signal.SIGKILL)
+        if self._stop_time and now - self._stop_time > STOP_TIMEOUT:
+            self._stop_failure = ComponentError(
+                "cosim", "the run", f"its process was stopped from outside for {STOP_TIMEOUT:g} s"
+            )
             os.kill(self.child, signal.SIGKILL)
         if self._interrupt_time and now - self._interrupt_time > INTERRUPT_TIMEOUT:
             os.kill(self.child, signal.SIGKILL)
@@ -215,10 +230,18 @@ class _Supervisor:
             return SupervisedOutcome(code, rows, journal)
         if self._interrupt_time:
             return SupervisedOutcome(130, rows, journal, interrupted=True)
-        failure = attribute_failure(journal, self._timeout_reason or describe_exit_status(status))
+        failure = self._stop_failure or attribute_failure(journal, self._timeout_reason or describe_exit_status(status))
         if phase == Phase.RESULTS_WRITTEN:
             return SupervisedOutcome(code, rows, journal, warning=f"{failure}; all results were written before")
         return SupervisedOutcome(1, rows, journal, failure)
+
+
+def is_stopped(process: int) -> bool:
+    """Return whether a process is stopped (SIGSTOP); False where the system does not tell."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(") ")[2].startswith("T")
+    except OSError:
+        return False
 
 
 def _child_processes() -> list[int]:

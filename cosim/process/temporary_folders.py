@@ -12,6 +12,8 @@ from pathlib import Path
 from shutil import rmtree
 from weakref import finalize
 
+from .output_lock import lock_descriptor
+
 #: prefixes of folders for a run, an extracted FMU, and the files that an isolated FMU writes
 RUN_PREFIX, FMU_PREFIX, WORKER_PREFIX = "cosim-run-", "cosim-fmu-", "cosim-worker-"
 
@@ -61,11 +63,10 @@ def _create_locked_folder(prefix: str) -> tuple[str, int]:
     while True:
         folder = tempfile.mkdtemp(prefix=prefix)
         lock = _lock_folder(folder, wait=True)
-        if lock is None:
-            return folder, -1
         if Path(folder).is_dir():  # else another process removed it before it was locked
-            return folder, lock
-        os.close(lock)
+            return folder, -1 if lock is None else lock
+        if lock is not None:
+            os.close(lock)
 
 
 @cache
@@ -83,13 +84,11 @@ def _lock_folder(folder: str | Path, wait: bool) -> int | None:
     """Lock a folder of this user and return the descriptor that holds the lock; None if that is impossible."""
     if sys.platform == "win32":
         return None
-    import fcntl
-
     with suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
         try:
             if os.fstat(descriptor).st_uid == os.geteuid():
-                fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+                lock_descriptor(descriptor, wait)
                 return descriptor
         except OSError:
             pass

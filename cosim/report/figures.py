@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from io import StringIO
+from io import BytesIO, StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -98,6 +98,17 @@ def figure_to_svg(figure: Figure) -> str:
     with figure_style():
         figure.savefig(text, format="svg", dpi="figure", metadata=_SVG_METADATA)
     return text.getvalue()
+
+
+def draw_nothing() -> None:
+    """Draw axes without curves, which imports and caches what matplotlib needs for any figure."""
+    from matplotlib.figure import Figure
+
+    with figure_style():
+        figure = Figure()
+        figure.subplots().set_title("0")
+        figure.savefig(BytesIO(), format="png")
+    figure_to_svg(figure)
 
 
 def draw_figures(

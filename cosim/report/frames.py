@@ -55,7 +55,7 @@ def render_frames(job: RenderJob, processes: int | None = None) -> Generator[np.
         processes: The number of processes; None: one per processor, but fewer for a short video.
 
     Raises:
-        CosimError: A process ended without an error of its own, such as after a crash.
+        CosimError: A process ended without an error message, for example by a crash.
     """
     if processes is None:
         processes = min(os.cpu_count() or 1, MAX_PROCESSES, len(job.times) // MIN_FRAMES_PER_PROCESS)

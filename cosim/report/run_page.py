@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -38,13 +38,13 @@ class KpiRow(NamedTuple):
     passed: bool = True
 
 
-def write_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Mapping[str, str], path: Path) -> None:
+def write_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Iterable[tuple[str, str]], path: Path) -> None:
     """Write the report of a run: KPIs, checks, figures, system diagram, scenario, versions, timings, warnings and replay.
 
     Args:
         result: The run.
         outcomes: The outcomes of the scenario's checks.
-        figures: The figures as SVG text, by name.
+        figures: Name and SVG text of each figure; read when the rest of the page is ready, so they may still be being drawn.
         path: The HTML file to write.
 
     Raises:
@@ -61,7 +61,7 @@ def write_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Mapp
         cards=[_check_row(outcome, units) for outcome in outcomes],
         kpis=_group_kpis(result.kpis, units),
         warnings=result.metadata.get("warnings", []),
-        figures=[_figure_element(name, svg) for name, svg in figures.items()],
+        figures=(_figure_element(name, svg) for name, svg in figures),
         d=build_diagram(about["system"]) if about["system"] else None,
         scenario=json.dumps(about["scenario"], indent=1, ensure_ascii=False),
         timings=list(_timings(result)),

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel, ValidationError
+
 from ..core.errors import InputError
+from ..core.json_values import parse_object
 from ..results import Kpis, Result
+from ..scenario.json_document import read_document
 from ..scenario.named_functions import load_function
+from ..scenario.validation import schema_problems
+from .run_schema import KpiFile, RunFile
 
 #: name, function and keyword arguments of a figure
 NamedCall = tuple[str, Callable[..., Any], Mapping[str, Any]]
@@ -26,23 +31,25 @@ def read_run(directory: str | Path) -> Result:
         InputError: A file is missing or invalid.
     """
     directory = Path(directory)
-    about = _read_json(directory / "run.json")
+    about = _read_json(directory / "run.json", RunFile)
     timing, units = about.pop("timing", {}), about.pop("units", {})
-    kpis = _read_json(directory / "kpis.json") if (directory / "kpis.json").exists() else {}
+    kpis = _read_json(directory / "kpis.json", KpiFile) if (directory / "kpis.json").exists() else {}
     numbers = {name: math.nan if value is None else value for name, value in kpis.items()}
     recording = Result.from_csv(directory / "result.csv").recording
     return Result(replace(recording, units={**recording.units, **units}), Kpis(numbers), timing, about)
 
 
-def _read_json(path: Path) -> dict[str, Any]:
+def _read_json(path: Path, schema: type[BaseModel]) -> dict[str, Any]:
+    """Read a JSON object that `cosim run` has written; raise InputError, with the line, if another program has changed it."""
     try:
-        value = json.loads(path.read_text(encoding="utf-8"))
+        value = parse_object(path.read_text(encoding="utf-8"))
+        schema.model_validate(value)
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}; expected a folder that `cosim run` wrote") from error
+    except ValidationError as error:
+        raise InputError(schema_problems(schema, read_document(path), error)) from None
     except ValueError as error:
-        raise InputError(f"{path} is not valid JSON: {error}") from error
-    if not isinstance(value, dict):
-        raise InputError(f"{path} is not a JSON object; expected a file that `cosim run` wrote")
+        raise InputError(f"{path} is not valid JSON: {error}; expected a file that `cosim run` wrote") from error
     return value
 
 

@@ -51,7 +51,7 @@ def build_scene(metadata: Mapping[str, Any]) -> dict[str, Any]:
     scene: dict[str, Any] = {**{key: [] for key in LIST_KEYS}, "water": None}
     if "scenario_file" not in metadata:
         return scene
-    for part in _scene_parts(metadata["scenario"], Path(metadata["scenario_file"]).parent):
+    for part in _scene_parts(metadata.get("scenario", {}), Path(metadata["scenario_file"]).parent):
         for key in LIST_KEYS:
             scene[key] += part.get(key, [])
         scene["water"] = scene["water"] or part.get("water")

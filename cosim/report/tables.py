@@ -1,8 +1,9 @@
-"""The table of KPIs and checks that is printed after a run."""
+"""Tables in the terminal: KPIs and checks after a run, and the console for tables of other commands."""
 
 from __future__ import annotations
 
 import math
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, TextIO
@@ -13,7 +14,6 @@ from ..results.checks import CheckOutcome, Number
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
 MAX_LINE_WIDTH = 1000  # characters, of output that is not a terminal
 
@@ -26,7 +26,8 @@ def print_kpis(
 ) -> None:
     """Print a table of all KPIs with their units and checks; print nothing if there are none.
 
-    Colours are used only on a terminal without NO_COLOR. Other output has no line breaks within a row.
+    It does without Rich, which takes longer to import than a short run to evaluate. Colours are used only on a terminal without
+    NO_COLOR.
 
     Args:
         kpis: The values by name.
@@ -36,8 +37,34 @@ def print_kpis(
     """
     if not kpis:
         return
-    console = table_console(file)
-    console.print(_kpi_table(kpis, outcomes, units or {}, plain=console.options.ascii_only))
+    file = unescaped(file or sys.stdout)
+    plain, coloured = not file.encoding.lower().startswith("utf"), _has_colours(file)
+    rows = [("KPI", "value", "unit", "check" if outcomes else "", "")]
+    for name, value in kpis.items():
+        checks = [(o.limits, _check_mark(o.passed, plain, coloured)) for o in outcomes if o.check["kpi"] == name] or [("", "")]
+        cells = escape_control_characters(name), format_number(value), escape_control_characters((units or {}).get(name, ""))
+        rows += [(*(("", "", "") if i else cells), *check) for i, check in enumerate(checks)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = [_join_cells(row, widths) for row in rows]
+    lines.insert(1, ("-" if plain else "─") * (sum(widths[:4]) + 3 * len(widths)))
+    file.write("\n".join((*lines, "")))
+
+
+def _join_cells(row: Sequence[str], widths: Sequence[int]) -> str:
+    name, value, unit, limits, mark = row
+    return f"{name:{widths[0]}}   {value:>{widths[1]}}   {unit:{widths[2]}}   {limits:{widths[3]}}   {mark}".rstrip()
+
+
+def _check_mark(passed: bool, plain: bool, coloured: bool) -> str:
+    word = ("ok" if plain else "✓") if passed else ("failed" if plain else "✗ failed")
+    return f"\x1b[{'32' if passed else '1;31'}m{word}\x1b[0m" if coloured else word
+
+
+def _has_colours(file: TextIO) -> bool:
+    """Return whether a stream shows colours; see no-color.org and force-color.org."""
+    if os.environ.get("NO_COLOR"):
+        return False
+    return bool(os.environ.get("FORCE_COLOR")) or (file.isatty() and os.environ.get("TERM") not in ("dumb", "unknown"))
 
 
 def table_console(file: TextIO | None = None, width: int = MAX_LINE_WIDTH) -> Console:
@@ -60,35 +87,6 @@ def cell_text(text: str) -> str:
     from rich.markup import escape
 
     return escape(escape_control_characters(text))
-
-
-def _kpi_table(kpis: Mapping[str, Number], outcomes: Sequence[CheckOutcome], units: Mapping[str, str], plain: bool) -> Table:
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    table.add_column("KPI", overflow="fold")
-    table.add_column("value", justify="right", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
-    if outcomes:
-        table.add_column("check", no_wrap=True)
-        table.add_column("", no_wrap=True)
-    for name, value in kpis.items():
-        own = [outcome for outcome in outcomes if outcome.check["kpi"] == name]
-        limits, marks = (
-            "\n".join(outcome.limits for outcome in own),
-            "\n".join(_check_mark(outcome.passed, plain) for outcome in own),
-        )
-        table.add_row(
-            cell_text(name), format_number(value), cell_text(units.get(name, "")), *([limits, marks] if outcomes else [])
-        )
-    return table
-
-
-def _check_mark(passed: bool, plain: bool) -> str:
-    if passed:
-        return f"[green]{'ok' if plain else '✓'}[/]"
-    return f"[bold red]{'failed' if plain else '✗ failed'}[/]"
 
 
 def format_number(value: Number) -> str:

@@ -32,19 +32,32 @@ def write_csv(recording: Recording, path: str | Path) -> None:
         OutputError: The disk is full or defective.
     """
     columns = [recording.time, *recording.columns.values()]
-    with writing_atomically(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(format_header(recording.columns))
+    format_rows = _format_texts if any(column.dtype == object for column in columns) else _format_numbers
+    with writing_atomically(path) as temporary, temporary.open("wb") as file:
+        file.write(format_header(recording.columns).encode())
         for piece in iterate_chunks(columns, ROWS_PER_CHUNK):
-            cells = [_format_column(column[piece]) for column in columns]
-            file.writelines(",".join(row) + "\n" for row in zip(*cells, strict=True))
+            file.write(format_rows([column[piece] for column in columns]))
 
 
-def _format_column(column: np.ndarray) -> list[str]:
-    """Return the cells of one column; `pydantic_core` finds the shortest exact digits three times faster than `repr`."""
-    if column.dtype == object:
-        return list(map(quote_cell, column))
-    numbers = column.astype(np.uint8) if column.dtype == bool else column
-    return pydantic_core.to_json(numbers.tolist(), inf_nan_mode="constants")[1:-1].decode().split(",")
+def _format_numbers(columns: Sequence[np.ndarray]) -> bytes:
+    """Return the lines of rows of numbers; `pydantic_core` finds the shortest exact digits three times faster than `repr`."""
+    rows = list(zip(*map(_to_numbers, columns), strict=True))
+    return pydantic_core.to_json(rows, inf_nan_mode="constants")[2:-2].replace(b"],[", b"\n") + b"\n"
+
+
+def _format_texts(columns: Sequence[np.ndarray]) -> bytes:
+    """Return the lines of rows with texts."""
+    cells = [
+        map(quote_cell, column) if column.dtype == object else _format_numbers([column]).decode().splitlines()
+        for column in columns
+    ]
+    return "".join(",".join(row) + "\n" for row in zip(*cells, strict=True)).encode()
+
+
+def _to_numbers(column: np.ndarray) -> list[float]:
+    """Return the values of a column; Booleans as 0 and 1."""
+    numbers: list[float] = (column.astype(np.uint8) if column.dtype == bool else column).tolist()
+    return numbers
 
 
 def read_csv(path: str | Path) -> Recording:

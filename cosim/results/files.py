@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import errno
 import glob
 import json
 import math
 import mmap
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from secrets import token_hex
 from tempfile import TemporaryFile
 from typing import Any
 
 import numpy as np
 
-from ..core.errors import CosimError, InputError, OutputError
-
-#: errors of the disk, not of the path
-_DISK_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+from ..core.errors import write_error
+from ..process.run_files.row_store import FileMapping
 
 #: suffix of files that are being written
 _PART_SUFFIX = ".part"
@@ -41,9 +38,9 @@ def iterate_chunks(arrays: Sequence[np.ndarray], size: int) -> Iterator[slice]:
             file.madvise(mmap.MADV_DONTNEED)
 
 
-def _memory_map(array: Any) -> mmap.mmap | None:
+def _memory_map(array: Any) -> mmap.mmap | FileMapping | None:
     """Return the file mapping behind an array; None if it is not mapped to a file."""
-    while array is not None and not isinstance(array, mmap.mmap):
+    while array is not None and not isinstance(array, mmap.mmap | FileMapping):
         array = getattr(array, "base", None)
     return array if hasattr(mmap, "MADV_DONTNEED") else None
 
@@ -63,45 +60,45 @@ def writing_atomically(path: str | Path) -> Iterator[Path]:
         OutputError: The disk is full or defective.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}{_PART_SUFFIX}")
+    temporary = path.with_name(f".{path.name}.{token_hex(8)}{_PART_SUFFIX}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield temporary
         temporary.replace(path)
     except OSError as error:
-        raise _write_error(f"cannot write {path}: {error}", error) from error
+        raise write_error(f"cannot write {path}: {error}", error) from error
     finally:
         with suppress(OSError):
             temporary.unlink()
 
 
-def _write_error(text: str, error: OSError) -> CosimError:
-    return OutputError(text) if error.errno in _DISK_ERRORS else InputError(text)
-
-
 def check_writable(directory: Path) -> None:
-    """Create a folder if necessary and raise the errors of `writing_atomically` if no file can be written there."""
+    """Create a folder if necessary; raise OutputError or InputError if no file can be written there."""
     try:
         directory.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=directory):
             pass
     except OSError as error:
-        raise _write_error(f'cannot write to "{directory}": {error.strerror or error}', error) from None
+        raise write_error(f'cannot write to "{directory}": {error.strerror or error}', error) from None
 
 
 def remove_files(directory: Path, *names: str) -> None:
-    """Remove files of earlier runs and their temporary files; raise the errors of `writing_atomically`.
+    """Remove files of earlier runs and their temporary files.
 
     Args:
         directory: Folder of the files.
         *names: Names of the files.
+
+    Raises:
+        OutputError: The disk failed or is full.
+        InputError: A file cannot be removed.
     """
     try:
         for name in names:
             for path in (directory / name, *directory.glob(f".{glob.escape(name)}.*{_PART_SUFFIX}")):
                 path.unlink(missing_ok=True)
     except OSError as error:
-        raise _write_error(f'cannot replace "{path}": {error.strerror or error}', error) from None
+        raise write_error(f'cannot replace "{path}": {error.strerror or error}', error) from None
 
 
 def write_json(data: Mapping[str, Any], path: str | Path) -> None:

@@ -22,7 +22,7 @@ from typing import Any, Literal, NamedTuple, TypeVar
 import numpy as np
 
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, Problem, describe_exception, did_you_mean
-from ..core.units import multiply_units
+from ..core.units import multiply_units, split_unit
 from .checks import Number
 from .result import Result
 
@@ -32,8 +32,8 @@ Signal = str
 Prefix = str
 KpiFunction = TypeVar("KpiFunction", bound=Callable[..., Any])
 
-#: factor of a declared unit: a unit, or the name of an argument in braces, and a power
-_UNIT_FACTOR = re.compile(r"(\{(\w+)\}|[A-Za-z%]+)(-?\d*)")
+#: name of an argument, in a declared unit
+_PLACEHOLDER = re.compile(r"\{(\w+)\}")
 
 
 class ResultFunction(NamedTuple):
@@ -216,9 +216,14 @@ def _resolve_unit(declared: str, arguments: Mapping[str, Any], signal_units: Map
     """Replace the names of arguments in a declared unit by the units of their signals."""
     if "{" not in declared:
         return declared
-    factors = [(part, signal, int(power or 1)) for part, signal, power in _UNIT_FACTOR.findall(declared)]
-    known = [(signal_units.get(str(arguments.get(signal)), "") if signal else part, power) for part, signal, power in factors]
-    return multiply_units(known) if all(unit for unit, _ in known) else ""
+    factors = [
+        (signal_units.get(str(arguments.get(match[1])), "") if (match := _PLACEHOLDER.fullmatch(symbol)) else symbol, power)
+        for symbol, power in split_unit(declared)
+    ]
+    if not all(unit for unit, _ in factors):
+        return ""
+    (unit, power), *others = factors
+    return unit if power == 1 and not others else multiply_units(factors)
 
 
 def kpi_senses(kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]], names: Iterable[str]) -> dict[str, str]:

@@ -14,8 +14,6 @@ from ..core.errors import InputError, did_you_mean
 from ..core.recording import Recording
 from .csv_files import read_csv, write_csv
 from .files import write_json
-from .mcap_files import write_mcap
-from .parquet_files import write_parquet
 
 if TYPE_CHECKING:
     from .checks import CheckOutcome
@@ -99,12 +97,19 @@ class Result:
         """Return the number of signals."""
         return len(self.recording.columns)
 
+    @property
+    def termination(self) -> str:
+        """Sentence that names the component that ended the run and the time; "" if none did."""
+        terminated_by = self.metadata.get("terminated_by")
+        return describe_termination(**terminated_by) if terminated_by else ""
+
     def __repr__(self) -> str:
-        """Return name, size, failure, failed checks and KPIs, in several lines."""
+        """Return name, size, failure, termination, failed checks and KPIs, in several lines."""
         rows = f"{len(self.time)} rows of {len(self)} signals"
         span = f", {self.time[0]:g} s to {self.time[-1]:g} s" if len(self.time) else ""
         failure, units = self.metadata.get("failure"), self.metadata.get("kpi_units", {})
         lines = [f"{self.metadata.get('name', 'Result')}: {rows}{span}", *([f"ended early: {failure}"] if failure else [])]
+        lines += [self.termination] if self.termination else []
         lines += self._summarize_checks()
         width = max(map(len, self.kpis), default=0)
         for name, value in self.kpis.items():
@@ -149,6 +154,8 @@ class Result:
             InputError: The path cannot be written, or the package pyarrow is not installed.
             OutputError: The disk is full or defective.
         """
+        from .parquet_files import write_parquet
+
         write_parquet(self.recording, path)
 
     def to_mcap(self, path: str | Path, scene: Mapping[str, Any] | None = None) -> None:
@@ -162,6 +169,8 @@ class Result:
             InputError: The path cannot be written, or the package foxglove-sdk is not installed.
             OutputError: The disk is full or defective.
         """
+        from .mcap_files import write_mcap
+
         about = {key: value for key, value in self.metadata.items() if key in ("name", "versions", "sha256")}
         write_mcap(self.recording, path, scene, about)
 
@@ -176,6 +185,11 @@ class Result:
             InputError: The file cannot be read.
         """
         return cls(read_csv(path))
+
+
+def describe_termination(component: str, time: float) -> str:
+    """Return a sentence that says that a component ended the run at `time` (s)."""
+    return f"{component} requested the end of the simulation at t = {time:.12g} s"
 
 
 def write_run(result: Result, directory: str | Path) -> None:

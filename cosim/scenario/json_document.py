@@ -18,14 +18,13 @@ from typing import Any
 
 from ..core.errors import InputError, Problem
 from ..core.paths import open_text
+from ..core.text import acceptable_text, shorten, text_problem
 
 #: keys and indices from the root of a document to a value
 JsonPath = tuple["str | int", ...]
 _DECODER = json.JSONDecoder()
 _WHITESPACE = re.compile(r"[ \t\r\n]*")
 _LITERAL = re.compile(r"-?Infinity|NaN|true|false|null|-?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][-+]?\d+)?")
-#: NUL is not allowed in file names, and surrogates are not allowed in UTF-8
-_FORBIDDEN_CHARACTERS = re.compile("[\0\ud800-\udfff]")
 #: longest number that is read (characters); a longer one counts as infinite
 _MAX_NUMBER_LENGTH = 1000
 _IDENTIFIER = re.compile(r"[A-Za-z_]\w*")
@@ -40,6 +39,8 @@ class Document:
     value: Any = None
     offsets: dict[JsonPath, int] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
+    #: paths of the values with these problems; they hold placeholders
+    invalid_paths: list[JsonPath] = field(default_factory=list)
 
     def where(self, path: Sequence[str | int]) -> str:
         """Return "file:line:column: $.json.path", with the position of the deepest part of `path` that exists."""
@@ -67,17 +68,17 @@ def json_path(path: Sequence[str | int]) -> str:
 def _format_key(key: str | int) -> str:
     if isinstance(key, int):
         return f"[{key}]"
-    return f".{key}" if _IDENTIFIER.fullmatch(key) else f"[{json.dumps(key)}]"
+    return f".{shorten(key)}" if _IDENTIFIER.fullmatch(key) else f"[{json.dumps(shorten(key))}]"
 
 
 def read_document(file: Path) -> Document:
-    """Read a JSON file.
+    """Read a JSON file in UTF-8, with or without a byte order mark.
 
     Raises:
         InputError: The file cannot be read, is not UTF-8, or is not JSON.
     """
     try:
-        with open_text(file, encoding="utf-8") as opened:
+        with open_text(file, encoding="utf-8-sig") as opened:
             text = opened.read()
     except OSError as error:
         raise InputError(f'cannot read "{file}": {error.strerror}') from None
@@ -116,7 +117,8 @@ class _JsonParser:
             case "[":
                 return self.array(offset, path)
             case '"':
-                return self.string(offset)
+                text, end = self.string(offset)
+                return self.clean(text, path), end
         return self.literal(offset, path)
 
     def object(self, offset: int, path: JsonPath) -> tuple[dict[str, Any], int]:
@@ -128,7 +130,11 @@ class _JsonParser:
             if self.text[offset : offset + 1] != '"':
                 raise self.error(offset, 'expected a key in double quotes or "}"')
             begin = offset
-            key, offset = self.string(offset)
+            raw_key, offset = self.string(offset)
+            key = acceptable_text(raw_key)
+            if key != raw_key:
+                self.document.offsets[(*path, key)] = begin
+                self.clean(raw_key, (*path, key))
             offset = self.expect(_skip_whitespace(self.text, offset), ":")
             value, offset = self.value(offset, (*path, key))
             if key in result:
@@ -160,10 +166,13 @@ class _JsonParser:
             text, end = _DECODER.raw_decode(self.text, offset)
         except json.JSONDecodeError as error:
             raise self.error(error.pos, error.msg) from None
-        if match := _FORBIDDEN_CHARACTERS.search(text):
-            message = f"the character U+{ord(match.group()):04X} is not allowed"
-            self.document.problems.append(Problem(message, self.document.position(offset)))
-        return _FORBIDDEN_CHARACTERS.sub("\N{REPLACEMENT CHARACTER}", text), end
+        return text, end
+
+    def clean(self, text: str, path: JsonPath) -> str:
+        """Return the acceptable part of a text; what is not acceptable is a problem of the value or key at `path`."""
+        if message := text_problem(text):
+            self.problem(path, message)
+        return acceptable_text(text)
 
     def literal(self, offset: int, path: JsonPath) -> tuple[Any, int]:
         match = _LITERAL.match(self.text, offset)
@@ -178,3 +187,4 @@ class _JsonParser:
 
     def problem(self, path: JsonPath, message: str) -> None:
         self.document.problems.append(Problem(message, self.document.where(path)))
+        self.document.invalid_paths.append(path)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..core.component import Component, Variable
 from ..core.errors import did_you_mean
+from ..core.text import shorten, text_problem
 from .nested_systems import Node
 
 _REALS = ("Float64", "Float32")
@@ -45,6 +46,8 @@ def resolve_name(node: Node, text: str, ports: Sequence[str], include_inner: boo
     if component in node.invalid_components or "components" in node.invalid_keys:
         raise UnknownNameError
     if component not in node.spec.components:
+        if node.has_wrong_names:
+            raise UnknownNameError
         raise UnknownNameError(f'unknown component "{component}"{did_you_mean(component, node.spec.components)}')
     child = node.children.get(component)
     if child is None:
@@ -54,12 +57,16 @@ def resolve_name(node: Node, text: str, ports: Sequence[str], include_inner: boo
             f'"{text}" names a nested system, expected one of its ports{did_you_mean("", _port_targets(child, ports))}'
         )
     port = re.split(r"[.\[]", rest, maxsplit=1)[0]
+    if port in child.invalid_ports and "outputs" in ports:
+        raise UnknownNameError
     inner_names = _port_targets(child, ports)
     if port in inner_names:
         suffix = rest[len(port) :]
         return [target for inner in inner_names[port] for target in resolve_name(child, inner + suffix, ports, include_inner)]
     if include_inner and port in {*child.spec.components, *child.invalid_components}:
         return resolve_name(child, rest, ports, include_inner)
+    if "ports" in child.invalid_keys:
+        raise UnknownNameError
     valid = [*inner_names, *(child.spec.components if include_inner else ())]
     raise UnknownNameError(f'nested system "{component}" has no {ports[0].rstrip("s")} port "{port}"{did_you_mean(port, valid)}')
 
@@ -127,7 +134,7 @@ def check_assignment(
         return {text: _check_value(variables[text], value, all_elements)}
     if f"{text}[1]" in variables:
         if not isinstance(value, list) or not value:
-            raise ValueError(f'"{text}" is a list of values, found {json.dumps(value)}')
+            raise ValueError(f'"{text}" is a list of values, found {_quote(value)}')
         names = [f"{text}[{i}]" for i in range(1, len(value) + 1)]
         if names[-1] not in variables:
             size = sum(other.startswith(f"{text}[") for other in variables)
@@ -142,13 +149,13 @@ def _check_value(variable: Variable, value: Any, all_elements: bool = False) -> 
         raise ValueError(f'"{variable.name}" is of causality {variable.causality} and cannot be set')
     if variable.causality == "structuralParameter" and value != variable.start:
         raise ValueError(
-            f'"{variable.name}" is a structural parameter: it stays {json.dumps(variable.start)}, found {json.dumps(value)}'
+            f'"{variable.name}" is a structural parameter: it stays {json.dumps(variable.start)}, found {_quote(value)}'
         )
     if not variable.shape:
         return _scalar_value(variable, value)
     size = len(variable.scalar_names)
     if not isinstance(value, list):
-        raise ValueError(f'"{variable.name}" is an array of {size} values, expected a list, found {json.dumps(value)}')
+        raise ValueError(f'"{variable.name}" is an array of {size} values, expected a list, found {_quote(value)}')
     if len(value) > size or (all_elements and len(value) < size):
         raise ValueError(f'"{variable.name}" takes {"" if all_elements else "at most "}{size} values, found {len(value)}')
     start = variable.start if isinstance(variable.start, tuple) else (variable.start or 0,) * size
@@ -164,20 +171,27 @@ def _enumeration_value(variable: Variable, value: Any) -> Any:
         return value
     valid = ", ".join(f"{name} ({number})" for name, number in items.items())
     hint = did_you_mean(value, items) if isinstance(value, str) else ""
-    raise ValueError(f'"{variable.name}" is one of {valid}, found {json.dumps(value)}{hint}')
+    raise ValueError(f'"{variable.name}" is one of {valid}, found {_quote(value)}{hint}')
 
 
 def _scalar_value(variable: Variable, value: Any) -> Any:
-    """Return the value in the variable's type; raise ValueError if it has another type or is out of range."""
+    """Return a scalar in the type of the variable; raise ValueError if its type does not fit or it is out of range."""
+    if isinstance(value, str) and (problem := text_problem(value)):
+        raise ValueError(f'"{variable.name}": {problem}')
     if variable.items:
         return _enumeration_value(variable, value)
     if not _type_accepts(variable.type, value):
-        raise ValueError(f'"{variable.name}" is of type {variable.type}, found {json.dumps(value)}')
+        raise ValueError(f'"{variable.name}" is of type {variable.type}, found {_quote(value)}')
     low, high = _limits(variable)
     if (low is not None and value < low) or (high is not None and value > high):
         span = f"{'-inf' if low is None else low} ... {'inf' if high is None else high}"
-        raise ValueError(f'"{variable.name}" must lie in {span}, found {json.dumps(value)}')
+        raise ValueError(f'"{variable.name}" must lie in {span}, found {_quote(value)}')
     return float(value) if variable.type in _REALS else value
+
+
+def _quote(value: Any) -> str:
+    """Return a value as JSON where that is possible, shortened."""
+    return shorten(json.dumps(value, default=repr))
 
 
 def _limits(variable: Variable) -> tuple[float | None, float | None]:

@@ -41,7 +41,7 @@ def find_function_problems(root: Node, spec: ScenarioSpec, signals: Collection[s
     if signals is not None:
         yield from signal_problems(root, "kpis", signals)
     kpis = [kpi for _, kpi in accepted(spec.kpis)]
-    for i, check in accepted(spec.checks):
+    for i, check in accepted(spec.checks) if "kpis" not in root.invalid_keys else ():
         if text := _kpi_name_problem(check.kpi, kpis, root.folder):
             yield Problem(text, root.where("checks", i, "kpi"))
 
@@ -196,7 +196,7 @@ def _module_file(module: str) -> Path | None:
 
 
 def load_function(reference: str, folder: Path) -> Callable[..., Any]:
-    """Import the function `file.py:function`, whose path starts from `folder`, or `package.module:function`.
+    """Import the function `file.py:function` (path relative to `folder`) or `package.module:function`.
 
     Raises:
         InputError: The file does not exist, cannot be imported, or does not define the function.
@@ -209,7 +209,7 @@ def load_function(reference: str, folder: Path) -> Callable[..., Any]:
 
 
 def _argument_problem(name: str, declared: ast.arguments, given: Collection[str]) -> str:
-    """Return what is wrong with keyword arguments `given` beside the first argument (the result or the scenario), or ""."""
+    """Return the problem of the keyword arguments `given`, or ""; the first argument is the result or the scenario."""
     positional = [argument.arg for argument in (*declared.posonlyargs, *declared.args)]
     optional = positional[len(positional) - len(declared.defaults) :]
     keywords = dict(zip((argument.arg for argument in declared.kwonlyargs), declared.kw_defaults, strict=True))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,10 +13,15 @@ from typing import Any
 from ..components.python_import import package_files
 from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean
+from ..core.size_limits import MAX_LEVELS
+from ..core.text import acceptable_text, shorten, text_problem
+from .expanded_size import SystemFile, check_expanded_size
 from .json_document import Document, read_document
-from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec
+from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
 from .validation import validate_document
+
+_LEGAL_NAME = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 
 
 @dataclass
@@ -30,6 +36,8 @@ class Node:
     invalid_components: set[str] = field(default_factory=set)
     #: keys of the file that are invalid or missing; problems that only follow from that are not reported
     invalid_keys: set[str] = field(default_factory=set)
+    #: output ports that name no output; likewise
+    invalid_ports: set[str] = field(default_factory=set)
 
     @property
     def folder(self) -> Path:
@@ -39,7 +47,13 @@ class Node:
     @property
     def ports(self) -> PortsSpec:
         """Ports of a nested system; the scenario itself has none."""
-        return self.spec.ports if isinstance(self.spec, NestedSpec) else PortsSpec()
+        return ports_of(self.spec)
+
+    @property
+    def has_wrong_names(self) -> bool:
+        """True if names of components are illegal or occur twice, so that an unknown name may mean one of them."""
+        repeated = any(path[:1] == ("components",) and len(path) == 2 for path in self.document.invalid_paths)
+        return repeated or not all(map(_LEGAL_NAME.fullmatch, self.invalid_components))
 
     def full_name(self, component: str) -> str:
         """Return the name of a component from the scenario's point of view, such as "uav.vtol"."""
@@ -54,6 +68,16 @@ class Node:
         for child in self.children.values():
             yield from child.walk()
         yield self
+
+    def find_component(self, full_name: str) -> tuple[Node, str] | None:
+        """Return (system, name) of the component with a full name such as "uav.vtol"; None if there is none."""
+        *systems, name = full_name.split(".")
+        node = self
+        for system in systems:
+            if system not in node.children:
+                return None
+            node = node.children[system]
+        return (node, name) if name in node.spec.components else None
 
     def leaves(self) -> Iterator[tuple[Node, str]]:
         """Yield (system, name) of every valid component that is not a nested system, in the order of the files."""
@@ -95,7 +119,7 @@ class Scenario:
                 python.append(node.folder / spec.python.rpartition(":")[0])
             else:
                 files.append(node.folder / (spec.fmu or (spec.modelica or "").rpartition(":")[0]))
-        return [*files, *(member for file in python for member in package_files(file))]
+        return [*files, *package_files(python)]
 
 
 def find_scenario(scenario: str | Path) -> Path:
@@ -123,46 +147,76 @@ def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = Non
             other name is that of a variable.
 
     Raises:
-        InputError: The file does not exist or is not JSON. Other problems are collected in the result.
+        InputError: The file does not exist or is not JSON, or the expanded scenario is too large. Other problems are collected in
+            the result.
     """
     document = read_document(find_scenario(scenario))
     problems: list[Problem] = []
     variables: dict[str, Any] = {}
     for name, value in (settings or {}).items():
-        if name.startswith("/"):
+        if text := next(_text_problems([name, value]), ""):
+            problems.append(Problem(text, f'setting "{shorten(acceptable_text(name))}"'))
+        elif name.startswith("/"):
             problems += _set_pointer(document, name, value)
         else:
             variables[name] = value
-    spec, schema_problems, invalid_keys = validate_document(document, ScenarioSpec)
-    root = Node(document, spec, invalid_keys=invalid_keys)
-    problems += schema_problems + _load_children(root, (document.file.resolve(),))
-    return Scenario(root, problems, variables)
+    reader = _SystemReader()
+    file = reader.read(document, ScenarioSpec, ())
+    check_expanded_size(file)
+    return Scenario(_make_node(file), problems + reader.problems, variables)
 
 
-def _load_children(node: Node, ancestors: tuple[Path, ...]) -> list[Problem]:
-    """Read the nested systems of a system; `ancestors` are the resolved files it is nested in."""
-    problems: list[Problem] = []
-    if not node.spec.components and "components" not in node.invalid_keys:
-        problems.append(Problem("expected at least one component, found none", node.where("components")))
-        node.invalid_keys.add("components")
-    raw = node.document.value.get("components") if isinstance(node.document.value, dict) else None
-    node.invalid_components |= set(raw if isinstance(raw, dict) else {}) - set(node.spec.components)
-    for name, component in node.spec.components.items():
-        if component.system is None:
-            continue
+class _SystemReader:
+    """Reader of a scenario file and the nested systems below it; every file is read once. `problems` collects its problems."""
+
+    def __init__(self) -> None:
+        #: files that have been read, by path; None if a file cannot be used
+        self._files: dict[Path, SystemFile | None] = {}
+        self.problems: list[Problem] = []
+
+    def read(self, document: Document, kind: type[SystemSpec], ancestors: tuple[Path, ...]) -> SystemFile:
+        """Validate a document and read its nested systems; `ancestors` are the resolved files that it is nested in."""
+        spec, problems, invalid_keys = validate_document(document, kind)
+        self.problems += problems
+        raw = document.value.get("components") if isinstance(document.value, dict) else None
+        invalid_components = set(raw if isinstance(raw, dict) else {}) - set(spec.components)
+        if not spec.components and not invalid_components and "components" not in invalid_keys:
+            self.problems.append(Problem("expected at least one component, found none", document.where(("components",))))
+            invalid_keys.add("components")
+        file = SystemFile(document, spec, invalid_keys, invalid_components, {})
+        ancestors = (*ancestors, paths.resolve_path(document.file))
+        for name, component in spec.components.items():
+            if component.system is not None:
+                if child := self._read_nested(file, name, component.system, ancestors):
+                    file.children[name] = child
+                else:
+                    invalid_components.add(name)
+        return file
+
+    def _read_nested(self, parent: SystemFile, name: str, path: str, ancestors: tuple[Path, ...]) -> SystemFile | None:
+        """Return the file of a nested system, or None if it cannot be used."""
+        file = parent.document.file.parent / path
+        key = paths.resolve_path(file.parent) / file.name  # the file's relative paths start from this folder
         try:
-            file = node.folder / component.system
-            if file.resolve() in ancestors:
-                raise InputError(f'the nested system "{component.system}" contains itself')
-            document = read_document(file)
+            if paths.resolve_path(file) in ancestors:
+                raise InputError(f'the nested system "{path}" contains itself')
+            child = self._files.get(key)
+            if len(ancestors) + (child.levels if child else 1) > MAX_LEVELS:
+                raise InputError(f'the nested system "{path}" is nested more than {MAX_LEVELS} levels deep')
+            if key not in self._files:
+                self._files[key] = None
+                child = self._files[key] = self.read(read_document(file), NestedSpec, ancestors)
         except InputError as error:
-            node.invalid_components.add(name)
-            problems += [Problem(p.message, p.where or node.where("components", name, "system")) for p in error.problems]
-            continue
-        spec, schema_problems, invalid_keys = validate_document(document, NestedSpec)
-        node.children[name] = Node(document, spec, node.full_name(name), invalid_keys=invalid_keys)
-        problems += schema_problems + _load_children(node.children[name], (*ancestors, file.resolve()))
-    return problems
+            where = parent.document.where(("components", name, "system"))
+            self.problems += [Problem(problem.message, problem.where or where) for problem in error.problems]
+            return None
+        return child
+
+
+def _make_node(file: SystemFile, prefix: str = "") -> Node:
+    node = Node(file.document, file.spec, prefix, {}, set(file.invalid_components), set(file.invalid_keys))
+    node.children = {name: _make_node(child, node.full_name(name)) for name, child in file.children.items()}
+    return node
 
 
 def pointer_keys(pointer: str) -> list[str]:
@@ -191,6 +245,15 @@ def _set_pointer(document: Document, pointer: str, value: Any) -> list[Problem]:
     return []
 
 
+def _text_problems(value: Any) -> Iterator[str]:
+    """Yield what is wrong with the texts in a JSON value."""
+    if isinstance(value, str) and (problem := text_problem(value)):
+        yield problem
+    elif isinstance(value, dict | list):
+        for part in value if isinstance(value, list) else (*value, *value.values()):
+            yield from _text_problems(part)
+
+
 def _json_child(value: Any, key: str) -> Any:
     if isinstance(value, dict):
         return value.get(key)
@@ -213,14 +276,21 @@ def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
             problems.append(Problem(f'expected NAME=value, found "{text}"'))
             continue
         try:
-            parsed[name] = json.loads(value)
-        except ValueError:
-            parsed[name] = value
-        if not _is_finite(parsed[name]):
-            problems.append(Problem(f"expected finite numbers, found {value}", name))
+            parsed[name] = _parse_json_or_text(value)
+            if not _is_finite(parsed[name]):
+                problems.append(Problem(f"expected finite numbers, found {shorten(value)}", name))
+        except RecursionError:
+            problems.append(Problem("nested too deeply", name))
     if problems:
         raise InputError(problems)
     return parsed
+
+
+def _parse_json_or_text(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
 
 
 def _is_finite(value: Any) -> bool:

@@ -1,38 +1,57 @@
-"""Description of a system as JSON for `run.json` and the report: components, stages and connections."""
+"""Description of a run as JSON for `run.json` and the report: components, stages, connections and software."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import platform
+from collections.abc import Iterable, Mapping
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from ..core.system import Connection, Group, Stage, System
+from ..core.version import __version__
 from ..engine.transfer_plan import unit_conversion
-from .prepared_run import PreparedRun
+
+#: packages whose versions can change a result
+_PACKAGES = ("numpy", "scipy", "fmpy", "pybullet", "pybullet-arm64", "pythonfmu")
 
 
-def describe_system(prepared: PreparedRun) -> dict[str, Any]:
-    """Return the components, stages and connections of a prepared run as JSON values.
+def describe_system(system: System, sources: Mapping[str, str]) -> dict[str, Any]:
+    """Return the components, stages and connections of a system as JSON values.
 
     - `components`: {"name", "origin", "inputs", "outputs", "period"}: the source in the scenario, the numbers of scalar inputs
       and outputs, and the period (s; None: every macro step)
     - `stages`: lists of component names; a nested system is {"name", "stages"}
     - `connections`: [source, target, unit of the source or "", notes on delay and conversion or ""]
+
+    Args:
+        system: The system.
+        sources: Source of each component.
     """
-    system = prepared.system
     return {
-        "components": [_describe_component(prepared, name) for name in system.components],
+        "components": [_describe_component(system, name, sources[name]) for name in system.components],
         "stages": _describe_stages(system.stages),
         "connections": [_describe_connection(system, connection) for connection in system.connections],
     }
 
 
-def _describe_component(prepared: PreparedRun, name: str) -> dict[str, Any]:
-    variables = prepared.system.components[name].variables
+def describe_software() -> dict[str, Any]:
+    """Return the versions of cosim, Python and the installed packages of `_PACKAGES`, and the kind of machine."""
+    versions = {"cosim": __version__, "python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return {"versions": versions, "machine": {"system": platform.system(), "machine": platform.machine()}}
+
+
+def _describe_component(system: System, name: str, source: str) -> dict[str, Any]:
+    variables = system.components[name].variables
     inputs, outputs = (sum(len(v.scalar_names) for v in variables if v.causality == kind) for kind in ("input", "output"))
-    period = prepared.system.periods.get(name)
+    period = system.periods.get(name)
     return {
         "name": name,
-        "origin": prepared.component_source(name),
+        "origin": source,
         "inputs": inputs,
         "outputs": outputs,
         "period": None if period is None else float(period),

@@ -18,10 +18,18 @@ VariablesByEndpoint = dict[Endpoint, Variable]
 
 def find_warnings(prepared: PreparedRun) -> list[Problem]:
     """Return all warnings about a prepared run, each with its location in the scenario file."""
-    return [*missing_connections(prepared), *_missing_reference(prepared), *_late_events(prepared)]
+    return [*find_run_warnings(prepared), *_missing_reference(prepared), *_late_events(prepared)]
 
 
-def missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
+def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
+    """Yield the warnings that concern the results: at most one about connections, and one for each FMU file."""
+    yield from _missing_connections(prepared)
+    for file in prepared.component_factory.fmus.values():
+        if file.run_warning:
+            yield Problem(file.run_warning)
+
+
+def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
     """Yield at most one warning: unconnected inputs for which another component has an output of the same name."""
     system, inputs = prepared.system, unconnected_inputs(prepared)
     outputs = _outputs_by_name(system) if inputs else {}
@@ -78,7 +86,7 @@ def _matching_output(end: Endpoint, variable: Variable, outputs: dict[str, Varia
 
 
 def _lookup_names(slot: str) -> list[str]:
-    """Return a scalar's name and its name without the vehicle: "uav.position.x" and "position.x"."""
+    """Return the names of a scalar with and without the name of the vehicle: "uav.position.x" and "position.x"."""
     rest = slot.partition(".")[2]
     return [slot, rest] if rest else [slot]
 

@@ -2,29 +2,37 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
 from os.path import relpath
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 from ..components.fmi import FmuFile
 from ..components.python_import import package_files
-from ..core.component import Component
-from ..core.errors import InputError, Problem
+from ..core.errors import Problem
 from ..core.stopwatch import Stopwatch
 from ..core.system import System
+from ..engine.pacer import LatePolicy
+from ..engine.plan import Plan
+from ..engine.run_loop import free_components
 from ..engine.settings import Settings
 from ..process.float_mode import default_float_mode
-from ..process.journal import as_component_error
+from ..process.process_state import exclusive_process_state
 from .component_factory import ComponentFactory
 from .json_document import Document
 from .named_functions import load_function, signal_problems
 from .nested_systems import Node, load_scenario
+from .overview import describe_software, describe_system
 from .schema import FunctionSpec, ScenarioSpec
-from .system_builder import SystemBuilder
+from .schema_types import accepted
+from .system_builder import PROFILE_PREFIX, SystemBuilder
+
+IsolationMode = Literal["fmu", "none"]
 
 #: name, function and keyword arguments of a KPI or figure
 NamedCall = tuple[str, Callable[..., Any], Mapping[str, Any]]
@@ -36,8 +44,7 @@ class PreparedRun:
 
     root: Node
     spec: ScenarioSpec
-    system: System
-    settings: Settings
+    plan: Plan
     component_factory: ComponentFactory
     #: wall time (s) of the preparation "load_seconds" and its parts "parse_seconds", "instantiate_seconds", "wiring_seconds"
     timing: Mapping[str, float]
@@ -46,6 +53,16 @@ class PreparedRun:
         system, settings = self.system, self.settings
         times = f"{float(settings.start_time):g} s to {float(settings.stop_time):g} s in steps of {float(settings.step_size):g} s"
         return f"{self.spec.name}: {', '.join(system.components)}; {len(system.connections)} connections; {times}"
+
+    @property
+    def system(self) -> System:
+        """Components and connections."""
+        return self.plan.system
+
+    @property
+    def settings(self) -> Settings:
+        """Time span, step size, recorded signals and events."""
+        return self.plan.settings
 
     @property
     def document(self) -> Document:
@@ -59,11 +76,11 @@ class PreparedRun:
 
     def kpis(self) -> list[NamedCall]:
         """Import the KPI functions and return (name, function, arguments) of each."""
-        return self._load_functions(self.spec.kpis)
+        return _load_functions(self.spec.kpis, self.root.folder)
 
     def figures(self) -> list[NamedCall]:
         """Import the figure functions and return (name, function, arguments) of each."""
-        return self._load_functions(self.spec.figures)
+        return _load_functions(self.spec.figures, self.root.folder)
 
     def figure_problems(self) -> list[Problem]:
         """Return a problem for every figure argument that names no recorded signal.
@@ -72,8 +89,17 @@ class PreparedRun:
         """
         return list(signal_problems(self.root, "figures", self.settings.columns))
 
-    def _load_functions(self, specs: Sequence[FunctionSpec]) -> list[NamedCall]:
-        return [(spec.name, load_function(spec.python, self.root.folder), spec.arguments) for spec in specs]
+    @cached_property
+    def metadata(self) -> dict[str, Any]:
+        """Metadata of the run that are known before it: scenario, system, versions, hashes of all files."""
+        return {
+            "name": self.spec.name,
+            "scenario": self.document.value,
+            "scenario_file": str(self.document.file.resolve()),
+            "system": describe_system(self.system, self.sources),
+            **describe_software(),
+            "sha256": {name: sha256(file.read_bytes()).hexdigest() for name, file in self.files().items()},
+        }
 
     def files(self) -> dict[str, Path]:
         """Return all files that the run depends on, by their path relative to the scenario's folder.
@@ -84,66 +110,94 @@ class PreparedRun:
         own += [self.root.folder / spec.file for spec in self.spec.inputs]
         calls = (*self.spec.kpis, *self.spec.figures, *([self.spec.scene] if self.spec.scene else []))
         modules = (spec.python.rpartition(":")[0] for spec in calls)
-        functions = [self.root.folder / module for module in modules if module.endswith(".py")]
-        python = [member for file in (*functions, *self.component_factory.python_files) for member in package_files(file)]
-        files = {file.resolve() for file in (*own, *python, *self.component_factory.fmus, *self.component_factory.modelica_files)}
-        return {Path(relpath(file, self.root.folder.resolve())).as_posix(): file for file in sorted(files)}
+        functions = (self.root.folder / module for module in modules if module.endswith(".py"))
+        factory, folder = self.component_factory, self.root.folder.resolve()
+        data = {file.resolve() for file in (*own, *factory.fmus, *factory.modelica_files)}
+        files = data | package_files((*functions, *factory.python_files))
+        return {relpath(file, folder).replace(os.sep, "/"): file for file in sorted(files, key=str)}
 
-    def component_source(self, name: str) -> str:
-        """Return the source of a component as the scenario names it: an FMU, a Python class, a Modelica model or a CSV file."""
-        for node, own in self.root.leaves():
-            if node.full_name(own) == name:
-                spec = node.spec.components[own]
-                return spec.fmu or spec.python or spec.modelica or ""
-        return self.spec.inputs[int(name.rpartition(".")[2])].file
+    @property
+    def sources(self) -> dict[str, str]:
+        """Source of each component as the scenario names it: an FMU, a Python class, a Modelica model or a CSV file."""
+        specs = {node.full_name(name): node.spec.components[name] for node, name in self.root.leaves()}
+        profiles = {f"{PROFILE_PREFIX}.{i}": spec.file for i, spec in enumerate(self.spec.inputs)}
+        return {name: spec.fmu or spec.python or spec.modelica or "" for name, spec in specs.items()} | profiles
 
     def free(self) -> None:
         """Free the components of a scenario that is not simulated."""
-        _free_components(self.system.components)
+        free_components(self.system.components)
 
 
 @default_float_mode()
-def prepare(
+@exclusive_process_state()
+def load(
     scenario: str | Path,
-    settings: Mapping[str, Any] | None = None,
+    parameters: Mapping[str, Any] | None = None,
     *,
-    isolate_fmus: bool = False,
+    stop_time: float | str | None = None,
+    step_size: float | str | None = None,
+    real_time: float | None = None,
+    late: LatePolicy = "warn",
+    isolation: IsolationMode = "none",
     sandbox: bool = False,
     loaded_fmus: Mapping[Path, FmuFile] = MappingProxyType({}),
 ) -> PreparedRun:
-    """Read a scenario, create its components, connect and check them.
+    """Read, connect and check a scenario.
 
     Args:
-        scenario: A path, or the name of a shipped scenario.
-        settings: Values that the caller changes, by variable name or JSON pointer (see `load_scenario`).
-        isolate_fmus: Run every FMU in a process of its own.
-        sandbox: Like `isolate_fmus`, and confine these processes to their own files, without network access.
+        scenario: Path of a scenario file, or the name of a shipped scenario.
+        parameters: Values that replace those of the file. A key is the name of a variable ("uav.vtol.landing_time") or the JSON
+            pointer of any entry ("/components/plant/arguments/environment/seed").
+        stop_time: End of the simulation (s), a number or a fraction such as "1/3"; None: as in the file.
+        step_size: Macro step (s), a number or a fraction such as "1/60"; None: as in the file.
+        real_time: Simulated seconds per second of wall time; None: as fast as possible.
+        late: Reaction to a real-time run that falls more than one step behind: "warn", or "fail" for a LateError.
+        isolation: "fmu" runs every FMU in a separate process; "none" does so only where the scenario sets `isolation`, or where
+            an FMU that allows one instance per process is used again.
+        sandbox: Run every FMU in a separate process that reads and writes only its own files, has no network and starts no
+            programs.
         loaded_fmus: FMU files that have already been read, by resolved path.
 
+    Returns:
+        A prepared run, which can be executed once.
+
     Raises:
-        InputError: Carries all problems, each with file, line and JSON path.
+        InputError: The scenario cannot be run; `problems` lists all reasons, each with file, line and JSON path.
     """
+    times = {"/stop_time": stop_time, "/step_size": step_size}
+    settings = {**{key: value for key, value in times.items() if value is not None}, **(parameters or {})}
     watch = Stopwatch()
     with watch.measure("load_seconds"):
         with watch.measure("parse_seconds"):
             loaded = load_scenario(scenario, settings)
-        builder = SystemBuilder(loaded, isolate_fmus, sandbox, loaded_fmus)
+        builder = SystemBuilder(loaded, isolation == "fmu", sandbox, loaded_fmus)
         try:
             with watch.measure("instantiate_seconds"):
                 builder.make_components()
             with watch.measure("wiring_seconds"):
-                builder.build_system()
-            if builder.problems:
-                raise InputError(dict.fromkeys(builder.problems))
+                plan = builder.build_plan(real_time, late)
         except BaseException:
-            _free_components(builder.components)
+            free_components(builder.components)
             raise
-    return PreparedRun(loaded.root, loaded.spec, builder.system, builder.settings, builder.component_factory, watch.seconds)
+    return PreparedRun(loaded.root, loaded.spec, plan, builder.component_factory, watch.seconds)
 
 
-def _free_components(components: Mapping[str, Component]) -> None:
-    """Free all components, even if freeing one of them fails."""
-    with ExitStack() as stack:
-        for name, component in components.items():
-            stack.enter_context(as_component_error(name, "free"))
-            stack.callback(component.free)
+def import_figures(scenario: str | Path, parameters: Mapping[str, Any] | None = None) -> list[NamedCall]:
+    """Import the figure functions of a scenario without loading its components.
+
+    Args:
+        scenario: See `load`.
+        parameters: See `load`.
+
+    Returns:
+        (name, function, arguments) of each figure.
+
+    Raises:
+        InputError: The scenario cannot be read, or a function cannot be imported.
+    """
+    loaded = load_scenario(scenario, parameters)
+    return _load_functions([spec for _, spec in accepted(loaded.spec.figures)], loaded.root.folder)
+
+
+def _load_functions(specs: Sequence[FunctionSpec], folder: Path) -> list[NamedCall]:
+    return [(spec.name, load_function(spec.python, folder), spec.arguments) for spec in specs]

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints, model_validator
 
+from ..engine.settings import NonFinitePolicy
 from .schema_types import INVALID, AutoOrBool, Name, NameList, Period, Seconds, Spec, Value
 
 #: keys of the sources of a component
@@ -41,7 +42,7 @@ class ComponentSpec(Spec):
 
 
 class ConnectionSpec(Spec):
-    """A connection of an output to an input, or of two prefixes, whose variables are matched by the rest of their names."""
+    """A connection of an output to an input, or of two prefixes; variables below prefixes match by the rest of their names."""
 
     source: str = Field(alias="from", description='output "component.variable", or a prefix of outputs')
     target: str = Field(alias="to", description='input "component.variable", or a prefix of inputs')
@@ -140,7 +141,7 @@ class ToleranceSpec(Spec):
     """Half width of the tolerance tube around a reference signal."""
 
     absolute: float = Field(default=0.0, ge=0, description="in the unit of the signal")
-    relative: float = Field(default=0.0, ge=0, description="relative to the reference value")
+    relative: float = Field(default=0.0, ge=0, description="fraction of the range (maximum - minimum) of the reference signal")
     time: float = Field(default=0.0, ge=0, description="along the time axis (s)")
 
 
@@ -207,9 +208,16 @@ class ScenarioSpec(SystemSpec):
     scene: CallSpec | None = Field(default=None, description="function that returns the scene of the 3-D replay")
     reference: ReferenceSpec | None = Field(default=None, description="recorded trajectory for comparisons")
     deadlines: DeadlinesSpec = Field(default=DeadlinesSpec(), description="time limits of calls in supervised runs")
-    non_finite: Literal["error", "allow"] = Field(
-        default="error", description="treatment of NaN or infinity on a connected output"
+    non_finite: NonFinitePolicy = Field(
+        default="error",
+        description="treatment of NaN and infinity. error: on a connected output they end the run, on a recorded one they give a "
+        "warning; fail: on a connected or recorded output they end the run; allow: neither",
     )
+
+
+def ports_of(spec: SystemSpec) -> PortsSpec:
+    """Return the ports of a nested system; a scenario has none."""
+    return spec.ports if isinstance(spec, NestedSpec) else PortsSpec()
 
 
 def json_schema(nested: bool = False) -> dict[str, Any]:

@@ -11,14 +11,16 @@ from typing import Any
 
 from ..components.fmi import FmuFile, Isolation
 from ..components.input_table import read_input_table
-from ..core.component import Component, Variable
-from ..core.errors import InputError, Problem
+from ..core.component import Component, Variable, count_scalars
+from ..core.errors import InputError, Problem, did_you_mean
+from ..core.size_limits import MAX_SCALARS, require_at_most
 from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System
-from ..engine.run_checks import find_problems
+from ..engine.pacer import LatePolicy
+from ..engine.plan import Plan, compile_plan
 from ..engine.settings import Event, Settings
 from ..process.journal import Deadlines
 from .component_factory import ComponentFactory
-from .name_resolution import SlotIndex, Target, UnknownNameError, check_assignment, resolve_name
+from .name_resolution import SlotIndex, UnknownNameError, check_assignment, resolve_name
 from .named_functions import find_function_problems
 from .nested_systems import Node, Scenario
 from .recorded_signals import SignalSelector
@@ -34,10 +36,7 @@ _TIMED_SETTINGS = (("stop_time",), ("record",), ("events",))
 
 
 class SystemBuilder:
-    """Builder of a system: call `make_components`, then `build_system`; each adds to `problems`.
-
-    `system` and `settings` exist after `build_system`; they can be simulated if there are no problems.
-    """
+    """Builder of a system: call `make_components`, then `build_plan`; each adds to `problems`."""
 
     def __init__(self, scenario: Scenario, isolate_fmus: bool, sandbox: bool, loaded_fmus: Mapping[Path, FmuFile]) -> None:
         self.root, self.spec, self.assignments = scenario.root, scenario.spec, scenario.assignments
@@ -46,16 +45,26 @@ class SystemBuilder:
         self.component_factory = ComponentFactory(Isolation(deadlines, sandbox), isolate_fmus or sandbox, loaded_fmus)
         self.components: dict[str, Component] = {}
         self._variables_by_component: dict[str, Mapping[str, Variable]] = {}
+        #: names with values that were refused, and the systems in which they are used
+        self._refused_values: list[tuple[Node, str]] = []
         #: some signals are missing because of other problems
         self._has_missing_signals = False
         self.start_values: dict[str, dict[str, Any]] = defaultdict(dict)
 
-    def build_system(self) -> None:
-        """Set start values, connections, stages, recorded signals and events, and check the result."""
+    def build_plan(self, real_time: float | None, late: LatePolicy) -> Plan:
+        """Set start values, connections, stages, recorded signals and events, and compile the result.
+
+        Args:
+            real_time: See `Settings`.
+            late: See `Settings`.
+
+        Raises:
+            InputError: Carries all problems found since the scenario was read.
+        """
         self._set_start_values()
         aliases = self._aliases()
         connections = list(self._connections())
-        self.system = System(
+        system = System(
             self.components,
             connections,
             (*self._root_stages(), *([tuple(self.profiles)] if self.profiles else [])),
@@ -64,31 +73,44 @@ class SystemBuilder:
             aliases,
             _parallel_mode(self.spec),
         )
-        self.settings = Settings(
+        settings = Settings(
             self.spec.start_time,
             self.spec.stop_time,
             self.spec.step_size,
             self._columns(aliases),
             self.spec.record.interval,
             list(self._events()),
-            require_finite=self.spec.non_finite == "error",
+            non_finite=self.spec.non_finite,
+            real_time=real_time,
+            late=late,
         )
-        self.problems += [
-            self._with_location(problem)
-            for problem in find_problems(self.system, self.settings)
-            if not self._is_consequence(problem)
-        ]
-        signals = None if self._has_missing_signals else self.settings.columns
+        try:
+            plan = compile_plan(system, settings)
+        except InputError as error:
+            found = (problem for problem in error.problems if not self._is_consequence(problem))
+            self.problems += map(self._with_location, found)
+        signals = None if self._has_missing_signals else settings.columns
         self.problems += find_function_problems(self.root, self.spec, signals)
+        if self.problems:
+            raise InputError(dict.fromkeys(self.problems))
+        return plan
 
     def make_components(self) -> None:
-        """Create the components of the scenario and its nested systems, and the tables of its input profiles."""
+        """Create the components of the scenario and its nested systems, and the tables of its input profiles.
+
+        Raises:
+            InputError: The components have too many scalars.
+        """
+        scalars = 0
         for node, name in self.root.leaves():
             try:
-                self.components[node.full_name(name)] = self.component_factory.create(node, name)
+                component = self.components[node.full_name(name)] = self.component_factory.create(node, name)
+                scalars += count_scalars(component.variables)
             except InputError as error:
                 node.invalid_components.add(name)
                 self._add_problems(error, node, "components", name)
+            noun = f"variables and elements of arrays up to {node.full_name(name)}"
+            require_at_most(MAX_SCALARS, scalars, noun, node.where("components", name))
         self.profiles = [f"{PROFILE_PREFIX}.{i}" for i, _ in accepted(self.spec.inputs)]
         for i, spec in accepted(self.spec.inputs):
             try:
@@ -117,6 +139,7 @@ class SystemBuilder:
                     variables = self._variables(target.component)
                     values[target.component] |= check_assignment(target.component, variables, target.prefix, value, all_elements)
         except (UnknownNameError, ValueError) as error:
+            self._refused_values.append((node, name))
             if str(error):
                 self.problems.append(Problem(str(error), where))
 
@@ -137,11 +160,17 @@ class SystemBuilder:
         for node in self.root.walk():
             wiring.connect(node)
         for i, spec in accepted(self.spec.inputs):
-            if f"{PROFILE_PREFIX}.{i}" in self.components:
-                for column, names in spec.to.items():
-                    for name in names:
-                        where = self.root.where("inputs", i, "to", column)
-                        wiring.connect_output(self.root, Endpoint(f"{PROFILE_PREFIX}.{i}", column), name, where)
+            profile = f"{PROFILE_PREFIX}.{i}"
+            for column, names in spec.to.items():
+                for name in names:
+                    if profile in self.components:
+                        wiring.connect_output(
+                            self.root, Endpoint(profile, column), name, self.root.where("inputs", i, "to", column)
+                        )
+                    else:
+                        wiring.excuse(self.root, name)
+        for node, name in self._refused_values:
+            wiring.excuse(node, name)
         yield from wiring.connections()
         self.problems += wiring.problems
 
@@ -149,7 +178,8 @@ class SystemBuilder:
         """Return the stages of a system. Unknown, repeated and missing names are reported by `System.problems`."""
         if "components" in node.invalid_keys:
             return ()
-        stages = node.spec.algorithm.stages if node.spec.algorithm else [[name] for name in node.spec.components]
+        listed = node.spec.algorithm.stages if node.spec.algorithm and not node.has_wrong_names else None
+        stages = [[name] for name in node.spec.components] if listed is None else listed
         return tuple(
             tuple(self._stage_member(node, name) for name in stage if name not in node.invalid_components)
             for stage in stages
@@ -182,32 +212,45 @@ class SystemBuilder:
         for node in self.root.walk():
             for name, child in node.children.items():
                 for port, inner in child.ports.outputs.items():
+                    where, alias = child.where("ports", "outputs", port), f"{node.full_name(name)}.{port}"
                     if port in child.spec.components:
                         text = f'"{port}" is already the name of a component here, so an output port cannot have it'
-                        self.problems.append(Problem(text, child.where("ports", "outputs", port)))
-                    try:
-                        (target,) = resolve_name(child, inner, ("outputs",))
-                    except UnknownNameError as error:
-                        if str(error):
-                            self.problems.append(Problem(str(error), child.where("ports", "outputs", port)))
-                        continue
-                    aliases |= self._alias_endpoints(target, f"{node.full_name(name)}.{port}")
+                        self.problems.append(Problem(text, where))
+                    ends = self._port_outputs(child, inner, where)
+                    if not ends:
+                        child.invalid_ports.add(port)
+                    aliases |= {alias + rest: end for rest, end in ends.items()}
+                    require_at_most(MAX_SCALARS, len(aliases), f"signals of output ports up to {alias}", where)
         return aliases
 
-    def _alias_endpoints(self, target: Target, alias: str) -> dict[str, Endpoint]:
+    def _port_outputs(self, node: Node, inner: str, where: str) -> dict[str, Endpoint]:
+        """Return the outputs that an output port refers to, by the rest of their names; add a problem if there are none."""
+        try:
+            (target,) = resolve_name(node, inner, ("outputs",))
+        except UnknownNameError as error:
+            if str(error):
+                self.problems.append(Problem(str(error), where))
+            return {}
         if target.component not in self.components:
             return {}
-        slots = SlotIndex(self.components[target.component], "output").below(target.prefix)
-        return {alias + rest: Endpoint(target.component, slot) for rest, slot in slots.items()}
+        component = self.components[target.component]
+        slots = SlotIndex(component, "output").below(target.prefix)
+        if not slots:
+            valid = (variable.name for variable in component.variables if variable.causality == "output")
+            self.problems.append(Problem(f'"{inner}" is no output{did_you_mean(target.prefix, valid)}', where))
+        return {rest: Endpoint(target.component, slot) for rest, slot in slots.items()}
 
     def _columns(self, aliases: Mapping[str, Endpoint]) -> dict[str, Endpoint]:
         invalid = [node.full_name(name) for node in self.root.walk() for name in node.invalid_components]
-        invalid += [node.prefix for node in self.root.walk() if "components" in node.invalid_keys]
+        for node in self.root.walk():
+            invalid += [f"{node.prefix}.{port}" for port in node.invalid_ports]
+            if node.invalid_keys & {"components", "ports"} or node.has_wrong_names:
+                invalid.append(node.prefix)
         selector = SignalSelector(self.components, aliases, invalid)
         patterns = [(text, self.root.where("record", "signals", i)) for i, text in enumerate(self.spec.record.signals)]
         columns = selector.select(patterns)
         self.problems += selector.problems
-        self._has_missing_signals = bool(invalid or selector.problems)
+        self._has_missing_signals = bool(invalid or selector.problems or "record" in self.root.invalid_keys)
         return columns
 
     def _events(self) -> Iterator[Event]:
@@ -235,10 +278,10 @@ class SystemBuilder:
         """Return a problem of the system with the location of its subject in the scenario file."""
         if problem.where or not problem.subject:
             return problem
-        for node in self.root.walk():
-            for name in node.spec.components:
-                if problem.subject[:2] == ("components", node.full_name(name)):
-                    return replace(problem, where=node.where("components", name, *problem.subject[2:]), subject=())
+        key, *rest = problem.subject
+        if key == "components" and rest and (found := self.root.find_component(rest[0])):
+            node, name = found
+            return replace(problem, where=node.where("components", name, *rest[1:]), subject=())
         return replace(problem, where=self.root.where(*problem.subject), subject=())
 
 

@@ -9,12 +9,13 @@ import copy
 import json
 import types
 import typing
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from ..core.errors import Problem, did_you_mean
+from ..core.text import REPLACEMENT
 from .json_document import Document
 from .schema import SystemSpec
 from .schema_types import INVALID
@@ -23,6 +24,8 @@ S = TypeVar("S", bound=SystemSpec)
 
 #: values that replace missing or invalid required keys of the root
 _PLACEHOLDERS: dict[str, Any] = {"name": "unnamed", "stop_time": 1, "step_size": 1, "components": {}}
+#: keys of the root with names that other parts refer to
+_LISTS_OF_NAMES = ("record", "kpis", "ports")
 
 
 class Validated(NamedTuple, Generic[S]):
@@ -36,33 +39,109 @@ class Validated(NamedTuple, Generic[S]):
 
 def validate_document(document: Document, kind: type[S]) -> Validated[S]:
     """Convert a document to a specification of the class `kind`; parts that are invalid are reported and removed."""
-    value = copy.deepcopy(document.value)
-    problems = list(document.problems)
-    invalid_keys: set[str] = set()
+    value, problems = copy.deepcopy(document.value), list(document.problems)
     if not isinstance(value, dict):
-        problems.append(Problem(f"expected an object, found {_shorten_json(value)}", document.where(())))
-        value = {}
-    is_first_pass = True
-    while True:
-        try:
-            return Validated(kind.model_validate(value), problems, invalid_keys)
-        except ValidationError as error:
-            if is_first_pass:  # errors of later passes are consequences of the removals
-                problems += schema_problems(kind, document, error)
-            for detail in error.errors(include_url=False):
-                path = _error_path(detail)
-                invalid_keys |= {str(key) for key in path[:1] if len(path) == 1}
-                if detail["type"] == "extra_forbidden":
-                    _remove_key(value, path)
-                else:
-                    _replace_invalid(kind, value, path[:-1] if detail["type"] == "missing" and len(path) > 1 else path)
-            is_first_pass = False
+        if () not in document.invalid_paths:
+            problems.append(Problem(f"expected an object, found {_shorten_json(value)}", document.where(())))
+        required = {key: each for key, each in _PLACEHOLDERS.items() if key in kind.model_fields}
+        return Validated(kind.model_validate(required), problems, set(kind.model_fields))
+    result = _validate(kind, value)
+    if isinstance(result, ValidationError):
+        problems += schema_problems(kind, document, result)
+    invalid_keys = _remove_invalid(kind, value, document.invalid_paths)
+    if document.invalid_paths:
+        result = _validate(kind, value)
+    while isinstance(result, ValidationError):  # errors of later passes are consequences of the removals
+        for detail in result.errors(include_url=False):
+            path = _error_path(detail)
+            if detail["type"] == "extra_forbidden":
+                _remove_key(value, path)
+                invalid_keys |= {key for key in kind.model_fields if len(path) == 1 and _may_mean(str(path[0]), key)}
+            else:
+                part = path[:-1] if detail["type"] == "missing" and len(path) > 1 else path
+                invalid_keys |= _remove_invalid(kind, value, [part])
+        result = _validate(kind, value)
+    return Validated(result, problems, invalid_keys)
+
+
+def _validate(kind: type[S], value: Any) -> S | ValidationError:
+    try:
+        return kind.model_validate(value)
+    except ValidationError as error:
+        return error
+
+
+def _remove_invalid(kind: type[BaseModel], value: Any, paths: Iterable[tuple[str | int, ...]]) -> set[str]:
+    """Remove the invalid parts at these paths; return the keys of the root that are invalid or incomplete now."""
+    keys = set()
+    for path in paths:
+        part = _smallest_meaningful_part(path)
+        if len(part) == 1 or part[0] in _LISTS_OF_NAMES:
+            keys.add(str(part[0]))
+        _replace_invalid(kind, value, part)
+    return keys
+
+
+def _smallest_meaningful_part(path: tuple[str | int, ...]) -> tuple[str | int, ...]:
+    """Return the path of what has no meaning without the value at `path`: all stages, or the owner of an argument."""
+    if path[0] == "algorithm":
+        return path[:1]
+    owner = 1 if path[0] == "scene" else 2
+    return path[:owner] if path[owner : owner + 1] == ("arguments",) else path
 
 
 def schema_problems(kind: type[BaseModel], document: Document, error: ValidationError) -> list[Problem]:
-    """Return a problem with its location in the document for every error that pydantic found."""
+    """Return a problem with its location in the document for every error that pydantic found.
+
+    Errors that only follow from another one, or from a problem of the document, are left out.
+    """
     details = [(_error_path(detail), detail) for detail in error.errors(include_url=False)]
-    return [Problem(_error_message(kind, path, detail), document.where(path)) for path, detail in details]
+    invalid = set(document.invalid_paths)
+    above_invalid = {path[:n] for path in invalid for n in range(len(path))}
+    unknown_keys = {path: detail for path, detail in details if detail["type"] == "extra_forbidden"}
+    illegal_names = {detail["input"] for _, detail in details if detail["loc"][::2] == ("components", "[key]")}
+
+    def is_consequence(path: tuple[str | int, ...], detail: Any) -> bool:
+        if any(path[:n] in invalid for n in range(len(path) + 1)):
+            return True
+        match detail["type"]:
+            case "value_error":
+                return path in above_invalid
+            case "missing":
+                misspelt = (key for *parent, key in (*unknown_keys, *invalid) if tuple(parent) == path[:-1])
+                return any(_may_mean(str(key), str(path[-1])) for key in misspelt)
+            case "string_pattern_mismatch":
+                return path[0] == "algorithm" and detail["input"] in illegal_names
+        return False
+
+    groups: dict[Any, list[tuple[tuple[str | int, ...], Any]]] = {}
+    for path, detail in details:
+        if not is_consequence(path, detail):
+            groups.setdefault(_common_cause(path, detail), []).append((path, detail))
+    return [_group_problem(kind, document, group) for group in groups.values()]
+
+
+def _common_cause(path: tuple[str | int, ...], detail: Any) -> Any:
+    """Return a key that is equal for missing keys of one object, and for elements of one list that have the same wrong type."""
+    is_shared = detail["type"] == "missing" or (detail["type"].endswith("_type") and isinstance(path[-1], int))
+    return (path[:-1] if is_shared else path, detail["type"])
+
+
+def _group_problem(kind: type[BaseModel], document: Document, group: Sequence[tuple[tuple[str | int, ...], Any]]) -> Problem:
+    """Return one problem for errors with a common cause."""
+    (path, detail), *others = group
+    if not others:
+        return Problem(_error_message(kind, path, detail), document.where(path))
+    if detail["type"] == "missing":
+        names = ", ".join(f'"{each[-1]}"' for each, _ in group)
+        return Problem(f"the keys {names} are missing", document.where(path[:-1]))
+    count = f"{len(others)} more element{'s' * (len(others) > 1)}"
+    return Problem(f"{_error_message(kind, path, detail)}, and {count} likewise", document.where(path))
+
+
+def _may_mean(key: str, required: str) -> bool:
+    """Return True if an unknown or unreadable key probably stands for a required one."""
+    return REPLACEMENT in key or f'"{required}"' in did_you_mean(key, (required,))
 
 
 def _error_path(detail: Any) -> tuple[str | int, ...]:
@@ -78,6 +157,8 @@ def _error_message(kind: type[BaseModel], path: Sequence[str | int], detail: Any
             return f'the key "{path[-1]}" is missing'
         case "value_error":
             return f"{detail['ctx']['error']}; found {found}"
+        case "dict_type" | "model_type":
+            return f"expected an object; found {found}"
         case "string_pattern_mismatch":
             return f"expected a name of letters, digits and underscores; found {found}"
     return f"{detail['msg'].replace('Input should be', 'expected')}; found {found}"

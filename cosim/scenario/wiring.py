@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 from ..core.component import Component
 from ..core.errors import Problem, did_you_mean
+from ..core.size_limits import MAX_CONNECTIONS, require_at_most
 from ..core.system import Connection, Endpoint
 from .name_resolution import SlotIndex, Target, UnknownNameError, resolve_name
 from .nested_systems import Node
 from .schema import ConnectionSpec
-from .schema_types import accepted
+from .schema_types import INVALID, accepted
 
 
 class _Candidate(NamedTuple):
@@ -38,10 +40,16 @@ class Wiring:
         self._slots: dict[tuple[str, str], SlotIndex] = {}
         self._by_input: dict[Endpoint, _Candidate] = {}
         self._unmatched_inputs: dict[Endpoint, Problem] = {}
+        #: connections so far, including those that are overridden or invalid
+        self._count = 0
+        #: inputs whose missing connection another problem explains, and whether an invalid connection may explain any
+        self._excused: set[Endpoint] = set()
+        self._has_invalid_connections = False
         self.problems: list[Problem] = []
 
     def connect(self, node: Node) -> None:
         """Expand the connections of one system, without those of its nested systems."""
+        self._has_invalid_connections |= any(spec is INVALID for spec in node.spec.connections)
         for i, spec in accepted(node.spec.connections):
             self._expand(node, i, spec)
 
@@ -50,9 +58,19 @@ class Wiring:
         for target in self._resolve(node, name, "inputs", where):
             self._add(_Candidate(Connection(output, Endpoint(*target), 0, where), True))
 
+    def excuse(self, node: Node, name: str) -> None:
+        """Do not report that the inputs that a name refers to have no output: another problem is the reason."""
+        with suppress(UnknownNameError):
+            for target in resolve_name(node, name, ("inputs",), include_inner=True):
+                if target.component in self._components:
+                    slots = self._slots_of_target(target, "input").values()
+                    self._excused.update(Endpoint(target.component, slot) for slot in slots)
+
     def connections(self) -> Iterator[Connection]:
         """Return all connections, and add the inputs that have no output to the problems."""
-        self.problems += [problem for end, problem in self._unmatched_inputs.items() if end not in self._by_input]
+        if not self._has_invalid_connections:
+            explained = self._by_input.keys() | self._excused
+            self.problems += [problem for end, problem in self._unmatched_inputs.items() if end not in explained]
         return (candidate.connection for candidate in self._by_input.values())
 
     def _expand(self, node: Node, i: int, spec: ConnectionSpec) -> None:
@@ -61,6 +79,8 @@ class Wiring:
         targets = self._resolve(node, spec.target, "inputs", where_to)
         outputs = self._slots_of_targets(sources, "output", where_from)
         inputs = self._slots_of_targets(targets, "input", where_to)
+        if not outputs:
+            self.excuse(node, spec.target)
         for source, own_outputs in outputs:
             for target, own_inputs in inputs:
                 self._match(source, own_outputs, target, own_inputs, spec.delay, node.where("connections", i))
@@ -86,6 +106,8 @@ class Wiring:
                 self._unmatched_inputs[end] = Problem(f"input {end} has no matching output {expected}{hint}", where)
 
     def _add(self, new: _Candidate) -> None:
+        self._count += 1
+        require_at_most(MAX_CONNECTIONS, self._count, "connections of scalars up to here", new.connection.where)
         end = new.connection.target
         old = self._by_input.get(end)
         if old and old.is_variable == new.is_variable:

@@ -50,19 +50,20 @@ def level_of_value(paths: Sequence[str], value: Any) -> Level:
     return Level(value, dict.fromkeys(paths, value))
 
 
-def build_factor(spec: FactorSpec) -> Factor:
-    """Return the factor that a sweep file describes."""
+def build_factor(spec: FactorSpec, gridded: bool) -> Factor:
+    """Return the factor that a sweep file describes, with the levels of a full factorial design if it is `gridded`."""
     if spec.levels is not None:
         return _listed_factor(spec.name, [Level(label, settings) for label, settings in spec.levels.items()])
     paths = spec.set or []
     if spec.values is not None:
         return _listed_factor(spec.name, [level_of_value(paths, value) for value in spec.values])
     if spec.range is not None:
-        exact, coordinates = _range_quantile(spec.range), _range_coordinates(spec.range.count or 0)
+        exact, grid_coordinates = _range_quantile(spec.range), _range_coordinates
     else:
         assert spec.distribution is not None
-        exact, coordinates = _distribution_quantile(spec.distribution), _median_coordinates(spec.distribution.count or 0)
+        exact, grid_coordinates = _distribution_quantile(spec.distribution), _median_coordinates
     quantile = _rounded_quantile(exact, spec.integer)
+    coordinates = grid_coordinates(spec.level_count) if gridded else []
     grid = [level_of_value(paths, quantile(coordinate)) for coordinate in coordinates]
     return Factor(spec.name, paths, quantile=quantile, grid_levels=grid)
 
@@ -177,7 +178,7 @@ class Design:
 
 def build_design(spec: SweepSpec) -> Design:
     """Build the design of a sweep; equal files give equal points."""
-    factors = [build_factor(each) for each in spec.factors]
+    factors = [build_factor(each, gridded=spec.design.runs is None) for each in spec.factors]
     seeds = spec.seeds
     replications = [level_of_value(seeds.set, seeds.first + i) for i in range(seeds.count)] if seeds else []
     return Design(factors, replications, _draw_samples(spec.design, len(factors)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -11,6 +12,7 @@ from pydantic import ValidationError
 
 from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean
+from ..core.size_limits import MAX_RUNS, require_at_most
 from ..scenario.json_document import Document, json_path, read_document
 from ..scenario.nested_systems import find_scenario, pointer_keys
 from ..scenario.validation import schema_problems
@@ -89,12 +91,13 @@ def _value_at(value: Any, path: tuple[str | int, ...]) -> object:
     return value
 
 
-def read_study(file: str | Path, kind: type[S]) -> StudyFile[S]:
+def read_study(file: str | Path, kind: type[S], max_runs: int = MAX_RUNS) -> StudyFile[S]:
     """Read a sweep or tuning from a file, or a shipped one by its name.
 
     Args:
         file: path of the file, or name of a shipped study.
         kind: schema of the file: SweepSpec or TuneSpec.
+        max_runs: largest accepted number of runs, and of cells of a map.
 
     Raises:
         InputError: with all problems of the file.
@@ -106,12 +109,22 @@ def read_study(file: str | Path, kind: type[S]) -> StudyFile[S]:
         raise InputError([*document.problems, *schema_problems(kind, document, error)]) from None
     if document.problems:
         raise InputError(document.problems)
+    _check_counts(spec, document, max_runs)
     study_file = StudyFile(spec, document)
     try:
         study_file.scenario  # noqa: B018  (raises InputError if there is no such scenario)
     except InputError as error:
         raise InputError([replace(problem, where=document.where(("scenario",))) for problem in error.problems]) from None
     return study_file
+
+
+def _check_counts(spec: StudySpec, document: Document, max_runs: int) -> None:
+    """Raise InputError if there are more than `max_runs` runs or cells of a map; the location is that of the largest factor."""
+    hint = "; --max-runs raises this limit"
+    largest, _ = max(spec.run_counts().items(), key=itemgetter(1))
+    require_at_most(max_runs, spec.max_runs, "runs", document.where(largest), hint)
+    for path, cells in spec.cell_counts().items():
+        require_at_most(max_runs, cells, "cells of the map", document.where(path), hint)
 
 
 def _find_study(file: str | Path) -> Path:

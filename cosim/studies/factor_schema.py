@@ -137,6 +137,16 @@ class FactorSpec(Spec):
             raise ValueError('expected "set" together with values, range or distribution, and not together with levels')
         return self
 
+    @property
+    def level_count(self) -> int:
+        """Number of levels in a full factorial design."""
+        listed = self.values or self.levels
+        if listed is not None:
+            return len(listed)
+        part = self.range or self.distribution
+        assert part is not None
+        return part.count or 0
+
     def settings(self) -> Iterator[tuple[str, Any]]:
         """Yield each path that the factor sets with its listed values, or with None if it has none."""
         for level in (self.levels or {}).values():

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.errors import CosimError, InputError
+from ..core.json_values import parse_object
 from ..core.paths import open_text
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ EXPECTATION_KEYS = ("checks", "reference")
 def has_keys(file: Path, *groups: Sequence[str]) -> bool:
     """Return whether a JSON file has at least one key of each group; an unreadable file counts, since its run reports why."""
     try:
-        with open_text(file, encoding="utf-8") as stream:
+        with open_text(file, encoding="utf-8-sig") as stream:
             content = json.load(stream)
     except (OSError, ValueError, RecursionError):
         return True
@@ -63,7 +64,7 @@ class Regression:
     update: bool
 
     def run(self) -> RegressionOutcome:
-        """Run the scenario by `cosim run` in a process of its own and check its results, or update the reference."""
+        """Run the scenario by `cosim run` in a separate process and check its results, or update the reference."""
         began = time.perf_counter()
         return replace(self._run(), seconds=time.perf_counter() - began)
 
@@ -78,9 +79,10 @@ class Regression:
             return RegressionOutcome(self.file.stem, done.returncode, "did not run to its end", tuple(done.stderr.splitlines()))
         try:
             run = _FinishedRun.read(self.file, self.directory)
-            return self._update_reference(run) if self.update else self._compare(run)
+            outcome = self._update_reference(run) if self.update else self._compare(run)
         except CosimError as error:
             return RegressionOutcome(self.file.stem, error.exit_code, "cannot be compared", tuple(str(error).splitlines()))
+        return replace(outcome, summary="; ".join(filter(None, (outcome.summary, run.result.termination))))
 
     def _compare(self, run: _FinishedRun) -> RegressionOutcome:
         failed, summary = run.failed_checks(), f"{len(run.checks)} checks"
@@ -161,7 +163,7 @@ class _FinishedRun:
         from ..results.comparison.reference import describe_provenance_changes
 
         try:
-            made_by = json.loads(self.reference_path.with_suffix(".json").read_text(encoding="utf-8"))
+            made_by = parse_object(self.reference_path.with_suffix(".json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return
         if changes := describe_provenance_changes(made_by, self.result.metadata):

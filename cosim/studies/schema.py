@@ -60,6 +60,10 @@ class DesignSpec(Spec):
         return self
 
 
+#: path of a number in a study file
+CountPath = tuple["str | int", ...]
+
+
 class StudySpec(Spec):
     """Common part of sweeps and tunings: a scenario, settings that all runs share, and the deadline of a run."""
 
@@ -69,6 +73,19 @@ class StudySpec(Spec):
     scenario: str = Field(description="path relative to this file, or the name of a shipped scenario")
     settings: dict[str, Any] = Field({}, description="settings of all runs, as of `--set`")
     deadline: float | None = Field(None, gt=0, description="wall time that a run may take (s)")
+
+    def run_counts(self) -> dict[CountPath, int]:
+        """Return the numbers whose product is the largest number of runs, by the paths that they result from."""
+        raise NotImplementedError
+
+    @property
+    def max_runs(self) -> int:
+        """Largest number of runs of the study."""
+        return math.prod(self.run_counts().values())
+
+    def cell_counts(self) -> dict[CountPath, int]:
+        """Return the number of cells of each map, by the path of the map."""
+        return {}
 
 
 class SweepSpec(StudySpec):
@@ -102,6 +119,19 @@ class SweepSpec(StudySpec):
                 if part and part.count is None:
                     raise ValueError(f'the factor "{factor.name}" needs a "count" in a full factorial design')
         return self
+
+    def run_counts(self) -> dict[CountPath, int]:
+        """Return the numbers of samples or levels, and of seeds."""
+        counts: dict[CountPath, int] = {("factors", i): factor.level_count for i, factor in enumerate(self.factors)}
+        if self.design.runs is not None and self.factors:
+            counts = {("design", "runs"): self.design.runs}
+        return counts | ({("seeds", "count"): self.seeds.count} if self.seeds else {})
+
+    def cell_counts(self) -> dict[CountPath, int]:
+        """Return the product of the numbers of levels of each map's factors."""
+        levels = {factor.name: factor.level_count for factor in self.factors}
+        levels["seed"] = self.seeds.count if self.seeds else 0
+        return {("maps", i): math.prod(levels[name] for name in each.factors) for i, each in enumerate(self.maps)}
 
 
 class ParameterSpec(Spec):
@@ -150,6 +180,14 @@ class TuneSpec(StudySpec):
         parameters = [(each.name, [(path, None) for path in each.set]) for each in self.parameters]
         check_conflicts(self.settings, [("cases", cases), *parameters])
         return self
+
+    def run_counts(self) -> dict[CountPath, int]:
+        """Return the numbers of points and cases."""
+        method = self.method
+        counts: dict[CountPath, int] = {("method", "evaluations"): method.evaluations}
+        if method.kind == "differential_evolution":
+            counts = {("method", "population"): method.population, ("method", "generations"): method.generations + 1}
+        return counts | {("cases",): len(self.cases)}
 
 
 def _check_unique(what: str, names: Iterable[str]) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import InputError, Problem
+from ..core.size_limits import MAX_RUNS
 from ..results.checks import Number, evaluate_checks
 from .design import Design, Point, build_design
 from .document import StudyFile, read_study
@@ -50,13 +51,17 @@ class Sweep:
     design: Design
 
     @classmethod
-    def from_file(cls, file: str | Path) -> Sweep:
+    def from_file(cls, file: str | Path, max_runs: int = MAX_RUNS) -> Sweep:
         """Read a sweep file, or a shipped sweep by its name.
+
+        Args:
+            file: path or name.
+            max_runs: largest accepted number of runs.
 
         Raises:
             InputError: with all problems of the file.
         """
-        study_file = read_study(file, SweepSpec)
+        study_file = read_study(file, SweepSpec, max_runs)
         return cls(study_file, build_design(study_file.spec))
 
     @cached_property

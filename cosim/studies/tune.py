@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import InputError, Problem
+from ..core.size_limits import MAX_RUNS
 from .design import interpolate
 from .document import StudyFile, read_study
 from .execution.job import Job
@@ -80,13 +81,17 @@ class Tuning:
     observed_kpis: ObservedKpis = field(default_factory=ObservedKpis)
 
     @classmethod
-    def from_file(cls, file: str | Path) -> Tuning:
+    def from_file(cls, file: str | Path, max_runs: int = MAX_RUNS) -> Tuning:
         """Read a tuning file, or a shipped tuning by its name.
+
+        Args:
+            file: path or name.
+            max_runs: largest accepted number of runs.
 
         Raises:
             InputError: with all problems of the file.
         """
-        study_file = read_study(file, TuneSpec)
+        study_file = read_study(file, TuneSpec, max_runs)
         problems: list[Problem] = []
 
         def parse(parser: Callable[[str], Any], text: str, *path: str | int) -> Any:

@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import TYPE_CHECKING
 from zipfile import BadZipFile, ZipFile
 
@@ -16,6 +15,7 @@ import numpy as np
 
 from cosim.core import resources
 from cosim.core.errors import InputError
+from cosim.results.files import writing_atomically
 
 if TYPE_CHECKING:
     from ctypes import _NamedFuncPointer
@@ -70,14 +70,19 @@ def _unreadable_fmu_error(model: str, fmu: Path, error: Exception) -> InputError
 
 
 def _extract_to_cache(content: bytes, cache_folder: Path, name: str) -> Path:
-    """Write a file to the cache; its name contains a hash of its content, so an existing file never changes."""
+    """Write a file to the cache; its name contains a hash of its content, and a damaged file is replaced."""
     path = cache_folder / f"{sha256(content).hexdigest()[:20]}-{name}"
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with NamedTemporaryFile(dir=path.parent, delete=False) as file:
-            file.write(content)
-        Path(file.name).replace(path)
+    if not _has_content(path, content):
+        with writing_atomically(path) as temporary:
+            temporary.write_bytes(content)
     return path
+
+
+def _has_content(path: Path, content: bytes) -> bool:
+    try:
+        return path.read_bytes() == content
+    except OSError:
+        return False
 
 
 def bind_arrays(

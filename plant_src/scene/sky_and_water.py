@@ -82,10 +82,14 @@ def water_distance(view: View, light: Rays) -> np.ndarray:
 
 
 class WaterPixels(NamedTuple):
-    """Water in n pixels of a picture.
+    """The n pixels of a picture that show water.
 
-    `sources` are flat indices (n,) of the reflected pixels of the mirrored picture, `sky` the reflected sky (3, n) and
-    `reflectance` the fraction of reflected light (n,).
+    The mirrored picture shows the solids from below the water surface; it gives the colours of their reflections.
+
+    Attributes:
+        sources: For each pixel the flat index of the pixel of the mirrored picture that it reflects, shape (n,).
+        sky: Colour of the reflected sky, shape (3, n).
+        reflectance: Fraction of light that the water reflects, shape (n,).
     """
 
     sources: np.ndarray

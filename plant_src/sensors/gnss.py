@@ -16,7 +16,7 @@ class Gnss(SampledSensor):
 
     Error model: position = true position + first-order Gauss-Markov drift + white noise; velocity = true velocity + white
     noise. Default values are those of a data sheet (`device_data.py`); each is a parameter. While the parameter `available`
-    is false, `valid` is false and the last fix stays.
+    is false, `valid` is false and the outputs keep the last fix.
 
     Inputs: `vehicle.position` (m, world), `vehicle.velocity` (m/s, world), of a vehicle or a deck. Outputs: `position.x|y|z`
     (m), `velocity.x|y|z` (m/s), `time` of the sample (s), `valid`.

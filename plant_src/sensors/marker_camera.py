@@ -18,14 +18,14 @@ _VEHICLE_ORIENTATION, _DECK_POSITION, _DECK_ORIENTATION = slice(3, 7), slice(7, 
 class MarkerCamera(SampledSensor):
     """Marker camera: pinhole geometry decides visibility, first-order error propagation gives the noise of the pose.
 
-    A square marker of edge `marker_size` (m) lies in the middle of the deck. A sample is valid under these conditions:
+    The marker is a square with the edge `marker_size` (m) in the middle of the deck. A sample is valid under these conditions:
 
     - all four corners are in the picture (`width` by `height` pixels, pinhole of `focal_length` pixels)
     - the marker is seen from above, at most `incidence` (rad) from its normal
     - its edge appears at least `smallest` pixels long
-    - it is not lost at random; this happens to the share `drop_out` of the pictures
+    - no random drop-out occurs (probability `drop_out` per picture)
 
-    Otherwise `valid` is false and the last pose stays. Nothing occludes the marker.
+    Otherwise `valid` is false and the outputs keep the last pose. Occlusion of the marker is not modelled.
 
     Error model: for corners with the standard deviation s (`pixel_noise`), focal length f, marker size m and depth z, the
     standard deviations are s z / f across the view, s z^2 / (f m) along it, s z / (f m) in yaw and `tilt_ratio` times that in

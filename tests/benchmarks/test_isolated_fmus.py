@@ -20,7 +20,6 @@ from lag_fmus import lag_fmu
 
 from cosim.components.fmi import FmuFile, Isolation, create_component
 from cosim.core.system import Endpoint, System
-from cosim.core.time_grid import TimeGrid
 from cosim.engine import ExecutorKind, Recorder, compile_plan, executor_class
 from cosim.engine.initialization import instantiate_components
 from cosim.engine.run_loop import SimulationOutcome, simulate
@@ -64,8 +63,8 @@ def microseconds(run_to: Callable[[int], object]) -> float:
 def per_step(fmu: Path, isolation: Isolation | None, kind: ExecutorKind) -> float:
     """Return the wall time (us) of a macro step of one FMU."""
     system = lags(fmu, 1, isolation)
-    plan = compile_plan(system, TimeGrid.from_times(Fraction(0), STEPS * STEP, STEP), [Endpoint("s0", "y1")])
-    executor = executor_class(kind)(plan, Recorder(plan, {"y": Endpoint("s0", "y1")}))
+    plan = compile_plan(system, Settings(Fraction(0), STEPS * STEP, STEP, {"y": Endpoint("s0", "y1")}))
+    executor = executor_class(kind)(plan, Recorder(plan))
     try:
         instantiate_components(plan)
         executor.initialize()

@@ -12,7 +12,7 @@ from cosim.components.fmi import FmuFile
 from cosim.engine.run_loop import simulating
 from cosim.results import Result
 from cosim.results.kpi import evaluate_kpis
-from cosim.scenario import prepare
+from cosim.scenario import load
 from cosim.scenario.nested_systems import find_scenario, load_scenario
 from cosim.studies.execution.job import Job, StudyContext
 from cosim.studies.execution.local import LocalRunner
@@ -58,8 +58,8 @@ def prepared_files(scenario):
 
 def run_in_process(job, scenario, files):
     """Run in this process, with FMUs that are already extracted."""
-    prepared = prepare(scenario, job.settings, loaded_fmus={path: file.share() for path, file in files.items()})
-    with simulating(prepared.system, prepared.settings) as run:
+    prepared = load(scenario, job.settings, loaded_fmus={path: file.share() for path, file in files.items()})
+    with simulating(prepared.plan) as run:
         evaluate_kpis(Result(run.recording), prepared.kpis())
 
 

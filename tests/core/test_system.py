@@ -18,16 +18,22 @@ def test_a_valid_system_has_no_problems():
 
 
 def test_all_problems_are_found_at_once():
-    components = {"a": gain(), "b": gain(), "c": gain()}
+    components = {"a": gain(), "b": gain(), "c": gain(), "f": gain()}
     built = make_system(components, "a.y > b.u, c.y > b.u, a.z > c.u, a.u > c.u, a.y > d.u", stages=[("a", "e"), ("b",)])
     assert texts(built) == [
-        'unknown component "e"; valid: a, b, c',
+        'unknown component "e"; valid: a, b, c, f',
         'component "c" is in no stage, so it would never step',
+        'component "f" is in no stage, so it would never step',
         "input b.u is connected twice: it is already fed by a.y",
         'component "a" has no variable "z"; valid: y',
         "a.u is of causality input, expected an output",
-        'unknown component "d"; valid: a, b, c',
+        'unknown component "d"; valid: a, b, c, f',
     ]
+
+
+def test_a_wrong_name_in_a_stage_explains_a_missing_one():
+    built = make_system({"ship": gain(), "pilot": gain()}, stages=[("ship",), ("pilto",)])
+    assert texts(built) == ['unknown component "pilto"; did you mean "pilot"?']
 
 
 def test_an_output_cannot_be_a_target():

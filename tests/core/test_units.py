@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from cosim.core.units import BASE_UNITS, multiply_units, parse_unit
+from cosim.core.units import BASE_UNITS, Unit, multiply_units, named_unit, parse_unit
 
 
 @pytest.mark.parametrize(
@@ -12,6 +12,70 @@ from cosim.core.units import BASE_UNITS, multiply_units, parse_unit
 def test_derived_units_have_the_exponents_of_their_definition(text, like):
     assert parse_unit(text).exponents == parse_unit(like).exponents
     assert parse_unit(text).factor == parse_unit(like).factor
+
+
+@pytest.mark.parametrize(
+    ("text", "like"),
+    [
+        ("N·m", "N.m"),
+        ("N⋅m", "N.m"),
+        ("N*m", "N.m"),
+        ("N m", "N.m"),
+        ("N\N{NO-BREAK SPACE}m", "N.m"),
+        ("W/m²", "W/m2"),
+        ("m³", "m3"),
+        ("m·s⁻¹", "m.s-1"),
+        ("m/s^2", "m/s2"),
+        ("m/s**2", "m/s2"),
+        ("m^-1", "1/m"),
+        ("m / s", "m/s"),
+        ("W/(m²·K)", "W/(m2.K)"),
+        ("W/m²/K", "W/(m2.K)"),
+        ("(kg m)/s²", "N"),
+        ("°C", "degC"),
+        ("\N{DEGREE CELSIUS}", "degC"),
+        ("°", "deg"),
+        ("°/s", "deg/s"),
+        ("Ω", "Ohm"),
+        ("\N{OHM SIGN}", "Ohm"),
+        ("-", "1"),
+        ("–", "1"),
+        ("—", "1"),
+        (" m ", "m"),
+    ],
+)
+def test_a_common_spelling_means_what_it_says(text, like):
+    found, expected = parse_unit(text), parse_unit(like)
+    assert (found.name, found.exponents, found.factor, found.offset) == (
+        text,
+        expected.exponents,
+        expected.factor,
+        expected.offset,
+    )
+
+
+#: texts that would take very long, or overflow
+HOSTILE = [
+    "a" * 10_000,
+    "x" + " " * 100_000 + "x",
+    "km999",
+    "mm999",
+    "km-999",
+    "m" + "9" * 5000,
+    "m9999",
+    "h99.h99",
+    "/" * 10_000,
+]
+
+
+@pytest.mark.parametrize("text", ["bar_g", "bar(g)", "€/kWh", "$/MWh", "10^3 m", "people", "{", "/", "m//", *HOSTILE])
+def test_a_text_that_is_no_known_unit_is_a_unit_by_its_name(text):
+    unit, metre = named_unit(text), parse_unit("m")
+    assert unit == Unit(text, ())
+    assert unit.converts_to(unit)
+    assert unit.converts_to(metre)
+    assert metre.converts_to(unit)
+    assert unit.conversion(metre) == metre.conversion(unit) == (1.0, 0.0)
 
 
 def test_degrees_become_radians():
@@ -37,7 +101,7 @@ def test_the_same_unit_needs_no_conversion():
     assert parse_unit("km/h").conversion(parse_unit("km/h")) == (1.0, 0.0)
 
 
-@pytest.mark.parametrize("text", ["parsec", "m/s^2", "kg m", "m//", "(m"])
+@pytest.mark.parametrize("text", ["", "parsec", "m//", "(m", "bar_g", "10^3 m", "1e-3", "W/m2K", "€/kWh", "{m}", "m/(s.(kg.K))"])
 def test_unreadable_input_is_refused(text):
     with pytest.raises(ValueError, match="unit"):
         parse_unit(text)
@@ -59,3 +123,26 @@ def test_products_of_units(factors, expected):
     assert multiply_units(factors) == expected
     exponents = [sum(power * parse_unit(text).exponents[i] for text, power in factors) for i in range(len(BASE_UNITS))]
     assert list(parse_unit(expected).exponents) == exponents
+
+
+@pytest.mark.parametrize(
+    ("factors", "expected"),
+    [
+        ([("°C", 1), ("s", 1)], "degC.s"),
+        ([("N·m", 2), ("s", 1)], "N2.m2.s"),
+        ([("W/m²", 1), ("s", 1)], "W.s/m2"),
+        ([("-", 1), ("s", 1)], "s"),
+        ([("bar_g", 2), ("s", 1)], "bar_g2.s"),
+        ([("€/kWh", 1), ("s", 1)], "€.s/kWh"),
+        ([("bar(g)", 1), ("s", 1)], "(bar(g)).s"),
+        ([("10^3 m", 1), ("s", -1)], "(10^3 m)/s"),
+        ([("m//", 1), ("m//", -1)], "1"),
+    ],
+)
+def test_products_of_units_of_any_spelling(factors, expected):
+    assert multiply_units(factors) == expected
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_products_with_any_text_are_texts(text):
+    assert isinstance(multiply_units([(text, 2), ("s", 1)]), str)

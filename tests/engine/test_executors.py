@@ -3,11 +3,12 @@
 import random
 import struct
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
-from fakes import FakeComponent
-from systems import endpoint
+from fakes import FakeComponent, inputs
+from systems import endpoint, make_system
 
 from cosim.components.fmi import FmuFile, Isolation, create_component
 from cosim.core.component import DTYPES, Variable
@@ -218,3 +219,62 @@ def test_constants_of_the_native_module_are_those_of_python():
     assert parallel.MEASURED_STEPS == _native.MEASURED_STEPS
     markers = journal.CALL_NUMBER, journal.STEP_COUNT, journal.ROW_COUNT
     assert markers == (_native.MARKER_CALL, _native.MARKER_STEPS, _native.MARKER_ROWS)
+
+
+def spoiled_source(type_="Float64", value=float("nan"), copies=1, spoiled=-1):
+    """Return a component with the outputs y0, y1, ..., one of which has this value in steps that begin after 0.045 s."""
+    variables = [Variable(f"y{i}", type_, "output") for i in range(copies)]
+
+    def step(values, t, _h):
+        values[variables[spoiled].name] = value if t > 0.045 else 1.0
+
+    return FakeComponent(variables, step)
+
+
+def fail_settings(kind, *recorded, **more):
+    columns = {name: endpoint(name) for name in recorded}
+    return Settings(Fraction(0), Fraction(1), Fraction(1, 100), columns, executor=kind, non_finite="fail", **more)
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+@pytest.mark.parametrize("copies", [1, 300])
+@pytest.mark.parametrize("type_", ["Float64", "Float32"])
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
+def test_a_recorded_output_must_be_finite_on_request(kind, copies, type_, value):
+    names = [f"a.y{i}" for i in range(copies)]
+    outcome = simulate(make_system({"a": spoiled_source(type_, value, copies=copies)}), fail_settings(kind, *names))
+    text = f'the output "y{copies - 1}" is {value}, and is recorded for t = 0.06 s'
+    assert str(outcome.failure) == f"a: do_step failed at t = 0.05 s: {text}"
+    assert len(outcome.recording.time) == 6
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_the_time_is_exact_between_recorded_rows(kind):
+    outcome = simulate(make_system({"a": spoiled_source()}), fail_settings(kind, "a.y0", record_interval=Fraction(1, 10)))
+    assert str(outcome.failure).endswith("is nan, and is recorded for t = 0.06 s")
+    assert outcome.recording.time.tolist() == [0]
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_initial_outputs_must_be_finite_on_request(kind):
+    source = FakeComponent([Variable("y0", causality="output")], lambda *_: None, start={"y0": float("inf")})
+    outcome = simulate(make_system({"a": source}), fail_settings(kind, "a.y0"))
+    text = 'a: exit_initialization_mode failed at t = 0 s: the output "y0" is inf, and is recorded for t = 0.0 s'
+    assert (str(outcome.failure), len(outcome.recording.time)) == (text, 0)
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_an_output_that_is_neither_recorded_nor_connected_may_have_any_value(kind):
+    """Its component binds all of its variables, so the value lies among the recorded ones."""
+    source = spoiled_source(copies=3, spoiled=1)
+    source.binds_everything = True
+    assert simulate(make_system({"a": source}), fail_settings(kind, "a.y0", "a.y2")).failure is None
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_any_value_may_be_allowed(kind):
+    reader = FakeComponent(inputs("u"), lambda *_: None)
+    built = make_system({"a": spoiled_source(), "b": reader}, "a.y0 > b.u")
+    outcome = simulate(built, replace(fail_settings(kind, "a.y0"), non_finite="allow"))
+    assert outcome.failure is None
+    assert np.isnan(outcome.recording.columns["a.y0"][6:]).all()

@@ -6,8 +6,9 @@ from fakes import FakeComponent
 from systems import endpoint, make_system
 
 from cosim.core.component import Variable
-from cosim.core.time_grid import TimeGrid, exact_fraction
+from cosim.core.time_grid import exact_fraction
 from cosim.engine import compile_plan
+from cosim.engine.settings import Settings
 
 INT = np.dtype(np.int32)
 
@@ -30,6 +31,6 @@ VARIABLES = {
 )
 def test_variables_that_one_fmi_call_can_get_are_adjacent(chosen, order):
     component = FakeComponent([VARIABLES[name] for name in chosen], lambda _values, _t, _h: None)
-    grid = TimeGrid.from_times(exact_fraction(0), exact_fraction(1), exact_fraction(1))
-    plan = compile_plan(make_system({"a": component}), grid, [endpoint(f"a.{name}") for name in chosen])
+    columns = {name: endpoint(f"a.{name}") for name in chosen}
+    plan = compile_plan(make_system({"a": component}), Settings(exact_fraction(0), exact_fraction(1), exact_fraction(1), columns))
     assert [variable.name for variable in plan.outputs.ports["a"].variables] == order

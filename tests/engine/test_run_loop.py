@@ -2,6 +2,7 @@
 
 import ctypes
 import platform
+import shutil
 import struct
 import sys
 from contextlib import contextmanager
@@ -15,7 +16,8 @@ from cosim.components.fmi import FmuFile, create_component
 from cosim.core.component import StepResult, Variable
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.run_checks import find_problems
+from cosim.engine.disk_space import find_space_problems
+from cosim.engine.plan import compile_plan
 from cosim.engine.run_loop import simulate
 from cosim.engine.settings import Event, Settings
 from cosim.process.float_mode import enabled_traps, is_changed
@@ -126,11 +128,23 @@ def test_observers_see_progress_and_the_end():
     assert len(seen) == 101
 
 
-def test_a_recording_larger_than_the_disk_is_refused():
+def test_a_recording_larger_than_the_disk_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"3\d* rows of 1 signal take about .* GB are free in .*; make the step longer"):
         simulate(make_system({"a": counter()}), settings(30, exact_fraction("1/1000000000000")))
     sparse = settings(30, exact_fraction("1/1000000000000"), record_interval=exact_fraction(30))
-    assert find_problems(make_system({"a": counter()}), sparse) == []
+    plan = compile_plan(make_system({"a": counter()}), sparse)
+    assert (plan.row_count, find_space_problems(plan, tmp_path, csv=True)) == (2, [])
+
+
+@pytest.mark.parametrize(
+    ("csv", "replaced", "fits"), [(False, 0.0, True), (True, 0.0, False), (True, 1.0, True), (True, 0.5, False)]
+)
+def test_the_free_space_is_that_of_the_folder_with_the_rows(tmp_path, csv, replaced, fits):
+    """Rows of half the free space; with a CSV file they need 1.75 times of it."""
+    free = shutil.disk_usage(tmp_path).free
+    assert free > 2e9
+    large = compile_plan(make_system({"a": counter()}), settings(free // 32, record=["a.y"]))
+    assert (find_space_problems(large, tmp_path, csv, int(replaced * free)) == []) == fits
 
 
 def flush_small_numbers(library):

@@ -216,3 +216,10 @@ def instantiate_sample(fmu: Path, tmp_path: Path) -> Iterator[Callable[..., FmuI
     yield instantiate
     for instance in instances:
         instance.fmu.freeInstance()
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty cache of the user."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache"

@@ -291,12 +291,6 @@ def test_fmu_names_are_in_snake_case(model, name):
     assert snake_case(model) == name
 
 
-@pytest.fixture
-def cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return tmp_path / "cache"
-
-
 def test_a_cached_fmu_is_built_once(tmp_path, cache):
     source = write(tmp_path, {"models/SampledPi.mo": MODELICA}) / "models/SampledPi.mo"
     fmu = cached_fmu(source, "SampledPi")

@@ -196,7 +196,7 @@ def test_tick_labels_are_complete(open_page, tmp_path):
 def test_the_diagram_of_one_component_is_as_large_as_its_texts(open_page, flight_result, tmp_path):
     box = {"name": "alone", "origin": "alone.fmu", "inputs": 0, "outputs": 1, "period": None}
     system = {"components": [box], "stages": [["alone"]], "connections": []}
-    write_report(replace(flight_result, metadata={"name": "alone", "system": system}), [], {}, tmp_path / "report.html")
+    write_report(replace(flight_result, metadata={"name": "alone", "system": system}), [], [], tmp_path / "report.html")
     rectangle = open_page(tmp_path / "report.html").page.locator(".diagram .box").bounding_box()
     assert rectangle["width"] == pytest.approx(WIDTH, abs=2)
 
@@ -204,7 +204,7 @@ def test_the_diagram_of_one_component_is_as_large_as_its_texts(open_page, flight
 def test_the_report_escapes_texts_of_the_scenario(open_page, flight_result, tmp_path):
     evil = "</script><script>window.caught = true</script><img src=x onerror='window.caught = true'>"
     result = replace(flight_result, metadata={"scenario": {"description": evil}, "name": evil, "warnings": [evil]})
-    write_report(result, [], {}, tmp_path / "report.html")
+    write_report(result, [], [], tmp_path / "report.html")
     opened = open_page(tmp_path / "report.html")
     assert opened("window.caught === undefined")
     assert opened.page.locator("h1").inner_text() == evil

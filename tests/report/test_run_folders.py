@@ -63,6 +63,54 @@ def test_a_run_with_an_invalid_file_is_refused(tmp_path):
         read_run(run)
 
 
+@pytest.mark.parametrize("name", ["run.json", "kpis.json"])
+@pytest.mark.parametrize("text", ["[" * 100_000, "[1]", "3", "\x00", '{"a": ' + "1" * 5000 + "}"])
+def test_a_file_that_is_no_object_is_refused(tmp_path, name, text):
+    run = write(tmp_path)
+    (run / name).write_text(text)
+    with pytest.raises(InputError, match=rf"{name} is not valid JSON: .*; expected a file that `cosim run` wrote"):
+        read_run(run)
+
+
+@pytest.mark.parametrize("value", ["text", {"b": 1}, [1], 10**400])
+def test_a_kpi_that_is_no_number_is_refused_with_its_line(tmp_path, value):
+    run = write(tmp_path)
+    (run / "kpis.json").write_text(json.dumps({"good": 1.5, "bad": value}, indent=2))
+    with pytest.raises(InputError, match=r"kpis\.json:3:3: \$\.bad: expected a number, true, false or null; found"):
+        read_run(run)
+
+
+DIAGRAM = {"components": [{"name": "a", "origin": "a.fmu", "inputs": 0, "outputs": 1, "period": None}], "connections": []}
+
+
+@pytest.mark.parametrize(
+    ("about", "place"),
+    [
+        ({"name": 3}, "name"),
+        ({"timing": {"loop_seconds": "long"}}, "timing.loop_seconds"),
+        ({"units": {"a.x": 1}}, r"units\[\"a\.x\"\]"),
+        ({"scenario": []}, "scenario"),
+        ({"scenario": {"checks": ["x"]}}, r"scenario\.checks\[0\]"),
+        ({"scenario": {"checks": [{"max": 1}]}}, r"scenario\.checks\[0\]\.kpi"),
+        ({"scenario": {"figures": [{"name": "a", "python": 1}]}}, r"scenario\.figures\[0\]\.python"),
+        ({"scenario": {"components": {"a": 1}}}, r"scenario\.components\.a"),
+        ({"system": {}}, r"system\.components"),
+        ({"system": {**DIAGRAM, "stages": [["b"]]}}, "system"),
+        ({"system": {**DIAGRAM, "stages": [["a"]], "connections": [["a.x"]]}}, r"system\.connections\[0\]"),
+        ({"terminated_by": {"component": "a"}}, r"terminated_by\.time"),
+        ({"real_time": {"steps": 1}}, r"real_time\.late_steps"),
+        ({"warnings": [1]}, r"warnings\[0\]"),
+    ],
+)
+def test_a_value_of_another_type_is_refused_with_its_line(tmp_path, about, place):
+    run = write(tmp_path)
+    former = json.loads((run / "run.json").read_text())
+    (run / "run.json").write_text(json.dumps({**former, **about}))
+    with pytest.raises(InputError, match=rf"run\.json:1:\d+: \$\.{place}: ") as refusal:
+        read_run(run)
+    assert len(refusal.value.problems) >= 1
+
+
 def test_a_run_with_an_unknown_scenario_file_is_refused(tmp_path):
     run = write(tmp_path)
     about = json.loads((run / "run.json").read_text())

@@ -40,6 +40,28 @@ def test_units_are_declared_once_also_for_arrays():
     }
 
 
+@pytest.mark.parametrize(
+    ("declared", "unit", "expected"),
+    [
+        ("{signal}", "°C", "°C"),
+        ("{signal}", "€/kWh", "€/kWh"),
+        ("{signal}.s", "N·m", "N.m.s"),
+        ("{signal}2.s", "bar_g", "bar_g2.s"),
+        ("{signal}/s", "m", "m/s"),
+        ("1/{signal}", "m", "1/m"),
+        ("{signal}/{signal}", "m//", "1"),
+        ("{signal} per 2 laps", "m", "{signal} per 2 laps"),
+        ("{signal}.s", "", ""),
+        ("{other}.s", "m", ""),
+    ],
+)
+def test_units_may_depend_on_those_of_signals(declared, unit, expected):
+    @units(value=declared)
+    def kpi(result, signal): ...
+
+    assert kpi_units([("x", kpi, {"signal": "y"})], ["x.value"], {"y": unit}) == {"x.value": expected}
+
+
 def test_a_failing_kpi_is_named():
     def ratio(_result):
         return {"ratio": 1 / 0}

@@ -25,6 +25,23 @@ def last(kind, value):
     return run_system(make_system({"a": PythonFmuComponent(Constant(instance_name="a"), "a")}), 1, 1, ["a.y"]).columns["a.y"][-1]
 
 
+@pytest.mark.parametrize("unit", ["m/s", "°C", "-", "bar_g", "€/kWh"])
+def test_a_unit_may_have_any_name(unit):
+    class Spoken(Fmi2Slave):
+        def __init__(self, **arguments):
+            super().__init__(**arguments)
+            self.y = 0.0
+            variable = Real("y", causality=Fmi2Causality.output)
+            variable.unit = unit
+            self.register_variable(variable)
+
+        def do_step(self, _t, _h):
+            return True
+
+    system = make_system({"a": PythonFmuComponent(Spoken(instance_name="a"), "a")})
+    assert run_system(system, 1, 1, ["a.y"]).units == {"a.y": unit}
+
+
 @pytest.mark.parametrize(
     ("kind", "value", "expected"),
     [

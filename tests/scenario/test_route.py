@@ -1,7 +1,8 @@
-"""The route in docs/route.md is the order in which a run first calls the functions of its table."""
+"""The route in docs/route.md is the order in which a run first calls the functions of its table, and it is short."""
 
 import re
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,14 @@ import cosim
 
 ROOT = Path(cosim.__file__).parents[1]
 TABLE_ROW = re.compile(r"\| \d+ \| `(\S+)` \| `(\S+)` \|")
+#: packages on the route, the highest first (see CONTRIBUTING.md)
+PACKAGES = ("api", "scenario", "engine", "components")
+CHECKS = ("check_run", "TimeGrid.from_times", "compile_plan")
+
+
+def table():
+    """Return (file, function) of each stop in docs/route.md."""
+    return TABLE_ROW.findall((ROOT / "docs/route.md").read_text())
 
 
 def called_functions(action):
@@ -28,12 +37,27 @@ def called_functions(action):
     return calls
 
 
-def test_a_run_passes_the_stops_in_their_order(folder, probe, monkeypatch):
-    stops = TABLE_ROW.findall((ROOT / "docs/route.md").read_text())
-    assert len(stops) == 16
+@pytest.fixture
+def calls(folder, probe, monkeypatch):
+    """Functions called by a run of one FMU."""
     monkeypatch.setattr("cosim.engine.native_available", lambda: False)
     scenario = folder.scenario({"a": {"fmu": str(probe)}})
-    calls = iter(called_functions(lambda: cosim.run(scenario)))
-    for stop in stops:
-        if stop not in calls:
+    return called_functions(lambda: cosim.run(scenario))
+
+
+def test_a_run_passes_the_stops_in_their_order(calls):
+    remaining = iter(calls)
+    for stop in table():
+        if stop not in remaining:
             pytest.fail(f"{stop} is not called after the stop before it")
+
+
+def test_the_route_is_short():
+    heights = [PACKAGES.index(Path(file).with_suffix("").parts[1]) for file, _ in table()]
+    assert 12 <= len(heights) <= 16
+    assert sum(after < before for before, after in pairwise(heights)) <= 4
+
+
+@pytest.mark.parametrize("function", CHECKS)
+def test_a_run_is_checked_and_compiled_once(calls, function):
+    assert [name for _, name in calls].count(function) == 1

@@ -4,7 +4,6 @@ import subprocess
 import sys
 
 import pytest
-from test_invalid_scenarios import refused
 
 import cosim
 from cosim.core.errors import ComponentError
@@ -89,7 +88,7 @@ def test_pythonfmu_is_not_imported_for_a_scenario_without_its_classes(folder, ow
     ],
 )
 def test_a_mistake_in_the_class_is_reported(folder, own, before, after, line):
-    found = refused(folder, own(before, after))
+    found = folder.problems(own(before, after))
     assert line in found[0]
     assert found[0].startswith("scenario.json:1:")
     assert "$.components.a: own.py:Own" in found[0]
@@ -99,7 +98,7 @@ def test_all_mistakes_in_the_class_are_reported_together(folder, own):
     own("def do_step", "def dostep")
     file = folder.path / "own.py"
     file.write_text(file.read_text().replace('"output", v', '"outptu", v'))
-    assert len(refused(folder, {"a": {"python": "own.py:Own"}})) == 2
+    assert len(folder.problems({"a": {"python": "own.py:Own"}})) == 2
 
 
 def test_do_step_must_return_none_or_a_step_result(folder, own):

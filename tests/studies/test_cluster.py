@@ -36,7 +36,7 @@ def test_documents_say_that_a_cluster_is_trusted_in_both_directions(document):
     assert "trusted in both directions" in (root() / document).read_text()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # its processes are busy also when nobody uses them
 def two_workers(tmp_path_factory):
     with running_cluster(tmp_path_factory.mktemp("cluster")) as made:
         yield made

@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
@@ -68,6 +69,25 @@ def test_killed_workers_and_fork_servers_are_replaced(lag, sweep_process):
     _, err = sweep_process.communicate(timeout=60)
     assert (sweep_process.returncode, len(lag.records())) == (0, RUNS), err
     assert not any("failure" in record for record in lag.records())
+
+
+@pytest.mark.parametrize("whom", ["worker", "fork server", "both"])
+def test_stopped_workers_and_fork_servers_are_replaced(lag, monkeypatch, whom):
+    """No run is lost or made twice; the time limit of a stopped process is shortened here."""
+    monkeypatch.setattr("cosim.studies.execution.worker_pool.STOP_TIMEOUT", 0.2)
+    monkeypatch.setattr("cosim.studies.execution.worker_pool._STOP_CHECK_INTERVAL", 0.1)
+    others = set(descendants(os.getpid()))
+    sweep = threading.Thread(target=lag.run_command, args=("sweep", lag.write(**SWEEP), "--workers", 1))
+    sweep.start()
+    wait_until(lambda: lag.records())
+    fork_server, worker = [process for process in descendants(os.getpid()) if process not in others][:2]
+    for victim in {"worker": [worker], "fork server": [fork_server], "both": [fork_server, worker]}[whom]:
+        os.kill(victim, signal.SIGSTOP)
+    sweep.join(60)
+    assert not sweep.is_alive()
+    assert (lag.last_result.code, len(lag.records())) == (0, RUNS), lag.last_result.err
+    assert not any("failure" in record for record in lag.records())
+    wait_until(lambda: not any(map(is_alive, (fork_server, worker))), 10)
 
 
 @pytest.mark.long

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from cosim.core import resources
-from cosim.scenario import prepare
+from cosim.scenario import load
 from cosim.studies.sweep import Sweep
 from cosim.studies.tune import Tuning
 
@@ -25,7 +25,7 @@ def test_a_shipped_file_can_be_run(file):
         study, settings = sweep.study, next(iter(sweep.design)).settings
         assert sweep.criteria
     assert str(study.bundle.scenario) in study.bundle.files
-    prepared = prepare(study.study_file.scenario, study.job(settings).settings)
+    prepared = load(study.study_file.scenario, study.job(settings).settings)
     assert prepared.kpis()
     prepared.free()
 

@@ -36,6 +36,11 @@ PRELOADED = (
     "cli.commands.regress",
     "cli.commands.run",
     "cli.commands.simulate",
+    "cli.messages",
+    "components.fmi.isolated.isolated_fmu",
+    "process.supervised_child",
+    "process.supervisor",
+    "scenario.plausibility",
 )
 PR_SET_CHILD_SUBREAPER = 36
 

@@ -46,8 +46,7 @@ def command(scenario: str, settings: tuple[str, ...], connections: bool, isolati
         for problem in warnings:
             click.echo(f"WARNING {problem}", err=True)
         verdict = f"{len(warnings)} warning{'s' * (len(warnings) > 1)}." if warnings else "No warnings."
-        times = prepared.settings
-        steps = int((times.stop_time - times.start_time) / times.step_size)
+        times, steps = prepared.settings, prepared.plan.grid.count
         click.echo(
             f"\n{prepared.spec.name}: {float(times.start_time):g} s ... {float(times.stop_time):g} s in {steps} steps of "
             f"{float(times.step_size):g} s, {len(times.columns)} signals recorded. {verdict}"
@@ -58,16 +57,14 @@ def command(scenario: str, settings: tuple[str, ...], connections: bool, isolati
 
 def _print_components(prepared: PreparedRun) -> None:
     click.echo("components")
-    width = max(map(len, prepared.system.components))
+    width, sources = max(map(len, prepared.system.components)), prepared.sources
     for name, component in prepared.system.components.items():
         counts = {
             kind: sum(len(v.scalar_names) for v in component.variables if v.causality == kind) for kind in ("input", "output")
         }
         period = prepared.system.periods.get(name)
         every = f", every {float(period):g} s" if period else ""
-        click.echo(
-            f"  {name:{width}}  {prepared.component_source(name)}, {counts['input']} inputs, {counts['output']} outputs{every}"
-        )
+        click.echo(f"  {name:{width}}  {sources[name]}, {counts['input']} inputs, {counts['output']} outputs{every}")
 
 
 def _print_processes(prepared: PreparedRun, isolation: str, sandbox: str | None) -> None:

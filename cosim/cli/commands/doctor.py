@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from ...core.errors import InputError
 from ...core.processors import available_processors
 
 if TYPE_CHECKING:
@@ -76,7 +77,11 @@ def _executor_finding() -> Finding:
         from ...engine import native_available
     except ImportError as error:
         return Finding("cosim", "executor", f"the engine cannot be imported: {error}", "broken")
-    if native_available():
+    try:
+        available = native_available()
+    except InputError as error:
+        return Finding("cosim", "executor", str(error), "broken")
+    if available:
         return Finding("cosim", "executor", "native")
     return Finding("cosim", "executor", "Python only: the native one was not built", "missing")
 

@@ -26,9 +26,9 @@ def command(result: Path, output_file: Path | None, open_page: bool) -> None:
     run, target = read_run(result), output_file or result / "report.html"
     checks = run.metadata.get("scenario", {}).get("checks", [])
     outcomes = evaluate_checks(run.kpis, [check for check in checks if check["kpi"] in run.kpis])
-    pictures = {
-        name: figure_to_svg(draw_figure(run, name, function, arguments)) for name, function, arguments in load_figures(run)
-    }
+    pictures = (
+        (name, figure_to_svg(draw_figure(run, name, function, arguments))) for name, function, arguments in load_figures(run)
+    )
     write_report(run, outcomes, pictures, target)
     click.echo(target)
     if open_page:

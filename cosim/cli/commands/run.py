@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,22 +10,23 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...core.errors import CosimError, InputError
+from ...core.errors import CosimError, InputError, Problem
+from ...core.json_values import parse_object
 from ...process.journal import STEP_COUNT
+from ...process.output_lock import LockKeeper
 from .. import live, strict_sandbox, supervision
 from ..csv_options import csv_options
 from ..progress import progress_bar
 from ..run_outputs import RunOptions, RunOutcome, write_outputs, write_partial_result
+from ..unfinished_runs import OutputFiles
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
     from ...engine.run_loop import Observer
     from ...process.supervisor import SupervisedOutcome
+    from ...report.drawing_process import DrawingProcess
     from ...scenario import PreparedRun
-
-#: folder of an unfinished run, inside its output directory
-UNFINISHED_FOLDER = ".unfinished"
 
 RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run.json", "report.html", "replay.html")
 
@@ -76,9 +76,12 @@ def command(isolation: str, sandbox: str | None, view: bool, view_port: int, **o
         live.check_view_options(isolation, sandbox, run_options.late)
     if strict_sandbox.must_rerun(sandbox):
         return strict_sandbox.rerun_in_bubblewrap(*_sandbox_paths(run_options))
-    if view:
-        return live.run_with_view(lambda link: _run_scenario(run_options, link), isolation, _save_after_crash, view_port)
-    return supervision.run_supervised_command(lambda: _run_scenario(run_options), isolation, _save_after_crash)
+    with LockKeeper() as locks:
+        if view:
+            return live.run_with_view(
+                lambda link: _run_scenario(run_options, locks, link), isolation, _save_after_crash, view_port
+            )
+        return supervision.run_supervised_command(lambda: _run_scenario(run_options, locks), isolation, _save_after_crash)
 
 
 def _sandbox_paths(options: RunOptions) -> tuple[list[Path], Path | None]:
@@ -90,8 +93,14 @@ def _sandbox_paths(options: RunOptions) -> tuple[list[Path], Path | None]:
     return loaded.files(), None if loaded.problems else options.output_folder(loaded.spec.name).absolute()
 
 
-def _run_scenario(options: RunOptions, link: Connection | None = None) -> int:
-    """Run the scenario in this process, write its outputs and return the exit code; `link` connects to a live view."""
+def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | None = None) -> int:
+    """Run the scenario in this process, write its outputs and return the exit code.
+
+    Args:
+        options: options of the command.
+        locks: keeper of the lock of the output directory.
+        link: connection to a live view; None: no live view.
+    """
     from ...api import executing
     from ...process.run_files.folder import keeping_run_files
     from .. import messages
@@ -99,41 +108,60 @@ def _run_scenario(options: RunOptions, link: Connection | None = None) -> int:
     warnings = messages.print_log()
     _require_packages(options)
     began = time.perf_counter()
-    prepared = _load(options)
-    folder = options.output_folder(prepared.spec.name).absolute()
-    try:
-        _prepare_folder(prepared, options, folder)
-        control = live.create_control(prepared, link) if link else None
-    except CosimError:
-        prepared.free()  # from here on `executing` frees the components
-        raise
-    with (
-        keeping_run_files(folder / UNFINISHED_FOLDER, folder / "result.csv"),
-        _progress_observers(prepared) as observers,
-        executing(live.with_control(prepared, control), observers) as execution,
-    ):
-        execution.result.metadata["warnings"] = warnings
-        if control:
-            execution.result.metadata["live_events"] = control.finish()
-        return supervision.results_written(write_outputs(RunOutcome(options, prepared, execution, began)))
+    with _drawing_process(options) as drawing:
+        prepared = _load(options, None if link else options.real_time)
+        folder = options.output_folder(prepared.spec.name).absolute()
+        try:
+            _prepare_folder(prepared, options, locks)
+            control = live.create_control(prepared, link, options.real_time) if link else None
+        except CosimError:
+            prepared.free()  # from here on `executing` frees the components
+            raise
+        with (
+            keeping_run_files(OutputFiles.of_folder(folder).unfinished, folder / "result.csv", prepared.metadata),
+            _progress_observers(prepared) as observers,
+            executing(prepared, observers, control) as execution,
+        ):
+            execution.result.metadata["warnings"] = warnings
+            if control:
+                execution.result.metadata["live_events"] = control.finish()
+            return supervision.results_written(write_outputs(RunOutcome(options, prepared, execution, began, drawing)))
+
+
+@contextmanager
+def _drawing_process(options: RunOptions) -> Iterator[DrawingProcess | None]:
+    """Yield a process that prepares to draw the figures of the scenario; None without a report or a supervisor."""
+    from ...process.journal import current_journal
+
+    if options.no_report or current_journal() is None:
+        yield None
+        return
+    from ...report.drawing_process import DrawingProcess
+    from ...scenario import import_figures
+    from ...scenario.nested_systems import parse_settings
+
+    settings = parse_settings(options.settings)
+    with DrawingProcess(lambda: import_figures(options.scenario, settings)) as process:
+        yield process
 
 
 def _require_packages(options: RunOptions) -> None:
     """Raise InputError if an optional package for one of the output files is not installed."""
-    from ...results.mcap_files import require_mcap
-    from ...results.parquet_files import require_parquet
-
     if options.parquet:
+        from ...results.parquet_files import require_parquet
+
         require_parquet()
     if options.mcap:
+        from ...results.mcap_files import require_mcap
+
         require_mcap()
 
 
-def _load(options: RunOptions) -> PreparedRun:
+def _load(options: RunOptions, real_time: float | None) -> PreparedRun:
     """Load the scenario, announce its deadlines to the supervisor and print warnings about it."""
     from ...api import load
     from ...scenario.nested_systems import parse_settings
-    from ...scenario.plausibility import missing_connections
+    from ...scenario.plausibility import find_run_warnings
     from .. import messages
 
     prepared = load(
@@ -141,14 +169,13 @@ def _load(options: RunOptions) -> PreparedRun:
         parse_settings(options.settings),
         stop_time=options.stop_time,
         step_size=options.step_size,
-        real_time=options.real_time,
+        real_time=real_time,
         late=options.late,
         isolation=options.isolation,
         sandbox=options.sandbox,
     )
     supervision.set_deadlines(prepared.spec.deadlines)
-    messages.log_problems(missing_connections(prepared))
-    _warn_overwriting(options.output_folder(prepared.spec.name), prepared.document.file.resolve())
+    messages.log_problems(find_run_warnings(prepared))
     return prepared
 
 
@@ -156,22 +183,35 @@ def _save_after_crash(outcome: SupervisedOutcome) -> None:
     """Write the rows of a child process that crashed, was killed or was interrupted."""
     from ...process.run_files.folder import read_metadata
     from ...results import Result
+    from ...results.non_finite import warn_non_finite
+    from .. import messages
 
     folder = outcome.journal.folder
     if folder is not None:
         failure = "interrupted" if outcome.interrupted else str(outcome.failure)
         metadata = {**read_metadata(folder), "macro_steps": outcome.journal[STEP_COUNT], "failure": failure}
-        result = Result(supervision.recover_outcome_recording(outcome), metadata=metadata)
-        write_partial_result(result, folder.parent, folder.parent)
+        recording = supervision.recover_outcome_recording(outcome)
+        if metadata.get("scenario", {}).get("non_finite") != "allow":
+            messages.print_log()
+            metadata["non_finite"] = warn_non_finite(recording)
+        write_partial_result(Result(recording, metadata=metadata), folder.parent, folder.parent, folder)
 
 
-def _prepare_folder(prepared: PreparedRun, options: RunOptions, folder: Path) -> None:
-    """Check the figures and that results can be written to `folder`, then remove the results of an earlier run."""
+def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeeper) -> None:
+    """Check the figures and that results can be written, lock the output directory, and remove results of an earlier run."""
+    from ...engine.disk_space import find_space_problems
     from ...results.files import check_writable, remove_files
 
     if not options.no_report and (problems := prepared.figure_problems()):
         raise InputError(problems)
+    shown = options.output_folder(prepared.spec.name)
+    folder = shown.absolute()
     check_writable(folder)
+    locks.lock(OutputFiles.of_folder(folder).lock, shown)
+    _warn_overwriting(shown, prepared.document.file.resolve())
+    replaced = sum((folder / name).stat().st_size for name in RESULT_FILES if (folder / name).is_file())
+    if problems := find_space_problems(prepared.plan, folder, csv=True, replaced=replaced):
+        raise InputError([Problem(problem.message, prepared.root.where(*problem.subject)) for problem in problems])
     figures = (f"{figure.name}{suffix}" for figure in prepared.spec.figures for suffix in (".png", ".svg", ".csv"))
     remove_files(folder, *RESULT_FILES, *figures)
 
@@ -179,8 +219,8 @@ def _prepare_folder(prepared: PreparedRun, options: RunOptions, folder: Path) ->
 def _warn_overwriting(folder: Path, scenario: Path) -> None:
     """Warn if results of another scenario file in this folder are replaced: a copy may have kept its name."""
     try:
-        former = json.loads((folder / "run.json").read_text(encoding="utf-8"))["scenario_file"]
-    except (OSError, ValueError, LookupError, TypeError):  # no earlier run, or an unreadable run.json
+        former = parse_object((folder / "run.json").read_text(encoding="utf-8"))["scenario_file"]
+    except (OSError, ValueError, LookupError):  # no earlier run, or an unreadable run.json
         return
     if former != str(scenario):
         text = f'replaces the results of {former} in {folder}; another "name" in the scenario or --output-dir keeps both'

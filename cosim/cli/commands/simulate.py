@@ -8,17 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ...process.output_lock import LockKeeper
 from ...process.temporary_folders import temporary_run_folder
 from .. import current_command_line, report_error, strict_sandbox, supervision
 from ..csv_options import csv_options
 from ..messages import print_line
+from ..unfinished_runs import OutputFiles, writing_results
 
 if TYPE_CHECKING:
     from ...components.fmi import Isolation
     from ...core.component import Component
     from ...core.recording import Recording
-    from ...core.system import System
-    from ...engine.settings import Settings
+    from ...engine.plan import Plan
+    from ...process.supervisor import SupervisedOutcome
 
 FMU_NAME, PROFILE_NAME = "fmu", "profile"
 
@@ -45,16 +47,17 @@ def command(isolation: str, sandbox: str | None, output_file: Path | None, **opt
         return strict_sandbox.rerun_in_bubblewrap(
             [path for path in (options["fmu"], options["input_file"]) if path], output and output.parent
         )
-    with temporary_run_folder() as folder:
-        unfinished = output.with_name(f".{output.name}.unfinished") if output else Path(folder) / "run"
+    with temporary_run_folder() as folder, LockKeeper() as locks:
+        unfinished = OutputFiles.of_file(output).unfinished if output else Path(folder) / "run"
         return supervision.run_supervised_command(
-            lambda: _simulate(unfinished, output, output_file, _isolation(isolation, bool(sandbox)), **options),
+            lambda: _simulate(locks, unfinished, output, output_file, _isolation(isolation, bool(sandbox)), **options),
             isolation,
-            lambda outcome: _write_recording(supervision.recover_outcome_recording(outcome), output, output_file),
+            lambda outcome: _save_after_crash(outcome, output, output_file),
         )
 
 
 def _simulate(
+    locks: LockKeeper,
     folder: Path,
     output: Path | None,
     shown: Path | None,
@@ -65,34 +68,58 @@ def _simulate(
     start_values: tuple[str, ...],
     input_file: Path | None,
 ) -> int:
+    from ...core.errors import InputError
+    from ...engine.disk_space import find_space_problems
     from ...engine.run_loop import simulating
-    from ...process.run_files.folder import keeping_run_files, remove_run_files
+    from ...process.run_files.folder import keeping_run_files, remove_run_files, run_folder
     from ...results.files import check_writable, remove_files
+    from ...results.non_finite import warn_non_finite
+    from ...results.result import describe_termination
     from ...scenario.nested_systems import parse_settings
     from .. import messages
 
     messages.print_log()
     if output:
         check_writable(output.parent)
-    system, settings = _build_system(fmu, fmu_isolation, stop_time, step_size, parse_settings(start_values), input_file)
-    if output:
+    plan = _compile_system(fmu, fmu_isolation, stop_time, step_size, parse_settings(start_values), input_file)
+    if output and shown:
+        locks.lock(OutputFiles.of_file(output).lock, shown)
+        replaced = output.stat().st_size if output.is_file() else 0
+        if problems := find_space_problems(plan, output.parent, csv=True, replaced=replaced):
+            raise InputError(problems)
         remove_files(output.parent, output.name)
-    with keeping_run_files(folder, output), simulating(system, settings) as run:
+    with keeping_run_files(folder, output), simulating(plan) as run:
+        warn_non_finite(run.recording)
         if output:
-            _write_recording(run.recording, output, shown)
+            _write_recording(run.recording, output, shown, run_folder())
             remove_run_files()
         if run.failure:
             return supervision.results_written(report_error(run.failure, current_command_line()))
         if not output:
             _print_final_values(run.recording)
+        if run.termination:
+            click.echo(describe_termination("the FMU", run.termination.time), err=True)
         return supervision.results_written(0)
 
 
-def _write_recording(recording: Recording, output: Path | None, shown: Path | None) -> None:
-    from ...results.csv_files import write_csv
+def _save_after_crash(outcome: SupervisedOutcome, output: Path | None, shown: Path | None) -> None:
+    """Write the rows of a child process that crashed, was killed or was interrupted."""
+    from ...results.non_finite import warn_non_finite
+    from .. import messages
 
-    if output and len(recording.time):
-        write_csv(recording, output)
+    messages.print_log()
+    recording = supervision.recover_outcome_recording(outcome)
+    warn_non_finite(recording)
+    _write_recording(recording, output, shown, outcome.journal.folder)
+
+
+def _write_recording(recording: Recording, output: Path | None, shown: Path | None, unfinished: Path | None) -> None:
+    from ...results import Result
+
+    if output and shown and len(recording.time):
+        result = Result(recording)
+        with writing_results(result, unfinished, shown):
+            result.to_csv(output)
         click.echo(f"{len(recording.time)} rows in {shown}")
 
 
@@ -108,20 +135,24 @@ def _isolation(isolation: str, sandbox: bool) -> Isolation | None:
     return Isolation(sandbox=sandbox) if sandbox or isolation == "fmu" else None
 
 
-def _build_system(
+def _compile_system(
     fmu: Path,
     fmu_isolation: Isolation | None,
     stop_time: str | None,
     step_size: str | None,
     start_values: dict[str, Any],
     input_file: Path | None,
-) -> tuple[System, Settings]:
-    """Return a system of the FMU, and of the input file if there is one, with the settings of its simulation."""
+) -> Plan:
+    """Compile the system of the FMU, and of the input file if there is one."""
     from ...components.fmi import FmuFile, create_component
+    from ...core.errors import Problem
     from ...core.system import Connection, Endpoint, System
+    from ...engine.plan import compile_plan
     from ...engine.settings import Settings
+    from .. import messages
 
     file = FmuFile(fmu)
+    messages.log_problems([Problem(file.run_warning)] if file.run_warning else [])
     experiment = file.description.default_experiment
     start = experiment.start_time or Fraction(0)
     stop = _parse_seconds(stop_time) if stop_time else experiment.stop_time or start + 1
@@ -137,7 +168,8 @@ def _build_system(
     assigned = _check_start_values(components[FMU_NAME], start_values)
     outputs = [slot for v in components[FMU_NAME].variables if v.causality == "output" for slot in v.scalar_names]
     columns = {slot: Endpoint(FMU_NAME, slot) for slot in outputs}
-    return System(components, connections, stages, start_values={FMU_NAME: assigned}), Settings(start, stop, step, columns)
+    system = System(components, connections, stages, start_values={FMU_NAME: assigned})
+    return compile_plan(system, Settings(start, stop, step, columns))
 
 
 def _read_profile(path: Path, component: Component) -> Component:

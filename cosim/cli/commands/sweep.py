@@ -41,7 +41,7 @@ def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, *
 
     if parquet:
         require_parquet()
-    loaded = Sweep.from_file(sweep)
+    loaded = Sweep.from_file(sweep, study.pop("max_runs"))
     folder = output_dir or Path("runs") / loaded.study_file.spec.name
     with study_options.open_run_store(folder, study.pop("retry_failed")) as run_store:
         return _run_sweep(loaded, run_store, folder, parquet, replays, **study)

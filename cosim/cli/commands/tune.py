@@ -29,7 +29,7 @@ def command(tuning: str, output_dir: Path | None, **study: Any) -> int:
     """
     from ...studies.tune import Tuning
 
-    loaded = Tuning.from_file(tuning)
+    loaded = Tuning.from_file(tuning, study.pop("max_runs"))
     folder = output_dir or Path("runs") / loaded.spec.name
     with study_options.open_run_store(folder, study.pop("retry_failed")) as run_store:
         return _run_tuning(loaded, run_store, folder, **study)
@@ -42,7 +42,7 @@ def _run_tuning(tuning: Tuning, run_store: RunStore, folder: Path, workers: int 
     try:
         with (
             interrupt_on_termination(),
-            study_options.show_progress(_max_runs(tuning)) as progress,
+            study_options.show_progress(tuning.spec.max_runs) as progress,
             study_options.create_runner(tuning.study, workers, scheduler) as runner,
         ):
             tuning.run(run_store, runner, progress)
@@ -53,13 +53,6 @@ def _run_tuning(tuning: Tuning, run_store: RunStore, folder: Path, workers: int 
     best = write_tuning_files(tuning, folder)
     _print_best(tuning, best, folder)
     return 0 if best.feasible else 1 if best.failure else 3
-
-
-def _max_runs(tuning: Tuning) -> int:
-    """Return the largest number of runs of a tuning."""
-    method = tuning.spec.method
-    points = method.population * (method.generations + 1) if method.kind == "differential_evolution" else method.evaluations
-    return points * len(tuning.spec.cases)
 
 
 def _print_best(tuning: Tuning, best: Trial, folder: Path) -> None:

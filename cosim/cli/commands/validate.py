@@ -20,7 +20,7 @@ def command(fmus: tuple[Path, ...], as_json: bool) -> int:
     """Validate FMUs against the FMI standard without running them.
 
     Examines the archive, the model description and the binary for this machine. `cosim run` refuses FMUs with errors; warnings
-    are violations of the FMI standard that do not affect a run. Results of the FMU are not examined. Exit code 0: no findings;
+    are violations of the FMI standard that do not prevent a run. Results of the FMU are not examined. Exit code 0: no findings;
     2: findings.
     """
     findings = {path: _validate_fmu(path) for path in fmus}

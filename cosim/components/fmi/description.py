@@ -14,7 +14,7 @@ import numpy as np
 
 from ...core.component import DTYPES, Causality, Variability, Variable
 from ...core.time_grid import exact_fraction
-from ...core.units import BASE_UNITS, Unit, parse_unit
+from ...core.units import BASE_UNITS, Unit, named_unit
 from .preflight import DEFAULT_LIMITS, Examination, PreflightLimits, examine, raise_errors
 from .preflight.binary import list_platforms
 from .preflight.model_description import ModelDescription, ModelVariable, UnitDefinition
@@ -125,12 +125,10 @@ def build_description(path: Path, examination: Examination) -> FmuDescription:
     )
 
 
-def _build_unit(definition: UnitDefinition) -> Unit | None:
+def _build_unit(definition: UnitDefinition) -> Unit:
     base = definition.base_unit
     if base is None:
-        with suppress(ValueError):  # FMI does not define a unit without BaseUnit; its name usually does
-            return parse_unit(definition.name)
-        return None
+        return named_unit(definition.name)  # FMI does not define a unit without BaseUnit; its name usually does
     exponents = tuple(int(base.get(name, 0)) for name in BASE_UNITS)
     return Unit(definition.name, exponents, float(base.get("factor", 1)), float(base.get("offset", 0)))
 
@@ -139,7 +137,7 @@ def _names_with_aliases(source: ModelVariable) -> list[str]:
     return [source.name, *(alias["name"] for alias in source.aliases)]
 
 
-def _build_variables(model: ModelDescription, source: ModelVariable, units: Mapping[str, Unit | None]) -> list[Variable]:
+def _build_variables(model: ModelDescription, source: ModelVariable, units: Mapping[str, Unit]) -> list[Variable]:
     """Build a variable and its aliases."""
     is_c_int = model.major == 2 and source.kind in ("Boolean", "Enumeration")
     descriptions = [source.attribute("description"), *(alias.get("description") for alias in source.aliases)]
@@ -150,7 +148,7 @@ def _build_variables(model: ModelDescription, source: ModelVariable, units: Mapp
             _CAUSALITIES[source.causality],
             _VARIABILITIES[source.variability],
             _parse_start(source),
-            units.get(source.attribute("unit") or ""),
+            _find_unit(source, units),
             tuple(dimension_size(model, dimension) or 0 for dimension in source.dimensions),
             description or descriptions[0] or "",
             _finite_limit(source, "min"),
@@ -161,6 +159,11 @@ def _build_variables(model: ModelDescription, source: ModelVariable, units: Mapp
         )
         for name, description in zip(_names_with_aliases(source), descriptions, strict=True)
     ]
+
+
+def _find_unit(source: ModelVariable, units: Mapping[str, Unit]) -> Unit | None:
+    name = source.attribute("unit")
+    return (units.get(name) or named_unit(name)) if name else None
 
 
 def _parse_start(source: ModelVariable) -> Any:

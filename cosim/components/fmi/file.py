@@ -13,7 +13,16 @@ from ...core.errors import InputError
 from ...process.journal import suspending_deadline
 from ...process.temporary_folders import FMU_PREFIX, LockedFolder
 from .description import FmuDescription, build_description
-from .preflight import DEFAULT_LIMITS, Examination, PreflightLimits, examine, extract, open_regular_file, raise_errors
+from .preflight import (
+    DEFAULT_LIMITS,
+    RUN_WARNINGS,
+    Examination,
+    PreflightLimits,
+    examine,
+    extract,
+    open_regular_file,
+    raise_errors,
+)
 
 
 @dataclass(frozen=True)
@@ -57,6 +66,15 @@ class FmuFile:
     def description(self) -> FmuDescription:
         """Model description; InputError if the preflight check found errors."""
         return build_description(self.path, self.examination)
+
+    @property
+    def run_warning(self) -> str:
+        """The first finding that may change the results of a run, and the number of the others; "" if there are none."""
+        found = [finding for finding in self.examination.findings if finding.rule in RUN_WARNINGS]
+        if not found:
+            return ""
+        more = f", and {len(found) - 1} more" if len(found) > 1 else ""
+        return f'"{self.path}": {found[0]}{more}; `cosim validate` lists all findings'
 
     @cached_property
     def sha256(self) -> str:

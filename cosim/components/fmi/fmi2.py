@@ -24,10 +24,11 @@ class Fmi2Instance(FmuInstance):
     _instantiate_function = "fmi2Instantiate"
     accessors = {"Float64": "Real", "Int32": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
 
-    def _create_fmpy_slave(self, **arguments: Any) -> Any:
+    def _fmpy_class(self) -> type:
         from fmpy.fmi2 import FMU2Slave
 
-        return FMU2Slave(**arguments)
+        slave_class: type = FMU2Slave
+        return slave_class
 
     def _instantiate_fmu(self) -> None:
         from fmpy import calloc, fmi2, free

@@ -27,10 +27,11 @@ class Fmi3Instance(FmuInstance):
     _instantiate_function = "fmi3InstantiateCoSimulation"
     accessors = {name: name for name in DTYPES} | {"Enumeration": "Int64"}
 
-    def _create_fmpy_slave(self, **arguments: Any) -> Any:
+    def _fmpy_class(self) -> type:
         from fmpy.fmi3 import FMU3Slave
 
-        return FMU3Slave(**arguments)
+        slave_class: type = FMU3Slave
+        return slave_class
 
     def _instantiate_fmu(self) -> None:
         try:

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from ...core.errors import InputError
 from .c_functions import FunctionTable
+from .description import FmuDescription
 from .file import FmuFile
+from .preflight.fmu_platform import current_platform
 
 
-def load_library(file: FmuFile, folder: Path, create_slave: Callable[..., Any]) -> Any:
+def load_library(file: FmuFile, folder: Path, slave_class: type) -> Any:
     """Load the library of an extracted FMU.
 
     Args:
         file: The FMU.
         folder: Folder of the extracted FMU.
-        create_slave: Creates FMPy's slave object, given `guid`, `modelIdentifier` and `unzipDirectory`.
+        slave_class: FMPy's class of a slave.
 
     Returns:
         FMPy's slave object. Its attribute `functions` is the `FunctionTable` of the library.
@@ -26,11 +27,8 @@ def load_library(file: FmuFile, folder: Path, create_slave: Callable[..., Any]) 
     Raises:
         InputError: The library cannot be loaded.
     """
-    description = file.description
     try:
-        slave = create_slave(
-            guid=description.instantiation_token, modelIdentifier=description.model_identifier, unzipDirectory=str(folder)
-        )
+        slave = _create_slave(slave_class, file.description, folder)
     except Exception as error:
         reason = str(error).replace(f"{folder}/", "")
         raise InputError(f'the binary of "{file.path}" cannot be loaded: {reason}') from None
@@ -38,6 +36,25 @@ def load_library(file: FmuFile, folder: Path, create_slave: Callable[..., Any]) 
         if function.restype is ctypes.c_int:
             function.errcheck = _reject_negative_status
     slave.functions = FunctionTable(slave.dll)
+    return slave
+
+
+def _create_slave(slave_class: type, description: FmuDescription, folder: Path) -> Any:
+    """Create FMPy's slave object without its constructor, which changes the working directory of all threads during the load."""
+    machine = current_platform()
+    library = folder / "binaries" / machine.binary_folder(description.major) / f"{description.model_identifier}{machine.suffix}"
+    slave: Any = object.__new__(slave_class)
+    vars(slave).update(
+        guid=description.instantiation_token,
+        unzipDirectory=str(folder),
+        dll=ctypes.cdll.LoadLibrary(str(library)),
+        requireFunctions=True,
+        fmiCallLogger=None,
+        callbacks=None,
+        component=None,
+        _functions={},
+    )
+    slave._loadFunctions()
     return slave
 
 

@@ -33,6 +33,7 @@ class FunctionCaller:
         self._deadline_name = "initialization"
         #: communication point at which the next step starts (s); doStep reads it
         self._current_time = ctypes.c_double()
+        self._float_mode = float_mode.FloatModeGuard()
 
     def call_function(self, function: str, *arguments: Any, unavailable_status: int | None = None) -> Any:
         """Call an FMI function outside the stepping loop.
@@ -46,7 +47,7 @@ class FunctionCaller:
             The result of the function, or None for `unavailable_status`.
 
         Raises:
-            ComponentError: The function returned a bad status, or changed the floating-point mode.
+            ComponentError: The function returned a bad status.
         """
         from fmpy.fmi1 import FMICallException
 
@@ -58,12 +59,13 @@ class FunctionCaller:
                 if error.status == unavailable_status:
                     return None
                 raise self.status_error(error.function, error.status) from None
-        self._check_float_mode(name)
+        self.restore_float_mode(name)
         return result
 
-    def _check_float_mode(self, function: str) -> None:
+    def restore_float_mode(self, function: str) -> None:
+        """Set the default floating-point mode again if the last call, of `function`, changed it."""
         if float_mode.is_changed() or float_mode.enabled_traps():
-            raise ComponentError(self.name, function, float_mode.CHANGE_REASON, self._current_time.value)
+            self._float_mode.restore(self.name, function, self._current_time.value)
 
     def status_error(self, function: str, status: int, details: str = "") -> ComponentError:
         """Return the error for a bad status, with the FMU's last log message and `details` at its end.

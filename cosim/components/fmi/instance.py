@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core import component_log
 from ...core.component import SUCCESS_STATUSES, Component, Ports, PreparedCall, StepResult
 from ...core.errors import ComponentError
 from ...process.journal import calling_component
@@ -24,6 +25,8 @@ from .c_functions import as_double, as_pointer
 from .file import FmuFile
 from .fmpy_library import load_library
 from .function_calls import OK, FunctionCaller
+from .preflight.binary import version_deviations
+from .preflight.library import EXPECTED_TEXTS
 
 
 class FmuInstance(FunctionCaller, Component):
@@ -55,8 +58,8 @@ class FmuInstance(FunctionCaller, Component):
 
     # -- what differs between the FMI versions ---------------------------------------------------------------------------
 
-    def _create_fmpy_slave(self, **arguments: Any) -> Any:
-        """Create FMPy's slave object of this FMI version, which loads the library."""
+    def _fmpy_class(self) -> type:
+        """Import FMPy's class of a slave of this FMI version."""
         raise NotImplementedError
 
     def _instantiate_fmu(self) -> None:
@@ -86,8 +89,12 @@ class FmuInstance(FunctionCaller, Component):
         """
         folder = self._file.acquire()
         self._has_acquired_file = True
-        with restoring_process_state(self.name), calling_component(self.name, "loading the binary", "load"):
-            self._fmu = self._copy_fmpy_slave(folder)
+        is_loaded = self._file.library is not None
+        with restoring_process_state(self.name):
+            with calling_component(self.name, "loading the binary", "load"):
+                self._fmu = self._copy_fmpy_slave(folder)
+            if not is_loaded:
+                self._check_version()
         with restoring_process_state(self.name), calling_component(self.name, self._instantiate_function, "load"):
             self._instantiate_fmu()
         self._is_instantiated = True
@@ -104,10 +111,21 @@ class FmuInstance(FunctionCaller, Component):
     def _copy_fmpy_slave(self, folder: Path) -> Any:
         """Return FMPy's slave object for this instance, a copy because creating one takes milliseconds."""
         if self._file.library is None:
-            self._file.library = load_library(self._file, folder, self._create_fmpy_slave)
+            self._file.library = load_library(self._file, folder, self._fmpy_class())
         slave = copy(self._file.library)
         slave.instanceName = self.name
         return slave
+
+    def _check_version(self) -> None:
+        """Log a warning for each function of the FMI version and platform that returns an unexpected text."""
+        texts = {}
+        for name in (name for name in EXPECTED_TEXTS if name.startswith(self.prefix)):
+            function = self._fmu.dll[name]
+            function.restype = ctypes.c_char_p
+            with calling_component(self.name, name, "load"):
+                texts[name] = function()
+        for text in version_deviations(texts):
+            component_log.log_message(self.name, component_log.WARNING, text)
 
     def _instantiation_error(self) -> ComponentError:
         return ComponentError(self.name, self._instantiate_function, self._last_message or "the FMU gave no reason")
@@ -204,7 +222,7 @@ class FmuInstance(FunctionCaller, Component):
                 status = call.function(*call.arguments)
             if status not in SUCCESS_STATUSES:
                 return self.interpret_status(call.name, status)
-            self._check_float_mode(call.name)
+            self.restore_float_mode(call.name)
         return None
 
     def interpret_status(self, function: str, status: int) -> StepResult:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from hashlib import sha256
-from io import BytesIO
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+
+from ...results.files import writing_atomically
 
 _DATE = (1980, 1, 1, 0, 0, 0)
 _UNIX, _REGULAR_FILE = 3, 0o100644 << 16
@@ -22,17 +22,15 @@ def write_archive(files: Mapping[str, bytes], target: Path) -> Path:
 
     Returns:
         `target`.
+
+    Raises:
+        InputError: The path cannot be written.
+        OutputError: The disk is full or defective.
     """
-    target.parent.mkdir(parents=True, exist_ok=True)
-    content = BytesIO()
-    with ZipFile(content, "w") as archive:
+    with writing_atomically(target) as temporary, ZipFile(temporary, "w") as archive:
         for name in sorted(files):
             archive.writestr(_member(name), files[name])
-    with NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as temporary:
-        temporary.write(content.getvalue())
-    path = Path(temporary.name)
-    path.chmod(0o644)
-    return path.replace(target)
+    return target
 
 
 def _member(name: str) -> ZipInfo:

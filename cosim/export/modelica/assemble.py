@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from math import prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...core.component import Causality, Variability
+from ...core.errors import InputError, Problem
 from ..fmu.block import Block, BlockVariable
 from .c_code.emit import generate_c
 from .c_code.header import struct_members
@@ -26,6 +29,9 @@ from .model.syntax_tree import raise_model_error
 _FMI_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 _DEFAULT_STEP_SIZE = 0.01
 
+#: largest number of values of all variables; an array has one per element
+MAX_MODEL_SIZE = 1_000_000
+
 FmiRole = tuple[Causality, Variability]
 
 
@@ -39,6 +45,11 @@ def load_block(path: Path, model: str | None = None) -> Block:
     Raises:
         InputError: The model has errors or uses unsupported features; the error contains the file and line.
     """
+    with _refusing_deep_nesting(path):
+        return _load_block(path, model)
+
+
+def _load_block(path: Path, model: str | None) -> Block:
     defaults, sources = _flatten(path, model)
     folder = _source_root(sources.files)
     names = {str(file.relative_to(folder)): file for file in sources.files}
@@ -62,7 +73,17 @@ def load_interpreter(path: Path, model: str | None = None) -> Interpreter:
     Raises:
         InputError: The model has errors or uses unsupported features.
     """
-    return _flatten(path, model)[0]
+    with _refusing_deep_nesting(path):
+        return _flatten(path, model)[0]
+
+
+@contextmanager
+def _refusing_deep_nesting(path: Path) -> Iterator[None]:
+    """Raise InputError if an expression is nested deeper than Python's recursion limit."""
+    try:
+        yield
+    except RecursionError:
+        raise InputError(Problem("an expression or statement is nested too deeply; divide it into several", str(path))) from None
 
 
 def _flatten(path: Path, model: str | None) -> tuple[Interpreter, ModelicaSources]:
@@ -74,7 +95,11 @@ def _flatten(path: Path, model: str | None) -> tuple[Interpreter, ModelicaSource
 
 
 def _check_types(model: Model) -> None:
+    size = 0
     for variable in model.variables.values():
+        size += prod(variable.shape)
+        if size > MAX_MODEL_SIZE:
+            raise_model_error(f"{variable.name}: the model has more than {MAX_MODEL_SIZE} values", variable.where)
         if variable.type not in _FMI_TYPES:
             raise_model_error(f"{variable.name}: variables of type {variable.type} are not supported", variable.where)
         if 0 in variable.shape:

@@ -4,6 +4,8 @@
 - `rows`: rows of numbers (see `row_store`)
 - `texts`: string signals, written when they change (see `engine.saving_recorder`)
 - `metadata.json`: description of the run
+
+If the results cannot be written, as on a full disk, the files are kept: `rows` becomes `rows.COUNT` (see `keep_rows`).
 """
 
 from __future__ import annotations
@@ -12,14 +14,14 @@ import io
 import json
 import os
 import shutil
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ...core.json_values import decode_object
+from ...core.json_values import decode_object, parse_object
 from ..journal import current_journal
 
 if TYPE_CHECKING:
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
 Value = TypeVar("Value")
 
 ROWS_FILE, TEXTS_FILE, HEADER_FILE, METADATA_FILE = "rows", "texts", "header.json", "metadata.json"
+#: prefix of the copies of the CSV file
+LIVE_COPY_PREFIX = "live-"
 
 
 @dataclass(frozen=True)
@@ -113,12 +117,12 @@ def read_header(folder: Path | None) -> RowsHeader | None:
     if folder is None:
         return None
     try:
-        data: dict[str, Any] = json.loads((folder / HEADER_FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        data = parse_object((folder / HEADER_FILE).read_text(encoding="utf-8"))
+        columns = [Column(**column) for column in data.pop("columns")]
+        pairs = {key: [tuple(pair) for pair in data[key]] for key in ("calls", "texts")}
+        return RowsHeader(**data | {"columns": columns} | pairs)
+    except (OSError, ValueError, TypeError, LookupError):
         return None
-    columns = [Column(**column) for column in data.pop("columns")]
-    pairs = {key: [tuple(pair) for pair in data[key]] for key in ("calls", "texts")}
-    return RowsHeader(**data | {"columns": columns} | pairs)
 
 
 class TextReader:
@@ -147,33 +151,39 @@ class TextReader:
                 self._file.seek(-len(line), os.SEEK_CUR)
                 self._pending_change = (-1, {})
                 break
-            first, texts = json.loads(line, object_hook=decode_object)
-            self._pending_change = (first, texts)
+            self._pending_change = self._parse_change(line)
         return list(self._texts.values())
 
+    def _parse_change(self, line: bytes) -> tuple[int, dict[str, Any]]:
+        """Return the row of a change and its texts; a line that foreign code has damaged changes nothing."""
+        try:
+            row, texts = json.loads(line, object_hook=decode_object)
+            return int(row), {name: text for name, text in texts.items() if name in self._texts}
+        except (ValueError, TypeError, AttributeError, RecursionError):
+            return self._pending_change[0], {}
 
-def write_metadata(metadata: dict[str, Any]) -> None:
-    """Write the description of the run to its folder, if this process has a supervisor."""
-    journal = current_journal()
-    if journal and journal.folder:
-        (journal.folder / METADATA_FILE).write_text(json.dumps(metadata, default=str), encoding="utf-8")
+
+def write_metadata(folder: Path, metadata: Mapping[str, Any]) -> None:
+    """Write the description of the run to its folder."""
+    (folder / METADATA_FILE).write_text(json.dumps(metadata, default=str), encoding="utf-8")
 
 
 def read_metadata(folder: Path) -> dict[str, Any]:
     """Read the description of a run; empty if it was not written."""
     try:
-        return dict(json.loads((folder / METADATA_FILE).read_text(encoding="utf-8")))
+        return parse_object((folder / METADATA_FILE).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
 
 
 @contextmanager
-def keeping_run_files(folder: Path, csv: Path | None = None) -> Iterator[None]:
+def keeping_run_files(folder: Path, csv: Path | None = None, metadata: Mapping[str, Any] | None = None) -> Iterator[None]:
     """Keep the files of a run in `folder` during the block, if this process has a supervisor; remove them if it succeeds.
 
     Args:
         folder: Folder that is created; an existing one is replaced.
         csv: CSV file that the supervisor updates during the run; None for none.
+        metadata: Description of the run; None for none.
     """
     journal = current_journal()
     if journal is None:
@@ -182,23 +192,70 @@ def keeping_run_files(folder: Path, csv: Path | None = None) -> Iterator[None]:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     journal.set_run_files(folder, csv)
+    if metadata:
+        write_metadata(folder, metadata)
     yield
     remove_run_files()
 
 
+def run_folder() -> Path | None:
+    """Return the folder of the run of this process; None without a supervisor."""
+    journal = current_journal()
+    return journal.folder if journal else None
+
+
 def remove_run_files() -> None:
     """Remove the folder of the run of this process, after its results were written."""
-    journal = current_journal()
-    if journal and journal.folder:
-        shutil.rmtree(journal.folder, ignore_errors=True)
+    if folder := run_folder():
+        shutil.rmtree(folder, ignore_errors=True)
 
 
-def recover_recording(folder: Path | None, rows: int) -> Recording:
+def keep_rows(folder: Path, rows: int, metadata: Mapping[str, Any]) -> None:
+    """Keep the rows of a run whose results cannot be written, so that they can be recovered after its processes have ended.
+
+    The name of their file contains their number, because a full disk has no space for another file.
+
+    Args:
+        folder: Folder of the run.
+        rows: Number of recorded rows.
+        metadata: Description of the run, in types that JSON supports; kept unless the disk has no space for it.
+
+    Raises:
+        OSError: The file cannot be renamed, or the run has no header.
+    """
+    header = read_header(folder)
+    if header is None:
+        raise FileNotFoundError(folder / HEADER_FILE)
+    file = folder / ROWS_FILE
+    os.truncate(file, min(file.stat().st_size, rows * header.row_size))
+    file.rename(folder / f"{ROWS_FILE}.{rows}")
+    temporary = folder / f"{METADATA_FILE}.part"
+    with suppress(OSError):
+        temporary.write_text(json.dumps(metadata), encoding="utf-8")
+        temporary.replace(folder / METADATA_FILE)
+
+
+def find_kept_rows(folder: Path) -> tuple[Path, int] | None:
+    """Return the file with the rows that were kept in the folder of a run, and their number; None if there is none."""
+    for file in folder.glob(f"{ROWS_FILE}.*"):
+        if (count := file.suffix[1:]).isdecimal():
+            return file, int(count)
+    return None
+
+
+def remove_live_copies(folder: Path) -> None:
+    """Remove the copies of the CSV file, except the one that is the result file, to free their space."""
+    for copy in folder.glob(f"{LIVE_COPY_PREFIX}*"):
+        copy.unlink(missing_ok=True)
+
+
+def recover_recording(folder: Path | None, rows: int, rows_file: Path | None = None) -> Recording:
     """Read the recording of an unfinished run.
 
     Args:
         folder: Folder of the run; None if it had none.
         rows: Number of recorded rows.
+        rows_file: File of the rows; None for `ROWS_FILE` in the folder.
 
     Returns:
         A recording with fewer rows if foreign code has truncated the file, empty if there is no header.
@@ -211,8 +268,9 @@ def recover_recording(folder: Path | None, rows: int) -> Recording:
     header = read_header(folder)
     if folder is None or header is None:
         return Recording.empty()
-    columns, rows = header.columns, _count_readable_rows(folder, header, rows)
-    data = read_rows(folder / ROWS_FILE, header.dtype, rows)
+    rows_file = rows_file or folder / ROWS_FILE
+    columns, rows = header.columns, _count_readable_rows(rows_file, header, rows)
+    data = read_rows(rows_file, header.dtype, rows)
     numbers = [data[column.name].astype(bool) if column.boolean else data[column.name] for column in columns]
     reader = TextReader(folder, header)
     texts = np.empty((rows, len(header.texts)), object)
@@ -224,9 +282,9 @@ def recover_recording(folder: Path | None, rows: int) -> Recording:
     return Recording(header.times(rows), signals, dict(zip(header.names, units, strict=True)))
 
 
-def _count_readable_rows(folder: Path, header: RowsHeader, rows: int) -> int:
+def _count_readable_rows(rows_file: Path, header: RowsHeader, rows: int) -> int:
     """Return the number of rows, up to `rows`, that the file contains."""
     try:
-        return min(rows, (folder / ROWS_FILE).stat().st_size // header.row_size) if header.row_size else rows
+        return min(rows, rows_file.stat().st_size // header.row_size) if header.row_size else rows
     except OSError:
         return 0

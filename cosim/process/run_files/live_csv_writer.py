@@ -17,7 +17,7 @@ from typing import IO
 
 from ...core.csv_text import format_header, quote_cell
 from ..journal import ROW_COUNT, Journal
-from .folder import ROWS_FILE, RowsHeader, TextReader, read_header
+from .folder import LIVE_COPY_PREFIX, ROWS_FILE, RowsHeader, TextReader, read_header
 
 #: time until the first update, time between updates, maximum duration of an update (s)
 FIRST_UPDATE_DELAY, UPDATE_INTERVAL, MAX_UPDATE_TIME = 0.2, 0.3, 0.2
@@ -64,7 +64,7 @@ class LiveCsvWriter:
             return False
         self._target, self._rows_file = target, folder / ROWS_FILE
         self._lines = CsvLineReader(header, TextReader(folder, header))
-        self._front, self._back = (_CsvCopy(folder / f"live-{name}.csv") for name in "ab")
+        self._front, self._back = (_CsvCopy(folder / f"{LIVE_COPY_PREFIX}{name}.csv") for name in "ab")
         self._front.path.write_bytes(self._lines.header_line())
         self._front.size = len(self._lines.header_line())
         self._back.path.touch()

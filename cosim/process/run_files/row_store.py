@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import ctypes
 import mmap
 import os
-from collections.abc import Callable
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO, Any
 from weakref import finalize
 
 import numpy as np
+
+from ...core.errors import write_error
 
 #: maximum size of a chunk of a file (bytes); number of values computed at a time
 CHUNK_BYTES, BATCH_VALUES = 1 << 24, 1 << 18
@@ -45,30 +51,80 @@ class RowStore:
 class FileRowStore(RowStore):
     """Rows in a file, which contains all recorded rows even if the process is killed.
 
-    Only the last chunk occupies memory. Disk space is allocated chunk by chunk, so that a full disk raises OSError instead of
-    crashing the process (SIGBUS).
+    Only the last chunk occupies memory. Disk space is allocated chunk by chunk, so that a full disk raises OutputError instead
+    of crashing the process (SIGBUS). A file given by its path is open only while a chunk is added, see `FileMapping`.
     """
 
-    def __init__(self, dtype: np.dtype[Any], expected: int, file: IO[bytes]):
+    def __init__(self, dtype: np.dtype[Any], expected: int, file: Path | IO[bytes]):
         super().__init__(dtype, min(expected, CHUNK_BYTES // max(1, dtype.itemsize)))
         self._file, self._rows = file, 0
-        finalize(self, file.close)
+        if isinstance(file, Path):
+            file.write_bytes(b"")
+
+    @contextmanager
+    def _open(self) -> Iterator[IO[bytes]]:
+        if isinstance(self._file, Path):
+            with self._file.open("r+b") as file:
+                yield file
+        else:
+            yield self._file
 
     def add_chunk(self) -> np.ndarray:
-        """Append a chunk of zeros and return it, shape (chunk_rows,), mapped to the file."""
+        """Append a chunk of zeros and return it, shape (chunk_rows,), mapped to the file.
+
+        Raises:
+            OutputError: The disk has no space for the chunk.
+        """
         if not self.dtype.itemsize:
             return np.zeros(self.chunk_rows, self.dtype)
-        begin = self._rows * self.dtype.itemsize
+        begin, size = self._rows * self.dtype.itemsize, self.chunk_rows * self.dtype.itemsize
+        try:
+            with self._open() as file:
+                _allocate_disk_space(file.fileno(), begin, begin + size)
+                chunk = _map_rows(file, self.dtype, begin, self.chunk_rows, writable=True)
+        except OSError as error:
+            where = self._file if isinstance(self._file, Path) else tempfile.gettempdir()
+            raise write_error(f"cannot write {size / 1e6:.3g} MB of recorded rows to {where}: {error.strerror}", error) from None
         self._rows += self.chunk_rows
-        end = self._rows * self.dtype.itemsize
-        _allocate_disk_space(self._file.fileno(), begin, end)
-        page = begin - begin % mmap.ALLOCATIONGRANULARITY
-        mapped = mmap.mmap(self._file.fileno(), end - page, offset=page)
-        return np.frombuffer(mapped, self.dtype, self.chunk_rows, begin - page)
+        return chunk
 
     def read_first(self, count: int) -> np.ndarray:
         """Return the first `count` rows, shape (count,), mapped to the file."""
-        return read_rows(self._file, self.dtype, count)
+        with self._open() as file:
+            return read_rows(file, self.dtype, count)
+
+
+class FileMapping:
+    """Part of a file mapped to memory without an open descriptor, which foreign code in this process could truncate.
+
+    `mmap.mmap` keeps one. `np.asarray` returns the bytes as an array.
+    """
+
+    def __init__(self, file: int, begin: int, size: int, writable: bool):
+        library = ctypes.CDLL(None, use_errno=True)
+        library.mmap.restype = ctypes.c_void_p
+        page = begin - begin % mmap.ALLOCATIONGRANULARITY
+        self._length = begin - page + size
+        protection = mmap.PROT_READ | (mmap.PROT_WRITE if writable else 0)
+        length, offset = ctypes.c_size_t(self._length), ctypes.c_long(page)
+        self._address = library.mmap(None, length, protection, mmap.MAP_SHARED, file, offset)
+        if self._address == ctypes.c_void_p(-1).value:
+            number = ctypes.get_errno()
+            raise OSError(number, os.strerror(number))
+        address = self._address + begin - page
+        self.__array_interface__ = {"data": (address, not writable), "shape": (size,), "typestr": "|u1", "version": 3}
+        finalize(self, library.munmap, ctypes.c_void_p(self._address), length).atexit = False
+
+    def madvise(self, option: int) -> None:
+        """Give the operating system advice about the mapping, like `mmap.mmap.madvise`."""
+        ctypes.CDLL(None).madvise(ctypes.c_void_p(self._address), ctypes.c_size_t(self._length), option)
+
+
+def _map_rows(file: IO[bytes], dtype: np.dtype[Any], begin: int, count: int, writable: bool) -> np.ndarray:
+    """Map `count` rows from byte `begin` on."""
+    if sys.platform == "win32":
+        return np.memmap(file, dtype, "r+" if writable else "r", begin, (count,))
+    return np.asarray(FileMapping(file.fileno(), begin, count * dtype.itemsize, writable)).view(dtype)
 
 
 def open_row_store(dtype: np.dtype[Any], expected: int, path: Path | None) -> RowStore:
@@ -81,7 +137,7 @@ def open_row_store(dtype: np.dtype[Any], expected: int, path: Path | None) -> Ro
     """
     if path is None and expected * dtype.itemsize <= MAX_MEMORY_BYTES:
         return RowStore(dtype, expected)
-    return FileRowStore(dtype, expected, path.open("w+b") if path else TemporaryFile())
+    return FileRowStore(dtype, expected, path or TemporaryFile())
 
 
 def compute_in_chunks(count: int, fill: Callable[[range], np.ndarray], dtype: np.dtype[Any]) -> np.ndarray:
@@ -106,7 +162,12 @@ def compute_in_chunks(count: int, fill: Callable[[range], np.ndarray], dtype: np
 
 def read_rows(file: Path | IO[bytes], dtype: np.dtype[Any], count: int) -> np.ndarray:
     """Return the first `count` rows of a file, shape (count,), mapped to memory."""
-    return np.memmap(file, dtype, "r", shape=(count,)) if count and dtype.itemsize else np.zeros(count, dtype)
+    if not count or not dtype.itemsize:
+        return np.zeros(count, dtype)
+    if isinstance(file, Path):
+        with file.open("rb") as opened:
+            return _map_rows(opened, dtype, 0, count, writable=False)
+    return _map_rows(file, dtype, 0, count, writable=False)
 
 
 def _allocate_disk_space(file: int, begin: int, end: int) -> None:

@@ -27,7 +27,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...core.errors import InputError
-from . import landlock, limits, system_call_filter
+from .. import limits
+from . import landlock, system_call_filter
 from .bubblewrap import bubblewrap_command, find_bubblewrap
 from .environment import KEPT_VARIABLES, clear_environment
 from .folders import interpreter_folders

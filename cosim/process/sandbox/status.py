@@ -7,7 +7,8 @@ import resource
 import socket
 from dataclasses import dataclass
 
-from . import landlock, limits, system_call_filter
+from .. import limits
+from . import landlock, system_call_filter
 from .bubblewrap import find_bubblewrap
 
 

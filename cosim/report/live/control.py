@@ -32,7 +32,7 @@ _Command = Callable[[int, Mapping[str, Any]], None]
 
 
 class LiveControl:
-    """Step hook (`cosim.engine.settings.StepHook`) that carries out commands; used in the main thread of the simulation process.
+    """Step hook (`cosim.engine.run_loop.StepHook`) that carries out commands; used in the main thread of the simulation process.
 
     Args:
         connection: The pipe to the supervising process.
@@ -170,7 +170,7 @@ class LiveControl:
         self._events.append({"time": self._event_time(n), "set": {name: value}})
         journal = current_journal()
         if journal and journal.folder:
-            write_metadata({**read_metadata(journal.folder), "live_events": self._events})
+            write_metadata(journal.folder, {**read_metadata(journal.folder), "live_events": self._events})
 
     def _event_time(self, n: int) -> float | str:
         """Return the time of communication point n in the form that a scenario file reads without rounding."""

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import json
+import socket
+import time
+from contextlib import suppress
 from hmac import compare_digest
 from http import HTTPStatus
+from http.client import LineTooLong
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from io import BufferedIOBase
+from threading import Lock
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -16,6 +22,21 @@ HOST = "127.0.0.1"
 
 #: largest size of a command (bytes)
 MAX_COMMAND_LENGTH = 1 << 16
+
+#: largest size of the head of a request (bytes)
+MAX_HEAD_LENGTH = 1 << 14
+
+#: connections at the same time; a further one ends the oldest, those without the token first
+MAX_CONNECTIONS = 64
+
+#: time that a connection has for its first request with the token (s)
+ADMISSION_TIMEOUT = 5.0
+
+#: time without a new request after which an admitted connection is closed (s)
+IDLE_TIMEOUT = 60.0
+
+#: wait after a connection could not be accepted, as when no descriptor is free (s)
+_ACCEPT_RETRY_INTERVAL = 0.1
 
 #: allows the page to send requests to this server, and to no other
 LIVE_CONTENT_SECURITY_POLICY = f"{CONTENT_SECURITY_POLICY}; connect-src 'self'"
@@ -35,7 +56,7 @@ class RequestRefusedError(Exception):
 
 
 class LiveServer(ThreadingHTTPServer):
-    """Server in the supervising process: it accepts connections in a thread of its own and handles each request in another.
+    """Server in the supervising process: it accepts connections in one thread and handles each request in another.
 
     It listens as soon as it is created, and serves requests once `session` is set.
 
@@ -45,10 +66,14 @@ class LiveServer(ThreadingHTTPServer):
     """
 
     daemon_threads = True
+    request_queue_size = 128
     session: LiveSession
 
     def __init__(self, port: int, token: str) -> None:
         self.token = token
+        #: end of the admission (s, monotonic) of each open connection, oldest first; None for one that has sent the token
+        self._admissions: dict[socket.socket, float | None] = {}
+        self._lock = Lock()
         super().__init__((HOST, port), _Handler)
         self.allowed_hosts = {f"{name}:{self.server_port}" for name in (HOST, "localhost")}
 
@@ -57,17 +82,87 @@ class LiveServer(ThreadingHTTPServer):
         """Address of the page, including the token."""
         return f"http://{HOST}:{self.server_port}/{self.token}/"
 
+    def get_request(self) -> tuple[socket.socket, Any]:
+        """Accept a connection, after a pause if the last one could not be accepted."""
+        try:
+            return super().get_request()
+        except OSError:
+            time.sleep(_ACCEPT_RETRY_INTERVAL)
+            raise
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Handle a connection in a thread; end the oldest one if there are too many."""
+        with self._lock:
+            if len(self._admissions) >= MAX_CONNECTIONS:
+                waiting = (connection for connection, end in self._admissions.items() if end is not None)
+                self._end(next(waiting, next(iter(self._admissions))))
+            self._admissions[request] = time.monotonic() + ADMISSION_TIMEOUT
+        super().process_request(request, client_address)
+
+    def admit(self, connection: socket.socket) -> None:
+        """Keep a connection that has sent the token."""
+        with self._lock:
+            if connection in self._admissions:
+                self._admissions[connection] = None
+
+    def service_actions(self) -> None:
+        """End the connections that have not sent the token in time; called twenty times per second."""
+        now = time.monotonic()
+        with self._lock:
+            for connection in [connection for connection, end in self._admissions.items() if end is not None and end < now]:
+                self._end(connection)
+
+    def _end(self, connection: socket.socket) -> None:
+        """End a connection; its thread reads the end of the data and closes it."""
+        del self._admissions[connection]
+        with suppress(OSError):
+            connection.shutdown(socket.SHUT_RDWR)
+
+    def shutdown_request(self, request: Any) -> None:
+        """Close a connection whose thread has ended."""
+        with self._lock:
+            self._admissions.pop(request, None)
+        super().shutdown_request(request)
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Ignore errors of requests, such as a closed browser."""
 
 
+class _HeadReader:
+    """Reader of a connection that limits the lines of each request's head to `MAX_HEAD_LENGTH` bytes together."""
+
+    def __init__(self, file: BufferedIOBase) -> None:
+        self._file, self._remaining = file, 0
+        self.read, self.close = file.read, file.close
+
+    def begin_request(self) -> None:
+        """Start to count anew."""
+        self._remaining = MAX_HEAD_LENGTH
+
+    def readline(self, size: int) -> bytes:
+        """Return a line; raise LineTooLong when the limit is reached."""
+        line = self._file.readline(min(size, self._remaining + 1))
+        self._remaining -= len(line)
+        if self._remaining < 0:
+            raise LineTooLong("the head of the request")
+        return line
+
+
 class _Handler(BaseHTTPRequestHandler):
-    """Handler of one request, in a thread of its own."""
+    """Handler of one request, in a separate thread."""
 
     server: LiveServer
     protocol_version = "HTTP/1.1"
     server_version, sys_version = "cosim", ""
-    timeout = 60
+    timeout = IDLE_TIMEOUT
+
+    def setup(self) -> None:
+        super().setup()
+        self.rfile: Any = _HeadReader(self.rfile)
+
+    def handle_one_request(self) -> None:
+        self.rfile.begin_request()
+        super().handle_one_request()
 
     def do_GET(self) -> None:
         self._respond({"": self._send_page, "rows": self._send_rows})
@@ -96,6 +191,7 @@ class _Handler(BaseHTTPRequestHandler):
         token, _, resource = urlsplit(self.path).path.removeprefix("/").partition("/")
         if not compare_digest(token.encode(), self.server.token.encode()):
             raise RequestRefusedError(HTTPStatus.FORBIDDEN)
+        self.server.admit(self.connection)
         expected = [f"http://{hosts[0]}"]
         if origins != expected and (origins or self.command == "POST"):
             raise RequestRefusedError(HTTPStatus.FORBIDDEN)
@@ -140,7 +236,7 @@ class _Handler(BaseHTTPRequestHandler):
             message = json.loads(self.rfile.read(int(length)))
         except (ValueError, RecursionError):
             message = None
-        if not isinstance(message, dict):
+        if not isinstance(message, dict) or not all(map(_is_flat, message.values())):
             raise RequestRefusedError(HTTPStatus.BAD_REQUEST)
         return message
 
@@ -150,3 +246,8 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_header(name, value)
         self.end_headers()
         self.wfile.write(body)
+
+
+def _is_flat(value: Any) -> bool:
+    """Return whether a JSON value is no object, and no list of lists or objects, as are all arguments of commands."""
+    return not any(isinstance(part, dict | list) for part in (value if isinstance(value, list) else [value]))

@@ -27,7 +27,7 @@ MAX_ROWS = 2000
 class LiveSession:
     """State of a live run and channel for commands; used by the request threads of the supervising process.
 
-    A thread of its own receives the messages of the simulation process.
+    A separate thread receives the messages of the simulation process.
 
     Args:
         connection: The pipe to the simulation process.
@@ -52,7 +52,7 @@ class LiveSession:
         self._listener.start()
 
     def _listen(self) -> None:
-        """Receive messages until the simulation process closes the pipe; runs in a thread of its own."""
+        """Receive messages until the simulation process closes the pipe; runs in a separate thread."""
         try:
             while True:
                 self._handle_message(json.loads(self._connection.recv_bytes()))

@@ -99,7 +99,8 @@ def describe_provenance_changes(before: Mapping[str, Any], after: Mapping[str, A
     """
     changes = []
     for key in _PROVENANCE_KEYS:
-        old, new = before.get(key) or {}, after.get(key) or {}
+        old, new = before.get(key), after.get(key) or {}
+        old = old if isinstance(old, dict) else {}
         names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
         changes += [name if key == "sha256" else f"{name} {old.get(name)} -> {new.get(name)}" for name in names]
     return changes

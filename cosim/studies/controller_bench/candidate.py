@@ -13,7 +13,7 @@ from typing import cast
 
 from ...core.component import Component, Variable
 from ...core.errors import InputError, Problem, did_you_mean
-from ...scenario import prepare
+from ...scenario import load
 from ...scenario.name_resolution import SlotIndex, Target, UnknownNameError, resolve_name
 from ...scenario.nested_systems import Node, load_scenario
 from ...scenario.schema import NestedSpec
@@ -92,7 +92,7 @@ def read_interface(candidate: CandidateSource) -> CandidateInterface:
         file = Path(folder) / f"{_CANDIDATE}.json"
         file.write_text(json.dumps(scenario), encoding="utf-8")
         try:
-            prepared = prepare(file, {"/step_size": _common_step(file)})
+            prepared = load(file, {"/step_size": _common_step(file)})
         except InputError as error:
             raise InputError([_with_user_location(problem, file, candidate) for problem in error.problems]) from None
     try:

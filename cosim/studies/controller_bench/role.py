@@ -98,14 +98,12 @@ def _find_role(role: str) -> Path:
 
 
 def _validate_role(document: Document) -> RoleSpec:
-    problems = list(document.problems)
+    if document.problems:
+        raise InputError(document.problems)
     try:
-        spec = TypeAdapter(RoleSpec).validate_python(document.value)
+        return TypeAdapter(RoleSpec).validate_python(document.value)
     except ValidationError as error:
-        problems += [Problem(found["msg"], document.where(found["loc"])) for found in error.errors()]
-    if problems:
-        raise InputError(problems)
-    return spec
+        raise InputError(Problem(found["msg"], document.where(found["loc"])) for found in error.errors()) from None
 
 
 def _input_units(name: str, source: str | OutputsSpec, folder: Path) -> list[tuple[str, Unit | None]]:

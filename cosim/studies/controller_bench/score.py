@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from ...core.json_values import is_number, parse_object
 from ...core.version import __version__
 from ...results.checks import CheckOutcome, Number, evaluate_checks
 
@@ -29,21 +29,22 @@ class RunKpis:
     def read(cls, directory: Path) -> RunKpis | None:
         """Read the KPIs from a folder written by `cosim run`; None if there is no complete run."""
         try:
-            kpis, about = (json.loads((directory / name).read_text(encoding="utf-8")) for name in ("kpis.json", "run.json"))
+            kpis, about = (parse_object((directory / name).read_text(encoding="utf-8")) for name in ("kpis.json", "run.json"))
             numbers = {name: math.nan if value is None else value for name, value in kpis.items()}
-            return cls(numbers, about["kpi_units"], about["kpi_senses"])
-        except (OSError, ValueError, KeyError):
+            units, senses = dict(about["kpi_units"]), dict(about["kpi_senses"])
+            return cls(numbers, units, senses) if all(map(is_number, numbers.values())) else None
+        except (OSError, ValueError, KeyError, TypeError):
             return None
 
 
 def is_current(directory: Path, scenario: Path) -> bool:
     """Return whether the run in `directory` is up to date: the files of `scenario` and the version of cosim are unchanged."""
     try:
-        about = json.loads((directory / "run.json").read_text(encoding="utf-8"))
+        about = parse_object((directory / "run.json").read_text(encoding="utf-8"))
         files = {scenario.parent.resolve() / name: digest for name, digest in about["sha256"].items()}
         same_files = all(sha256(file.read_bytes()).hexdigest() == digest for file, digest in files.items())
         return same_files and scenario.resolve() in files and about["versions"]["cosim"] == __version__
-    except (OSError, ValueError, KeyError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return False
 
 

@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from ...components.python_import import package_files, package_root
+from ...components.python_import import package_root
 from ...core import paths, resources
 from ...core.errors import InputError, Problem
 from ...core.version import __version__
@@ -60,7 +60,8 @@ class Bundle:
 
 def collect_bundle(scenario: Path, variants: Iterable[Mapping[str, Any]] = ({},)) -> Bundle:
     """Collect the files of a scenario, including those that it uses only with one of the `variants` of its settings."""
-    used = {path for settings in variants for path in _scenario_files(scenario, settings)}
+    named = {path for settings in variants for path in _scenario_files(scenario, settings)}
+    used = {path for file in named for path in _package_files(file)}
     root = Path(os.path.commonpath([path.parent for path in used]))
     files = {path.relative_to(root).as_posix(): sha256(path.read_bytes()).hexdigest() for path in sorted(used)}
     return Bundle(root, PurePosixPath(scenario.resolve().relative_to(root).as_posix()), files)
@@ -91,10 +92,8 @@ def _scenario_files(scenario: Path, settings: Mapping[str, Any]) -> Iterator[Pat
 
 
 def _existing_files(folder: Path, names: Iterable[str]) -> Iterator[Path]:
-    """Yield the names that are files; a Python file with all files of its package."""
-    for path in (paths.resolve_path(folder / name) for name in names):
-        if paths.is_file(path):
-            yield from _package_files(path) if path.suffix == ".py" else [path]
+    """Return the paths of the names that are files."""
+    return filter(paths.is_file, (paths.resolve_path(folder / name) for name in names))
 
 
 def _pointer_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -134,9 +133,10 @@ def _strings(value: Any) -> Iterator[str]:
 
 
 def _package_files(path: Path) -> Iterator[Path]:
-    """Yield a Python file, or all files of its outermost package including data files."""
-    if package_files(path) == [path]:
+    """Yield a file, or if it belongs to a Python package, all files of its outermost package including data files."""
+    root = package_root(path)
+    if path.suffix != ".py" or root == path.parent:
         yield path
         return
-    top = package_root(path) / path.relative_to(package_root(path)).parts[0]
-    yield from (each for each in top.rglob("*") if each.is_file() and "__pycache__" not in each.parts)
+    package = root / path.relative_to(root).parts[0]
+    yield from (each for each in package.rglob("*") if each.is_file() and "__pycache__" not in each.parts)

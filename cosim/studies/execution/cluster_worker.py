@@ -11,6 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from ...results.files import writing_atomically
 from .bundle import cosim_fingerprint, fmu_paths
 from .job import Job, RunKey, StudyContext
 from .worker_pool import WorkerPool
@@ -70,9 +71,8 @@ def store_contents(blobs: Mapping[str, bytes], dask_worker: Any) -> None:
     for sha, content in blobs.items():
         if sha256(content).hexdigest() != sha:
             raise ValueError(f"the content {sha} was damaged during the transfer")
-        part = folder / f"{sha}.{os.getpid()}.part"
-        part.write_bytes(content)
-        part.replace(folder / sha)
+        with writing_atomically(folder / sha) as temporary:
+            temporary.write_bytes(content)
 
 
 def run_job(package: StudyPackage, key: RunKey, settings: Mapping[str, Any], check: bool) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from typing import Any
 from ...components.fmi import FmuFile
 from ...components.python_import import load_object
 from ...core.errors import CosimError
-from ...process.sandbox.limits import detach, thread_count
+from ...process.limits import detach, thread_count
 from ...process.temporary_folders import temporary_run_folder
 from ...scenario import load_scenario
 from ...scenario.named_functions import function_problem, load_function
@@ -112,6 +112,7 @@ def _redirect_output() -> None:
 
 
 def _serve_requests(client: socket.socket, context: StudyContext, fmu_files: FmuFiles) -> None:
+    client.sendall(f"{os.getpid()}\n".encode())
     with client.makefile("rb") as requests:
         for line in requests:
             client.sendall((_handle_request(json.loads(line), context, fmu_files) + "\n").encode())

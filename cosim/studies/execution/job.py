@@ -9,6 +9,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, NewType, Protocol
 
+from ...core.json_values import is_number, parse_object
 from ...results.checks import Number
 
 #: messages between the worker pool and its fork server
@@ -50,8 +51,24 @@ class Record:
 
     @classmethod
     def from_json(cls, text: str | bytes) -> Record:
-        """Read a record from a line of JSON."""
-        return cls(**json.loads(text))
+        """Read a record from a line of JSON.
+
+        Raises:
+            ValueError: The line is not a record.
+        """
+        fields = parse_object(text)
+        if fields.keys() - _FIELD_TYPES.keys() or "key" not in fields:
+            raise ValueError("expected the fields of a record")
+        record = cls(**fields)
+        if not all(isinstance(value, _FIELD_TYPES[name]) for name, value in vars(record).items()):
+            raise ValueError("a field of the record has another type")
+        if not all(map(is_number, record.kpis.values())):
+            raise ValueError("a KPI of the record is not a number")
+        bytes.fromhex(record.key)
+        return record
+
+
+_FIELD_TYPES: Mapping[str, Any] = {"key": str, "kpis": dict, "failure": str, "seconds": float | int, "output": str}
 
 
 @dataclass(frozen=True)
@@ -80,5 +97,5 @@ class Runner(Protocol):
 
 
 def run_key(digest: str, settings: Mapping[str, Any]) -> RunKey:
-    """Return the key of the run of a scenario, whose files have this digest, with these settings."""
+    """Return the key of a run: a hash of its settings and of the `digest` of all files that it depends on."""
     return RunKey(sha256(json.dumps([digest, settings], sort_keys=True).encode()).hexdigest()[:32])

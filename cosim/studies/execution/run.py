@@ -15,13 +15,14 @@ from typing import IO, Any, NamedTuple
 
 from ...components.fmi import FmuFile
 from ...core.errors import ComponentError, CosimError, InputError, Problem
+from ...core.json_values import parse_object
 from ...engine.run_loop import simulating
 from ...process.journal import EXIT_CODE, Deadlines, Phase, current_journal
 from ...process.run_files.folder import keeping_run_files
 from ...process.supervisor import SupervisedOutcome, run_supervised
 from ...results import Result
 from ...results.kpi import evaluate_kpis
-from ...scenario import PreparedRun, prepare
+from ...scenario import PreparedRun, load
 from .job import Job, Record, StudyContext
 
 #: length kept of the text that components printed in a failed run (bytes)
@@ -99,7 +100,7 @@ def _write_reply(reply: IO[str], value: Any) -> None:
 def _run_job(context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[str]) -> None:
     _set_deadline(context)
     prepared = _prepare_job(context, job, fmu_files)
-    with keeping_run_files(Path(tempfile.gettempdir()) / "run"), simulating(prepared.system, prepared.settings) as outcome:
+    with keeping_run_files(Path(tempfile.gettempdir()) / "run"), simulating(prepared.plan) as outcome:
         if outcome.failure:
             raise outcome.failure
         kpis = evaluate_kpis(Result(outcome.recording), prepared.kpis())
@@ -128,7 +129,7 @@ def _set_deadline(context: StudyContext) -> None:
 
 
 def _prepare_job(context: StudyContext, job: Job, fmu_files: FmuFiles) -> PreparedRun:
-    prepared = prepare(context.scenario, job.settings, loaded_fmus={path: file.share() for path, file in fmu_files.items()})
+    prepared = load(context.scenario, job.settings, loaded_fmus={path: file.share() for path, file in fmu_files.items()})
     if journal := current_journal():
         journal.deadlines = Deadlines(**prepared.spec.deadlines.model_dump())
     return prepared
@@ -158,8 +159,12 @@ def _make_record(context: StudyContext, job: Job, outcome: SupervisedOutcome, re
     if outcome.failure:
         return Record(job.key, failure=_without_root(context, _failure_cause(context, outcome.failure)))
     reply.seek(0)
-    answer = json.load(reply)
-    return Record(job.key, answer.get("kpis", {}), _without_root(context, answer.get("failure", "")))
+    try:
+        answer = parse_object(reply.read())
+        record = Record.from_json(json.dumps({"key": job.key, **answer}))
+    except ValueError:  # foreign code has written to the file
+        return Record(job.key, failure="the process of the run left no valid result")
+    return replace(record, failure=_without_root(context, record.failure))
 
 
 def _failure_cause(context: StudyContext, failure: ComponentError) -> str:

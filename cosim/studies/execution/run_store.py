@@ -6,13 +6,13 @@ disk every second. Unreadable lines are skipped.
 
 from __future__ import annotations
 
-import fcntl
 import os
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from ...core.errors import InputError, OutputError
+from ...core.errors import InputError, OutputError, write_error
+from ...process.output_lock import LOCK_FILE, acquire_lock
 from .job import Job, Record, RunKey
 
 RUN_STORE_FILE = "journal.jsonl"
@@ -39,15 +39,21 @@ class RunStore:
 
         Raises:
             InputError: if the folder cannot be written, is used by another process, or holds a foreign file of that name.
+            OutputError: if the disk is full or defective.
         """
         self.path = folder / RUN_STORE_FILE
+        self._lock = acquire_lock(folder / LOCK_FILE, folder)
+        try:
+            self._open(retry_failed)
+        except BaseException:
+            self._lock.release()
+            raise
+
+    def _open(self, retry_failed: bool) -> None:
         try:
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(f'another sweep or tuning is writing to "{folder}"') from None
         except OSError as error:
-            raise InputError(f'cannot write "{self.path}": {error.strerror}') from None
+            raise write_error(f'cannot write "{self.path}": {error.strerror}', error) from None
         #: number of lines that are not records; their runs are treated as not finished
         self.unreadable_lines = 0
         self._positions: dict[bytes, int] = {}
@@ -123,13 +129,12 @@ class RunStore:
         self._sync()
         self._reader.close()
         os.close(self._file)
+        self._lock.release()
 
 
 def _parse_record(line: bytes) -> Record | None:
     """Return the record of a line, or None if the line is not a complete record."""
     try:
-        record = Record.from_json(line)
-        bytes.fromhex(record.key)
-        return record if line.endswith(b"\n") and isinstance(record.kpis, dict) else None
-    except (ValueError, TypeError):
+        return Record.from_json(line) if line.endswith(b"\n") else None
+    except ValueError:
         return None

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import json
+import math
 import os
+import select
+import signal
 import socket
 import subprocess
 import sys
 import threading
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from ...core.errors import ComponentError, CosimError, Problem
+from ...process.supervisor import STOP_TIMEOUT, is_stopped
 from .job import FORK_REQUEST, READY, Job, Record, StudyContext
 
 #: attempts at a run whose worker process is killed
 MAX_ATTEMPTS = 3
 #: time limits for the start of the fork server and for its end (s)
 _STARTUP_TIMEOUT, _SHUTDOWN_TIMEOUT = 120.0, 5.0
+#: time between two looks at a process that does not answer (s)
+_STOP_CHECK_INTERVAL = 1.0
 #: number of FMUs unpacked in advance
 _MAX_PRELOADED_FMUS = 100
 #: one thread per process: many processes share the machine, and a process with threads cannot be forked safely
@@ -32,25 +39,46 @@ class WorkerLostError(CosimError):
 
 
 class Worker:
-    """Connection to a worker process, which handles one job at a time."""
+    """Connection to a worker process, which handles one job at a time.
 
-    def __init__(self, connection: socket.socket):
-        self._connection, self._answers = connection, connection.makefile("rb")
+    The first line that the process sends is its id.
+    """
+
+    def __init__(self, connection: socket.socket, fork_server: int):
+        self._connection, self._fork_server = connection, fork_server
+        self._poll = select.poll()
+        self._poll.register(connection, select.POLLIN)
+        self._process: int | None = None
 
     def request(self, request: dict[str, Any]) -> bytes:
         """Send a request and return the answer, a line of JSON.
 
         Raises:
-            WorkerLostError: if the process ends before it has answered.
+            WorkerLostError: if the process ends before it has answered, or is killed because it was stopped from outside.
         """
         try:
+            if self._process is None:
+                self._process = int(self._read_line())
             self._connection.sendall(json.dumps(request).encode() + b"\n")
-            answer = self._answers.readline()
-        except OSError:
-            answer = b""
-        if not answer.endswith(b"\n"):
-            raise WorkerLostError("a worker process ended")
-        return answer
+            return self._read_line()
+        except (OSError, ValueError):
+            raise WorkerLostError("a worker process ended") from None
+
+    def _read_line(self) -> bytes:
+        """Return the next line; kill the worker, or the fork server before there is one, if it is stopped for too long."""
+        line, stopped_since = b"", math.inf
+        while not line.endswith(b"\n"):
+            if self._poll.poll(_STOP_CHECK_INTERVAL * 1000):
+                if not (data := self._connection.recv(1 << 16)):
+                    raise ConnectionError
+                line += data
+                continue
+            process = self._process or self._fork_server
+            stopped_since = min(stopped_since, time.monotonic()) if is_stopped(process) else math.inf
+            if time.monotonic() - stopped_since > STOP_TIMEOUT:
+                os.kill(process, signal.SIGKILL)  # closes the connection
+                stopped_since = math.inf
+        return line
 
     def close(self) -> None:
         """Close the connection; the worker process then ends."""
@@ -102,7 +130,7 @@ class _ForkServer:
         connection, other = socket.socketpair()
         with other:
             socket.send_fds(self._control, [FORK_REQUEST], [other.fileno()])
-        return Worker(connection)
+        return Worker(connection, self.pid)
 
     @property
     def pid(self) -> int:

@@ -6,7 +6,7 @@ import math
 import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 from .success_map import SuccessMap
@@ -126,11 +126,15 @@ def _wrap_and_break(text: str, width: float, size: float, weight: str = "normal"
 
 def _text_width(lines: Iterable[str], size: float, weight: str = "normal") -> float:
     """Return the width of the widest line."""
+    return max((_line_width(line, size, weight) for line in lines if line.strip()), default=0.0)
+
+
+@lru_cache(4096)  # wrapping measures the same words again and again, 0.3 ms each
+def _line_width(line: str, size: float, weight: str) -> float:
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import TextPath
 
-    font = FontProperties(size=size, weight=weight)
-    return max((float(TextPath((0, 0), line, prop=font).get_extents().x1) / 72 for line in lines if line.strip()), default=0.0)
+    return float(TextPath((0, 0), line, prop=FontProperties(size=size, weight=weight)).get_extents().x1) / 72
 
 
 def _every_nth_label(texts: Sequence[str], space: float) -> dict[int, str]:

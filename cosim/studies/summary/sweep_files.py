@@ -88,7 +88,7 @@ def _setting_text(value: Any) -> str:
     """Return a value as `--set` reads it: JSON, or a string that is not JSON."""
     try:
         json.loads(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, RecursionError):
         return value if isinstance(value, str) else json.dumps(value)
     return json.dumps(value)
 

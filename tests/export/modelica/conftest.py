@@ -19,6 +19,8 @@ from cosim.export.modelica.causality.interpreter import Interpreter
 CTYPES = {"Float64": ctypes.c_double, "Int32": ctypes.c_int32, "Enumeration": ctypes.c_int32, "Boolean": ctypes.c_bool}
 GCC = ["gcc", "-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-pedantic", "-fPIC", "-shared"]
 
+TICKS = 500  # default number of steps with random inputs
+
 
 class CompiledBlock:
     """An instance of a compiled block, which is accessed like by the FMI shells: struct offsets and four functions."""
@@ -108,7 +110,13 @@ class CompiledAndInterpreted:
             self.python.set(name, value)
         return values
 
-    def run(self, ticks: int, seed: int = 0, period: float = 0.01) -> Iterator[tuple[int, dict[str, Any]]]:
+    def simulate(self, ticks: int = TICKS, **parameters: Any) -> Iterator[tuple[int, dict[str, Any]]]:
+        """Set parameters, initialize, and step like `run`."""
+        self.set(**parameters)
+        self.initialize()
+        yield from self.run(ticks)
+
+    def run(self, ticks: int = TICKS, seed: int = 0, period: float = 0.01) -> Iterator[tuple[int, dict[str, Any]]]:
         """Step with random inputs; yield the number of the tick and its inputs after each step."""
         for k in range(ticks):
             values = self.randomize(seed * 100_000 + k)

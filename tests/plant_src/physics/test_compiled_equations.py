@@ -53,3 +53,14 @@ def test_a_binary_is_unpacked_once_and_completely(cache: Path) -> None:
     with ZipFile(resources.root() / "fmus" / "ar_drone.fmu") as archive:
         (member,) = [name for name in archive.namelist() if name.endswith(f"/ar_drone{library.suffix}")]
         assert library.read_bytes() == archive.read(member)
+
+
+@pytest.mark.parametrize("content", [b"", b"\x7fELF", None])
+def test_a_damaged_library_in_the_cache_is_replaced(cache: Path, content: bytes | None) -> None:
+    library = compiled_equations.library_path("ar_drone")
+    original = library.read_bytes()
+    library.write_bytes(original[:-1] + b"!" if content is None else content)
+    compiled_equations._cached_library_path.cache_clear()  # as in a new process
+    assert compiled_equations.library_path("ar_drone") == library
+    assert library.read_bytes() == original
+    assert list(cache.iterdir()) == [library]

@@ -12,7 +12,16 @@ import pytest
 
 from cosim.core.recording import Recording
 from cosim.process.journal import JOURNAL_SIZE, ROW_COUNT, Journal, Phase
-from cosim.process.run_files.folder import HEADER_FILE, ROWS_FILE, TEXTS_FILE, Column, RowsHeader, TextReader
+from cosim.process.run_files.folder import (
+    HEADER_FILE,
+    ROWS_FILE,
+    TEXTS_FILE,
+    Column,
+    RowsHeader,
+    TextReader,
+    read_header,
+    recover_recording,
+)
 from cosim.process.run_files.live_csv_writer import CsvLineReader, LiveCsvWriter
 from cosim.results.csv_files import write_csv
 
@@ -133,3 +142,21 @@ def test_the_final_file_is_not_replaced(table, tmp_path):
     final.write_text("final")
     csv._append_rows(float("inf"))
     assert final.read_text() == "final"
+
+
+@pytest.mark.parametrize("line", [b"[" * 100_000, b"{}", b"[1]", b'["x", {}]', b"[1, 2]", b"\xff", b'[1, {"other": "x"}]', b"\0"])
+def test_a_damaged_line_of_texts_changes_nothing(table, tmp_path, line):
+    write_texts(tmp_path)
+    first, *others = (tmp_path / TEXTS_FILE).read_bytes().splitlines(keepends=True)
+    (tmp_path / TEXTS_FILE).write_bytes(b"".join([first, line, b"\n", *others]))
+    reader = TextReader(tmp_path, header(table))
+    assert [reader.read_row(row) for row in range(ROWS_COUNT)] == list(map(list, zip(*texts(ROWS_COUNT).values(), strict=True)))
+
+
+@pytest.mark.parametrize(
+    "text", ["[" * 100_000, "{}", "[]", '{"columns": [1]}', '{"columns": [], "calls": 3, "texts": []}', "\0"]
+)
+def test_a_damaged_header_counts_as_missing(tmp_path, text):
+    (tmp_path / HEADER_FILE).write_text(text)
+    assert read_header(tmp_path) is None
+    assert len(recover_recording(tmp_path, 10).time) == 0

@@ -9,8 +9,9 @@ from systems import endpoint, make_system
 
 from cosim.engine.run_loop import simulate
 from cosim.engine.settings import Settings
-from cosim.process.run_files.row_store import read_rows
+from cosim.process.run_files.row_store import FileMapping, read_rows
 from cosim.results.csv_files import read_csv, write_csv
+from cosim.results.files import _memory_map
 
 pytestmark = pytest.mark.usefixtures("executor")
 STEPS = 3000
@@ -32,8 +33,8 @@ def small_chunks(monkeypatch):
 @pytest.mark.usefixtures("small_chunks")
 def test_many_rows_are_kept_in_a_file_and_are_the_same():
     recording = recorded()
-    assert isinstance(recording.columns["a.y"].base, np.memmap)
-    assert isinstance(recording.time, np.memmap)
+    assert isinstance(_memory_map(recording.columns["a.y"]), FileMapping)
+    assert isinstance(_memory_map(recording.time), FileMapping)
     assert recording.time.tolist() == [n / 100 for n in range(STEPS + 1)]
     assert recording.columns["a.y"].tolist() == list(range(STEPS + 1))
     assert recording.columns["a.n"].tolist() == list(range(STEPS + 1))

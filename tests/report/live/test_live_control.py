@@ -30,7 +30,8 @@ class Steered:
         self.commands, self.refuse = commands, refuse
         self.connection, child_end = Pipe()
         gain = Variable("k", causality="parameter", variability="tunable", start=1.0, minimum=0.0, maximum=9.0)
-        self.fake = FakeComponent([gain, *inputs("u"), *outputs("y")], self.step, start={"k": 1.0})
+        text = Variable("text", "String", causality="parameter", variability="tunable", start="")
+        self.fake = FakeComponent([gain, text, *inputs("u"), *outputs("y")], self.step, start={"k": 1.0, "text": ""})
         self.fake.set = self.set
         self.system = make_system({"a": self.fake})
         self.control = LiveControl(child_end, self.system, GRID, speed, {"rows": 61})
@@ -54,8 +55,8 @@ class Steered:
 
     def run(self, events=(), control=True):
         columns = {"y": endpoint("a.y")}
-        settings = Settings(Fraction(0), Fraction(1), STEP, columns, events=events, step_hook=self.control if control else None)
-        return simulate(self.system, settings)
+        settings = Settings(Fraction(0), Fraction(1), STEP, columns, events=events)
+        return simulate(self.system, settings, step_hook=self.control if control else None)
 
     def said(self):
         messages = []
@@ -99,7 +100,8 @@ def test_the_first_message_lists_the_variables_that_can_be_set():
     run.run()
     about, *rest = run.said()
     assert rest == []
-    gain, free = about["about"]["adjustable"]
+    gain, text, free = about["about"]["adjustable"]
+    assert text["name"] == "a.text"
     assert (gain["name"], gain["value"], gain["minimum"], gain["maximum"]) == ("a.k", 1.0, 0.0, 9.0)
     assert free["name"] == "a.u"
 
@@ -117,6 +119,15 @@ def test_an_invalid_value_changes_nothing(value):
     run = Steered({4: [change(value)]})
     assert run.run().recording.columns["y"][-1] == 60
     assert '"k"' in run.said()[-1]["error"]
+
+
+@pytest.mark.parametrize("value", ["\ud800", "end\0"])
+@pytest.mark.parametrize("name", ["a.text", "a.k"])
+def test_a_text_that_no_fmu_can_hold_is_refused_and_the_run_goes_on(name, value):
+    run = Steered({4: [change(value, name)]})
+    assert run.run().macro_steps == 60
+    assert "is not allowed" in run.said()[-1]["error"]
+    assert run.control.finish() == []
 
 
 @pytest.fixture

@@ -175,6 +175,9 @@ def test_requests_for_rows_by_other_pages_are_refused(paused):
         (b"no JSON", {}, 400),
         (b'["resume"]', {}, 400),
         (b"[" * 60_000, {}, 400),
+        (b'{"command": "set", "value": ' + b"[" * 970 + b"]" * 970 + b"}", {}, 400),
+        (b'{"command": "set", "value": [{}]}', {}, 400),
+        (b'{"command": {"resume": 1}}', {}, 400),
     ],
 )
 def test_an_invalid_request_body_is_refused(paused, body, headers, status):

@@ -9,7 +9,7 @@ from cosim import __version__
 from cosim.core import resources
 from cosim.core.component import Variable
 from cosim.core.errors import InputError
-from cosim.scenario import prepare
+from cosim.scenario import load
 from cosim.studies.controller_bench.candidate import CandidateInterface, interface_problems, parse_source, read_interface
 from cosim.studies.controller_bench.role import read_role, role_names
 from cosim.studies.controller_bench.score import RunKpis, compare_kpis, compare_values, is_current, merge_senses
@@ -50,7 +50,7 @@ def test_a_shipped_controller_can_replace_itself_in_a_scenario(name, tmp_path):
     path = substitution.write(tmp_path)
     assert path
     assert len(substitution.replaced_components) == 1
-    prepared = prepare(path)
+    prepared = load(path)
     try:
         place = substitution.replaced_components[0]
         assert any(component == place or component.startswith(f"{place}.") for component in prepared.system.components)
@@ -94,7 +94,7 @@ def test_ports_without_a_target_are_removed_with_their_settings(tmp_path):
     assert nested["ports"] == {"parameters": {}}
     assert nested["components"]["uav"]["python"] == f"{keeper}:Bare"
     assert {each["to"].split(".")[0] for each in nested["connections"]} == {"plant", "usv"}
-    prepare(path).free()
+    load(path).free()
 
 
 def test_changed_systems_of_different_scenarios_are_separate_files(tmp_path):

@@ -37,7 +37,12 @@ def test_an_incomplete_last_line_is_cut_off(tmp_path):
             assert [run_store[key].kpis["a"] for key in KEYS[:2]] == [1.0, 3.0]
 
 
-@pytest.mark.parametrize("line", [b"\0" * 20, b"{", b'{"key": "zz"}', b'{"key": "00", "kpis": 3}', b"[1]", b"\xff"])
+LINES = [b"\0" * 20, b"{", b'{"key": "zz"}', b'{"key": "00", "kpis": 3}', b"[1]", b"\xff", b"[" * 100_000, b"1" * 5000]
+LINES += [b'{"key": "00", "kpis": {"a": %s}}' % value for value in (b'"text"', b'{"b": 1}', b"[1]", b"null", b"1" + b"0" * 400)]
+LINES += [b'{"key": "00", %s}' % field for field in (b'"seconds": "x"', b'"failure": 1', b'"output": null', b'"more": 1')]
+
+
+@pytest.mark.parametrize("line", LINES, ids=range(len(LINES)))
 def test_an_unreadable_line_does_not_affect_the_others(tmp_path, line):
     file = filled(tmp_path, Record(KEYS[0], {"a": 1.0}))
     file.write_bytes(file.read_bytes() + line + b"\n")
@@ -79,7 +84,7 @@ def test_failed_runs_are_unfinished_with_retry_failed(tmp_path):
 
 
 def test_a_folder_is_locked_against_a_second_sweep(tmp_path):
-    with RunStore(tmp_path), pytest.raises(InputError, match="another sweep or tuning is writing to"):
+    with RunStore(tmp_path), pytest.raises(InputError, match="is in use by process"):
         RunStore(tmp_path)
     RunStore(tmp_path).__enter__().__exit__()
 

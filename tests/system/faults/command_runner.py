@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -58,10 +59,12 @@ class CommandRunner:
     def close(self) -> None:
         self._server.close()
 
-    def cosim(self, folder: Path, *arguments: object, **conditions: Any) -> CommandResult:
+    def cosim(
+        self, folder: Path, *arguments: object, environment: Mapping[str, str] | None = None, **conditions: Any
+    ) -> CommandResult:
         """Run a command in `folder`, with temporary files in folder/tmp; `conditions`: see `cosim_command.CONDITIONS`."""
         (folder / "tmp").mkdir(exist_ok=True)
-        environment = {"TMPDIR": str(folder / "tmp")}
+        environment = {"TMPDIR": str(folder / "tmp"), **(environment or {})}
         conditions = {"limit": 60, "observe": True, **conditions}
         return CommandResult(folder, **self._server.run(folder, folder, arguments, environment, **conditions))
 

@@ -19,7 +19,9 @@
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/time.h>
+#include <sys/wait.h>
 #include <unistd.h>
 #include <xmmintrin.h>
 #include "fault_actions.h"
@@ -170,6 +172,25 @@ static int linger(int own_session) {
 }
 static int fork_(Lag *m) { return linger(0); }
 static int daemon_(Lag *m) { return linger(1); }
+static int fork_return(Lag *m) { return fork() < 0; } /* the copy returns, too */
+static int fork_silently(Lag *m) { return syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0) < 0; } /* unknown to the C library */
+static int fork_program(Lag *m) {
+    pid_t child = fork();
+    int status = 1;
+    if (child == 0) {
+        execl("/bin/true", "true", (char *)NULL);
+        _exit(1);
+    }
+    return waitpid(child, &status, 0) != child || status;
+}
+/* Write the bytes of the environment variable FAULT_ANSWER to all pipes, as a worker process answers its importer. */
+static int answer(Lag *m) {
+    const char *text = getenv("FAULT_ANSWER");
+    struct stat status;
+    for (int file = 3; text && file < 1024; file++)
+        if (!fstat(file, &status) && S_ISFIFO(status.st_mode) && write(file, text, strlen(text)) < 0) continue;
+    return OK;
+}
 static void *for_ever(void *m) { for (;;) usleep(1000); }
 static int thread(Lag *m) {
     Dl_info here;
@@ -235,8 +256,10 @@ static const struct { const char *name; int (*act)(Lag *); } FAULTS[] = {
     {"change_folder", change_folder}, {"change_locale", change_locale}, {"change_umask", change_umask},
     {"limit_files", limit_files}, {"limit_size", limit_size}, {"set_alarm", set_alarm}, {"block_signals", block_signals},
     {"change_environment", change_environment}, {"ignore_interrupts", ignore_interrupts}, {"close_output", close_output},
-    {"truncate_all", truncate_all}, {"close_all", close_all}, {"fork", fork_}, {"daemon", daemon_}, {"thread", thread}, {"write_here", write_here},
-    {"write_temporary", write_temporary}, {"attack", attack_all}, {"tcp", tcp}, {"udp", udp}, {"processes", processes},
+    {"truncate_all", truncate_all}, {"close_all", close_all}, {"fork", fork_}, {"daemon", daemon_}, {"answer", answer},
+    {"fork_return", fork_return}, {"fork_silently", fork_silently}, {"fork_program", fork_program},
+    {"thread", thread}, {"write_here", write_here}, {"attack", attack_all},
+    {"write_temporary", write_temporary}, {"tcp", tcp}, {"udp", udp}, {"processes", processes},
 };
 
 static int misbehave(Fault *fault, Lag *m, const char *function, double time) {

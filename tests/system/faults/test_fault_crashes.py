@@ -12,6 +12,7 @@ from command_runner import CommandResult
 from fault_fmu import STEP_COUNT, function_name, scenario
 
 from cosim.engine import native_available as native_available
+from cosim.results import Result
 
 ALL = STEP_COUNT + 1
 #: a hang is found within its deadline and half a second; the process around it takes its time, too
@@ -119,9 +120,9 @@ def test_a_hang_is_found_at_its_deadline(fmus, runner, tmp_path, case, version):
     Case("DoStep 6 set_alarm", "lag: changed the timers of the process", code=0, rows=ALL),
     Case("GetReal @0.095 limit_files", "lag: changed the limits of the process", code=0, rows=ALL),
     Case("GetReal @0.095 limit_size", "lag: changed the limits of the process", code=0, rows=ALL),
-    Case("DoStep 6 round_up", "changed the floating-point mode"),
-    Case("DoStep 6 flush_to_zero", "changed the floating-point mode"),
-    Case("DoStep 6 fp_traps", "changed the floating-point mode"),
+    Case("DoStep 6 round_up", "lag: the step changed the floating-point mode", code=0, rows=ALL),
+    Case("DoStep 6 flush_to_zero", "lag: the step changed the floating-point mode", code=0, rows=ALL),
+    Case("DoStep 6 fp_traps", "lag: a step changed the floating-point mode", code=0, rows=ALL),
     Case("DoStep 6 thread", code=0, rows=ALL),
     Case("DoStep 6 close_output", code=0, rows=ALL),
     Case("DoStep 6 flood_stdout", code=0, rows=ALL),
@@ -161,19 +162,37 @@ def test_an_fmu_that_takes_all_descriptors_costs_no_rows(fmus, runner, tmp_path,
     assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
 
 
-def test_an_fmu_that_empties_all_open_files_is_named(fmus, runner, tmp_path, version):
-    """The rows until then are gone: a file of results would have nothing to say."""
-    done = runner.run(tmp_path, fmus(version, "DoStep 6 truncate_all"))
-    assert "lag: fmi" in done.err
-    assert "ended by signal 7 (SIGBUS" in done.err
-    assert (done.code, done.rows) == (1, [])
+TICKER = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real, String
+
+class Ticker(Fmi2Slave):
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        self.count, self.text = 0.0, "step 0"
+        self.register_variable(Real("count", causality=Fmi2Causality.output))
+        self.register_variable(String("text", causality=Fmi2Causality.output))
+
+    def do_step(self, current_time, step_size):
+        self.count += 1
+        self.text = f"step {self.count:.0f}"
+        return True
+"""
+
+
+@pytest.mark.parametrize("isolation", ["run", "fmu", "none"])
+@pytest.mark.parametrize("moment", ["DoStep 1", "GetReal 6", "Terminate 1"])
+def test_an_fmu_that_empties_all_open_files_costs_no_rows(fmus, runner, tmp_path, version, isolation, moment):
+    """A string that changes in each step is recorded beside the numbers."""
+    (tmp_path / "ticker.py").write_text(TICKER)
+    lag = {"fmu": str(fmus(version, f"{moment} truncate_all"))}
+    components = {"lag": lag, "ticker": {"python": "ticker.py:Ticker"}}
+    file = scenario(tmp_path, fmus.folder, components=components)
+    done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", "--isolation", isolation)
+    assert done.code == 0, done.err
+    result = Result.from_csv(tmp_path / "out/result.csv")
+    assert result["ticker.count"].tolist() == list(range(ALL))
+    assert result["ticker.text"].tolist() == [f"step {n}" for n in range(ALL)]
     assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
-
-
-def test_an_fmu_that_empties_all_open_files_reaches_no_rows_from_its_own_process(fmus, runner, tmp_path, version):
-    file = scenario(tmp_path, fmus(version, "DoStep 6 truncate_all"))
-    done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", "--isolation", "fmu")
-    assert (done.code, len(done.rows)) == (0, ALL), done.err
 
 
 def test_an_fmu_that_closes_all_files_is_named(fmus, runner, tmp_path, version):
@@ -189,6 +208,50 @@ def test_no_process_of_an_fmu_outlives_the_run(fmus, runner, tmp_path, version, 
     assert fmus.lines("child")
     assert done.processes == []
     assert len(done.rows) == ALL
+
+
+NOTICED = "WARNING lag: {f} forked the process; a copy that returns from the call is ended"
+
+
+FORKS = ["DoStep 6 fork_return", "DoStep 6 fork_silently", "DoStep 6 fork_program"]
+OTHER_FORKS = ["GetReal 6", "Instantiate 1", "ExitInitializationMode 1", "Terminate 1", "FreeInstance 1", "DoStep *"]
+
+
+@pytest.mark.parametrize(
+    ("order", "isolation", "executor"),
+    [
+        *[(order, isolation, "native") for order in FORKS for isolation in ("run", "fmu", "none")],
+        *[(f"{moment} fork_return", isolation, "python") for moment in OTHER_FORKS for isolation in ("run", "fmu")],
+    ],
+)
+def test_a_forked_copy_does_not_continue_the_run(fmus, runner, tmp_path, order, isolation, executor):
+    """Calls of a component that another one follows; without supervision a copy ends at the latest with the run."""
+    version = 2 + (isolation == "run")
+    noticed = isolation != "none" and "silently" not in order
+    components = {"lag": {"fmu": str(fmus(version, order))}, "other": {"fmu": str(fmus(version, name="other"))}}
+    file = scenario(tmp_path, fmus.folder, components=components)
+    words = ("run", file, "--output-dir", "out", "--no-report", "--isolation", isolation)
+    done = runner.cosim(tmp_path, *words, executor=executor, limit=20)
+    assert (done.code, len(done.rows)) == (0, ALL), done.err
+    assert done.out.count("simulated in") == 1
+    assert done.err.count("forked") == noticed
+    if noticed:
+        assert NOTICED.format(f=function_name(version, order.split()[0])) in done.err
+    assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
+
+
+@pytest.mark.parametrize("isolation", ["run", "none"])
+def test_a_copy_that_a_python_component_forks_does_not_continue_the_run(runner, tmp_path, isolation):
+    (tmp_path / "ticker.py").write_text(
+        TICKER.replace("        return True", "        __import__('os').fork()\n        return True")
+    )
+    file = scenario(tmp_path, tmp_path, components={"ticker": {"python": "ticker.py:Ticker"}}, stop_time=0.03)
+    done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", "--isolation", isolation, limit=20)
+    assert done.code == 0, done.err
+    assert len(Result.from_csv(tmp_path / "out/result.csv").time) == 4
+    assert done.out.count("simulated in") == 1
+    assert ("WARNING ticker: do_step forked the process" in done.err) == (isolation == "run")
+    assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
 
 
 def test_an_fmu_cannot_read_what_is_typed(fmus, runner, tmp_path, version):

@@ -75,7 +75,6 @@ def test_a_bad_return_stops_the_run_with_one_line_and_keeps_the_rows(fmus, runne
         ("DoStep @0.08 error", T8 + "status 3 (error)"),
         ("DoStep @0.08 negative", T8 + "status -1 (not defined by FMI)"),
         ("GetReal @0.085 error", T8 + "status 3 (error)"),
-        ("DoStep @0.08 round_up", T8 + "changed the floating-point mode"),
     ],
 )
 def test_every_fault_is_reported_in_packed_steps(fmus, runner, tmp_path, version, order, words):
@@ -169,13 +168,6 @@ def test_a_scenario_tells_an_fmu_by_its_parameter_to_misbehave(fmus, runner, tmp
     assert f"other: fmi{version}DoStep failed at t = 0.03 s: status 3 (error)" in done.err
 
 
-@pytest.mark.parametrize("what", ["round_up", "flush_to_zero", "fp_traps"])
-def test_a_changed_floating_point_mode_is_a_failure(fmus, runner, tmp_path, version, what):
-    done = runner.run(tmp_path, fmus(version, f"DoStep 6 {what}"))
-    assert (done.code, len(done.rows)) == (1, 6)
-    assert f"lag: fmi{version}DoStep failed at t = 0.05 s: changed the floating-point mode" in done.err
-
-
 AS_OUTPUT = 'causality="output" variability="discrete" initial="calculated"'
 SPEAKING = {
     2: f'<ScalarVariable name="s" valueReference="1" {AS_OUTPUT}><String/></ScalarVariable></ModelVariables>',
@@ -195,24 +187,6 @@ def test_a_text_that_is_not_utf_8_is_read_as_far_as_it_can_be(fmus, runner, tmp_
     done = runner.cosim(tmp_path, "run", scenario(tmp_path, fmu), "--output-dir", "out", "--no-report")
     assert done.code == 0, done.err
     assert "\N{REPLACEMENT CHARACTER}" * 2 in (tmp_path / "out/result.csv").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize("isolation", ["none", "run", "fmu"])
-@pytest.mark.parametrize("order", ["load 1 flush_to_zero", "Instantiate 1 round_up", "Instantiate 1 fp_traps"])
-def test_a_floating_point_mode_that_comes_with_the_binary_is_changed_back(fmus, runner, tmp_path, version, order, isolation):
-    """Code compiled for fast mathematics does that; the other components and cosim itself would compute in this mode."""
-    file = scenario(tmp_path, fmus(version, order))
-    done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", "--isolation", isolation)
-    assert done.code == 0, done.err
-    assert "WARNING lag: changed the floating-point mode of the process; it was changed back" in done.err
-    assert [row["lag.y"] for row in done.rows] == [lag_output(n) for n in range(STEP_COUNT + 1)]
-
-
-@pytest.mark.parametrize("executor", ["python", "native"])
-def test_a_floating_point_mode_changed_in_initialization_is_a_failure(fmus, runner, tmp_path, version, executor):
-    done = runner.run(tmp_path, fmus(version, "EnterInitializationMode 1 round_up"), executor=executor)
-    assert done.code == 1, done.err
-    assert f"lag: fmi{version}EnterInitializationMode failed at t = 0 s: changed the floating-point mode" in done.err
 
 
 def test_rows_of_an_earlier_run_do_not_pass_for_those_of_a_failed_one(fmus, runner, tmp_path, version):

@@ -62,8 +62,10 @@ int mkdir(const char *path, mode_t mode) {
     return REAL(mkdir)(path, mode);
 }
 
+/* The file of rows is renamed within its folder, which needs no space; others are refused, so that a run ends at each step. */
 int rename(const char *from, const char *to) {
-    if (full_at(to)) REFUSE;
+    const char *name = strrchr(from, '/');
+    if ((!name || strcmp(name, "/rows")) && full_at(to)) REFUSE;
     return REAL(rename)(from, to);
 }
 

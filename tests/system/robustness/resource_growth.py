@@ -37,7 +37,7 @@ def entries(folder: str) -> int:
 
 def measure_runs(scenario: str, count: int) -> list[dict[str, int]]:
     """After the first runs, in which caches and memory pools fill, and after as many as asked for."""
-    looks, first = [], max(20, min(50, count // 2))
+    looks, first = [], max(10, min(50, count // 2))
     for n in range(1, first + count + 1):
         cosim.run(scenario, NO_OUTPUTS | {"/record": {"signals": ["*"]}}, stop_time=0.05)
         if n in (first, first + count):

@@ -25,12 +25,13 @@ def tens(count):
 class SlowCounter(Fmi2Slave):
     """Each step lasts `pause` s; `count` counts the steps, `tens` says in words how many tens, `clock` is the wall clock (s).
 
+    Step `fail_at` fails.
     `slow` names the place where it stays: load, initialization, step, stubborn (a step that no interrupt ends), or nowhere.
     """
 
-    def __init__(self, pause=0.002, slow="", **arguments):
+    def __init__(self, pause=0.002, slow="", fail_at=None, **arguments):
         super().__init__(**arguments)
-        self.pause, self.slow, self.count, self.clock = pause, slow, 0.0, 0.0
+        self.pause, self.slow, self.fail_at, self.count, self.clock = pause, slow, fail_at, 0.0, 0.0
         self.tens = tens(0)
         for name in ("count", "clock"):
             self.register_variable(Real(name, causality=Fmi2Causality.output))
@@ -51,7 +52,7 @@ class SlowCounter(Fmi2Slave):
         self.tens = tens(self.count)
         if self.count == 20:
             self.block_in_step()
-        return True
+        return self.count != self.fail_at
 
     def block_in_step(self):
         if self.slow == "step":
@@ -67,6 +68,12 @@ def row_count(result):
 
 def slow_kpi(_result):
     signal_and_sleep("kpi")
+    return {"value": 1}
+
+
+def block_result(_result):
+    Path("out/result.csv").unlink(missing_ok=True)
+    Path("out/result.csv").mkdir()
     return {"value": 1}
 
 

@@ -67,7 +67,7 @@ CHANGES: dict[str, tuple[Change, str]] = {
     # types
     "text for a number": (put("checks/0/max", "10"), '$.checks[0].max: expected a valid number; found "10"'),
     "number for a text": (put("name", 3), "$.name: expected a valid string; found 3"),
-    "list for an object": (put("components", []), "$.components: expected a valid dictionary; found []"),
+    "list for an object": (put("components", []), "$.components: expected an object; found []"),
     "object for a list": (put("connections", {}), "$.connections: expected a valid list; found {}"),
     "null": (put("stop_time", None), "$.stop_time: expected seconds"),
     "truth for a time": (put("stop_time", True), "$.stop_time: expected seconds"),

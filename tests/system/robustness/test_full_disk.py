@@ -1,10 +1,11 @@
-"""Disks that are full or may not be written: a line that says so, whole files or none, and nothing left behind."""
+"""Disks that are full or may not be written: a line that says so, whole files or none, and no row lost."""
 
 from __future__ import annotations
 
 import ctypes
 import json
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -19,7 +20,7 @@ from cosim.core import resources
 
 FULL = "No space left on device"
 RUN = ("--output-dir", "out")
-FMU = resources.root() / "fmus" / "strider.fmu"
+FMU = resources.root() / "fmus" / "strider_autopilot.fmu"
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
 #: operations on the disk of a run of less than half a second, and of one that lasts
 SHORT, LONG = {"stop": 0.5, "arguments": {"pause": 0}}, {"stop": 1.5, "arguments": {"pause": 0.01}}
@@ -62,9 +63,11 @@ class Disk(CommandFolder):
         _, errors = self.process.communicate(timeout=100)
         full = struct.unpack("l", self._left.read_bytes())[0] < 0
         where = f"{self.operations} operations: {errors}"
-        assert self.leftovers() == [], where
         rows, whole = kept(self), round(1 + 100 * self._stop())
         assert rows <= whole
+        if "`cosim recover out`" in errors:
+            rows = self.recover(errors)
+        assert self.leftovers() == [], where
         if self.process.returncode == 0:
             assert rows == whole, where
             assert (self.out / "picture.png").exists(), where
@@ -76,13 +79,21 @@ class Disk(CommandFolder):
         assert "Traceback" not in errors, where
         return True
 
+    def recover(self, errors: str) -> int:
+        """Write the rows that were kept, with space on the disk, and return their number."""
+        done = self.run("recover", "out")
+        assert done.returncode == 0, done.stderr
+        rows = kept(self)
+        assert f"; {rows} row" in errors
+        return rows
+
     def _stop(self) -> float:
         return float(json.loads((self.folder / "robust.json").read_text())["stop_time"])
 
 
-@pytest.mark.parametrize("kind", [SHORT, LONG], ids=["short", "long"])
-def test_a_disk_that_is_full_after_some_operations(full_disk, tmp_path, kind):
-    disks = [Disk(tmp_path / str(n), full_disk, n) for n in (0, 2, 6, 9, 12)]
+@pytest.mark.parametrize(("kind", "numbers"), [(SHORT, (0, 6, 12)), (LONG, (2, 9))], ids=["short", "long"])
+def test_a_disk_that_is_full_after_some_operations(full_disk, tmp_path, kind, numbers):
+    disks = [Disk(tmp_path / str(n), full_disk, n) for n in numbers]
     for disk in disks:
         disk.begin(**kind)
     assert all(disk.end() for disk in disks)
@@ -100,24 +111,139 @@ def test_a_disk_that_is_full_after_each_number_of_operations(full_disk, tmp_path
     assert 15 < n < 99
 
 
-def test_a_real_disk_that_is_too_small_for_the_result(tmp_path):
-    """30 000 rows: their numbers fit, their texts do not."""
-    workplace = CommandFolder(tmp_path / "work")
-    file = workplace.scenario(300, arguments={"pause": 0})
-    script = f"""mkdir out && mount -t tmpfs -o size=1200k none out || exit 99
-        {sys.executable} -m cosim run {file} --output-dir out --no-report; code=$?
-        mkdir kept; cp out/result.csv kept; find out -mindepth 1 -not -name result.csv > others; exit $code"""
-    variables = {**os.environ, "TMPDIR": str(workplace.tmp), "WORKPLACE": str(workplace.folder)}
+def on_small_disk(workplace: CommandFolder, size: str, *scripts: str) -> subprocess.CompletedProcess[str]:
+    """Run commands in the folder out on a disk of its own, and copy its files to the folder kept."""
+    cosim_command = f"{sys.executable} -m cosim"
+    script = (
+        f"mkdir out && mount -t tmpfs -o size={size} none out || exit 99\n" + "\n".join(scripts) + "\ncp -r out kept; exit $code"
+    )
+    variables = {**os.environ, "TMPDIR": str(workplace.tmp), "WORKPLACE": str(workplace.folder), "COSIM": cosim_command}
     words = ["unshare", "-rm", "sh", "-c", script]
     done = subprocess.run(words, cwd=workplace.folder, env=variables, capture_output=True, text=True, check=False)
     if done.returncode == 99 or "unshare" in done.stderr:
         pytest.skip("no disk can be mounted here")
+    workplace.out = workplace.folder / "kept"
+    return done
+
+
+RECOVER = "mount -o remount,size=100m out; $COSIM recover out >&2 || code=98"
+
+
+@pytest.mark.parametrize("more", ["true", RECOVER], ids=["full", "recovered"])
+def test_a_real_disk_that_is_too_small_for_the_result(tmp_path, more):
+    """30 000 rows: their numbers fit, their texts do not."""
+    workplace = CommandFolder(tmp_path / "work")
+    workplace.scenario(300, arguments={"pause": 0})
+    done = on_small_disk(workplace, "1200k", "$COSIM run robust.json --output-dir out --no-report; code=$?", more)
     assert done.returncode == 1, done.stderr
     assert done.stderr.count(FULL) == 1
-    assert (workplace.folder / "others").read_text() == ""
-    workplace.out = workplace.folder / "kept"
-    assert kept(workplace) < 30_001
+    assert "free about 1 MB, then call `cosim recover out`" in done.stderr
+    if more == RECOVER:
+        assert sorted(path.name for path in workplace.out.iterdir()) == ["kpis.json", "result.csv", "run.json"]
+        assert f"{kept(workplace)} rows until t = " in done.stderr
+    else:
+        assert [path.name for path in workplace.out.iterdir() if path.name != "result.csv"] == [".unfinished"]
+        assert kept(workplace) < 30_001
     assert list(workplace.tmp.iterdir()) == []
+
+
+def test_all_rows_of_a_finished_run_are_kept(tmp_path):
+    """The rows fit the disk, the CSV file does not; the recovered files are those of a run with enough space."""
+    workplace = CommandFolder(tmp_path / "work")
+    pilot = {"pilot": {"fmu": str(FMU)}}
+    kpi = {"name": "rows", "python": f"{TICKER}:row_count"}
+    workplace.scenario(2000, components=pilot, kpis=[kpi], record={"signals": ["pilot.thrust", "pilot.rudder_angle"]})
+    run = "$COSIM run robust.json --no-report --output-dir"
+    done = on_small_disk(workplace, "5m", f"{run} out; code=$?", RECOVER, f"{run} whole >&2")
+    assert done.returncode == 1, done.stderr
+    assert "; 200001 rows are kept: free about " in done.stderr
+    for name in ("result.csv", "kpis.json"):
+        assert (workplace.out / name).read_bytes() == (workplace.folder / "whole" / name).read_bytes()
+    whole, recovered = (json.loads((folder / "run.json").read_text()) for folder in (workplace.folder / "whole", workplace.out))
+    assert whole.keys() == recovered.keys()
+    assert whole | {"timing": {}} == recovered | {"timing": {}}
+
+
+def test_one_fmu_alone_on_a_full_disk(tmp_path):
+    workplace = CommandFolder(tmp_path / "work")
+    simulate = f"$COSIM simulate {FMU} --stop-time 1000 --step-size 0.01 --output-file out/x.csv; code=$?"
+    recover = RECOVER.replace("recover out", "recover out/x.csv")
+    done = on_small_disk(workplace, "5500k", simulate, "test -e out/x.csv && code=97", recover)
+    assert done.returncode == 1, done.stderr
+    assert "; 100001 rows are kept: free about " in done.stderr
+    assert [path.name for path in workplace.out.iterdir()] == ["x.csv"]
+    assert len(cosim.Result.from_csv(workplace.out / "x.csv").time) == 100_001
+
+
+def test_a_result_that_cannot_be_written_for_another_reason(workplace):
+    """A KPI function puts a folder where the result should be."""
+    workplace.scenario(1.0, arguments={"pause": 0}, kpis=[{"name": "k", "python": f"{TICKER}:block_result"}])
+    done = workplace.run("run", "robust.json", *RUN, "--no-report")
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert line.endswith("; 101 rows are kept: remove the cause, then call `cosim recover out`")
+    again = workplace.run("recover", "out")
+    assert again.returncode == 2
+    assert again.stderr.endswith("; remove the cause, then call `cosim recover out`\n")
+    (workplace.out / "result.csv").rmdir()
+    assert workplace.run("recover", "out").returncode == 0
+    assert kept(workplace) == 101
+    assert json.loads((workplace.out / "kpis.json").read_text()) == {"k.value": 1}
+    assert workplace.leftovers() == []
+
+
+def test_a_component_that_fails_on_a_full_disk_is_named(tmp_path):
+    workplace = CommandFolder(tmp_path / "work")
+    workplace.scenario(300, arguments={"pause": 0, "fail_at": 20_000}, record={"signals": ["ticker.count"]})
+    done = on_small_disk(workplace, "480k", "$COSIM run robust.json --output-dir out --no-report; code=$?")
+    assert done.returncode == 1
+    full, failure = done.stderr.splitlines()
+    assert "; 20000 rows are kept: free about " in full
+    assert failure.startswith("ticker: do_step failed at t = 199.99 s")
+
+
+@pytest.mark.parametrize("output", ["nowhere", "empty", "robust.json"])
+def test_nothing_to_recover(workplace, output):
+    workplace.scenario(0.1)
+    (workplace.folder / "empty").mkdir()
+    done = workplace.run("recover", output)
+    assert done.returncode == 2
+    assert done.stderr == f'no rows were kept for "{output}"; expected an output directory or an output file\n'
+    assert workplace.leftovers() == []
+
+
+#: rows for about 1.1 GB
+MANY = {"stop": 200_000, "arguments": {"pause": 0, "fail_at": 10}, "record": {"signals": ["ticker.count"]}}
+
+
+@pytest.mark.parametrize("command", ["run", "run --isolation none"])
+def test_a_small_temporary_folder_does_not_limit_the_rows_in_the_output_directory(tmp_path, command):
+    workplace = CommandFolder(tmp_path / "work")
+    workplace.scenario(**MANY)
+    done = on_small_disk(workplace, "20m", f"TMPDIR=$PWD/out $COSIM {command} robust.json --output-dir big --no-report; code=$?")
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.startswith("10 rows until t = 0.09 s kept in big\n")
+
+
+def test_a_recording_larger_than_the_output_directory_is_refused_before_results_are_removed(tmp_path):
+    workplace = CommandFolder(tmp_path / "work")
+    workplace.scenario(**MANY)
+    run = "$COSIM run robust.json --output-dir out --no-report"
+    done = on_small_disk(workplace, "20m", f"{run} --stop-time 0.05 >&2", f"{run}; code=$?")
+    assert done.returncode == 2, done.stderr
+    where = re.escape(str(workplace.folder / "out"))
+    text = f"robust.json:1:.* 20000001 rows of 1 signal take about 1.12 GB, 0.0.* GB are free in {where}; make the step longer.*"
+    assert re.fullmatch(text, done.stderr.splitlines()[-1])
+    assert kept(workplace) == 6
+
+
+def test_one_fmu_alone_is_refused_before_its_former_result_is_removed(tmp_path):
+    workplace = CommandFolder(tmp_path / "work")
+    simulate = f"$COSIM simulate {FMU} --step-size 0.01 --output-file out/x.csv"
+    done = on_small_disk(workplace, "20m", f"{simulate} --stop-time 1", f"{simulate} --stop-time 100000; code=$?")
+    assert done.returncode == 2, done.stderr
+    assert "GB are free in" in done.stderr
+    assert len(cosim.Result.from_csv(workplace.out / "x.csv").time) == 101
 
 
 def without_privileges() -> None:

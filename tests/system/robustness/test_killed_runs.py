@@ -93,7 +93,7 @@ def test_the_next_run_removes_what_a_killed_one_left(workplace):
     killed = Killed(workplace, "both", 1.5)
     killed.begin()
     killed.kill()
-    assert len(workplace.leftovers()) == 2  # the rows, and a folder in tmp
+    assert len(workplace.leftovers()) == 3  # the rows, the lock file, and a folder in tmp
     done = workplace.run("run", workplace.scenario(stop=0.1), "--output-dir", "out", "--no-report")
     assert done.returncode == 0, done.stderr
     assert workplace.leftovers() == []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from hashlib import sha256
+from pathlib import Path
 
 import pytest
 from command_folder import CommandFolder
@@ -14,8 +15,15 @@ SAME = "Determinism and saved states"
 SCENARIOS = ("demo1_waves", "demo1_wind", "demo1_current")
 
 
-def digest(workplace: CommandFolder, scenario: str, *options: str, **environment: str) -> str:
-    words = ("run", scenario, "--stop-time", "3", "--output-dir", "out", "--no-report", *options)
+def digest_here(scenario: str, folder: Path, parameters: dict[str, int]) -> str:
+    """The digest of a run in this process."""
+    cosim.run(scenario, parameters, stop_time=3).to_csv(folder / "result.csv")
+    return sha256((folder / "result.csv").read_bytes()).hexdigest()
+
+
+def digest(workplace: CommandFolder, scenario: str, **environment: str) -> str:
+    """The digest of a run in a process of its own."""
+    words = ("run", scenario, "--stop-time", "3", "--output-dir", "out", "--no-report")
     process = workplace.start(*words, environment=environment, cwd=workplace.folder)
     _, errors = process.communicate(timeout=100)
     assert process.returncode in (0, 3), errors  # the landing is not reached
@@ -25,12 +33,7 @@ def digest(workplace: CommandFolder, scenario: str, *options: str, **environment
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """The digests of runs in this process, which has done other things before."""
-    digests = {}
-    for name in SCENARIOS:
-        file = tmp_path_factory.mktemp(name) / "result.csv"
-        cosim.run(name, stop_time=3).to_csv(file)
-        digests[name] = sha256(file.read_bytes()).hexdigest()
-    return digests
+    return {name: digest_here(name, tmp_path_factory.mktemp(name), {}) for name in SCENARIOS}
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
@@ -47,9 +50,8 @@ def test_threads_do_not_matter(workplace: CommandFolder, expected: dict[str, str
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
-def test_another_seed_is_another_run(workplace: CommandFolder, expected: dict[str, str], scenario: str) -> None:
-    other = digest(workplace, scenario, "--set", "/components/plant/arguments/environment/seed=99")
-    assert other != expected[scenario]
+def test_another_seed_is_another_run(tmp_path: Path, expected: dict[str, str], scenario: str) -> None:
+    assert digest_here(scenario, tmp_path, {"/components/plant/arguments/environment/seed": 99}) != expected[scenario]
 
 
 @pytest.mark.long

@@ -79,7 +79,7 @@ def test_the_scenario_is_good_before_it_is_changed(folder):
     assert write(folder, SCENARIO, INNER_SYSTEM)
 
 
-@in_parts(500, 100_000)
+@in_parts(250, 100_000)
 def test_mutated_scenarios(folder, count):
     results = set()
 
@@ -92,7 +92,7 @@ def test_mutated_scenarios(folder, count):
     assert results == {True, False}
 
 
-@in_parts(150, 20_000)
+@in_parts(100, 20_000)
 def test_mutated_nested_systems(folder, count):
     results = set()
 
@@ -105,7 +105,7 @@ def test_mutated_nested_systems(folder, count):
     assert results == {True, False}
 
 
-@in_parts(250, 20_000)
+@in_parts(150, 20_000)
 def test_mutated_texts(folder, count):
     """Characters changed, so that most of them are no JSON any more."""
     text = json.dumps(SCENARIO)
@@ -120,7 +120,7 @@ def test_mutated_texts(folder, count):
     change()
 
 
-@in_parts(25, 5_000)
+@in_parts(15, 5_000)
 def test_mutated_shipped_scenarios(tmp_path_factory, count):
     """All that is shipped stands beside the mutant, so that its paths are right."""
     root = tmp_path_factory.mktemp("shipped")

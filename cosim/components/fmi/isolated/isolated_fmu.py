@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from ....process.temporary_folders import WORKER_PREFIX, LockedFolder
 from ..file import FmuFile
 from ..function_calls import DISCARD, OK
 from ..instance import FmuInstance
+from .answers import call_names, state_number, step_result, string_values, variable_value
 from .isolation import Isolation
 from .pipes import STEP_COMMAND, STEP_DONE
 from .shared_memory import SharedMemoryBlock, matching_buffers, string_array
@@ -30,6 +32,7 @@ class IsolatedFmu(WorkerClient, Component):
     """
 
     binds_everything = False
+    runs_foreign_code = False
 
     def __init__(
         self, instance_class: type[FmuInstance], file: FmuFile, instance_name: str, logging_on: bool, isolation: Isolation
@@ -53,6 +56,7 @@ class IsolatedFmu(WorkerClient, Component):
         self._instance_class, self.isolation = instance_class, isolation
         self.description = file.description
         self.variables, self.has_state = self.description.variables, self.description.has_state
+        self._variables_by_name = {variable.name: variable for variable in self.variables}
         self._logging_on = logging_on
         self._temporary_folder: LockedFolder | None = None
         self._result: StepResult | None = None
@@ -128,11 +132,11 @@ class IsolatedFmu(WorkerClient, Component):
 
     def get(self, name: str) -> Any:
         """Return the value of a variable of the FMU in the worker process."""
-        return self._execute("get", name)
+        return self._execute("get", name, convert=partial(variable_value, variable=self._variables_by_name[name]))
 
     def get_state(self) -> Any:
         """Save the FMU state in the worker process and return its number."""
-        return self._execute("get_state")
+        return self._execute("get_state", convert=state_number)
 
     def set_state(self, state: Any) -> None:
         """Restore the FMU state with a number."""
@@ -151,19 +155,17 @@ class IsolatedFmu(WorkerClient, Component):
 
     def do_step(self, time: float, step_size: float) -> StepResult | None:
         """Call `FmuInstance.do_step` in the worker process."""
-        result = self._execute("do_step", time, step_size)
-        return result and StepResult(*result)
+        return self._execute("do_step", time, step_size, convert=step_result)
 
     def get_outputs(self) -> None:
         """Get the outputs of the FMU in the worker process and copy them to the bound arrays."""
-        strings = self._execute("get_outputs")
+        strings = self._execute("get_outputs", convert=self._convert_strings)
         self._copy_outputs()
-        if strings:
-            self._output_strings[:] = strings
+        self._output_strings[:] = strings
 
     def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
         """Prepare one call that makes a whole step (set inputs, doStep, get outputs) in the worker process."""
-        self._call_names = self._execute("prepare_step", step_size)
+        self._call_names = self._execute("prepare_step", step_size, convert=call_names)
         step = self._step_with_strings if self._has_strings else self._step
         return [PreparedCall(step, (current_time,), "step in the worker process")]
 
@@ -173,7 +175,7 @@ class IsolatedFmu(WorkerClient, Component):
             target[:] = source
         self._command = "step"
         answer = self._request(STEP_COMMAND)
-        result = None if answer == STEP_DONE else self._parse_answer(answer)
+        result = None if answer == STEP_DONE else self._parse_answer(answer, step_result)
         for target, source in self._output_buffers:
             target[:] = source
         return OK if result is None else self._store_early_return(result)
@@ -181,14 +183,21 @@ class IsolatedFmu(WorkerClient, Component):
     def _step_with_strings(self, current_time: ctypes.c_double) -> int:
         self._current_time.value = current_time.value
         self._copy_inputs()
-        result, strings = self._execute("step", self._input_strings.tolist())
+        result, strings = self._execute("step", self._input_strings.tolist(), convert=self._convert_step_with_strings)
         self._copy_outputs()
         self._output_strings[:] = strings
         return self._store_early_return(result) if result else OK
 
-    def _store_early_return(self, result: Sequence[Any]) -> int:
+    def _convert_strings(self, value: Any) -> list[Any]:
+        return string_values(value, len(self._output_strings))
+
+    def _convert_step_with_strings(self, value: Any) -> tuple[StepResult | None, list[Any]]:
+        result, strings = value
+        return step_result(result), self._convert_strings(strings)
+
+    def _store_early_return(self, result: StepResult) -> int:
         """Keep the result of a step for `interpret_status`, which discard makes the executor call."""
-        self._result = StepResult(*result)
+        self._result = result
         return DISCARD
 
     def interpret_status(self, _function: str, _status: int) -> StepResult:

@@ -18,6 +18,7 @@ from ....core.component import SUCCESS_STATUSES, NativeDoStep, PreparedCall, Ste
 from ....core.errors import ComponentError, InputError
 from ....process import float_mode
 from ....process import journal as journals
+from ....process.forks import attributing_forks, report_forks, watch_forks
 from ....process.journal import CALL_NUMBER, Phase
 from ..instance import FmuInstance
 from .pipes import STEP_COMMAND, STEP_DONE, SpinningPoller, decode_line, encode_line, read_line, write_line
@@ -74,6 +75,8 @@ class Worker:
         """
         gc.freeze()
         self._block.unshare_other_memory()
+        self._block.journal.exclude_from_forks()
+        watch_forks()
         journals.set_current_journal(self._block.journal)
         tempfile.tempdir = os.environ["TMPDIR"] = str(temporary)
         # the importer limits number and length of the messages
@@ -82,8 +85,17 @@ class Worker:
         logger = logging.getLogger("cosim.component")
         logger.handlers, logger.propagate, logger.level = [sender], False, logging.INFO
         poller = SpinningPoller([commands])
-        while line := read_line(commands, poller):
-            sender.send(self._execute(line))
+        process = os.getpid()
+        with attributing_forks(self._describe_step_call):
+            while line := read_line(commands, poller):
+                answer = self._execute(line)
+                if os.getpid() != process:
+                    return
+                report_forks()
+                sender.send(answer)
+
+    def _describe_step_call(self) -> tuple[str, str]:
+        return self._instance.name, self._calls[self._block.marker[CALL_NUMBER]][-1].name
 
     def _execute(self, line: bytes) -> bytes:
         try:
@@ -144,7 +156,7 @@ class Worker:
             if status and status not in SUCCESS_STATUSES:
                 result = self._instance.interpret_status(call.name, status)
             if one + tiny != one - tiny or not subnormal + subnormal or (is_do_step and traps()):
-                raise ComponentError(self._instance.name, call.name, float_mode.CHANGE_REASON, self._block.current_time.value)
+                self._instance.restore_float_mode(call.name)
         return result
 
     # -- FMU states, which stay in the worker process ------------------------------------------------------------------

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 from ....core import component_log
-from ....core.errors import ComponentError, InputError
+from ....core.errors import ComponentError
 from ....process.journal import CALL_NUMBER, Phase
 from ..file import FmuFile
+from .answers import INVALID_ANSWER_ERRORS, no_value, raise_reported_error
 from .pipes import STEP_DONE, decode_line, encode_line
 from .shared_memory import SharedMemoryBlock
-from .worker_process import WorkerLostError, WorkerProcess
+from .worker_process import INVALID_ANSWER, WorkerLostError, WorkerProcess
+
+Value = TypeVar("Value")
 
 
 class WorkerEndedError(ComponentError):
@@ -42,9 +45,10 @@ class WorkerClient:
         #: names of the FMI calls of a prepared step, in their order
         self._call_names: Sequence[str] = [""]
 
-    def _execute(self, command: str, *arguments: Any) -> Any:
+    def _execute(self, command: str, *arguments: Any, convert: Callable[[Any], Value] = no_value) -> Value:  # type: ignore[assignment]
+        """Execute a command in the worker process and return its value, converted by a function of `answers`."""
         self._command = command
-        return self._parse_answer(self._request(encode_line([command, *arguments])))
+        return self._parse_answer(self._request(encode_line([command, *arguments])), convert)
 
     def _request(self, line: bytes) -> bytes:
         process = self._process
@@ -59,31 +63,20 @@ class WorkerClient:
             self._stop_worker()
             raise
 
-    def _parse_answer(self, answer: bytes) -> Any:
-        if answer == STEP_DONE:
-            return None
-        message = self._decode_answer(answer)
-        self._file.has_fatal_error = self._file.has_fatal_error or bool(message.get("fatal"))
-        if "component_error" in message:
-            raise ComponentError(*message["component_error"])
-        if "input_error" in message:
-            raise InputError(message["input_error"])
-        return message["value"]
-
-    def _decode_answer(self, answer: bytes) -> dict[str, Any]:
+    def _parse_answer(self, answer: bytes, convert: Callable[[Any], Value]) -> Value:
         try:
-            message = decode_line(answer)
-        except ValueError:
-            message = None
-        if not isinstance(message, dict) or not {"value", "component_error", "input_error"} & message.keys():
+            message = {"value": None} if answer == STEP_DONE else decode_line(answer)
+            self._file.has_fatal_error = self._file.has_fatal_error or message.get("fatal") is True
+            raise_reported_error(message, self.name)
+            return convert(message["value"])
+        except INVALID_ANSWER_ERRORS:
             self._stop_worker()
-            raise WorkerEndedError(self.name, self._command, "its worker process sent an invalid answer")
-        return message
+            raise WorkerEndedError(self.name, self._command, INVALID_ANSWER) from None
 
     def _worker_ended_error(self, reason: str) -> WorkerEndedError:
         """Return the error for an ended worker process; its journal names the FMI function that was being called."""
         journal = self._shared_memory.journal
-        if journal.phase == Phase.CALLING:
+        if journal.is_valid and journal.phase == Phase.CALLING:
             activity = journal.activity()
             time = None if math.isnan(activity.time) else activity.time
             return WorkerEndedError(self.name, activity.function, reason, time)

@@ -15,8 +15,10 @@ from typing import NoReturn
 from ....core import component_log
 from ....process.failure_attribution import describe_exit_status
 from ....process.foreign_output import ForeignOutput
+from ....process.forks import attributing_forks
 from ....process.journal import CALL_NUMBER, CHANGE_COUNT, Journal, suspending_deadline
 from ....process.supervisor import POLL_INTERVAL
+from .answers import INVALID_ANSWER_ERRORS
 from .pipes import READ_SIZE, STEP_DONE, SpinningPoller, decode_line, write_line
 
 #: wait (ms) that still counts for the deadline of the run's own supervisor
@@ -27,6 +29,9 @@ _EXIT_TIMEOUT = 0.5
 _FIRST_RESERVED_DESCRIPTOR = 256
 #: largest accepted answer (bytes)
 _MAX_ANSWER_SIZE = 1 << 26
+#: reason why a worker process is stopped after an answer that it would not send by itself
+INVALID_ANSWER = "its worker process sent an invalid answer"
+_LOG_LEVELS = (component_log.INFO, component_log.WARNING, component_log.ERROR)
 #: exit code of a worker process that raised an exception outside a command
 _INTERNAL_ERROR = 70
 
@@ -53,9 +58,10 @@ class WorkerProcess:
         commands, self._writer = os.pipe()
         self._reader, answers = os.pipe()
         self._output, output_writer = os.pipe()
-        self._pid = os.fork()
-        if self._pid == 0:
-            _run_worker(serve, commands, answers, output_writer)
+        with attributing_forks(None):
+            self._pid = os.fork()
+            if self._pid == 0:
+                _run_worker(serve, commands, answers, output_writer)
         for descriptor in (commands, answers, output_writer):
             os.close(descriptor)
         self._foreign_output = ForeignOutput(self._output)
@@ -78,6 +84,8 @@ class WorkerProcess:
         Raises:
             WorkerLostError: The worker process has ended, exceeded the deadline or sent too much.
         """
+        if self._received and self._take_answer() is not None:  # before the command to which it would be the answer
+            raise WorkerLostError(INVALID_ANSWER)
         try:
             write_line(self._writer, line)
             if self._poller.wait(_SHORT_WAIT) == self._answer_event:
@@ -131,8 +139,13 @@ class WorkerProcess:
         """Log the message if the line contains one; return whether it does."""
         if not line.startswith(b'{"log"'):
             return False
-        level, text = decode_line(line)["log"]
-        component_log.log_message(self._name, int(level), str(text))
+        try:
+            level, text = decode_line(line)["log"]
+        except INVALID_ANSWER_ERRORS:
+            raise WorkerLostError(INVALID_ANSWER) from None
+        if level not in _LOG_LEVELS:
+            raise WorkerLostError(INVALID_ANSWER)
+        component_log.log_message(self._name, level, str(text))
         return True
 
     def _lost_error(self) -> WorkerLostError:

@@ -23,6 +23,7 @@ from .xml_reader import check_repeated_elements, read_model
 __all__ = [
     "DEFAULT_LIMITS",
     "DESCRIPTION_FILE",
+    "RUN_WARNINGS",
     "Examination",
     "Finding",
     "PreflightLimits",
@@ -34,6 +35,8 @@ __all__ = [
 
 MISSING = Rule("archive.description", "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5")
 CHANGED = Rule("archive.changed", "limits")
+#: rules whose violations do not prevent a run, but may change its results
+RUN_WARNINGS = (rules_structure.OUTPUTS, rules_variables.UNIT)
 _MAX_FINDINGS_PER_CHECK = 100
 _CHECKS: Sequence[Callable[[ModelDescription], Iterator[Finding]]] = (
     *rules_model.CHECKS,

@@ -9,9 +9,9 @@ from pathlib import Path
 from ....core.errors import abbreviate_names
 from . import elf, macho, pe
 from .archive import Archive
-from .findings import Finding, Rule
+from .findings import Finding, Rule, escape_unprintable
 from .fmu_platform import FmuPlatform
-from .library import InvalidLibraryError, SharedLibrary
+from .library import EXPECTED_TEXTS, InvalidLibraryError, SharedLibrary
 from .limits import PreflightLimits
 from .model_description import ModelDescription
 
@@ -23,6 +23,7 @@ FORMAT = Rule("binary.format", _BINARIES)
 FUNCTIONS = Rule("binary.functions", _FUNCTIONS)
 SIZE = Rule("binary.size", "limits")
 NEEDED = Rule("binary.needed", _BINARIES, "warning")
+VERSION = Rule("binary.version", "FMI 2.0.5 section 2.1.4, FMI 3.0.2 section 2.2.4", "warning")
 
 _READERS: Mapping[str, Callable[[bytes, str], SharedLibrary]] = {
     ".so": elf.read_library,
@@ -121,9 +122,24 @@ def _check_library(archive: Archive, member: str, major: int, machine: FmuPlatfo
         return
     if missing := sorted(REQUIRED_FUNCTIONS[major] - library.exports):
         yield FUNCTIONS(f"the library does not export {abbreviate_names(missing, limit=5)}", member)
+    for text in version_deviations(library.constant_texts):
+        yield VERSION(text, member)
     for name in library.needed_libraries:
         if not _is_library_found(name, library, archive, member):
             yield NEEDED(f"needs the library {name}, which was not found on this machine", member)
+
+
+def version_deviations(texts: Mapping[str, bytes | None]) -> Iterator[str]:
+    """Yield a description of each returned text that does not have its value in `EXPECTED_TEXTS`.
+
+    Args:
+        texts: Returned texts by function; None for a null pointer.
+    """
+    for name, text in texts.items():
+        expected = EXPECTED_TEXTS[name]
+        if text is None or not (text + b".").startswith(expected + b"."):  # "2.0.1" is a version 2.0
+            found = "a null pointer" if text is None else f'"{escape_unprintable(text.decode("utf-8", "replace"), 40)}"'
+            yield f'{name} returns {found}, expected "{expected.decode()}"'
 
 
 def _is_library_found(name: str, library: SharedLibrary, archive: Archive, member: str) -> bool:

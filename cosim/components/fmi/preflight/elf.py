@@ -6,11 +6,12 @@ headers, dynamic section, symbol table and symbol hash table.
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from .library import InvalidLibraryError, SharedLibrary
+from .library import EXPECTED_TEXTS, InvalidLibraryError, SharedLibrary
 
 MAGIC = b"\x7fELF"
 #: (EI_CLASS, e_machine) of the supported architectures
@@ -25,6 +26,9 @@ _STB_LOCAL = 0
 _STV_DEFAULT, _STV_PROTECTED = 0, 3
 _SHN_UNDEF = 0
 _MAX_SYMBOLS = 1 << 22
+_MAX_TEXT_SIZE = 100
+#: x86-64 code that returns the address of a constant: endbr64, push rbp, mov rbp, rsp, lea rax, [rip + offset], pop rbp, ret
+_RETURN_OF_CONSTANT = re.compile(rb"(?:\xf3\x0f\x1e\xfa)?(?:\x55\x48\x89\xe5)?\x48\x8d\x05(.{4})\x5d?\xc3", re.DOTALL)
 
 
 class _ProgramHeader(NamedTuple):
@@ -115,10 +119,13 @@ class _ElfReader:
             raise InvalidLibraryError("has no symbol table")
         strings = self._read_address(first_values[_DT_STRTAB], first_values[_DT_STRSZ])
         search_path = ":".join(_string_at(strings, value) for tag, value in dynamic if tag in (_DT_RPATH, _DT_RUNPATH))
+        addresses = dict(self._exported_symbols(first_values, strings))
+        texts = {name: self._constant_text(addresses[name]) for name in EXPECTED_TEXTS if name in addresses}
         return SharedLibrary(
-            frozenset(self._exported_symbols(first_values, strings)),
+            frozenset(addresses),
             [_string_at(strings, value) for tag, value in dynamic if tag == _DT_NEEDED],
             [folder for folder in search_path.split(":") if folder],
+            {name: text for name, text in texts.items() if text is not None},
         )
 
     def _dynamic_entries(self) -> Iterator[tuple[int, int]]:
@@ -144,14 +151,26 @@ class _ElfReader:
             raise InvalidLibraryError(f"is truncated: a table ends at byte {begin + size}, the file at {len(self.content)}")
         return self.content[begin : begin + size]
 
-    def _exported_symbols(self, dynamic: Mapping[int, int], strings: bytes) -> Iterator[str]:
-        """Yield the names of the symbols that are defined and visible to other libraries."""
-        symbol = struct.Struct(self.byte_order + ("L2BH16x" if self.bits == 64 else "L8x2BH"))
+    def _constant_text(self, address: int) -> bytes | None:
+        """Return the text that a function returns; None if its code does anything else."""
+        try:
+            code = self._read_address(address, 0x20)
+            match = _RETURN_OF_CONSTANT.match(code) if self.unpack("H", 18) == (MACHINES["x86_64"][1],) else None
+            if match is None:
+                return None
+            begin = self._file_offset(address + match.end(1) + int.from_bytes(match[1], "little", signed=True))
+        except InvalidLibraryError:
+            return None
+        return self.content[begin : begin + _MAX_TEXT_SIZE].partition(b"\0")[0]
+
+    def _exported_symbols(self, dynamic: Mapping[int, int], strings: bytes) -> Iterator[tuple[str, int]]:
+        """Yield names and addresses (0 in 32-bit files) of the symbols that are defined and visible to other libraries."""
+        symbol = struct.Struct(self.byte_order + ("L2BHQ8x" if self.bits == 64 else "L8x2BH"))
         table = self._read_address(dynamic[_DT_SYMTAB], self._symbol_count(dynamic) * symbol.size)
-        for st_name, st_info, st_other, st_shndx in symbol.iter_unpack(table):
+        for st_name, st_info, st_other, st_shndx, *st_value in symbol.iter_unpack(table):
             is_visible = st_other & 3 in (_STV_DEFAULT, _STV_PROTECTED)
             if st_shndx != _SHN_UNDEF and st_info >> 4 != _STB_LOCAL and is_visible:
-                yield _string_at(strings, st_name)
+                yield _string_at(strings, st_name), st_value[0] if st_value else 0
 
     def _symbol_count(self, dynamic: Mapping[int, int]) -> int:
         if _DT_HASH in dynamic:

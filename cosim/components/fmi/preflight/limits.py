@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ....core.size_limits import MAX_SCALARS
+from ....core.text import MAX_TEXT_LENGTH
+
 
 @dataclass(frozen=True, slots=True)
 class PreflightLimits:
@@ -21,8 +24,12 @@ class PreflightLimits:
     #: size of an XML file (bytes) and number of its tags
     max_xml_size: int = 1 << 25
     max_xml_tags: int = 500_000
+    #: length of one attribute or text in an XML file (characters)
+    max_text_length: int = MAX_TEXT_LENGTH
     #: number of elements of one array variable
     max_array_size: int = 1_000_000
+    #: number of variables, an array counted with all its elements
+    max_scalars: int = MAX_SCALARS
 
 
 DEFAULT_LIMITS = PreflightLimits()

@@ -113,7 +113,8 @@ def _check_enumeration_start(variable: ModelVariable) -> Iterator[Finding]:
 
 
 def check_dimensions(model: ModelDescription, limits: PreflightLimits) -> Iterator[Finding]:
-    """Check the dimensions of arrays and the number of their start values."""
+    """Check the dimensions of arrays, the number of their start values, and the number of all elements."""
+    scalars = 0
     for variable in model.variables:
         if not variable.dimensions:
             shape: Sequence[int] | None = ()
@@ -124,7 +125,13 @@ def check_dimensions(model: ModelDescription, limits: PreflightLimits) -> Iterat
         size = math.prod(shape)
         if size > limits.max_array_size:
             yield _variable_finding(SIZE, variable, f"has {size} elements, expected at most {limits.max_array_size}")
-        elif variable.start_words and len(variable.start_words) not in (1, size):
+            continue
+        scalars += size * (1 + len(variable.aliases))
+        if scalars > limits.max_scalars:
+            text = f"the variables up to this one have {scalars} elements, expected at most {limits.max_scalars}"
+            yield _variable_finding(SIZE, variable, text)
+            return
+        if variable.start_words and len(variable.start_words) not in (1, size):
             count = len(variable.start_words)
             text = f"found {count} start value{'s' if count > 1 else ''}, expected {size}"
             yield _variable_finding(COUNT, variable, text)

@@ -32,6 +32,7 @@ SHARED = Rule("reference.shared", _ATTRIBUTES)
 ALIAS = Rule("reference.alias", _ATTRIBUTES, "warning")
 DECLARED = Rule("variable.declared-type", _TYPE_SPECIFIC)
 UNIT = Rule("variable.unit", _UNITS, "warning")
+DISPLAY_UNIT = Rule("variable.display-unit", _UNITS, "warning")
 DERIVATIVE = Rule("variable.derivative", _TYPE_SPECIFIC)
 CLOCK = Rule("variable.clocks", "FMI 3.0.2 section 2.4.7.4")
 
@@ -185,7 +186,7 @@ def _check_units(variable: ModelVariable, units: dict[str, Sequence[str]]) -> It
         hint = did_you_mean(unit, islice(units, _MAX_HINT_CANDIDATES))
         yield _variable_finding(UNIT, variable, f'the unit "{unit}" is not defined{hint}')
     elif display is not None and display not in units.get(unit or "", ()):
-        yield _variable_finding(UNIT, variable, f'the display unit "{display}" is not defined for unit "{unit or ""}"')
+        yield _variable_finding(DISPLAY_UNIT, variable, f'the display unit "{display}" is not defined for unit "{unit or ""}"')
 
 
 def _variable_finding(rule: Rule, variable: ModelVariable, text: str) -> Finding:

@@ -18,6 +18,9 @@ SYNTAX = Rule("xml.syntax", "XML 1.0")
 #: accepted encodings; FMI requires UTF-8, but exporters use the others too
 _ENCODINGS = ("utf-8", "us-ascii", "ascii", "iso-8859-1", "windows-1252", "utf-16")
 _DECLARED = re.compile(rb"""\s*<\?xml[^>]*?\sencoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
+_TOO_LONG_TEXTS = etree.XPath("//@*[string-length() > $length] | //text()[string-length() > $length]")
+#: begin of libxml2's message for an attribute or text above its own limit of 10^7 bytes
+_LIBRARY_LIMIT = "Resource limit exceeded"
 #: largest number of attributes of an element; lxml takes quadratic time in it
 _MAX_ATTRIBUTES = 100
 _TOO_MANY_ATTRIBUTES = etree.XPath(f"//*[@*[{_MAX_ATTRIBUTES + 1}]]")
@@ -45,9 +48,13 @@ def parse_xml(content: bytes, member: str, limits: PreflightLimits) -> Any:
         raise FatalFindingError(DOCTYPE("found a DOCTYPE, expected none", member, content.count(b"\n", 0, position) + 1))
     if (tags := content.count(b"<")) > limits.max_xml_tags:
         raise FatalFindingError(SIZE(f"has {tags} tags, expected at most {limits.max_xml_tags}", member))
-    root = _parse_tree(content, member)
+    root = _parse_tree(content, member, limits)
     for element in _TOO_MANY_ATTRIBUTES(root):
         raise FatalFindingError(SIZE(f"<{element.tag}> has more than {_MAX_ATTRIBUTES} attributes", member, element.sourceline))
+    for text in _TOO_LONG_TEXTS(root, length=limits.max_text_length):
+        where = f'attribute "{text.attrname}"' if text.is_attribute else "text"
+        found = f"<{text.getparent().tag}> has {where} with {len(text)} characters, expected at most {limits.max_text_length}"
+        raise FatalFindingError(SIZE(found, member, text.getparent().sourceline))
     return root
 
 
@@ -68,7 +75,7 @@ def _to_utf8(content: bytes, member: str) -> bytes:
     return content if encoding == "utf-8" else text.encode()
 
 
-def _parse_tree(content: bytes, member: str) -> Any:
+def _parse_tree(content: bytes, member: str, limits: PreflightLimits) -> Any:
     parser = etree.XMLParser(
         encoding="utf-8",
         resolve_entities=False,
@@ -82,6 +89,9 @@ def _parse_tree(content: bytes, member: str) -> Any:
         return etree.fromstring(content, parser)
     except etree.XMLSyntaxError as error:
         line, column = error.position
+        if _LIBRARY_LIMIT in error.msg:
+            found = f"has an attribute or text with more than {limits.max_text_length} characters"
+            raise FatalFindingError(SIZE(found, member, line)) from None
         raise FatalFindingError(SYNTAX(f"is not well-formed XML: {error.msg} (column {column})", member, line)) from None
     except (ValueError, LookupError) as error:
         raise FatalFindingError(SYNTAX(f"is not well-formed XML: {error}", member)) from None

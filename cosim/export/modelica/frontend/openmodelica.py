@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from ....core.errors import InputError, Problem
-from .rumoca_frontend import find_packages, model_name
+from .rumoca_frontend import find_packages, model_name, read_source
 
 _ERROR = re.compile(r"^(?:\[(?P<file>[^\]]+?):(?P<line>\d+):\d+-\d+:\d+:\w+\] )?Error: (?P<what>.+)$", re.MULTILINE)
 _TIMEOUT = 1800.0
@@ -35,8 +35,6 @@ def export_with_omc(path: Path, target: Path, model: str | None = None) -> None:
     if compiler is None:
         raise InputError('OpenModelica is not installed: there is no "omc" on PATH (see https://openmodelica.org)')
     path = path.resolve()
-    if not path.is_file():
-        raise InputError(Problem("no such Modelica file", str(path)))
     with TemporaryDirectory() as folder:
         script = Path(folder) / "export.mos"
         script.write_text(_script(path, model), encoding="utf-8")
@@ -50,7 +48,7 @@ def export_with_omc(path: Path, target: Path, model: str | None = None) -> None:
 
 def _script(path: Path, model: str | None) -> str:
     """Return the script for omc: load the packages and the file, and build the FMU."""
-    text = path.read_text(encoding="utf-8")
+    text = read_source(path)
     packages = find_packages(path, text)
     model_files = [] if any(map(path.is_relative_to, packages)) else [path]  # a package loads its members
     files = [*(package / "package.mo" for package in packages), *model_files]

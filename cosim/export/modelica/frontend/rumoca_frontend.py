@@ -15,8 +15,12 @@ from typing import Any
 
 from ....core.errors import InputError, Problem
 from ..model.syntax_tree import SourceLocation
+from .rumoca_client import run_rumoca
 
 RUMOCA_VERSION = "0.10.2"
+#: largest Modelica file (bytes)
+MAX_SOURCE_SIZE = 1 << 24
+
 _WITHIN = re.compile(r"^\s*within\s+([\w.]+)\s*;", re.MULTILINE)
 _QUOTED = re.compile(r"'([\w.]+)'")
 _LOCATION_SUFFIX = re.compile(r"\[(?P<file>[^\[\]]+):(?P<line>\d+):\d+\]$")
@@ -67,43 +71,45 @@ def flatten_model(path: Path, model: str | None) -> tuple[dict[str, Any], Modeli
         InputError: The front end reports errors, for example syntax errors and unknown names.
     """
     path = path.resolve()
-    rumoca = _import_rumoca()
-    if not path.is_file():
-        raise InputError(Problem("no such Modelica file", str(path)))
-    text = path.read_text(encoding="utf-8")
-    packages = find_packages(path, text)
+    text = read_source(path)
+    packages, name = find_packages(path, text), model_name(path, text, model)
     sources = ModelicaSources.from_files(
         [path, *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path)]
     )
-    _check_syntax(rumoca, sources.files)
-    name = model_name(path, text, model)
-    session = rumoca.Session(roots=[str(package) for package in packages])
+    answer = run_rumoca(RUMOCA_VERSION, sources.files, packages, name, None if _WITHIN.search(text) else _display_name(path))
+    if "version" in answer:
+        raise InputError(_version_problem(answer["version"]))
+    if "syntax_errors" in answer:
+        raise InputError(_to_syntax_problem(*error) for error in answer["syntax_errors"])
+    if "error" in answer:
+        raise InputError(_to_problems(answer["error"], answer["panicked"], name, path, sources))
+    return json.loads(answer["flat"]), sources
+
+
+def read_source(path: Path) -> str:
+    """Return the text of a Modelica file.
+
+    Raises:
+        InputError: There is no such file, it is too large, or it is not UTF-8 text.
+    """
+    if not path.is_file():
+        raise InputError(Problem("no such Modelica file", str(path)))
+    if (size := path.stat().st_size) > MAX_SOURCE_SIZE:
+        raise InputError(Problem(f"the file has {size} bytes, expected at most {MAX_SOURCE_SIZE}", str(path)))
     try:
-        compiled = session.load(str(path), model=name) if _WITHIN.search(text) else _load_text(session, path, text, name)
-        return json.loads(compiled.to_json("flat")), sources
-    except (KeyboardInterrupt, SystemExit):
-        raise
-    except BaseException as error:  # a panic of rumoca is not derived from Exception
-        raise InputError(_to_problems(error, name, path, sources)) from error
-
-
-def _load_text(session: Any, path: Path, text: str, name: str) -> Any:
-    """Load the text under a name without a folder, because rumoca reads all files beside an existing file."""
-    return session.loads(text, model=name, filename=_display_name(path))
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(Problem(f"the file is not UTF-8 text: {error.reason} at byte {error.start}", str(path))) from None
 
 
 def _display_name(path: Path) -> str:
     return f"<{path.name}>"
 
 
-def _import_rumoca() -> Any:
-    try:
-        import rumoca
-    except ImportError as error:
-        raise InputError('Modelica needs the compiler front end rumoca: pip install "fmi-cosim[build]"') from error
-    if (version := rumoca.version()) != RUMOCA_VERSION:
-        raise InputError(f"found rumoca {version}, but only {RUMOCA_VERSION} is supported: pip install rumoca=={RUMOCA_VERSION}")
-    return rumoca
+def _version_problem(found: str | None) -> str:
+    if found is None:
+        return 'Modelica needs the compiler front end rumoca: pip install "fmi-cosim[build]"'
+    return f"found rumoca {found}, but only {RUMOCA_VERSION} is supported: pip install rumoca=={RUMOCA_VERSION}"
 
 
 def model_name(path: Path, text: str, model: str | None) -> str:
@@ -127,28 +133,20 @@ def find_packages(path: Path, text: str) -> list[Path]:
     return sorted(child for child in folder.iterdir() if (child / "package.mo").is_file())
 
 
-def _check_syntax(rumoca: Any, files: Sequence[Path]) -> None:
-    """Raise all syntax errors with file and line; loading a model only reports errors that follow from them."""
-    problems = []
-    for file in files:
-        for diagnostic in rumoca.validate_source(file.read_text(encoding="utf-8"), filename=str(file)):
-            if diagnostic.rule == "syntax-error":
-                detail = _SYNTAX_ERROR.search(diagnostic.message)
-                line = int(detail["line"]) if detail else diagnostic.line
-                problems.append(Problem(detail["what"] if detail else diagnostic.message, f"{file}:{line}"))
-    if problems:
-        raise InputError(problems)
+def _to_syntax_problem(file: str, line: int, message: str) -> Problem:
+    detail = _SYNTAX_ERROR.search(message)
+    return Problem(detail["what"] if detail else message, f"{file}:{detail['line'] if detail else line}")
 
 
-def _to_problems(error: BaseException, name: str, path: Path, sources: ModelicaSources) -> list[Problem]:
+def _to_problems(error: str, panicked: bool, name: str, path: Path, sources: ModelicaSources) -> list[Problem]:
     """Convert the front end's message to problems, one for each informative line."""
-    if panic := _PANIC.search(str(error)):
+    if panic := _PANIC.search(error):
         return [Problem(panic["what"], str(sources.locate({key: int(panic[key]) for key in ("source", "start")}) or path))]
-    lines = [line.rpartition("[Resolve]:")[2].strip(" -") for line in str(error).splitlines()]
+    lines = [line.rpartition("[Resolve]:")[2].strip(" -") for line in error.splitlines()]
     reasons = [line for line in dict.fromkeys(lines) if line and not line.startswith("Related failures")]
     specific = [line for line in reasons if " could not be compiled: " not in line] or reasons
-    if not specific or not isinstance(error, Exception):
-        specific = [f"the Modelica front end failed on the model {name}: {' '.join(lines) or type(error).__name__}"]
+    if not specific or panicked:
+        specific = [f"the Modelica front end failed on the model {name}: {' '.join(lines)}"]
     return [_locate_problem(reason, path, sources) for reason in specific]
 
 

@@ -19,7 +19,7 @@ from cosim import api, cli
 from cosim.components.fmi.isolated.isolated_fmu import IsolatedFmu
 from cosim.core.errors import InputError
 from cosim.process.sandbox import find_available_sandboxes
-from cosim.scenario import prepare
+from cosim.scenario import load
 
 FMUS = Path(__file__).parents[4] / "fmus"
 
@@ -55,7 +55,7 @@ def isolated_names(prepared: api.PreparedRun) -> list[str]:
 
 def test_a_scenario_isolates_one_component(probe, tmp_path):
     file = scenario(tmp_path, {"a": {"fmu": str(probe), "isolation": "fmu"}, "b": {"fmu": str(probe)}})
-    assert isolated_names(prepare(file)) == ["a"]
+    assert isolated_names(load(file)) == ["a"]
 
 
 @pytest.mark.parametrize("arguments", [{"isolation": "fmu"}, {"sandbox": True}])
@@ -85,13 +85,13 @@ def test_only_fmus_can_be_isolated(tmp_path):
     (tmp_path / "own.py").write_text("")
     file = scenario(tmp_path, {"a": {"python": "own.py:Own", "isolation": "fmu"}})
     with pytest.raises(InputError, match='"isolation" is for components with "fmu" or "modelica"'):
-        prepare(file)
+        load(file)
 
 
 def test_an_unknown_isolation_is_refused(probe, tmp_path):
     file = scenario(tmp_path, {"a": {"fmu": str(probe), "isolation": "own"}})
     with pytest.raises(InputError, match="isolation"):
-        prepare(file)
+        load(file)
 
 
 @pytest.fixture
@@ -117,6 +117,6 @@ def test_instances_of_a_once_per_process_fmu_are_isolated_automatically(single_i
     components = {name: {"fmu": str(single_instance_fmu)} for name in ("a", "b", "c")}
     wires = [{"from": "a.y", "to": "b.u"}, {"from": "b.y", "to": "c.u"}, {"from": "c.y", "to": "a.u"}]
     file = scenario(tmp_path, components, connections=wires)
-    assert isolated_names(prepare(file)) == ["b", "c"]
+    assert isolated_names(load(file)) == ["b", "c"]
     result = cosim.run(file)
     assert all(np.array_equal(result[f"{name}.y"], np.ones(11)) for name in components)

@@ -161,6 +161,38 @@ def test_a_missing_dependency_is_a_warning(fmu, tmp_path):
     assert "needs the library libnowhere.so, which was not found on this machine" in findings[1].message
 
 
+WRONG_VERSIONS = {
+    "other version": (2, b"\0002.0\0", b"\0001.0\0", 'fmi2GetVersion returns "1.0", expected "2.0"'),
+    "later version": (2, b"\0002.0\0", b"\0002.1\0", 'fmi2GetVersion returns "2.1", expected "2.0"'),
+    "control character": (2, b"\0002.0\0", b"\0002\x1b0\0", 'fmi2GetVersion returns "2\\x1b0", expected "2.0"'),
+    "no version": (2, b"\0002.0\0", b"\0\0.0\0", 'fmi2GetVersion returns "", expected "2.0"'),
+    "other platform": (2, b"default\0", b"Default\0", 'fmi2GetTypesPlatform returns "Default", expected "default"'),
+    "standard of 1.0": (2, b"default\0", b"std\0\0\0\0\0", 'fmi2GetTypesPlatform returns "std", expected "default"'),
+    "version 2": (3, b"\0003.0\0", b"\0002.0\0", 'fmi3GetVersion returns "2.0", expected "3.0"'),
+    "a draft": (3, b"\0003.0\0", b"\0003.b\0", 'fmi3GetVersion returns "3.b", expected "3.0"'),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_VERSIONS)
+def test_a_wrong_version_or_platform_is_a_warning(case, good, tmp_path):
+    version, old, new, message = WRONG_VERSIONS[case]
+    files = good[version]
+    member = next(name for name in files if name.endswith(".so"))
+    assert old in files[member]
+    path = tmp_path / "old.fmu"
+    path.write_bytes(pack_archive(members({**files, member: files[member].replace(old, new)})))
+    found = [(f.rule.name, f.rule.severity, f.member, f.message) for f in find_problems(path)]
+    assert found == [("binary.version", "warning", member, message)]
+
+
+@pytest.mark.parametrize("option", ["-O0", "-O1", "-O3", "-Os", "-fcf-protection=none"])
+def test_texts_are_read_from_functions_that_only_return_them(tmp_path, option):
+    source = """const char *fmi2GetVersion(void) { return "2.0"; } char text[] = "later";
+    const char *fmi3GetVersion(void) { text[0] = 'L'; return text; } int other(void) { return 1; }"""
+    library = elf.read_library(compiled(tmp_path, "texts", source, option).read_bytes(), "x86_64")
+    assert library.constant_texts == {"fmi2GetVersion": b"2.0"}
+
+
 def test_another_platform_is_reported_with_the_existing_ones(fmu):
     path = fmu(b"MZ", "binaries/win64/probe.dll")
     this = current_platform()

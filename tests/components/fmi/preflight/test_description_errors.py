@@ -293,6 +293,24 @@ ERRORS = {
         15,
         "has 9999800001 elements",
     ),
+    "many arrays": (
+        3,
+        '<Float64 name="u"',
+        "".join(f'<Float64 name="b{i}" valueReference="{90 + i}"><Dimension start="1000000"/></Float64>' for i in range(3))
+        + '<Float64 name="u"',
+        "variable.size",
+        11,
+        "elements, expected at most 2000000",
+    ),
+    "many aliases of an array": (
+        3,
+        '<Float64 name="u"',
+        '<Float64 name="b" valueReference="90"><Dimension start="1000000"/><Alias name="c"/><Alias name="d"/></Float64>'
+        '<Float64 name="u"',
+        "variable.size",
+        11,
+        "elements, expected at most 2000000",
+    ),
     "output index": (
         2,
         '<Outputs><Unknown index="2"/>',

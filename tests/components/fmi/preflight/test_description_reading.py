@@ -8,6 +8,7 @@ from fmpy import read_model_description
 
 from cosim.components.fmi import FmuFile
 from cosim.core import resources
+from cosim.core.units import Unit, parse_unit
 
 FMUS = sorted(resources.root().glob("fmus/**/*.fmu"))
 FMI2_TYPES = {"Real": "Float64", "Integer": "Int32"}
@@ -88,6 +89,7 @@ FMI3 = """<?xml version="1.0"?>
     <Clock name="c" valueReference="5" causality="input" intervalVariability="triggered"/>
     <Float64 name="turn" valueReference="7" declaredType="Angle"/>
     <Float64 name="gauge" valueReference="8" unit="bar(g)"/>
+    <Float64 name="flow" valueReference="10" unit="m³/s"/>
     <Enumeration name="mode" valueReference="9" declaredType="Mode" causality="parameter" start="4"/>
     <Int8 name="i" valueReference="6" causality="input" clocks="5" start="-128"/>
   </ModelVariables>
@@ -107,7 +109,9 @@ def test_features_of_fmi3(tmp_path):
         True,
         False,
     )
-    assert found["gauge"].unit is None  # a unit without BaseUnit whose name is not a known unit
+    assert found["gauge"].unit == Unit("bar(g)", ())  # a unit without BaseUnit whose name is not a known unit
+    assert found["flow"].unit == parse_unit("m³/s")  # a unit that is not defined
+    assert found["a"].unit is None
     assert found["mode"].items == (("off", -1), ("on", 4))
     assert (found["v"].description, found["speed"].description, found["v"].start) == ("short", "a speed", 50.0)
     assert description.value_references["v"] == description.value_references["speed"] == 2

@@ -80,7 +80,7 @@ WARNINGS = {
         3,
         'start="0" unit="m"',
         'start="0" unit="m" displayUnit="km"',
-        "variable.unit",
+        "variable.display-unit",
         11,
         'the display unit "km" is not defined for unit "m"',
     ),

@@ -38,7 +38,17 @@ def many_attributes(xml):
     return xml.replace(b"<DefaultExperiment", b"<DefaultExperiment " + attributes)
 
 
+LONG = "x" * (1 << 21)
 CASES = {
+    "long description": (edited("a lag", LONG), "xml.size", ':2: <fmiModelDescription> has attribute "description" with 2097'),
+    "long name": (
+        edited('name="y"', f'name="{LONG}"'),
+        "xml.size",
+        '> has attribute "name" with 2097152 characters, ',
+    ),
+    "long start": (edited('start=""', f'start="{LONG}"'), "xml.size", 'has attribute "start" with 2097152 characters'),
+    "long text": (edited("</ModelVariables>", f"</ModelVariables>{LONG}"), "xml.size", "<ModelVariables> has text with 20971"),
+    "endless description": (edited("a lag", LONG * 6), "xml.size", "has an attribute or text with more than 1048576 characters"),
     "DOCTYPE": (with_prolog("<!DOCTYPE fmiModelDescription>"), "xml.doctype", ":2: found a DOCTYPE"),
     "billion laughs": (with_prolog(f'<!DOCTYPE x [<!ENTITY l0 "ha">{LAUGHS}]>'), "xml.doctype", ":2: found a DOCTYPE"),
     "file entity": (with_prolog('<!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]>'), "xml.doctype", "found a DOCTYPE"),
@@ -78,10 +88,11 @@ def listener():
     """Yield the port of a server and the list of its connections."""
     server = socket.create_server(("127.0.0.1", 0))
     connections = []
-    threading.Thread(target=lambda: connections.append(server.accept()), daemon=True).start()
+    accepting = threading.Thread(target=lambda: connections.append(server.accept()), daemon=True)
+    accepting.start()
     yield server.getsockname()[1], connections
     with socket.create_connection(server.getsockname()):
-        pass
+        accepting.join()
     server.close()
 
 

@@ -1,0 +1,81 @@
+"""Rows of runs whose results cannot be written, as on a full disk: they are kept until `cosim recover` writes them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from shutil import disk_usage
+from typing import TYPE_CHECKING
+
+from ..core.csv_text import BYTES_PER_NUMBER
+from ..core.errors import CosimError, InputError, OutputError
+from ..process.output_lock import LOCK_FILE
+
+if TYPE_CHECKING:
+    from ..results import Result
+
+_UNFINISHED_FOLDER = ".unfinished"
+
+
+@dataclass(frozen=True)
+class OutputFiles:
+    """Files that accompany an output while it is written.
+
+    Attributes:
+        unfinished: Folder of the rows, see `process.run_files.folder`.
+        lock: Lock file.
+    """
+
+    unfinished: Path
+    lock: Path
+
+    @classmethod
+    def of_folder(cls, folder: Path) -> OutputFiles:
+        """Return those of the output directory of `cosim run`."""
+        return cls(folder / _UNFINISHED_FOLDER, folder / LOCK_FILE)
+
+    @classmethod
+    def of_file(cls, file: Path) -> OutputFiles:
+        """Return those of the output file of `cosim simulate`."""
+        return cls(file.with_name(f".{file.name}{_UNFINISHED_FOLDER}"), file.with_name(f".{file.name}{LOCK_FILE}"))
+
+
+@contextmanager
+def writing_results(result: Result, folder: Path | None, shown: Path) -> Iterator[None]:
+    """Write results in this block; their rows are kept if they cannot be written.
+
+    Args:
+        result: The result that the block writes.
+        folder: Folder of the unfinished run; None if there is none.
+        shown: The output as messages show it.
+
+    Raises:
+        InputError: The output cannot be written; the text says how to continue.
+        OutputError: The same, on a full or defective disk.
+    """
+    from ..process.run_files.folder import keep_rows, remove_live_copies
+    from ..results.files import to_json_types
+
+    if folder:
+        remove_live_copies(folder)
+    try:
+        yield
+    except (InputError, OutputError) as error:
+        if folder is None:
+            raise
+        about = {**result.metadata, "timing": result.timing, "kpis": result.kpis}
+        try:
+            keep_rows(folder, len(result.time), to_json_types(about))
+        except OSError:
+            raise error from None
+        rows = "1 row is" if len(result.time) == 1 else f"{len(result.time)} rows are"
+        raise type(error)(f"{error}; {rows} kept: {how_to_recover(result, folder, shown, error)}") from None
+
+
+def how_to_recover(result: Result, folder: Path, shown: Path, error: CosimError) -> str:
+    """Return the remedy of an error, and the command that writes the rows that were kept in a folder."""
+    missing = len(result.time) * (len(result) + 1) * BYTES_PER_NUMBER - disk_usage(folder).free
+    remedy = f"free about {max(1, round(missing / 1e6))} MB" if isinstance(error, OutputError) else "remove the cause"
+    return f"{remedy}, then call `cosim recover {shown}`"

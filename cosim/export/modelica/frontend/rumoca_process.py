@@ -1,0 +1,71 @@
+"""Program of the child process in which rumoca runs, since it may crash, hang or use up the memory.
+
+It reads a request from standard input (JSON, see `main`) and writes lines of JSON: {"file": PATH} before rumoca reads a file, and
+at last one of {"flat": TEXT}, {"syntax_errors": [[PATH, line, message], ...]}, {"error": text, "panicked": bool} and
+{"version": text or null}, the version of rumoca if it is not the requested one.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+from pathlib import Path
+from typing import Any
+
+
+def main(request: dict[str, Any]) -> None:
+    """Flatten a model.
+
+    Args:
+        request: "version" of rumoca; "files", the file of the model first; "packages", their folders; "model", its name;
+            "display_name" under which a model outside a package is loaded, null for one in a package; "memory" (bytes),
+            "output_size" (bytes) and "seconds" of processor time, the limits of this process.
+    """
+    limits = {resource.RLIMIT_DATA: "memory", resource.RLIMIT_FSIZE: "output_size", resource.RLIMIT_CPU: "seconds"}
+    for kind, name in limits.items():
+        resource.setrlimit(kind, (request[name], request[name]))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    try:
+        import rumoca
+    except ImportError:
+        _write({"version": None})
+        return
+    if rumoca.version() != request["version"]:
+        _write({"version": rumoca.version()})
+        return
+    errors = [error for file in request["files"] for error in _syntax_errors(rumoca, file)]
+    _write({"syntax_errors": errors} if errors else _flatten(rumoca, request))
+
+
+def _syntax_errors(rumoca: Any, file: str) -> list[tuple[str, int, str]]:
+    _write({"file": file})
+    try:
+        text = Path(file).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        return [(file, 1, f"the file cannot be read: {error}")]
+    diagnostics = rumoca.validate_source(text, filename=file)
+    return [(file, each.line, each.message) for each in diagnostics if each.rule == "syntax-error"]
+
+
+def _flatten(rumoca: Any, request: dict[str, Any]) -> dict[str, Any]:
+    path, model, name = request["files"][0], request["model"], request["display_name"]
+    _write({"file": path})
+    session = rumoca.Session(roots=request["packages"])
+    try:
+        if name is None:
+            compiled = session.load(path, model=model)
+        else:  # the text under a name without a folder, because rumoca reads all files beside an existing file
+            compiled = session.loads(Path(path).read_text(encoding="utf-8"), model=model, filename=name)
+        return {"flat": compiled.to_json("flat")}
+    except BaseException as error:  # a panic of rumoca is not derived from Exception
+        return {"error": str(error) or type(error).__name__, "panicked": not isinstance(error, Exception)}
+
+
+def _write(message: dict[str, Any]) -> None:
+    sys.stdout.write(json.dumps(message) + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main(json.load(sys.stdin))

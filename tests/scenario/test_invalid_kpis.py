@@ -1,0 +1,81 @@
+"""Invalid KPIs and checks, which are refused before the run."""
+
+import pytest
+
+FUNCTIONS = """
+from cosim.results.kpi import Prefix, Signal
+
+def good(result, signal, limit=1.0): ...
+
+def error(result, vehicle: Prefix, target: float | Signal = 0.0):
+    if not result:
+        return nothing()
+    return {"largest": 1.0, "final_error": 0.0, **{f"time[{i}]": 0.0 for i in range(3)}}
+
+def unsaid(result, vehicle: Prefix):
+    if not result:
+        return {"found": False}
+    values = {"value": 1.0}
+    return values
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ({"sgnal": "a.y"}, '"good" takes no argument "sgnal"; did you mean "signal"?'),
+        ({}, '"good" needs the argument signal'),
+    ],
+)
+def test_arguments_of_kpis_are_checked_before_the_run(folder, arguments, line):
+    (folder.path / "f.py").write_text(FUNCTIONS)
+    kpi = {"name": "k", "python": "f.py:good", "arguments": arguments}
+    (found,) = folder.problems({"a": folder.block("Gain")}, kpis=[kpi])
+    assert found.endswith(f"$.kpis[0]: {line}")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ({"vehicle": "a.shpi"}, 'vehicle: no signal below "a.shpi" is recorded; did you mean "a.ship"?'),
+        (
+            {"vehicle": "a.ship", "target": "a.ship"},
+            'target: no signal "a.ship" is recorded; valid: a.ship.position.x, a.ship.position.y',
+        ),
+    ],
+)
+def test_signals_in_arguments_of_functions_are_checked_before_the_run(folder, arguments, line):
+    (folder.path / "f.py").write_text(FUNCTIONS)
+    kpi = {"name": "k", "python": "f.py:error", "arguments": arguments}
+    (found,) = folder.problems({"a": folder.block("Plant")}, kpis=[kpi])
+    assert found.endswith(f"$.kpis[0].arguments.{line}")
+
+
+def test_missing_signals_of_an_invalid_component_are_not_reported(folder):
+    kpi = {"name": "k", "python": "cosim.kpis:rms", "arguments": {"signal": "a.y"}}
+    (found,) = folder.problems({"a": {"python": "none.py:A"}, "b": folder.block("Gain")}, kpis=[kpi])
+    assert 'file "none.py" does not exist' in found
+
+
+@pytest.mark.parametrize(
+    ("number", "message"),
+    [
+        ("error.final_eror", 'no KPI "error.final_eror"; did you mean "error.final_error"?'),
+        ("error", 'no KPI "error"; did you mean "error.time"?'),
+        ("eror.time[1]", 'no KPI "eror.time[1]"; did you mean "error"?'),
+    ],
+)
+def test_checks_must_name_a_value_of_a_kpi(folder, number, message):
+    """Only names in a literal after `return` can be checked; `unsaid` returns a variable, so any name is accepted."""
+    (folder.path / "f.py").write_text(FUNCTIONS)
+    known, unknown = ({"name": name, "python": f"f.py:{name}", "arguments": {"vehicle": "a"}} for name in ("error", "unsaid"))
+    checks = [{"kpi": each, "max": 1} for each in (number, "error.largest", "error.time[2]", "unsaid.anything")]
+    (found,) = folder.problems({"a": folder.block("Gain")}, kpis=[known, unknown], checks=checks)
+    assert found.endswith(f"$.checks[0].kpi: {message}")
+
+
+def test_two_kpis_cannot_have_the_same_name(folder):
+    (folder.path / "f.py").write_text(FUNCTIONS)
+    kpi = {"name": "k", "python": "f.py:good", "arguments": {"signal": "a.y"}}
+    (found,) = folder.problems({"a": folder.block("Gain")}, kpis=[kpi, kpi])
+    assert found.endswith('$.kpis[1].name: the name "k" is used more than once')
