@@ -15,7 +15,7 @@ import click
 
 from ..core.errors import CosimError
 from ..core.version import __version__
-from ..process.standard_streams import protected_stream
+from ..process.standard_streams import open_closed_streams, protected_stream
 
 #: module in `commands` and description of each command
 COMMANDS = {
@@ -94,6 +94,7 @@ def main(arguments: list[str] | None = None) -> None:
     """
     if arguments is None:
         _avoid_useless_collections()
+    open_closed_streams()
     sys.stdout, sys.stderr = protected_stream(sys.stdout), protected_stream(sys.stderr)
     sys.exit(_run_command_line(sys.argv[1:] if arguments is None else arguments))
 

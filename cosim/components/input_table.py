@@ -6,7 +6,6 @@ communication point n, and every other component reads the profile at n in its s
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -14,8 +13,8 @@ from typing import Any, Literal
 import numpy as np
 
 from ..core.component import Component, Ports, Variable
+from ..core.csv_text import read_rows
 from ..core.errors import InputError, Problem, did_you_mean
-from ..core.paths import open_text
 
 Interpolation = Literal["linear", "hold"]
 
@@ -116,12 +115,7 @@ def read_input_table(path: Path, columns: Sequence[str], interpolation: Interpol
         InputError: The file or a column is missing, a column occurs twice, a cell is not a finite number, or time does not
             increase.
     """
-    try:
-        with open_text(path, encoding="utf-8-sig", newline="") as file:
-            header, *rows = list(csv.reader(file))
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "no header row"
-        raise InputError(Problem(f'cannot read profile "{path}": {reason}', where)) from None
+    header, rows = read_rows(path)
     problems = [Problem(f'profile "{path}" {text}', where) for text in _header_violations(header, columns)]
     try:
         values = np.array([[float(cell) for cell in row] for row in rows]).reshape(len(rows), len(header))

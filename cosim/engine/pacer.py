@@ -16,6 +16,9 @@ from ..core.time_grid import TimeGrid
 #: reaction to a step that is more than one step late: one warning, or a LateError
 LatePolicy = Literal["warn", "fail"]
 
+#: longest wait in one call of the operating system, which accepts only some years (ns)
+_LONGEST_SLEEP = 10**15
+
 
 class Pacer:
     """Delays communication point n until n * step / factor after the start.
@@ -48,10 +51,11 @@ class Pacer:
         Raises:
             LateError: the point was due more than one step ago and `late` is "fail".
         """
-        ahead = self._start + n * self._numerator // self._denominator - time.monotonic_ns()
+        due = self._start + n * self._numerator // self._denominator
+        ahead = due - time.monotonic_ns()
         self._lateness.append(max(0, -ahead))
         if ahead > 0:
-            time.sleep(ahead * 1e-9)
+            _sleep_until(due)
         elif -ahead * self._denominator > self._numerator:
             self._report_lateness(n, -ahead * 1e-9)
 
@@ -77,3 +81,9 @@ class Pacer:
             "mean_lateness": float(lateness.mean()),
             "lateness_99_percent": float(np.percentile(lateness, 99)),
         }
+
+
+def _sleep_until(due: int) -> None:
+    """Wait until a time of the monotonic clock (ns)."""
+    while (ahead := due - time.monotonic_ns()) > 0:
+        time.sleep(min(ahead, _LONGEST_SLEEP) * 1e-9)

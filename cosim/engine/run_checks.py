@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Set
-from math import inf
+from fractions import Fraction
+from math import inf, ulp
 
 from ..core.component import Variable
 from ..core.errors import InputError, Problem
@@ -12,6 +13,11 @@ from ..core.size_limits import MAX_DELAYED_VALUES, format_count
 from ..core.system import Endpoint, System
 from ..core.time_grid import TimeGrid
 from .settings import Event, Settings
+
+#: longest wall time of a step of a run in real time (s)
+MAX_STEP_DURATION = 1_000_000
+#: smallest step in units in the last place of the times; its length is then exact to 1 %
+MIN_ULPS_PER_STEP = 100
 
 
 def check_run(system: System, settings: Settings) -> TimeGrid:
@@ -22,8 +28,7 @@ def check_run(system: System, settings: Settings) -> TimeGrid:
             ("events", "time"), ...
     """
     problems = [*system.problems(), *_find_event_problems(system, settings.events)]
-    if settings.real_time is not None and not 0 < settings.real_time < inf:
-        problems.append(Problem(f"expected a positive factor for real time, found {settings.real_time!r}"))
+    problems += _find_real_time_problems(settings)
     try:
         grid = TimeGrid.from_times(settings.start_time, settings.stop_time, settings.step_size)
     except ValueError as error:
@@ -31,6 +36,7 @@ def check_run(system: System, settings: Settings) -> TimeGrid:
         if settings.step_size <= 0:
             raise InputError(problems) from None
         grid = TimeGrid.from_times(settings.start_time, settings.start_time, settings.step_size)
+    problems += _find_resolution_problems(settings)
     problems += _find_period_problems(system, grid)
     problems += _find_delay_problems(system)
     problems += _find_recording_problems(settings, grid)
@@ -38,6 +44,26 @@ def check_run(system: System, settings: Settings) -> TimeGrid:
     if problems:
         raise InputError(problems)
     return grid
+
+
+def _find_real_time_problems(settings: Settings) -> Iterator[Problem]:
+    factor = settings.real_time
+    if factor is None:
+        return
+    if not 0 < factor < inf:
+        yield Problem(f"expected a positive factor for real time, found {factor!r}")
+    elif settings.step_size > MAX_STEP_DURATION * Fraction(factor):
+        text = f"a step of {float(settings.step_size)!r} s takes more than {MAX_STEP_DURATION} s of wall time"
+        yield Problem(f"{text} with the factor {factor!r} for real time")
+
+
+def _find_resolution_problems(settings: Settings) -> Iterator[Problem]:
+    """Find a step that is too short for the float64 numbers that are the times of the components."""
+    largest = max(abs(float(settings.start_time)), abs(float(settings.stop_time)))
+    if settings.step_size < MIN_ULPS_PER_STEP * Fraction(ulp(largest)):
+        step = f"a step of {float(settings.step_size)!r} s is not resolved at t = {largest!r} s"
+        text = f"{step}, where the times of components are {ulp(largest):.3g} s apart"
+        yield Problem(f"{text}; make the step longer, or move the times towards 0", subject=("step_size",))
 
 
 def settable_variables(system: System) -> Iterator[tuple[str, Variable]]:

@@ -132,7 +132,7 @@ def simulating(plan: Plan, observers: Sequence[Observer] = (), step_hook: StepHo
 
 
 def _end_components(components: Mapping[str, Component], terminate: bool) -> None:
-    """Free all components, even if freeing one of them fails; call their `terminate` before if asked for."""
+    """Free all components, even if one of them fails; call `terminate` first if requested."""
     with ExitStack() as stack:
         stack.callback(free_components, components)
         for name, component in components.items() if terminate else ():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import sys
 from typing import Any, TextIO
 
 from ..core.printable_text import SPACES, escape_control_characters
@@ -32,6 +33,18 @@ class _EscapingStream(io.TextIOWrapper):
 
     def write(self, text: str) -> int:
         return super().write(escape_control_characters(text, keep=f"\n{SPACES}"))
+
+
+def open_closed_streams() -> None:
+    """Connect closed standard streams to the null device, so that no file that is opened later takes their descriptors."""
+    for descriptor in range(3):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)  # the lowest free descriptor, which is this one
+    for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(descriptor, "w" if descriptor else "r", closefd=False))
 
 
 def protected_stream(stream: TextIO, duplicate: bool = False) -> TextIO:

@@ -252,6 +252,23 @@ def test_simulate_refuses_unknown_names(probe, tmp_path):
     assert (done.returncode, 'did you mean "y_start"?' in done.stderr) == (2, True)
 
 
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"time,u\n0," + b"1" * (1 << 21), "u.csv:2: cannot read the row: field larger than field limit (1048576)"),
+        (b"time,\xe9\n0,1\n", "u.csv: it is not UTF-8 text"),
+        (b"", "u.csv: the file is empty, expected a header"),
+        (None, "u.csv: No such file or directory"),
+    ],
+)
+def test_simulate_refuses_an_unreadable_input_file(probe, tmp_path, content, message):
+    if content is not None:
+        (tmp_path / "u.csv").write_bytes(content)
+    done = cosim("simulate", probe, "--input-file", tmp_path / "u.csv")
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert message in done.stderr
+
+
 def test_a_failing_fmu_gives_exit_code_1_and_keeps_its_rows(probe, tmp_path):
     done = cosim("simulate", probe, "--start-value", "fail_time=0.025", "--output-file", tmp_path / "y.csv")
     assert done.returncode == 1
@@ -320,4 +337,4 @@ def test_an_interrupt_gives_exit_code_130_and_keeps_the_rows(tmp_path):
 def test_a_deeply_nested_setting_is_refused(tmp_path):
     done = cosim("run", scenario(tmp_path), "--set", f"a.k={'[' * 20_000}", cwd=tmp_path)
     assert done.returncode == 2
-    assert done.stderr == "a.k: nested too deeply\n"
+    assert done.stderr == "a.k: nested too deep\n"

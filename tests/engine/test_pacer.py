@@ -122,3 +122,21 @@ def test_an_interrupt_ends_the_waiting():
 def test_an_invalid_factor_is_refused(factor):
     with pytest.raises(InputError, match="expected a positive factor for real time, found"):
         paced(counter(), "0.1", factor)
+
+
+@pytest.mark.parametrize("factor", [5e-324, 1e-300, 1e-9])
+def test_a_factor_that_lets_a_step_last_for_days_is_refused(factor):
+    with pytest.raises(InputError, match=r"a step of 0\.01 s takes more than 1000000 s of wall time with the factor"):
+        paced(counter(), 1.0, factor)
+
+
+@pytest.mark.parametrize("factor", [1e-7, 1e300, 1.7e308])
+def test_extreme_factors_with_steps_of_hours_or_none_are_possible(factor):
+    assert paced(counter(), 0.0 if factor < 1 else 1.0, factor).failure is None
+
+
+def test_a_long_wait_is_made_of_several(monkeypatch):
+    monkeypatch.setattr(cosim.engine.pacer, "_LONGEST_SLEEP", 10**6)
+    began = time.monotonic()
+    assert paced(counter(), 0.05).failure is None
+    assert time.monotonic() - began >= 0.05

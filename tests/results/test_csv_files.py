@@ -8,7 +8,10 @@ import pytest
 
 from cosim.core.errors import InputError
 from cosim.core.recording import Recording
+from cosim.core.text import MAX_TEXT_LENGTH
 from cosim.results.csv_files import read_csv, write_csv
+
+LONG = "x" * (MAX_TEXT_LENGTH + 1)
 
 
 def recording(time, **columns):
@@ -124,12 +127,28 @@ def test_files_of_other_programs_are_read(tmp_path):
         ("time,x\n0,1\n\n1\n", r"given\.csv:4: 1 cells, expected 2 as in the header"),
         ("time,x\n0,1\nsoon,2\n", "the column time: .*soon"),
         ("time,x\n0,1\nnan,2\n", "not finite"),
+        pytest.param(f"time,x\n0,{LONG}x\n", r"given\.csv:2: cannot read the row: field larger than", id="long cell"),
+        pytest.param(f"time,{LONG}x\n", r"given\.csv:1: cannot read the row: field larger than", id="long name"),
+        pytest.param(f'time,x\n0,"{LONG}\n', r"given\.csv:\d: cannot read the row: ", id="quote without end"),
         ("time,x\n0,1\n0.2,2\n0.1,2\n", r"time goes back from 0\.2 s to 0\.1 s"),
     ],
 )
 def test_unreadable_input_is_refused(tmp_path, text, message):
     with pytest.raises(InputError, match=message):
         read_csv(written(tmp_path, text))
+
+
+def test_a_file_in_another_encoding_is_refused(tmp_path):
+    path = tmp_path / "given.csv"
+    path.write_bytes(b"time,\xe9\n0,1\n")
+    with pytest.raises(InputError, match=r"cannot read .*given\.csv: it is not UTF-8 text: .* at byte 5"):
+        read_csv(path)
+
+
+@pytest.mark.parametrize("length", [131_072, 131_073, MAX_TEXT_LENGTH])
+def test_long_texts_are_read_as_they_were_written(tmp_path, length):
+    write_csv(recording([0.0, 1.0], x=np.array(["y" * length, "z"], object)), tmp_path / "long.csv")
+    assert read_csv(tmp_path / "long.csv").columns["x"].tolist() == ["y" * length, "z"]
 
 
 def test_a_missing_file_is_refused(tmp_path):

@@ -51,6 +51,16 @@ def test_all_problems_are_reported_at_once(folder):
         ({"stop_tme": 1}, '$.stop_tme: unknown key; did you mean "stop_time"?'),
         ({"step_size": 0}, "$.step_size: expected a positive number of seconds; found 0"),
         ({"step_size": "fast"}, 'expected seconds as a number or as a fraction in text such as "1/60"; found "fast"'),
+        (
+            {"start_time": 1e15, "stop_time": 1e15 + 3, "step_size": 0.01},
+            "$.step_size: a step of 0.01 s is not resolved at t = 1000000000000003.0 s, where the times of components are 0.125",
+        ),
+        (
+            {"start_time": -1e15, "stop_time": -1e15 + 3, "step_size": 0.125},
+            "a step of 0.125 s is not resolved at t = 10000000",
+        ),
+        ({"start_time": 2**53, "stop_time": 2**53}, "a step of 1.0 s is not resolved"),
+        ({"start_time": 1e10, "stop_time": 1e10 + 1, "step_size": 0.0001}, "a step of 0.0001 s is not resolved at t = 1000"),
         ({"stop_time": 2.5}, "$.stop_time: 2.5 s is no multiple of the step size 1.0 s"),
         ({"record": {"signals": ["a.z"]}}, '$.record.signals[0]: no output matches "a.z"; did you mean "a.y"?'),
         ({"record": {"interval": 1.5}}, "$.record.interval: recording interval 1.5 s is no multiple of the step size 1.0 s"),
@@ -70,7 +80,7 @@ def test_all_problems_are_reported_at_once(folder):
         ({"kpis": [{"name": "k", "python": "none.py:f"}]}, '$.kpis[0]: file "none.py" does not exist'),
         ({"checks": [{"kpi": "k.x", "max": 1}]}, '$.checks[0].kpi: no KPI "k.x"'),
         ({"checks": [{"kpi": "k.x"}]}, 'expected at least one of "min", "max", "equals"'),
-        ({"inputs": [{"file": "no.csv", "to": {"x": "a.u"}}]}, "cannot read profile"),
+        ({"inputs": [{"file": "no.csv", "to": {"x": "a.u"}}]}, "no.csv: No such file"),
     ],
 )
 def test_one_mistake_is_reported_in_one_line(folder, change, line):
@@ -156,3 +166,15 @@ def test_settings_of_the_caller_may_be_arrays_and_must_be_finite(folder):
     assert folder.problems_of(file, parameters={"a.offset": np.inf}) == [
         'setting "a.offset": "offset" is of type Float64, found Infinity'
     ]
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        {"start_time": 1_700_000_000, "stop_time": 1_700_000_001, "step_size": 0.0001},
+        {"start_time": -1e13, "stop_time": -1e13, "step_size": 0.25},
+        {"stop_time": "1e-300", "step_size": "1e-300"},
+    ],
+)
+def test_steps_that_the_times_resolve_are_accepted(folder, times):
+    cosim.load(folder.scenario({"a": folder.block("Gain")}, **times)).free()

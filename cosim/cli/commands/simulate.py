@@ -173,15 +173,11 @@ def _compile_system(
 
 
 def _read_profile(path: Path, component: Component) -> Component:
-    import csv
-
     from ...components.input_table import read_input_table
+    from ...core.csv_text import read_rows
     from ...core.errors import InputError, Problem, did_you_mean
 
-    if not path.is_file():
-        raise InputError(f'input file "{path}" does not exist')
-    with path.open(newline="") as file:
-        columns = next(csv.reader(file), ["time"])[1:]
+    columns = read_rows(path)[0][1:]
     inputs = [slot for v in component.variables if v.causality == "input" for slot in v.scalar_names]
     unknown = [column for column in columns if column not in inputs]
     if unknown:

@@ -87,7 +87,7 @@ class MapLayout:
 
     @cached_property
     def x_ticks(self) -> dict[int, str]:
-        """Tick labels along x by index: wrapped to the width of a cell, or rotated and only every n-th."""
+        """Tick labels of the x axis by index: wrapped to the width of a cell, or rotated with every n-th label only."""
         if self.rotate_x_labels:
             return _every_nth_label(list(map(_label_text, self.levels[3])), self.cell[0])
         return dict(enumerate(self._wrapped_x_labels))

@@ -197,9 +197,9 @@ def _run_worker(serve: Callable[[int, int], None], commands: int, answers: int, 
     code = _INTERNAL_ERROR
     _streams = sys.stdout, sys.stderr  # kept alive, because deleting them would write the importer's buffered output again
     try:
+        commands, answers, output = map(_duplicate_above_limit, (commands, answers, output))  # they may be standard streams
         os.dup2(output, 1)
         os.dup2(output, 2)
-        commands, answers = _duplicate_above_limit(commands), _duplicate_above_limit(answers)
         _close_other_descriptors({0, 1, 2, commands, answers})
         sys.stdout, sys.stderr = (os.fdopen(n, "w", buffering=1, errors="replace", closefd=False) for n in (1, 2))
         serve(commands, answers)
@@ -214,9 +214,8 @@ def _duplicate_above_limit(descriptor: int) -> int:
     import resource
 
     soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-    return fcntl.fcntl(
-        descriptor, fcntl.F_DUPFD, _FIRST_RESERVED_DESCRIPTOR if soft > 2 * _FIRST_RESERVED_DESCRIPTOR else descriptor
-    )
+    lowest = _FIRST_RESERVED_DESCRIPTOR if soft > 2 * _FIRST_RESERVED_DESCRIPTOR else max(descriptor, 3)
+    return fcntl.fcntl(descriptor, fcntl.F_DUPFD, lowest)
 
 
 def _close_other_descriptors(keep_open: set[int]) -> None:

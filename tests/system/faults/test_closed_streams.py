@@ -1,0 +1,55 @@
+"""Commands and programs whose standard streams are closed: the usual results and exit codes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+from fault_fmu import STEP_COUNT, lag_output, scenario
+
+import cosim
+
+CLOSED = ["2>&-", "<&- >&-", "<&- >&- 2>&-"]
+
+
+def run_shell(command, folder):
+    return subprocess.run(["/bin/sh", "-c", command], cwd=folder, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("closed", CLOSED)
+def test_run(fmus, closed):
+    """Output of the FMU reaches no file of the run."""
+    path = scenario(fmus.folder, fmus(2, "DoStep 6 flood_stdout"), record={"signals": ["lag.y"]})
+    done = run_shell(f"{sys.executable} -m cosim run {path} --no-report --output-dir out {closed}", fmus.folder)
+    assert done.returncode == 0, done.stderr
+    result = cosim.Result.from_csv(fmus.folder / "out/result.csv")
+    assert [len(result.time), result["lag.y"][-1]] == [STEP_COUNT + 1, lag_output(STEP_COUNT)]
+
+
+@pytest.mark.parametrize("isolation", ["none", "fmu"])
+def test_run_with_another_isolation(fmus, isolation):
+    path = scenario(fmus.folder, fmus(3))
+    command = f"{sys.executable} -m cosim run {path} --no-report --isolation {isolation} --output-dir out <&- >&- 2>&-"
+    assert run_shell(command, fmus.folder).returncode == 0
+    assert len(cosim.Result.from_csv(fmus.folder / "out/result.csv").time) == STEP_COUNT + 1
+
+
+@pytest.mark.parametrize(("order", "code"), [("DoStep 6 segv", 1), ("DoStep 6 error", 1), ("", 2)])
+def test_exit_codes_stay(fmus, order, code):
+    path = scenario(fmus.folder, fmus(2, order), **({} if order else {"stop_time": -1}))
+    command = f"{sys.executable} -m cosim run {path} --no-report --output-dir out <&- >&- 2>&-"
+    assert run_shell(command, fmus.folder).returncode == code
+
+
+@pytest.mark.parametrize("command", ["check fault.json", "simulate lag.fmu", "--version"])
+def test_other_commands(fmus, command):
+    scenario(fmus.folder, fmus(2))
+    assert run_shell(f"{sys.executable} -m cosim {command} >&- 2>&-", fmus.folder).returncode == 0
+
+
+@pytest.mark.parametrize("isolation", ["none", "fmu"])
+def test_a_program_that_closed_its_streams(fmus, isolation):
+    path = scenario(fmus.folder, fmus(2), record={"signals": ["lag.y"]})
+    program = f"import cosim; assert cosim.run('{path}', isolation='{isolation}')['lag.y'][-1] == {lag_output(STEP_COUNT)!r}"
+    assert run_shell(f'{sys.executable} -c "{program}" <&- >&- 2>&-', fmus.folder).returncode == 0
