@@ -154,7 +154,7 @@ FAULTS = [
     Fault("exit_0", "end the process with success", EXIT + "0", NAMED),
     Fault("loop", "never return", FAILED + "did not return within 0.5 s", NAMED),
     Fault("memory", "take all memory", FAILED + "status 3 (error)", NAMED),
-    Fault("fp_traps", "let arithmetic end the process", FAILED, NAMED),
+    Fault("fp_traps", "let arithmetic end the process", "changed the floating-point mode", WARNED),
     Fault("close_all", "close all files of the process", "lag: a call that closed the files", NAMED, SURVIVED),
     Fault("open_files", "open files without end", "lag: changed the number of free descriptors", WARNED, SURVIVED),
     Fault("flood_stdout", "print without end"),

@@ -57,7 +57,8 @@ def test_info_prints_names_and_descriptions_in_one_line_each(fmus, runner, tmp_p
 
 def kpi_scenario(folder, fmu):
     (folder / "kpi.py").write_text(f"def sly(result):\n    return {{{CONTROL!r}: 1.0}}\n")
-    return scenario(folder, fmu, kpis=[{"name": "sly", "python": "kpi.py:sly"}])
+    checks = [{"kpi": f"sly.{CONTROL}", "max": 2.0}]
+    return scenario(folder, fmu, kpis=[{"name": "sly", "python": "kpi.py:sly"}], checks=checks)
 
 
 def test_names_of_kpis_are_escaped(fmus, runner, tmp_path):
