@@ -94,7 +94,7 @@ DIAGRAM = {"components": [{"name": "a", "origin": "a.fmu", "inputs": 0, "outputs
         ({"scenario": {"checks": [{"max": 1}]}}, r"scenario\.checks\[0\]\.kpi"),
         ({"scenario": {"figures": [{"name": "a", "python": 1}]}}, r"scenario\.figures\[0\]\.python"),
         ({"scenario": {"components": {"a": 1}}}, r"scenario\.components\.a"),
-        ({"system": {}}, r"system\.components"),
+        ({"system": {}}, "system"),
         ({"system": {**DIAGRAM, "stages": [["b"]]}}, "system"),
         ({"system": {**DIAGRAM, "stages": [["a"]], "connections": [["a.x"]]}}, r"system\.connections\[0\]"),
         ({"terminated_by": {"component": "a"}}, r"terminated_by\.time"),

@@ -9,6 +9,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO, Any
@@ -101,8 +102,7 @@ class FileMapping:
     """
 
     def __init__(self, file: int, begin: int, size: int, writable: bool):
-        library = ctypes.CDLL(None, use_errno=True)
-        library.mmap.restype = ctypes.c_void_p
+        library = _c_library()
         page = begin - begin % mmap.ALLOCATIONGRANULARITY
         self._length = begin - page + size
         protection = mmap.PROT_READ | (mmap.PROT_WRITE if writable else 0)
@@ -117,7 +117,14 @@ class FileMapping:
 
     def madvise(self, option: int) -> None:
         """Give the operating system advice about the mapping, like `mmap.mmap.madvise`."""
-        ctypes.CDLL(None).madvise(ctypes.c_void_p(self._address), ctypes.c_size_t(self._length), option)
+        _c_library().madvise(ctypes.c_void_p(self._address), ctypes.c_size_t(self._length), option)
+
+
+@cache
+def _c_library() -> Any:
+    library = ctypes.CDLL(None, use_errno=True)
+    library.mmap.restype = ctypes.c_void_p
+    return library
 
 
 def _map_rows(file: IO[bytes], dtype: np.dtype[Any], begin: int, count: int, writable: bool) -> np.ndarray:
