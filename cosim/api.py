@@ -123,7 +123,7 @@ def _add_timings(first: Mapping[str, float], second: Mapping[str, float]) -> dic
 
 
 def _evaluate_run(result: Result, prepared: PreparedRun) -> Execution:
-    """Evaluate KPIs and checks; a KPI that fails does not keep the others from being evaluated."""
+    """Evaluate all KPIs and checks; the others are also evaluated if a KPI fails."""
     kpis = Kpis()
     failures: list[BaseException] = []
     functions = prepared.kpis()

@@ -38,7 +38,7 @@ def call_names(value: Any) -> list[str]:
 
 
 def step_result(value: Any) -> StepResult | None:
-    """Return the step result that a worker sent; None if the step ended at its planned end time."""
+    """Return the step result that a worker sent; None if the step reached its end and requested nothing."""
     if value is None:
         return None
     time, event_needed, terminate_requested = value
