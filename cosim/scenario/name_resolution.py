@@ -100,7 +100,7 @@ class SlotIndex:
         self._names = PrefixIndex(self._positions)
 
     def below(self, prefix: str) -> dict[str, str]:
-        """Return the scalars below a prefix, keyed by the rest of their names.
+        """Return the scalars below a prefix, keyed by their names after the prefix.
 
         The key is "" for the prefix itself, and for example ".position.x" below it. The order is that of the variables.
         """

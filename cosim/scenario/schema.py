@@ -68,7 +68,7 @@ class ComponentSpec(Spec):
 
 
 class ConnectionSpec(Spec):
-    """A connection of an output to an input, or of two prefixes; variables below prefixes match by the rest of their names."""
+    """A connection of an output to an input, or of two prefixes; variables match if their names after the prefixes are equal."""
 
     source: str = Field(alias="from", description='output "component.variable", or a prefix of outputs')
     target: str = Field(alias="to", description='input "component.variable", or a prefix of inputs')

@@ -224,7 +224,7 @@ class SystemBuilder:
         return aliases
 
     def _port_outputs(self, node: Node, inner: str, where: str) -> dict[str, Endpoint]:
-        """Return the outputs that an output port refers to, by the rest of their names; add a problem if there are none."""
+        """Return the outputs of an output port by their names after the prefix; add a problem if there are none."""
         try:
             (target,) = resolve_name(node, inner, ("outputs",))
         except UnknownNameError as error:

@@ -26,7 +26,7 @@ class _Candidate(NamedTuple):
 class Wiring:
     """Expander of the connections of a scenario and its nested systems; `problems` collects those that are invalid.
 
-    A prefix connects every input below it to the output with the same rest of the name. An input without such an output is
+    A prefix connects every input below it to the output with the same name after the prefix. An input without such an output is
     a problem unless it has a value or another connection. A connection of single variables overrides one of prefixes.
 
     Args:
@@ -94,7 +94,7 @@ class Wiring:
         delay: int,
         where: str,
     ) -> None:
-        """Connect every input to the output with the same rest of the name."""
+        """Connect every input to the output with the same name after the prefix."""
         for rest, slot in inputs.items():
             end = Endpoint(target.component, slot)
             if rest in outputs:
