@@ -46,7 +46,7 @@ class Verdict(NamedTuple):
 
 @dataclass(frozen=True)
 class Comparison:
-    """Verdicts on all signals in the order of the reference, after those on patterns and on the whole comparison."""
+    """Verdicts on the whole comparison and on patterns, followed by those on all signals in the order of the reference."""
 
     verdicts: tuple[Verdict, ...]
 
