@@ -58,7 +58,7 @@ def _find_real_time_problems(settings: Settings) -> Iterator[Problem]:
 
 
 def _find_resolution_problems(settings: Settings) -> Iterator[Problem]:
-    """Find a step that is too short for the float64 numbers that are the times of the components."""
+    """Yield a problem if the step size is too small for the resolution of float64 times, which components receive."""
     largest = max(abs(float(settings.start_time)), abs(float(settings.stop_time)))
     if settings.step_size < MIN_ULPS_PER_STEP * Fraction(ulp(largest)):
         step = f"a step of {float(settings.step_size)!r} s is not resolved at t = {largest!r} s"
