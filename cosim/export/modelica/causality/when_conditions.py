@@ -47,7 +47,7 @@ def tick_flag(index: int) -> Builtin:
 
 
 class WhenConditions:
-    """Translation of when-clauses; numbers the clocks and edge detectors of a model, equal ones once."""
+    """Translation of when-clauses; assigns one number to each distinct clock and edge detector of a model."""
 
     def __init__(self, model: Model):
         self._model = model
