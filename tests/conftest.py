@@ -23,7 +23,7 @@ def pytest_configure(config):
         config.pluginmanager.register(ValidationReport(Path(target)))
 
 
-def pytest_xdist_auto_num_workers(config):
+def pytest_xdist_auto_num_workers():
     """One worker more than processors: many tests wait for processes, clocks or a browser."""
     return available_processors() + 1
 
