@@ -42,9 +42,9 @@ def run(
     """Run a scenario in this process and evaluate its KPIs and checks.
 
     Runs in several threads of one process are safe, also in an event loop (`asyncio.to_thread(cosim.run, ...)`) and after a fork.
-    They load and step in turns, because FMUs may change the state of the whole process. This state (working directory,
-    environment, locale and others) is restored after each turn. So an observer must not wait for a run of another thread. Runs
-    whose components are all isolated FMUs step at the same time.
+    Only one thread at a time loads or steps components, because FMUs may change the state of the whole process. This state
+    (working directory, environment, locale and others) is restored before another thread continues. Therefore an observer must
+    not wait for a run of another thread. If all components of several runs are isolated FMUs, these runs step at the same time.
 
     Args:
         scenario: Path of a scenario file, or the name of a shipped scenario.
@@ -123,7 +123,7 @@ def _add_timings(first: Mapping[str, float], second: Mapping[str, float]) -> dic
 
 
 def _evaluate_run(result: Result, prepared: PreparedRun) -> Execution:
-    """Evaluate KPIs and checks; a KPI that fails does not keep the others from being evaluated."""
+    """Evaluate all KPIs and checks; the others are also evaluated if a KPI fails."""
     kpis = Kpis()
     failures: list[BaseException] = []
     functions = prepared.kpis()

@@ -50,7 +50,7 @@ class ScenarioItem(pytest.Item):
 
     @property
     def _output_directory(self) -> Path:
-        """A separate output directory per scenario: names may repeat across folders and tests run in parallel."""
+        """Separate output directory of the scenario: names may repeat across folders, and tests may run in parallel."""
         root = self.config.rootpath
         relative = self.path.relative_to(root if self.path.is_relative_to(root) else self.path.anchor)
         return root / "runs" / relative.with_suffix("")

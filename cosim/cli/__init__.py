@@ -100,7 +100,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _avoid_useless_collections() -> None:
-    """Search for reference cycles rarely, and not at the end: almost all objects of a command stay until its process ends."""
+    """Let the cycle collector run rarely, because almost all objects of a command exist until its process ends."""
     gc.set_threshold(_GC_THRESHOLD)
     atexit.register(gc.freeze)
 

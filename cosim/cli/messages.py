@@ -40,7 +40,7 @@ def print_log(level: int = logging.INFO) -> list[str]:
 
 
 def print_line(text: str) -> None:
-    """Print a text with foreign parts as one line of standard output; line breaks in it are escaped."""
+    """Print a text that may contain foreign text as one line of standard output; line breaks in it are escaped."""
     click.echo(escape_control_characters(text, keep=SPACES))
 
 

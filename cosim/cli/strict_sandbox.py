@@ -1,4 +1,4 @@
-"""`--sandbox strict`: the same command in a child process inside bubblewrap, for which this process only waits."""
+"""`--sandbox strict`: execution of the same command in bubblewrap, while this process only waits."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _INSIDE_VARIABLE = "COSIM_INSIDE_STRICT_SANDBOX"
 #: variables that name folders for a program's own files
 _HOME_VARIABLES = ("TMPDIR", "HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME")
 
-#: variables that the command inside keeps besides those of a sandboxed FMU: programs, modules, compiler and terminal
+#: variables that the command keeps in addition to those of a sandboxed FMU: programs, modules, compiler and terminal
 _COMMAND_VARIABLES = ("PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "PYTHONHASHSEED", "CC", "TERM", "COLUMNS", "LINES", "NO_COLOR")
 
 #: programs (compilers for Modelica sources), shared libraries and fonts; without private files and sockets
@@ -33,7 +33,7 @@ _SYSTEM_PATHS = ("/usr", "/bin", "/lib", "/lib64", "/etc/ld.so.cache", "/etc/alt
 
 
 class SandboxCommand(click.Command):
-    """Command whose option `--sandbox` has an optional value, even before an argument."""
+    """Command with the option `--sandbox`, whose value is optional even if an argument follows."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments after adding the default value to a bare `--sandbox`."""
@@ -121,7 +121,7 @@ def _output_folder(path: Path) -> Iterator[None]:
 
 
 def _wait_for_exit(process: subprocess.Popen[bytes], status: IO[str]) -> dict[str, int]:
-    """Return the status that bubblewrap reports until it exits; forward interrupts to the command, which ends cleanly."""
+    """Wait until bubblewrap exits and return the status that it reported; forward interrupts to the command."""
     report: dict[str, int] = {}
     while True:
         try:

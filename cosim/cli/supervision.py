@@ -79,7 +79,7 @@ def run_supervised_command(
 
 
 def _save_partial(outcome: SupervisedOutcome, save_partial: Callable[[SupervisedOutcome], None], folder: Path) -> None:
-    """Save the rows of an unfinished run and remove its folder, unless the rows cannot be written or the child kept them."""
+    """Save the rows of an unfinished run and remove its folder, unless writing fails or the child kept the rows itself."""
     from ..process.run_files.folder import find_kept_rows
 
     if find_kept_rows(folder):
@@ -93,7 +93,7 @@ def _save_partial(outcome: SupervisedOutcome, save_partial: Callable[[Supervised
 
 
 def results_written(code: int) -> int:
-    """Record the final exit code in the journal: later failures of components no longer change it; return the code."""
+    """Record the final exit code in the journal, so that later failures do not change it, and return the code."""
     from ..process.journal import EXIT_CODE, Phase, current_journal
 
     if journal := current_journal():

@@ -1,4 +1,4 @@
-"""Rows of runs whose results cannot be written, as on a full disk: they are kept until `cosim recover` writes them."""
+"""Rows of runs whose results cannot be written (for example on a full disk), kept for `cosim recover`."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class OutputFiles:
 
     @classmethod
     def of_folder(cls, folder: Path) -> OutputFiles:
-        """Return those of the output directory of `cosim run`."""
+        """Return the files that accompany the output directory of `cosim run`."""
         return cls(folder / _UNFINISHED_FOLDER, folder / LOCK_FILE)
 
     @classmethod
     def of_file(cls, file: Path) -> OutputFiles:
-        """Return those of the output file of `cosim simulate`."""
+        """Return the files that accompany the output file of `cosim simulate`."""
         return cls(file.with_name(f".{file.name}{_UNFINISHED_FOLDER}"), file.with_name(f".{file.name}{LOCK_FILE}"))
 
 
@@ -75,7 +75,7 @@ def writing_results(result: Result, folder: Path | None, shown: Path) -> Iterato
 
 
 def how_to_recover(result: Result, folder: Path, shown: Path, error: CosimError) -> str:
-    """Return the remedy of an error, and the command that writes the rows that were kept in a folder."""
+    """Return an instruction for the user: the remedy for an error, and the `cosim recover` command to call afterwards."""
     missing = len(result.time) * (len(result) + 1) * BYTES_PER_NUMBER - disk_usage(folder).free
     remedy = f"free about {max(1, round(missing / 1e6))} MB" if isinstance(error, OutputError) else "remove the cause"
     return f"{remedy}, then call `cosim recover {shown}`"

@@ -1,6 +1,6 @@
 """Input profiles: a component whose outputs are read from a table over time.
 
-The scenario puts input tables into a last stage of their own. Row n of the results therefore contains the profile at
+The scenario puts all input tables into a separate last stage. Row n of the results therefore contains the profile at
 communication point n, and every other component reads the profile at n in its step from n.
 """
 

@@ -10,7 +10,7 @@ The methods of a component are called in the order of the FMI Co-Simulation life
     { set_inputs, do_step, get_outputs }            once per step; set tunable parameters between steps
     terminate, free                                 free is always called exactly once, also after a failure
 
-Values are exchanged in typed arrays ("ports") that belong to the engine. A step converts, allocates and looks up nothing.
+Values are exchanged in typed arrays ("ports") that belong to the engine. A step makes no conversions, allocations or look-ups.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def count_scalars(variables: Iterable[Variable]) -> int:
 
 
 class StepResult(NamedTuple):
-    """Outcome of a step that did not simply reach its end time; `time_reached` in s."""
+    """Outcome of a step that ended early, needs event handling or requests termination; `time_reached` in s."""
 
     time_reached: float
     event_needed: bool = False
@@ -223,7 +223,7 @@ class Component(Protocol):
             step_size: Length of the step (s).
 
         Returns:
-            None if the end was reached and nothing else is to be reported.
+            None if the step reached its end, needs no event handling and requests no termination.
         """
 
     def get_outputs(self) -> None:

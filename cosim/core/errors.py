@@ -151,7 +151,7 @@ def abbreviate_names(names: Iterable[str], limit: int = 8) -> str:
 
 
 def join_alternatives(names: Iterable[str]) -> str:
-    """Return the name of the component a failure is attributed to, or "one of ..." if several come into question.
+    """Return the name of the component a failure is attributed to, or "one of ..." if several are possible.
 
     >>> join_alternatives(["uav"]), join_alternatives(["uav", "usv"])
     ('uav', 'one of uav, usv')

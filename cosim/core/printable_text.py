@@ -7,7 +7,7 @@ SPACES = "\t\u00a0\u202f\u3000"
 
 
 def escape_control_characters(text: str, keep: str = "") -> str:
-    r"""Return a text with line breaks, control and direction characters as escape sequences such as \x1b.
+    r"""Return a text with line breaks, control characters and direction marks as escape sequences such as \x1b.
 
     These characters could move the cursor of a terminal, change its title, reorder text or fake lines of a log.
 

@@ -16,7 +16,7 @@ _FORBIDDEN_CHARACTERS = re.compile("[\0\ud800-\udfff]")
 
 
 def text_problem(text: str) -> str:
-    r"""Return the reason why neither an FMU nor a file can hold a text; "" if they can.
+    r"""Return the reason why a text cannot be stored in an FMU or a file; "" if they can.
 
     >>> text_problem("a\0"), text_problem("a")
     ('the character U+0000 is not allowed', '')
@@ -28,7 +28,7 @@ def text_problem(text: str) -> str:
 
 
 def acceptable_text(text: str) -> str:
-    """Return a text, or what replaces it in further messages if `text_problem` refuses it."""
+    """Return a text, shortened and without forbidden characters if `text_problem` refuses it."""
     return _FORBIDDEN_CHARACTERS.sub(REPLACEMENT, text if len(text) <= MAX_TEXT_LENGTH else shorten(text))
 
 

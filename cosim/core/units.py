@@ -182,7 +182,7 @@ def multiply_units(units: Iterable[tuple[str, int]]) -> str:
     'm2/s'
 
     Args:
-        units: Pairs of unit and power. A unit that cannot be read is a factor of its own, in parentheses.
+        units: Pairs of unit and power. A unit that cannot be read becomes one factor, in parentheses.
 
     Returns:
         The product, "1" if all factors cancel out.

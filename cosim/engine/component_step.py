@@ -19,7 +19,7 @@ class ScheduledStep(NamedTuple):
 
 
 class StepFailure(NamedTuple):
-    """A step that stopped at call `call_index` with `status`; None: it did not stop, but changed the floating-point mode."""
+    """Call `call_index` of a step that returned `status`; a status None means that it changed the floating-point mode."""
 
     step: ScheduledStep
     call_index: int

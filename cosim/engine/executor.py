@@ -1,4 +1,4 @@
-"""Stepping of a plan, common to the pure Python executor and the native one, whose results are bit-identical."""
+"""Common base of the pure Python and the native executor, which step a plan with bit-identical results."""
 
 from __future__ import annotations
 

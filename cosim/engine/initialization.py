@@ -1,4 +1,4 @@
-"""From new components to step mode; in initialization mode, outputs are passed to inputs until they converge."""
+"""Initialization of components up to step mode; outputs are passed to connected inputs until they converge."""
 
 from __future__ import annotations
 

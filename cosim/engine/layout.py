@@ -1,4 +1,4 @@
-"""Memory layout of the values of all components: one buffer, in it one array per dtype, in each array a part per component."""
+"""Memory layout of the values of all components: a buffer with one array per dtype, each with one part per component."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Layout:
     """Arrays of all components.
 
     Attributes:
-        buffer: bytes that all numeric arrays share; strings and binaries are objects in an array of their own.
+        buffer: bytes that all numeric arrays share; strings and binaries are objects in a separate array.
         arrays: one array per dtype.
         ports: each component's variables and its parts of the arrays.
         positions: position of every scalar.

@@ -127,7 +127,7 @@ class NativeExecutor(Executor):
         self._program.run(first, count, *(coefficients or (grid.time_at(first), 0.0, 1.0)))
 
     def _steps_per_call(self, first: int) -> int:
-        """Return the most macro steps of a call; the first call only measures, then the next one packs the steps."""
+        """Return the largest number of macro steps in one call; the first call is short and measures the durations of steps."""
         measured = first >= self._program_start + _native.MEASURED_STEPS
         return MAX_STEPS_PER_CALL if measured else _native.MEASURED_STEPS
 

@@ -95,7 +95,7 @@ class ParallelSteps:
         return bool(self._candidates)
 
     def find_candidates(self, phases: Sequence[Phase], schedule: Schedule) -> None:
-        """Find the phases with independent steps in C, and schedule a step that stands for them."""
+        """Find the phases with independent steps in C, and schedule one parallel step for each of these phases."""
         for index, (phase, steps) in enumerate(zip(phases, schedule.phases, strict=True)):
             group = ParallelGroup([step for step in steps if releases_gil(step)], phase.parallel)
             if phase.parallel and len(group.exclusive_groups()) > 1:

@@ -1,8 +1,8 @@
 """Compilation of a system into a flat plan: phases of transfers and steps on shared arrays.
 
 A stage becomes a phase: all its inputs are set first, then its components step. The order within a stage therefore has no
-influence (Jacobi); one component per stage is Gauss-Seidel. A group (nested system) gets its inputs from outside with its stage
-and then runs phases of its own.
+influence (Jacobi); one component per stage is Gauss-Seidel. A group (nested system) gets its outer inputs with its stage and
+then runs its own phases.
 """
 
 from __future__ import annotations

@@ -89,7 +89,7 @@ class Recorder:
         )
 
     def write_header(self, call_names: Sequence[tuple[str, str]]) -> None:
-        """Describe the rows for other processes; only rows that are saved for them need that."""
+        """Write a description of the rows for other processes; this recorder keeps its rows private and writes none."""
 
     def start_chunk(self) -> None:
         """Add a chunk to the row store; call it when the current chunk is full."""

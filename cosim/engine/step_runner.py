@@ -1,4 +1,4 @@
-"""Execution of scheduled steps from Python, and what a call's status or result means for the run."""
+"""Execution of scheduled steps from Python, and interpretation of the status or result of each call."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ class ThreadPool:
 
 
 def _wait_for(futures: Sequence[Future[Result]]) -> None:
-    """Wait until all calls have ended, and only then raise a KeyboardInterrupt that came meanwhile."""
+    """Wait until all calls have ended, and only then raise a KeyboardInterrupt that was received while waiting."""
     interrupt: KeyboardInterrupt | None = None
     while not all(future.done() for future in futures):
         try:

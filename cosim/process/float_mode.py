@@ -48,14 +48,14 @@ class FloatEnvironment:
         ctypes.PyDLL(None).fegetenv(self._state)
 
     def restore(self) -> bool:
-        """Restore the mode if it was changed; return whether it was."""
+        """Restore the mode if it was changed; return whether it was changed."""
         if not is_changed() and enabled_traps() == self._traps:
             return False
         self.reinstate()
         return True
 
     def reinstate(self) -> None:
-        """Set the mode, without a check of the present one."""
+        """Set the mode without checking the present mode."""
         ctypes.PyDLL(None).fesetenv(self._state)
 
 

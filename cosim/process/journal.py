@@ -106,7 +106,7 @@ class Journal:
         return self[PHASE] in _PHASES and self[CSV_UPDATE] in (0, 1) and -1 <= deadline <= _MAX_DEADLINE and min(counts) >= 0
 
     def exclude_from_forks(self) -> None:
-        """Let each later copy of this process end at its first access (Linux); see `process.forks`."""
+        """Make later forks of this process crash at their first access to the journal (Linux); see `process.forks`."""
         if hasattr(mmap, "MADV_DONTFORK"):
             self.memory.madvise(mmap.MADV_DONTFORK)
 
@@ -239,7 +239,7 @@ def as_component_error(component: str, function: str, time: float = math.nan) ->
 
 @contextmanager
 def suspending_deadline() -> Iterator[None]:
-    """Suspend the deadline: the time spent in this block is not a component's."""
+    """Suspend the deadline during this block, because no component is running in it."""
     journal = _current
     if journal is None:
         yield

@@ -122,7 +122,7 @@ def waiting_for_lock(path: Path) -> Iterator[None]:
 
 
 def _open_locked(path: Path, wait: bool = False) -> int:
-    """Open and lock a file that exists: its former holder may remove it between opening and locking."""
+    """Create, open and lock a file; repeat this if its former holder removed the file before it was locked."""
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
         try:

@@ -28,7 +28,7 @@ _RESERVED_DESCRIPTORS = 32
 _SIGACTION_SIZE = 512  # more than any platform's struct sigaction, which begins with the handler
 _POINTER_SIZE = ctypes.sizeof(ctypes.c_void_p)
 
-#: held while foreign code may change the state of the process, so that threads run foreign code in turns
+#: held while foreign code may change the state of the process, so that only one thread at a time runs foreign code
 _lock = threading.RLock()
 #: states at the begin of the nested blocks of the thread that holds the lock
 _saved_states: list[ProcessState] = []
@@ -75,7 +75,7 @@ def restoring_process_state(component: str) -> Iterator[None]:
 
 @contextmanager
 def exclusive_process_state() -> Iterator[None]:
-    """Wait until no other thread is in such a block or in `restoring_process_state`, and keep other threads out."""
+    """Exclude other threads from this block and from `restoring_process_state` while the block runs."""
     with _lock:
         yield
 
@@ -238,7 +238,7 @@ def _has_free_descriptor() -> bool:
 
 
 def _release_descriptors(had_free: bool) -> str | None:
-    """Release the reserved descriptors if there are no others."""
+    """Release the reserved descriptors if no others are free."""
     if not had_free or _has_free_descriptor():
         return None
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -260,7 +260,7 @@ class _Attribute(NamedTuple):
 
 
 def _compared(name: str, read: Callable[[], Any], write: Callable[[Any], object]) -> _Attribute:
-    """Return an attribute that has changed if its value differs, and is restored by `write`."""
+    """Return an attribute that is compared by its value and restored by `write`."""
 
     def restore(value: Any) -> str | None:
         if read() == value:

@@ -237,7 +237,7 @@ class _Supervisor:
 
 
 def is_stopped(process: int) -> bool:
-    """Return whether a process is stopped (SIGSTOP); False where the system does not tell."""
+    """Return whether a process is stopped (SIGSTOP); False on systems that do not report it."""
     try:
         return Path(f"/proc/{process}/stat").read_text().rpartition(") ")[2].startswith("T")
     except OSError:

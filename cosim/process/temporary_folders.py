@@ -22,7 +22,8 @@ class LockedFolder:
     """New temporary folder, removed by `cleanup` or at the end of the process.
 
     The process holds a lock on the folder, which the operating system releases even if the process is killed. An unlocked folder
-    is therefore abandoned. Process ids would not do: they are reused, and another container may share /tmp. Abandoned folders are
+    is therefore abandoned. Process ids would not be sufficient, because they are reused, and another container may share /tmp.
+    Abandoned folders are
     removed before the new one is created.
 
     Attributes:

@@ -166,7 +166,7 @@ def _forward_path(start: Box, end: Box) -> tuple[str, float, float]:
 
 
 def _feedback_path(start: Box, end: Box, number: int, bottom: float) -> tuple[str, float, float]:
-    """Return a path from a box to one further left, along a lane of its own below all boxes, and its middle (px)."""
+    """Return a path from a box to one further left, along a separate lane below all boxes, and its middle (px)."""
     aside, lane = 12 + 4 * (number % 6), bottom - GAP_Y / 2 + LANE * (number + 1)
     x1, y1, x2, y2 = start.x + WIDTH, start.y + 0.75 * HEIGHT, end.x, end.y + 0.75 * HEIGHT
     right, left = x1 + aside, x2 - aside

@@ -1,4 +1,4 @@
-"""Drawing of the figures of a run in processes of their own, prepared while the simulation runs."""
+"""Drawing of the figures of a run in separate processes, prepared while the simulation runs."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ _EXCEPTION = 1
 class DrawingProcess:
     """Process that imports matplotlib and the figure functions during a simulation, and draws the figures after it.
 
-    Create it before any FMU is loaded: then it holds no foreign code of the simulation. It draws each figure in a process of its
-    own. Leaving its context ends it.
+    Create it before any FMU is loaded, so that it contains no code of FMUs. It draws each figure in a separate process. It ends
+    when its context is left.
 
     Args:
         load_figures: Imports the figure functions; called in the process.
@@ -115,7 +115,7 @@ def _run_process(load_figures: Callable[[], Iterable[Figure]], requests: IO[byte
 
 
 def _load(load_figures: Callable[[], Iterable[Figure]]) -> Sequence[Figure]:
-    """Import the figure functions and what drawing needs; without success, the simulation process draws and reports why."""
+    """Import the figure functions and matplotlib; after a failure, the simulation process draws and reports the error."""
     with suppress(Exception):
         if figures := list(load_figures()):
             draw_nothing()
@@ -135,7 +135,7 @@ def _serve(request: Mapping[str, Any], figures: Sequence[Figure], answers: IO[by
 
 
 def _fork_drawing(result: Result, figure: Figure, folder: Path, pictures: Path) -> int:
-    """Draw a figure to NAME.png and NAME.svg in a process of its own; return its id."""
+    """Draw a figure to NAME.png and NAME.svg in a separate process; return the process id."""
     process = os.fork()
     if process:
         return process

@@ -44,7 +44,7 @@ def write_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Iter
     Args:
         result: The run.
         outcomes: The outcomes of the scenario's checks.
-        figures: Name and SVG text of each figure; read when the rest of the page is ready, so they may still be being drawn.
+        figures: Name and SVG text of each figure; read when the rest of the page is ready, so drawing them may end later.
         path: The HTML file to write.
 
     Raises:

@@ -12,7 +12,7 @@ from .files import iterate_chunks
 
 #: number of rows that are examined at a time
 _CHUNK_ROWS = 1 << 14
-#: number of signals with a warning of their own
+#: number of signals with a separate warning
 _MAX_WARNINGS = 20
 
 

@@ -34,7 +34,7 @@ class KpiError(InputError, KeyError):
 class Kpis(dict[str, float | int | bool]):
     """Values of KPIs by name, such as `result.kpis["landing.lateral_error"]`.
 
-    An unknown name raises KpiError (an InputError and a KeyError), whose message contains the most similar name.
+    An unknown name raises KpiError (an InputError and a KeyError). Its message contains the most similar name.
     """
 
     def __missing__(self, name: str) -> float | int | bool:

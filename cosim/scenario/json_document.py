@@ -169,7 +169,7 @@ class _JsonParser:
         return text, end
 
     def clean(self, text: str, path: JsonPath) -> str:
-        """Return the acceptable part of a text; what is not acceptable is a problem of the value or key at `path`."""
+        """Return the permitted part of a text; add a problem of the value or key at `path` if another part exists."""
         if message := text_problem(text):
             self.problem(path, message)
         return acceptable_text(text)

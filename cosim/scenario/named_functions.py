@@ -74,7 +74,7 @@ def signal_problems(root: Node, kind: str, signals: Collection[str]) -> Iterator
     """Yield a problem for every argument of a KPI or figure that should name a recorded signal and does not.
 
     The parameters are recognized by their annotations: `Signal` is the name of a signal, `Prefix` that of a group of signals
-    (see `cosim.results.kpi`). Functions that have a problem of their own are skipped.
+    (see `cosim.results.kpi`). Functions for which `function_problem` finds a problem are skipped.
 
     Args:
         root: The scenario.

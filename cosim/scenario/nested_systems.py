@@ -246,7 +246,7 @@ def _set_pointer(document: Document, pointer: str, value: Any) -> list[Problem]:
 
 
 def _text_problems(value: Any) -> Iterator[str]:
-    """Yield what is wrong with the texts in a JSON value."""
+    """Yield the problems of the texts in a JSON value."""
     if isinstance(value, str) and (problem := text_problem(value)):
         yield problem
     elif isinstance(value, dict | list):

@@ -53,7 +53,7 @@ class ComponentSpec(Spec):
     arguments: dict[str, Any] = Field(default={}, description="arguments of the constructor; only for Python components")
     parameters: dict[str, Value] = Field(default={}, description="values of parameters and start values, by variable name")
     period: Period | None = Field(default=None, description="time between two steps (s); default: every macro step")
-    isolation: Literal["fmu"] | None = Field(default=None, description="run the FMU in a process of its own")
+    isolation: Literal["fmu"] | None = Field(default=None, description="run the FMU in a separate process")
 
     @model_validator(mode="after")
     def _one_source(self) -> ComponentSpec:

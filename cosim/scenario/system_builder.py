@@ -198,7 +198,7 @@ class SystemBuilder:
         return node.full_name(name)
 
     def _periods(self, node: Node, inherited: Fraction | None = None) -> Iterator[tuple[str, Fraction]]:
-        """Yield (full name, period in s) of all components with a period of their own or of a system around them."""
+        """Yield (full name, period in s) of all components that have a period themselves or through an enclosing system."""
         for name, spec in node.spec.components.items():
             period = spec.period or inherited
             if name in node.children:

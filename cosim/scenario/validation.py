@@ -88,7 +88,7 @@ def _remove_invalid(kind: type[BaseModel], value: Any, paths: Iterable[tuple[str
 
 
 def _smallest_meaningful_part(path: tuple[str | int, ...]) -> tuple[str | int, ...]:
-    """Return the path of what has no meaning without the value at `path`: all stages, or the owner of an argument."""
+    """Return the path of the part that must be removed with the value at `path`: `algorithm`, or the owner of an argument."""
     if path[0] == "algorithm":
         return path[:1]
     owner = 1 if path[0] == "scene" else 2
@@ -145,7 +145,7 @@ def _group_problem(kind: type[BaseModel], document: Document, group: Sequence[tu
 
 
 def _may_mean(key: str, required: str) -> bool:
-    """Return True if an unknown or unreadable key probably stands for a required one."""
+    """Return True if an unknown or unreadable key is probably a misspelt required key."""
     return REPLACEMENT in key or f'"{required}"' in did_you_mean(key, (required,))
 
 
@@ -212,7 +212,7 @@ def _known_keys(kind: Any, path: Sequence[str | int]) -> list[str]:
 
 
 def _child_type(kind: Any, key: str | int) -> Any:
-    """Return the annotation of what a key or index of a value of type `kind` holds, or None if it is unknown."""
+    """Return the annotation of the value at a key or index of a value of type `kind`; None if it is unknown."""
     if model := _model_type(kind):
         return next((f.annotation for n, f in model.model_fields.items() if key in (n, f.alias)), None)
     for option in _union_members(kind):

@@ -59,7 +59,7 @@ class Wiring:
             self._add(_Candidate(Connection(output, Endpoint(*target), 0, where), True))
 
     def excuse(self, node: Node, name: str) -> None:
-        """Do not report that the inputs that a name refers to have no output: another problem is the reason."""
+        """Do not report missing outputs for the inputs that a name refers to, because another problem is the reason."""
         with suppress(UnknownNameError):
             for target in resolve_name(node, name, ("inputs",), include_inner=True):
                 if target.component in self._components:

@@ -65,12 +65,12 @@ class StudyFile(Generic[S]):
         return self.document.where(paths[-1]) + (part if paths[-1][-1] == name else "") if paths else ""
 
     def _is_setting(self, path: tuple[str | int, ...], name: str, settings: Mapping[str, Any]) -> bool:
-        """Return whether a path in this file makes a setting: as a key with its value, or as a string of "set"."""
+        """Return whether a path in this file defines a setting, as a key with its value or as a string of "set"."""
         value = _value_at(self.document.value, path)
         return value == name or (path[-1] == name and value == settings.get(name))
 
     def _setting_paths(self) -> Iterable[tuple[str | int, ...]]:
-        """Yield the paths in this file that may make settings, in file order."""
+        """Yield the paths in this file that may define settings, in file order."""
         for path in sorted(self.document.offsets, key=lambda path: self.document.offsets[path]):
             if path and ("set" in path or "settings" in path or "levels" in path or "cases" in path):
                 yield path

@@ -28,7 +28,7 @@ _UNARY_OPERATORS: Mapping[type[ast.unaryop], Callable[[Any], Any]] = {ast.USub: 
 
 
 class AllowedFunction(NamedTuple):
-    """Function of an expression: the numbers of arguments it takes, and those in words."""
+    """Function of an expression: the permitted numbers of arguments, and a text that states them."""
 
     call: Callable[..., float]
     counts: range = range(1, 2)

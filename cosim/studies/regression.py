@@ -27,7 +27,7 @@ EXPECTATION_KEYS = ("checks", "reference")
 
 
 def has_keys(file: Path, *groups: Sequence[str]) -> bool:
-    """Return whether a JSON file has at least one key of each group; an unreadable file counts, since its run reports why."""
+    """Return whether a JSON file has a key of each group; True for an unreadable file, because its run reports the error."""
     try:
         with open_text(file, encoding="utf-8-sig") as stream:
             content = json.load(stream)
@@ -57,7 +57,7 @@ class RegressionOutcome:
 
 @dataclass(frozen=True)
 class Regression:
-    """Regression test of a scenario file with an output directory; with `update`, its reference is written anew."""
+    """Regression test of a scenario file with an output directory; with `update`, its reference is written again."""
 
     file: Path
     directory: Path

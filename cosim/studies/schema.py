@@ -75,7 +75,7 @@ class StudySpec(Spec):
     deadline: float | None = Field(None, gt=0, description="wall time that a run may take (s)")
 
     def run_counts(self) -> dict[CountPath, int]:
-        """Return the numbers whose product is the largest number of runs, by the paths that they result from."""
+        """Return the factors of the largest number of runs, by the paths of the entries that determine them."""
         raise NotImplementedError
 
     @property

@@ -205,7 +205,8 @@ def report(comparison: Comparison, sizes: Sequence[int], rounds: int) -> str:
     """Return the table with a description of machine and load."""
     load = os.getloadavg()[0]
     lines = table({size: comparison.measure(size, rounds) for size in sizes}, comparison.versions)
-    lines += ["", f"CPU microseconds per macro step (times the limit); median of {rounds} alternating rounds."]
+    lines += ["", "Each cell contains CPU microseconds per macro step, and in parentheses the ratio to the C limit "]
+    lines[-1] += f"(median of {rounds} alternating rounds)."
     machine = f"CPython {platform.python_version()} on {os.cpu_count()} processors"
     lines += [f"{machine}; load average {load:.2f} at the start, {os.getloadavg()[0]:.2f} at the end."]
     if comparison.absent:

@@ -1,4 +1,4 @@
-"""Cost of FMUs in processes of their own: per FMU and step, at start, and in memory.
+"""Cost of FMUs in separate processes: per FMU and step, at start, and in memory.
 
 Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_isolated_fmus.py
 """

@@ -1,4 +1,4 @@
-"""Figures of a supervised run, drawn in processes of their own that are prepared while it simulates."""
+"""Figures of a supervised run, drawn in separate processes that are prepared while it simulates."""
 
 import json
 from pathlib import Path

@@ -62,7 +62,7 @@ class LagProject:
         return self.last_result
 
     def start_command(self, *words: object) -> subprocess.Popen[str]:
-        """Start a command in a process of its own."""
+        """Start a command in a separate process."""
         command = [sys.executable, "-m", "cosim", *map(str, words)]
         return subprocess.Popen(command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 

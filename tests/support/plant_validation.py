@@ -44,16 +44,18 @@ MODELS = (
 
 INTRODUCTION = """# Validation
 
-Comparison of every plant model with an independent reference, with the values that the tests measured. This page is written by
+This page compares every plant model with an independent reference. It contains the values that the tests measured. The page is
+written by this command:
 
 ```text
 pytest tests -m "" --validation docs/validation.md
 ```
 
-Do not edit it by hand. A comparison that exceeds its limit fails its test. `tests/test_validation_document.py` fails if this page
-and the tests list different comparisons. Speed is documented in [performance.md](performance.md).
+Do not edit this page by hand. A comparison that exceeds its limit fails its test. `tests/test_validation_document.py` fails if
+this page and the tests list different comparisons. Speed is documented in [performance.md](performance.md).
 
-* *Reference* and *measured* are empty if the quantity is itself a deviation. Of several values the worst one is listed.
+* *Reference* and *measured* are empty if the quantity is itself a deviation. If a
+  quantity has several values, the worst one is listed.
 * *Deviation* is absolute, or relative to the reference if it is marked "rel."; values below 1e-12 are rounding errors. *Exact*
   means equal to the last bit.
 * *DOP853* is the eighth-order Runge-Kutta method of SciPy with tolerances of 1e-11 or less, applied to an independent

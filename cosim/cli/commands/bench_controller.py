@@ -86,7 +86,7 @@ def command(
 
 
 def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], folder: Path, settings: Mapping[str, Any]) -> int:
-    """Examine the candidate and write the scenarios with it; called in a child process, since it runs the candidate's code."""
+    """Examine the candidate and write the scenarios that use it; runs in a child process, since it executes foreign code."""
     from ...results.files import write_json
     from ...studies.controller_bench.candidate import interface_problems, parse_source, read_interface
     from ...studies.controller_bench.role import read_role

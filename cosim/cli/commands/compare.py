@@ -58,7 +58,7 @@ def _read_result(path: Path) -> Result:
 
 
 def _is_scenario(path: Path) -> bool:
-    """Return whether a path is a JSON file, or the name of a shipped scenario: a bare name of no existing file."""
+    """Return whether a path is a JSON file, or a name without a folder that is no existing file (a shipped scenario)."""
     return path.suffix == ".json" or (path.name == str(path) and not path.suffix and not path.exists())
 
 

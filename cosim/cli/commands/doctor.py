@@ -1,4 +1,4 @@
-"""`cosim doctor`: report on packages, tools and sandboxes; everything reported has been looked up or tried."""
+"""`cosim doctor`: report on packages, tools and sandboxes; each reported item is tested on this machine."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def command(scenarios: tuple[Path, ...], update: bool, junit: Path | None, outpu
     """Run all scenarios that have checks or a reference, and compare their results with these.
 
     SCENARIO is a file or the name of a shipped scenario; DIR stands for its files *.json; default: the folder scenarios/. Each
-    scenario runs as by `cosim run`. --update writes the references: the signals matched by the patterns of their tolerances,
+    scenario runs as with `cosim run`. --update writes the references: the signals matched by the patterns of their tolerances,
     with as few rows as necessary, and a JSON file with their origin. A run that fails its checks does not become a reference.
     Exit code 0: all passed; 1: a component failed; 2: a scenario was refused; 3: a check or comparison failed.
     """
@@ -93,7 +93,7 @@ def check_unique_names(files: Iterable[Path]) -> None:
 
 
 def run_in_parallel(work: Sequence[Callable[[], T]], jobs: int) -> Iterator[T]:
-    """Call functions on `jobs` threads and yield what they return, in order; each mostly waits for a child process.
+    """Call functions on `jobs` threads and yield their return values, in order.
 
     After an interrupt, functions that have not started are not called.
     """

@@ -217,7 +217,7 @@ def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeepe
 
 
 def _warn_overwriting(folder: Path, scenario: Path) -> None:
-    """Warn if results of another scenario file in this folder are replaced: a copy may have kept its name."""
+    """Warn if results of another scenario file with the same name are replaced in this folder."""
     try:
         former = parse_object((folder / "run.json").read_text(encoding="utf-8"))["scenario_file"]
     except (OSError, ValueError, LookupError):  # no earlier run, or an unreadable run.json

@@ -70,7 +70,7 @@ def _print_best(tuning: Tuning, best: Trial, folder: Path) -> None:
 
 
 def _failure_text(tuning: Tuning, best: Trial) -> str:
-    """Return why not even the best point is feasible."""
+    """Return the reason why even the best point is not feasible."""
     if best.failure:
         return f"a run failed at every point; at the first one: {best.failure}"
     if not best.value < math.inf:

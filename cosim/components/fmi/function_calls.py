@@ -63,7 +63,7 @@ class FunctionCaller:
         return result
 
     def restore_float_mode(self, function: str) -> None:
-        """Set the default floating-point mode again if the last call, of `function`, changed it."""
+        """Restore the default floating-point mode if the last call, which was a call of `function`, changed it."""
         if float_mode.is_changed() or float_mode.enabled_traps():
             self._float_mode.restore(self.name, function, self._current_time.value)
 

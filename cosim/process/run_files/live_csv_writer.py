@@ -34,7 +34,7 @@ class _CsvCopy:
 
 
 class LiveCsvWriter:
-    """Writer of the journal's CSV file; does without NumPy, which is slow to import."""
+    """Writer of the CSV file that the journal names; it avoids NumPy, which is slow to import."""
 
     def __init__(self, journal: Journal):
         self._journal = journal
@@ -90,7 +90,7 @@ class LiveCsvWriter:
         self._next_update = time.monotonic() + (UPDATE_INTERVAL if self._lines.row_count == rows else 0)
 
     def _synchronize_back(self, target: IO[bytes]) -> None:
-        """Copy to the back copy what only the front copy has, and undo an interrupted append."""
+        """Append the lines that only the front copy has to the back copy, and undo an interrupted append."""
         size = min(self._back.size, self._front.size)
         target.truncate(size)
         target.seek(size)

@@ -98,7 +98,7 @@ class FileRowStore(RowStore):
 class FileMapping:
     """Part of a file mapped to memory without an open descriptor, which foreign code in this process could truncate.
 
-    `mmap.mmap` keeps one. `np.asarray` returns the bytes as an array.
+    `mmap.mmap` would keep a descriptor open. `np.asarray` returns the bytes as an array.
     """
 
     def __init__(self, file: int, begin: int, size: int, writable: bool):

@@ -24,8 +24,8 @@ def clear_environment() -> None:
 
     HOME names the folder for temporary files afterwards.
 
-    Values remain readable in memory otherwise: in the block that the kernel made at the start of the program, in copies of the
-    C library, and in bytes objects of `os.environ`.
+    Removed but not overwritten values would remain readable in memory: in the block that the kernel created at the start of the
+    program, in copies of the C library, and in bytes objects of `os.environ`.
     """
     kept = {name: os.environ[name] for name in KEPT_VARIABLES if name in os.environ} | {"HOME": tempfile.gettempdir()}
     library = ctypes.CDLL(None)

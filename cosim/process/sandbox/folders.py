@@ -31,11 +31,11 @@ _METADATA_SUFFIXES = (".dist-info", ".egg-info", ".libs")
 def interpreter_folders() -> tuple[Path, ...]:
     """Return the existing folders and files of this interpreter, its packages and shared libraries.
 
-    Other folders of `sys.path` are included only if they hold nothing but packages. The folder of a script, the current folder
-    and a checkout often hold more.
+    Other folders of `sys.path` are included only if they contain only packages. The folder of a script, the current folder and a
+    checkout often contain other files.
 
     Raises:
-        InputError: A folder in PYTHONPATH holds more than packages.
+        InputError: A folder in PYTHONPATH contains other files than packages.
     """
     installed = [sys.prefix, sys.base_prefix, site.getusersitepackages()]
     paths = [*map(Path, (*_SYSTEM_PATHS, *installed)), *_folders_of_packages(installed), package_folder()]

@@ -1,6 +1,6 @@
-"""Landlock: a Linux process restricts its own and its children's access to files, without root privileges.
+"""Restriction of the file access of a Linux process and its children by Landlock, without root privileges.
 
-Three system calls, by number (the same on every architecture); constants from linux/landlock.h.
+The three system calls are made by number, which is the same on every architecture. The constants are from linux/landlock.h.
 """
 
 from __future__ import annotations

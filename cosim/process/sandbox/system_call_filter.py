@@ -1,4 +1,4 @@
-"""System call filter (Linux seccomp): a process and its threads give up calls that reach beyond their own files and memory.
+"""System call filter (Linux seccomp) that denies a process the calls that reach beyond its own files and memory.
 
 The filter is a program of the Berkeley Packet Filter (BPF), which the kernel executes at each system call. Constants are from
 linux/filter.h, linux/seccomp.h and linux/audit.h, numbers of calls from the tables of both architectures.
@@ -77,7 +77,7 @@ class Instruction(NamedTuple):
 
 
 class Condition(NamedTuple):
-    """Condition for a call: 32 bits of an argument, under a mask, have one of the values (or none of them)."""
+    """Condition for a call: an argument (32 bits), combined with a mask, equals one of the values (or none of them)."""
 
     argument: int
     values: Sequence[int]
@@ -87,7 +87,7 @@ class Condition(NamedTuple):
 
 
 def is_available() -> bool:
-    """Return whether this system supports the filter, and the filter this processor."""
+    """Return whether this system supports the filter, and whether the filter supports this processor."""
     if sys.platform != "linux" or os.uname().machine not in _ARCHITECTURES:
         return False
     # a filter at no address is refused with EFAULT where filters are supported

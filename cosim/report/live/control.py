@@ -166,7 +166,7 @@ class LiveControl:
         self._record_event(n, full_name, value)
 
     def _record_event(self, n: int, name: str, value: Any) -> None:
-        """Remember the event and write it to the files of the run, so that it is known after a crash."""
+        """Store the event and write it to the files of the run, so that it survives a crash."""
         self._events.append({"time": self._event_time(n), "set": {name: value}})
         journal = current_journal()
         if journal and journal.folder:

@@ -53,7 +53,7 @@ class RowFeed:
         return table.tobytes()
 
     def _rows(self, numbers: range) -> np.ndarray:
-        """Map rows into memory: several threads read at the same time, which a shared file position would not allow."""
+        """Map rows into memory, because threads that read at the same time cannot share one file position."""
         size = self._dtype.itemsize
         mapped = np.memmap(self._file, self._dtype, "r", numbers.start * size, (numbers[-1] - numbers.start + 1,))
         return mapped[:: self.stride]

@@ -249,5 +249,5 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 def _is_flat(value: Any) -> bool:
-    """Return whether a JSON value is no object, and no list of lists or objects, as are all arguments of commands."""
+    """Return whether a JSON value is a scalar or a list of scalars, as all arguments of commands are."""
     return not any(isinstance(part, dict | list) for part in (value if isinstance(value, list) else [value]))

@@ -6,7 +6,8 @@ reference. Hence
 
     lower(t) = min r(s) - half_width, upper(t) = max r(s) + half_width over all s of the reference with |s - t| <= time.
 
-Two rows with the same time are a jump, whose whole height belongs to the reference. This is the tube of funnel and pyfunnel
+Two rows with the same time are a jump, and the reference then includes all values between the two rows. This is the tube of
+funnel and pyfunnel
 (Lawrence Berkeley National Laboratory) without their tolerance relative to the local value.
 """
 

@@ -68,7 +68,7 @@ def compare_values(value: Number | None, other: Number | None, sense: str | None
 
 
 def merge_senses(declared: Mapping[str, str], checks: list[Mapping[str, Any]]) -> dict[str, str]:
-    """Return which values of each KPI are better: as its function declares, else by its check ("max": lower is better)."""
+    """Return the sense of each KPI: as its function declares it, else derived from its check ("max": lower is better)."""
     of_checks = {
         check["kpi"]: "lower" if "max" in check else "higher"
         for check in checks

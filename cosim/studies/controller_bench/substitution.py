@@ -74,7 +74,7 @@ class ControllerSubstitution:
     # -- systems -------------------------------------------------------------------------------------------------------
 
     def _substitute_system(self, value: Mapping[str, Any], folder: Path, prefix: str) -> tuple[dict[str, Any], NameFilter]:
-        """Return a system with the candidate in it, and a filter of the names that still exist."""
+        """Return a system that contains the candidate, and a filter of the names that exist in it."""
         filters: dict[str, NameFilter] = {}
         components = {
             name: self._substitute_component(spec, folder, f"{prefix}{name}", name, filters)
@@ -110,7 +110,7 @@ class ControllerSubstitution:
         return {key: value for key, value in spec.items() if key not in (kind, "isolation")} | {"system": str(changed)}
 
     def _substitute_nested(self, file: Path, full_name: str) -> tuple[Path, NameFilter] | None:
-        """Write a changed nested system; return its path and the filter of its names, or None if no component has the role."""
+        """Write a nested system with the candidate; return its path and name filter, or None if no component has the role."""
         before = len(self.replaced_components)
         value, known = self._substitute_system(read_document(file).value, file.parent, f"{full_name}.")
         if len(self.replaced_components) == before:
@@ -127,7 +127,7 @@ class ControllerSubstitution:
         return path, known_outside
 
     def _prune_ports(self, ports: Mapping[str, Any], known: NameFilter) -> tuple[dict[str, Any], set[str]]:
-        """Return the ports that still lead to a variable, and the names of those that do not."""
+        """Return the ports that lead to a `known` variable of the changed system, and the names of the removed ports."""
         remaining: dict[str, dict[str, Any]] = {kind: {} for kind in ports}
         lost = set()
         for kind, named in ports.items():

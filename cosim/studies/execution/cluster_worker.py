@@ -29,7 +29,7 @@ class StudyPackage:
         identity: fingerprint of the cosim that the worker must have.
         scenario: path of the scenario's file among `files`.
         files: content hash (SHA-256) of each file by its path.
-        deadline: wall time that a run may take (s); None: any.
+        deadline: largest wall time of a run (s); None: no limit.
     """
 
     digest: str

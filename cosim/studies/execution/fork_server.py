@@ -2,7 +2,7 @@
 
 It imports all modules that runs need, loads the scenario once, unpacks its FMUs and calls the function `warm` of component
 classes that have one. It never loads a library of an FMU and never starts a thread. For every file descriptor that it receives,
-it forks a worker process. A worker handles one job at a time, each in a child process of its own.
+it forks a worker process. A worker handles one job at a time, each in a separate child process.
 """
 
 from __future__ import annotations

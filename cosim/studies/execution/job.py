@@ -78,7 +78,7 @@ class StudyContext:
     Attributes:
         scenario: the scenario's file.
         root: folder of all files that the runs need; messages show paths relative to it.
-        deadline: wall time that a run may take (s); None: any.
+        deadline: largest wall time of a run (s); None: no limit.
         fmus: paths below `root` of the FMUs that the runs use.
     """
 

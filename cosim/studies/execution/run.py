@@ -1,4 +1,4 @@
-"""One run of a study in a supervised child process of its own."""
+"""One run of a study in a separate, supervised child process."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def supervised_check(context: StudyContext, job: Job, fmu_files: FmuFiles) -> li
 
 
 def _run_reporting_failure(reply: IO[str], work: Callable[[], None]) -> int:
-    """Call `work` and return an exit code; the reply to an exception is its text."""
+    """Call `work` and return an exit code; write the text of an exception to `reply`."""
     try:
         work()
         return 0
@@ -168,7 +168,7 @@ def _make_record(context: StudyContext, job: Job, outcome: SupervisedOutcome, re
 
 
 def _failure_cause(context: StudyContext, failure: ComponentError) -> str:
-    """Return the cause of a failure; a missed deadline has the same text wherever the run was then."""
+    """Return the cause of a failure; the text for a missed deadline does not name the present call."""
     if context.deadline and f"signal {signal.SIGALRM:d} " in failure.reason:
         return f"the run did not end within {context.deadline:g} s"
     return str(failure)

@@ -150,7 +150,7 @@ class _ForkServer:
 class WorkerPool:
     """Pool of worker processes for the runs of a study.
 
-    Several threads may call it at a time; each of them gets a worker of its own. Killed workers and a killed fork server are
+    Several threads may call it at the same time; each of them gets a separate worker. Killed workers and a killed fork server are
     replaced.
     """
 

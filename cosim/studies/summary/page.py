@@ -91,7 +91,7 @@ def _level_summary(design: Design, number: int) -> str:
 
 
 def _write_map(sweep: Sweep, map_: SuccessMap, folder: Path) -> dict[str, Any]:
-    """Write a map to its files; return its SVG, whose cells are links, and its width (in)."""
+    """Write a map to its files; return its SVG with links in the cells, and its width (in)."""
     figure = draw_map(map_, lambda cell: _cell_link(sweep, cell, folder))
     save_figure(figure, folder / f"{map_.name}.png")
     text = figure_to_svg(figure).replace(' target="_blank"', "")

@@ -71,7 +71,7 @@ class Rising(Component):
 
 
 def simulated(components, wires, record, stop, events=()):
-    """Every component in a stage of its own, from the first to the last."""
+    """Every component in a separate stage, from the first to the last."""
 
     def end(name):
         component, _, slot = name.partition(".")

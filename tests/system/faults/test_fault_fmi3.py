@@ -1,4 +1,4 @@
-"""Faults that exist in FMI 3.0 only: early return, events, a time of its own at the end of a step, arrays, tokens."""
+"""Faults that exist in FMI 3.0 only: early return, events, a different time at the end of a step, arrays, tokens."""
 
 from __future__ import annotations
 

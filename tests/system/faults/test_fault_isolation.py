@@ -1,4 +1,4 @@
-"""FMUs in processes of their own: nothing that one of them does reaches the importer, which has no supervisor here."""
+"""FMUs in separate processes: nothing that one of them does reaches the importer, which has no supervisor here."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ needs_bubblewrap = pytest.mark.skipif(not find_available_sandboxes().bubblewrap,
 
 
 def run(runner: CommandRunner, folder: Path, components: dict[str, Any], *words: str, **more: Any) -> CommandResult:
-    """A run without supervisor whose components are in processes of their own."""
+    """A run without supervisor whose components are in separate processes."""
     conditions = {name: more.pop(name) for name in ("limit", "stdin", "executor") if name in more}
     apart = {name: {"fmu": str(fmu), "isolation": "fmu"} for name, fmu in components.items()}
     file = scenario(folder, next(iter(components.values())), components=apart, **more)

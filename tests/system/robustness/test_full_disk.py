@@ -112,7 +112,7 @@ def test_a_disk_that_is_full_after_each_number_of_operations(full_disk, tmp_path
 
 
 def on_small_disk(workplace: CommandFolder, size: str, *scripts: str) -> subprocess.CompletedProcess[str]:
-    """Run commands in the folder out on a disk of its own, and copy its files to the folder kept."""
+    """Run commands in the folder out on a separate disk, and copy its files to the folder kept."""
     cosim_command = f"{sys.executable} -m cosim"
     script = (
         f"mkdir out && mount -t tmpfs -o size={size} none out || exit 99\n" + "\n".join(scripts) + "\ncp -r out kept; exit $code"

@@ -69,7 +69,7 @@ class Killed:
 
 
 def together(folder, seed: int, count: int = 10) -> None:
-    """Several runs at once, each killed at a moment of its own."""
+    """Several runs at once, each killed at a different moment."""
     draw = random.Random(seed)  # noqa: S311 - the same moments each time
     who = ["supervisor", "child", "both"]
     runs = [Killed(CommandFolder(folder / str(n)), who[n % 3], draw.uniform(0.0, 4.0)) for n in range(count)]

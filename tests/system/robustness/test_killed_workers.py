@@ -26,7 +26,7 @@ def probe(probes):
 
 
 def scenario(place: CommandFolder, probe: Path, stop: float = 1000.0) -> Path:
-    """A ticker and two FMUs, each in a process of its own."""
+    """A ticker and two FMUs, each in a separate process."""
     fmus = {name: {"fmu": str(probe), "isolation": "fmu"} for name in ("lag", "twin")}
     return place.scenario(stop, components={"ticker": {"python": f"{TICKER}:SlowCounter"}, **fmus})
 

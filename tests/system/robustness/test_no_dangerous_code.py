@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[3]
 FILES = sorted(path for room in ("cosim", "plant_src", "controllers") for path in (ROOT / room).rglob("*.py"))
 MODULES = {"pickle", "cPickle", "marshal", "shelve", "dill", "cloudpickle", "joblib"}
 CALLS = {"eval", "exec", "os.system", "os.popen", "yaml.load", "yaml.unsafe_load", "torch.load"}
-#: frames travel from a worker to its parent, both the same program, through a pipe of their own; nothing is read from a file
+#: frames travel from a worker to its parent, both the same program, through a separate pipe; nothing is read from a file
 ALLOWED = {("cosim/report/frames.py", "import of pickle")}
 LOCK = ROOT / ".ci" / "requirements.txt"
 

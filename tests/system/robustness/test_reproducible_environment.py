@@ -22,7 +22,7 @@ def digest_here(scenario: str, folder: Path, parameters: dict[str, int]) -> str:
 
 
 def digest(workplace: CommandFolder, scenario: str, **environment: str) -> str:
-    """The digest of a run in a process of its own."""
+    """The digest of a run in a separate process."""
     words = ("run", scenario, "--stop-time", "3", "--output-dir", "out", "--no-report")
     process = workplace.start(*words, environment=environment, cwd=workplace.folder)
     _, errors = process.communicate(timeout=100)

@@ -1,4 +1,4 @@
-"""Conversion of the values in a worker process's answers, which foreign code in it may have written.
+"""Conversion of the values in the answers of a worker process. Foreign code in the worker may have written these values.
 
 Each function raises one of `INVALID_ANSWER_ERRORS` for a value that is not of the expected form.
 """
@@ -18,27 +18,27 @@ _OBJECT_DTYPE = np.dtype(object)
 
 
 def no_value(value: Any) -> None:
-    """Check that a command returned no value."""
+    """Raise TypeError if a worker sent a value for a command that has no result."""
     if value is not None:
         raise TypeError("a value that no command asked for")
 
 
 def state_number(value: Any) -> int:
-    """Return the number of an FMU state."""
+    """Return the number of an FMU state that a worker sent."""
     if type(value) is not int:
         raise TypeError("no number of a state")
     return value
 
 
 def call_names(value: Any) -> list[str]:
-    """Return the names of the calls of a step."""
+    """Return the names of the FMI calls of a step that a worker sent."""
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
         raise TypeError("no names of calls")
     return value
 
 
 def step_result(value: Any) -> StepResult | None:
-    """Return the outcome of a step, None if it simply reached its end."""
+    """Return the step result that a worker sent; None if the step reached its end and requested nothing."""
     if value is None:
         return None
     time, event_needed, terminate_requested = value
@@ -48,7 +48,7 @@ def step_result(value: Any) -> StepResult | None:
 
 
 def variable_value(value: Any, variable: Variable) -> Any:
-    """Return the value of a variable: a scalar, or a list for an array."""
+    """Return the value of a variable that a worker sent: a scalar, or a list for an array."""
     count = len(variable.scalar_names)
     if variable.dtype == _OBJECT_DTYPE:
         string_values(value if variable.shape else [value], count)
@@ -60,7 +60,7 @@ def variable_value(value: Any, variable: Variable) -> Any:
 
 
 def string_values(value: Any, count: int) -> list[Any]:
-    """Return `count` values of String and Binary variables; None stands for none."""
+    """Return `count` values of String or Binary variables that a worker sent; None means an empty list."""
     values = [] if value is None else value
     if not isinstance(values, list) or len(values) != count or not all(isinstance(text, str | bytes) for text in values):
         raise TypeError("no values of strings")
@@ -68,7 +68,7 @@ def string_values(value: Any, count: int) -> list[Any]:
 
 
 def raise_reported_error(message: dict[str, Any], component: str) -> None:
-    """Raise the error that an answer reports, if any, as one of `component`."""
+    """Raise the error that a worker's answer reports, if any, with the name of `component`."""
     if "component_error" in message:
         _, function, reason, time = message["component_error"]
         raise ComponentError(component, str(function), str(reason), None if time is None else float(time))

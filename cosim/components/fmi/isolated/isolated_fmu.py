@@ -196,7 +196,7 @@ class IsolatedFmu(WorkerClient, Component):
         return step_result(result), self._convert_strings(strings)
 
     def _store_early_return(self, result: StepResult) -> int:
-        """Keep the result of a step for `interpret_status`, which discard makes the executor call."""
+        """Store the result of a step for `interpret_status`, which the executor calls after the status discard."""
         self._result = result
         return DISCARD
 

@@ -42,8 +42,8 @@ def decode_line(line: bytes) -> Any:
 class SpinningPoller:
     """Poller that spins briefly before it sleeps, because sleeping and waking up take longer than most answers.
 
-    If spinning was unsuccessful, as when the other process computes longer or has no processor of its own, the next waits sleep
-    at once. Their number doubles with each further unsuccessful spin.
+    Spinning is unsuccessful if the other process computes longer or has no free processor. The next waits then sleep at once.
+    Their number doubles with each further unsuccessful spin.
     """
 
     def __init__(self, descriptors: Iterable[int]):

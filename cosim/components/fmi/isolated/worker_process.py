@@ -209,7 +209,7 @@ def _run_worker(serve: Callable[[int, int], None], commands: int, answers: int, 
 
 
 def _duplicate_above_limit(descriptor: int) -> int:
-    """Duplicate a descriptor above the worker's limit of open files, where code that closes all descriptors does not look."""
+    """Duplicate a descriptor to a number above the limit of open files, which code that closes all files does not reach."""
     import fcntl
     import resource
 

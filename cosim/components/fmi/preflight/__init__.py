@@ -94,7 +94,7 @@ def examine(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> Examination
 
 
 def _examine_archive(archive: Archive, limits: PreflightLimits, result: Examination) -> None:
-    """Check the archive first: if it has errors, nothing in it is read."""
+    """Check the archive; read and check its members only if it has no errors."""
     result.findings += archive.findings
     if _has_errors(archive.findings):
         return

@@ -41,7 +41,7 @@ def check_member(entry: ZipEntry) -> Iterator[Finding]:
 
 
 def file_type_name(mode: int) -> str:
-    """Return the file type in a Unix file mode, as the end of a sentence with "is"."""
+    """Return words for the file type in a Unix file mode, for a message of the form "NAME is ..."."""
     letter = stat.filemode(mode)[0]
     return _FILE_TYPE_NAMES.get(letter, f'of file type "{letter}"')
 

@@ -107,7 +107,7 @@ class Lowering:
         return scalar_value(value.type, CExpression(name), reusable=True)
 
     def as_c_array(self, value: CValue, type_name: str) -> str:
-        """Return the name of a C array with the elements of a value, which is copied if there is none of this type."""
+        """Return the name of a C array with the elements of a value; they are copied unless such an array exists."""
         if value.pointer is not None and C_TYPES[value.type] == C_TYPES[type_name]:
             return value.pointer
         target = self.new_temporary(type_name, value.shape)

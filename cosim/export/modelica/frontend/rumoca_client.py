@@ -28,7 +28,7 @@ def run_rumoca(
 
     Args:
         version: The required version.
-        files: All files that the model may use, its own one first.
+        files: All files that the model may use; the file of the model is the first one.
         packages: Folders of packages.
         model: Full name of the model.
         display_name: Name under which the model's file is loaded; None for a member of a package.

@@ -39,7 +39,7 @@ def rewrite(node: Any, change: Callable[[Any], Any]) -> Any:
 
     Args:
         node: A node, or a tuple of nodes.
-        change: Returns the replacement of a node, whose children are already replaced.
+        change: Returns the replacement of a node. The children of the node are already replaced.
     """
     if isinstance(node, tuple) and not isinstance(node, SourceLocation | Colon):
         return tuple(rewrite(item, change) for item in node)
