@@ -27,7 +27,7 @@ static uint32_t float_control(void) {
 static uint32_t float_control(void) { return 0; }
 #endif
 
-enum { INTERFACE = 2 };                              /* also in native_executor.py, where it is described */
+enum { INTERFACE = 3 };                              /* also in native_executor.py, where it is described */
 enum { WARNING = 1, DISCARD = 2 };                   /* FMI statuses; 0 is OK, everything but OK and WARNING is bad */
 /* Codes passed to `on_status` like an FMI status. They exceed 32 bits, so no FMU can return them. */
 #define FLOAT_MODE_CHANGED (INT64_C(1) << 33)
@@ -64,7 +64,7 @@ typedef struct {
 } DoStepData;
 
 typedef enum {
-    INDEXED_COPY, TRANSFER, STEP_BEGIN, PACKED_STEPS, GET_SET2, GET_SET3, DO_STEP2, DO_STEP3, FLAG_CHECK, PYTHON_CALL
+    BLOCK_COPY, INDEXED_COPY, TRANSFER, STEP_BEGIN, PACKED_STEPS, GET_SET2, GET_SET3, DO_STEP2, DO_STEP3, FLAG_CHECK, PYTHON_CALL
 } OperationKind;
 
 /* The most frequent step in compact form: set, doStep and get of one FMU. Consecutive instances of an FMU whose variables are the
@@ -93,6 +93,7 @@ typedef struct {
         struct { const uint32_t *references; size_t reference_count; void *values; size_t value_count; } get_set;
         struct { DoStepData *data; double step_size; } do_step;
         Transfer *transfer;
+        struct { char *target; const char *source; size_t size; } block;
         struct { const PackedStep *first, *end; } packed;
         struct { PyObject *callable, *arguments; } python;
         int64_t divisor;
@@ -372,6 +373,7 @@ static int run_macro_step(Program *p, int64_t n, double time) {
     Operation *op = p->operations, *last = op + p->count;
     while (op < last) {
         switch (op->kind) {
+        case BLOCK_COPY: memcpy(op->block.target, op->block.source, op->block.size); op++; continue;
         case INDEXED_COPY: copy_indexed(op++->transfer); continue;
         case TRANSFER: run_transfer(op++->transfer); continue;
         case PACKED_STEPS:
@@ -616,6 +618,18 @@ static PyObject *add_transfer(Program *p, PyObject *arguments) {
     Py_RETURN_NONE;
 }
 
+static PyObject *add_block_copy(Program *p, PyObject *arguments) {
+    unsigned long long target, source;
+    Py_ssize_t size;
+    if (!PyArg_ParseTuple(arguments, "KKn", &target, &source, &size)) return NULL;
+    Operation *op = append_operation(p, BLOCK_COPY, -1);
+    if (!op) return NULL;
+    op->block.target = pointer(target);
+    op->block.source = pointer(source);
+    op->block.size = (size_t)size;
+    Py_RETURN_NONE;
+}
+
 static PyObject *begin_step(Program *p, PyObject *arguments) {
     long long divisor;
     if (!PyArg_ParseTuple(arguments, "L", &divisor)) return NULL;
@@ -782,6 +796,7 @@ static void deallocate(Program *p) {
 
 static PyMethodDef methods[] = {
     {"add_transfer", (PyCFunction)add_transfer, METH_VARARGS, "Add a transfer of output values to inputs."},
+    {"add_block_copy", (PyCFunction)add_block_copy, METH_VARARGS, "Add a copy of consecutive bytes."},
     {"begin_step", (PyCFunction)begin_step, METH_VARARGS,
      "Begin a component's step, which runs in every `divisor`-th macro step."},
     {"end_step", (PyCFunction)end_step, METH_NOARGS, "End the component's step that `begin_step` began."},
