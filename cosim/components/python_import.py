@@ -46,7 +46,7 @@ def package_root(path: Path) -> Path:
 
 
 def package_files(paths: Iterable[Path]) -> set[Path]:
-    """Return Python files and all modules that they can import relatively, which are those of their outermost packages."""
+    """Return Python files and all modules that they can import relatively: the modules of their outermost packages."""
     files = {path.resolve() for path in paths}
     packages = {root / path.relative_to(root).parts[0] for path in files if (root := package_root(path)) != path.parent}
     return files.union(*(package.rglob("*.py") for package in packages))

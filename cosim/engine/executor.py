@@ -105,12 +105,12 @@ class Executor(ABC):
         self._parallel_steps.close()
 
     def _restore_float_mode(self, call_number: int) -> None:
-        """Set the default floating-point mode again after the step of this call changed it."""
+        """Restore the default floating-point mode, which the step of this call has changed."""
         step, _ = self._schedule.find_call(call_number)
         self._runner.restore_float_mode(step.step.name)
 
     def _restore_float_traps(self, n: int) -> None:
-        """Disable floating-point traps again that a step before communication point `n` enabled."""
+        """Disable the floating-point traps that a step before communication point `n` has enabled."""
         self._runner.restore_float_traps(self.plan.system.components, self.plan.grid.time_at(n))
 
     def _transfer_call(self, transfer: Transfer) -> TransferCall:

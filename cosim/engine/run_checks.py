@@ -114,7 +114,7 @@ def _find_period_problems(system: System, grid: TimeGrid) -> Iterator[Problem]:
 
 
 def _find_delay_problems(system: System) -> Iterator[Problem]:
-    """Yield a problem if the delays store too many values; it has the location of the connections with the most of them."""
+    """Yield a problem if the delays store too many values, located at the connections that store most of them."""
     stored: Counter[str] = Counter()
     for connection in system.connections:
         stored[connection.where] += connection.delay

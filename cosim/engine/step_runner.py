@@ -124,9 +124,9 @@ class StepRunner:
             raise ComponentError(step.name, "do_step", f"{reached}; early return is not supported", time)
 
     def restore_float_mode(self, component: str) -> None:
-        """Set the default floating-point mode again after a step of `component` changed it."""
+        """Restore the default floating-point mode, which a step of `component` has changed."""
         self._float_mode.restore(component, "the step", self.current_time.value)
 
     def restore_float_traps(self, components: Iterable[str], end: float) -> None:
-        """Disable floating-point traps again that one of the components enabled before time `end` (s)."""
+        """Disable the floating-point traps that one of the components has enabled before time `end` (s)."""
         self._float_mode.restore(join_alternatives(components), "a step", end, "before")

@@ -39,7 +39,7 @@ def _contiguous_view(array: np.ndarray, indices: np.ndarray) -> memoryview:
 
 
 def compile_transfer(transfer: Transfer) -> TransferCall:
-    """Return a function that performs the transfer without its delay; it allocates as little as NumPy allows."""
+    """Return a function that performs the transfer without its delay, with as few memory allocations as possible."""
     first, count = int(transfer.target_indices[0]), len(transfer.target_indices)
     is_contiguous = np.array_equal(transfer.target_indices, np.arange(first, first + count))
     if count <= MAX_SINGLE_COPIES and transfer.factor is None and _is_safe_cast(transfer.source.dtype, transfer.target.dtype):

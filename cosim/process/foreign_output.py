@@ -31,7 +31,7 @@ class ForeignOutput:
         return max(0, self._size - MAX_OUTPUT_SIZE)
 
     def forward(self) -> bool:
-        """Forward what has arrived; return False if the other end of the pipe is closed."""
+        """Forward the output that has arrived; return False if the other end of the pipe is closed."""
         for _ in range(_MAX_READS):
             try:
                 data = os.read(self._reader, _READ_SIZE)

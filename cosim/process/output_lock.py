@@ -43,7 +43,7 @@ def lock_descriptor(descriptor: int, wait: bool = False) -> None:
 
 
 class OutputLock:
-    """Locked file beside an output; it names the process that writes the output."""
+    """Locked file beside an output; its content describes the process that writes the output."""
 
     def __init__(self, path: Path, descriptor: int):
         self._path, self._descriptor = path, descriptor

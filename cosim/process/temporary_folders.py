@@ -51,7 +51,7 @@ def temporary_run_folder() -> Iterator[str]:
 
 
 def _remove_folder(folder: str, lock: int, owner: int) -> None:
-    """Remove the folder, except in a forked child; a later process removes what remains."""
+    """Remove the folder, except in a forked child; a later process removes remaining files."""
     if os.getpid() != owner:
         return
     rmtree(folder, ignore_errors=True)

@@ -101,7 +101,7 @@ def figure_to_svg(figure: Figure) -> str:
 
 
 def draw_nothing() -> None:
-    """Draw axes without curves, which imports and caches what matplotlib needs for any figure."""
+    """Draw axes without curves, so that matplotlib imports its modules and fills its caches."""
     from matplotlib.figure import Figure
 
     with figure_style():

@@ -137,7 +137,7 @@ def _tool_findings() -> Iterator[Finding]:
 
 
 def _program_finding(name: str, program: str, option: str) -> Finding:
-    """Return the finding about a program: the first line of what it prints about its version."""
+    """Return the finding about a program, with the first line of its version text."""
     path = shutil.which(program)
     if path is None:
         return Finding("tools", name, f"no program {program}", "missing")

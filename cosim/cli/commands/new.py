@@ -86,7 +86,7 @@ def _read_template(language: Language) -> dict[str, str]:
 
 
 def _template_names(name: str, texts: Iterable[str]) -> dict[str, str]:
-    """Return the controller's names by those of the template; raise InputError if a language does not allow the name."""
+    """Map names in the template to names of the controller; raise InputError if a language does not allow one of them."""
     from ...export.sources import snake_case
 
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):

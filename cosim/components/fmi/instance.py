@@ -117,7 +117,7 @@ class FmuInstance(FunctionCaller, Component):
         return slave
 
     def _check_version(self) -> None:
-        """Log a warning for each function of the FMI version and platform that returns an unexpected text."""
+        """Call fmi*GetVersion (and fmi2GetTypesPlatform), and log a warning about each unexpected return value."""
         texts = {}
         for name in (name for name in EXPECTED_TEXTS if name.startswith(self.prefix)):
             function = self._fmu.dll[name]

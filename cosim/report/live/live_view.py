@@ -49,7 +49,7 @@ class LiveView:
         return self._server.url
 
     def open_in_child(self) -> Connection:
-        """Return the end of the pipe for the simulation process, and close what only the supervising process uses."""
+        """Return the end of the pipe for the simulation process, and close the sockets of the supervising process."""
         self._server.socket.close()
         self._parent_end.close()
         return self._child_end

@@ -205,7 +205,7 @@ class Comparer:
         return Verdict(name, f'is "{actual[row]}" at t = {time[row]:g} s, expected "{expected[row]}"', float(time[row]))
 
     def _compare_numbers(self, name: str, tolerance: Tolerance) -> Verdict:
-        """Compare numbers; the tube is computed only at points that are not close to the reference at their own time."""
+        """Compare numbers; the tube is computed only at points where the deviation exceeds the half height of the tube."""
         values, reference = self.points.interpolate_result(_to_floats(self._result, name)), _to_floats(self._reference, name)
         half_width = tolerance.half_width(reference)
         deviation = np.abs(values - self.points.interpolate_reference(reference))

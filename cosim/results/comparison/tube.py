@@ -75,7 +75,8 @@ class TimeWindows:
     def _include_rows(self, choose: np.ufunc, extremes: np.ndarray, row: np.ndarray) -> np.ndarray:
         """Extend the extremes of the edges by all rows inside the windows.
 
-        In round k `row[i]` is the extreme of the 2**k rows from i on; two such pieces cover a window.
+        The windows are processed in rounds by their number of rows. In round k, `row[i]` is the extreme of the 2**k rows from i
+        on. Two such pieces, which may overlap, cover each window of the round.
         """
         for k, (windows, left, right) in enumerate(self._levels):
             if k:
@@ -132,7 +133,7 @@ class UniformTimeWindows:
 
 
 def _sliding_extreme(choose: np.ufunc, row: np.ndarray, width: int) -> np.ndarray:
-    """Return the extreme of each `width` neighbours, by doubling the width of the pieces."""
+    """Return the extreme of each `width` neighbouring rows, computed from pieces of doubling width."""
     length, rows = 1, len(row) - width + 1
     while 2 * length <= width:
         row = choose(row[:-length], row[length:])

@@ -59,7 +59,7 @@ class Bundle:
 
 
 def collect_bundle(scenario: Path, variants: Iterable[Mapping[str, Any]] = ({},)) -> Bundle:
-    """Collect the files of a scenario, including those that it uses only with one of the `variants` of its settings."""
+    """Collect the files of a scenario, also those that it uses only with one of the `variants` of its settings."""
     named = {path for settings in variants for path in _scenario_files(scenario, settings)}
     used = {path for file in named for path in _package_files(file)}
     root = Path(os.path.commonpath([path.parent for path in used]))

@@ -33,7 +33,7 @@ FmuFiles = Mapping[Path, FmuFile]
 
 
 class ReplayRequest(NamedTuple):
-    """Title and path of the replay page to be written of a run."""
+    """Title and path of the page to which the replay of a run is written."""
 
     title: str
     page: str

@@ -28,7 +28,7 @@ def replay_settings(sweep: Sweep, run: int) -> dict[str, Any]:
 
 
 def write_replays(sweep: Sweep, runs: Iterable[int], folder: Path, workers: int) -> dict[int, str]:
-    """Repeat runs and write those of their replays that are missing; return the failure of each run whose replay is missing."""
+    """Write the missing replays by repeating their runs; return the failure of each run whose replay is still missing."""
     pages = {run: folder / replay_path(sweep, run) for run in dict.fromkeys(runs)}
     missing = {run: page for run, page in pages.items() if not page.exists()}
     (folder / REPLAY_FOLDER).mkdir(exist_ok=True)

@@ -66,7 +66,7 @@ def csv_value(value: Any) -> Any:
 
 
 def write_parquet(rows: RowSource, factors: Sequence[str], kpis: Sequence[str], path: Path) -> None:
-    """Write the table as Parquet (extra `parquet`): KPIs, and factors whose labels are all numbers, as doubles."""
+    """Write the table as Parquet (extra `parquet`), with KPIs and purely numeric factors as doubles."""
     import pyarrow as pa
     from pyarrow.parquet import ParquetWriter
 

@@ -190,7 +190,7 @@ class ExpressionLowering(SubscriptLowering):
 
         Args:
             node: The call.
-            target: A C array for the only result. Without it, results that are not returned are stored in new temporaries.
+            target: A C array for the only result. If None, new temporaries receive all results that are not returned.
 
         Returns:
             The results of the function.

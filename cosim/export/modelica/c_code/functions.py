@@ -19,7 +19,7 @@ Shapes = tuple[tuple[int, ...], ...]
 
 @dataclass
 class FunctionTranslator:
-    """Translator of the functions that a model calls; it is the `TranslationUnit` of their calls."""
+    """Translator of the functions that a model calls to C; it implements `TranslationUnit`."""
 
     functions: dict[str, Function]
     #: returns the number of a failure reason, for the C code

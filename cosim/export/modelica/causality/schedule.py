@@ -60,7 +60,7 @@ def start_value(model: Model, name: str) -> Expression:
 
 
 def pre_variables(model: Model, body: Body) -> list[str]:
-    """Return the variables whose value before the event the statements use, in order of declaration."""
+    """Return the variables of which the statements use the value before the event, in order of declaration."""
     used = {name for name, _ in pre_references(body)}
     return [name for name in model.variables if name in used]
 

@@ -25,7 +25,7 @@ class Node:
 
 
 def sort_topologically(nodes: list[Node]) -> list[Node]:
-    """Sort nodes so that every node follows those that write what it reads.
+    """Sort nodes so that every node follows the nodes that write the variables that it reads.
 
     Among the nodes that could be next, one that can be merged with the previous node comes first, then one of the same
     component; otherwise the given order is preserved.
@@ -53,7 +53,7 @@ def sort_topologically(nodes: list[Node]) -> list[Node]:
 
 
 def required_nodes(order: list[Node], results: set[ScalarKey]) -> list[Node]:
-    """Return those of the sorted nodes that are needed to compute the results."""
+    """Return the sorted nodes that are needed to compute the results."""
     required, needed_keys = list[Node](), set(results)
     for node in reversed(order):
         if node.writes & needed_keys:
