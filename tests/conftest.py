@@ -1,4 +1,4 @@
-"""Fixtures for all rooms."""
+"""Fixtures of all tests."""
 
 from pathlib import Path
 
@@ -6,6 +6,7 @@ import pytest
 from plant_validation import MeasurementCheck, ValidationReport
 from probe_fmus import probe, probes
 
+from cosim.core.processors import available_processors
 from cosim.engine import EXECUTORS
 from cosim.engine import native_available as native_available
 
@@ -20,6 +21,11 @@ def pytest_configure(config):
     target = config.getoption("--validation")
     if target and not hasattr(config, "workerinput"):
         config.pluginmanager.register(ValidationReport(Path(target)))
+
+
+def pytest_xdist_auto_num_workers():
+    """One worker more than processors: many tests wait for processes, clocks or a browser."""
+    return available_processors() + 1
 
 
 def pytest_collection_modifyitems(config, items):

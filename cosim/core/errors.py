@@ -98,7 +98,8 @@ class ComponentError(CosimError):
 
     def __str__(self) -> str:
         when = "" if self.time is None else f" at t = {self.time:.12g} s"
-        return escape_control_characters(f"{self.component}: {self.function} failed{when}: {self.reason}")
+        text = f"{self.component}: {self.function} failed{when}: {self.reason}"
+        return escape_control_characters(shorten(text, _MAX_LINE_LENGTH))
 
 
 class LateError(CosimError):

@@ -15,19 +15,20 @@
 #if defined(__x86_64__) || defined(_M_X64)
 #include <xmmintrin.h>
 #define MXCSR_CONTROL 0xFFC0u /* rounding, flush to zero, denormals are zero, traps; not the sticky flags */
-/* Control bits of both floating-point units. */
-static uint32_t float_control(void) {
-    uint16_t x87 = 0;
-#ifdef __GNUC__
-    __asm__ volatile("fnstcw %0" : "=m"(x87));
-#endif
-    return (uint32_t)x87 << 16 | (_mm_getcsr() & MXCSR_CONTROL);
-}
+static unsigned sse_control(void) { return _mm_getcsr() & MXCSR_CONTROL; }
 #else
-static uint32_t float_control(void) { return 0; }
+static unsigned sse_control(void) { return 0; }
 #endif
 
-enum { INTERFACE = 2 };                              /* also in native_executor.py, where it is described */
+static unsigned x87_control(void) {
+    uint16_t word = 0;
+#if defined(__x86_64__) && defined(__GNUC__)
+    __asm__ volatile("fnstcw %0" : "=m"(word));
+#endif
+    return word;
+}
+
+enum { INTERFACE = 3 };                              /* also in native_executor.py, where it is described */
 enum { WARNING = 1, DISCARD = 2 };                   /* FMI statuses; 0 is OK, everything but OK and WARNING is bad */
 /* Codes passed to `on_status` like an FMI status. They exceed 32 bits, so no FMU can return them. */
 #define FLOAT_MODE_CHANGED (INT64_C(1) << 33)
@@ -64,7 +65,7 @@ typedef struct {
 } DoStepData;
 
 typedef enum {
-    INDEXED_COPY, TRANSFER, STEP_BEGIN, PACKED_STEPS, GET_SET2, GET_SET3, DO_STEP2, DO_STEP3, FLAG_CHECK, PYTHON_CALL
+    BLOCK_COPY, INDEXED_COPY, TRANSFER, STEP_BEGIN, PACKED_STEPS, GET_SET2, GET_SET3, DO_STEP2, DO_STEP3, FLAG_CHECK, PYTHON_CALL
 } OperationKind;
 
 /* The most frequent step in compact form: set, doStep and get of one FMU. Consecutive instances of an FMU whose variables are the
@@ -80,7 +81,8 @@ typedef struct {
 typedef struct {
     const StepCalls *calls;
     void *instance, *set_values, *get_values;
-    const DoStepData *data;
+    bool *flags;                /* FMI 3.0 only, like the next member */
+    double *last_successful_time;
     int first_call;
 } PackedStep;
 
@@ -93,6 +95,7 @@ typedef struct {
         struct { const uint32_t *references; size_t reference_count; void *values; size_t value_count; } get_set;
         struct { DoStepData *data; double step_size; } do_step;
         Transfer *transfer;
+        struct { char *target; const char *source; size_t size; } block;
         struct { const PackedStep *first, *end; } packed;
         struct { PyObject *callable, *arguments; } python;
         int64_t divisor;
@@ -109,7 +112,7 @@ typedef struct {
     double *current_time;
     volatile int64_t *marker;
     PyObject *on_status, *record;
-    uint32_t float_control;     /* in the usual floating-point mode */
+    unsigned sse_control, x87_control; /* in the usual floating-point mode */
     double one, tiny, smallest; /* see `rounds_as_usual` */
     const uint64_t *doubles;    /* bit patterns of the monitored floats */
     const uint32_t *singles;
@@ -333,32 +336,37 @@ static int report_bad_status(Program *p, int call_number, int64_t status) {
 }
 
 /* Like `run_step`, but without a switch per operation, and with one check of the floating-point mode per step. */
-static inline int run_packed_step(Program *p, const PackedStep *s, double time) {
+static inline int run_packed_step2(Program *p, const PackedStep *s, double time) {
     volatile int64_t *marker = p->marker;
     const StepCalls *c = s->calls;
-    const int fmi2 = c->fmi_version == 2, first_call = s->first_call;
-    marker[MARKER_CALL] = first_call;
-    int status = fmi2 ? ((Fmi2GetSet *)c->set)(s->instance, c->set_references, c->set_reference_count, s->set_values)
-                      : ((Fmi3GetSet *)c->set)(s->instance, c->set_references, c->set_reference_count, s->set_values,
-                                               c->set_value_count);
-    if (is_bad(status) && report_bad_status(p, first_call, status) < 0) return -1;
-    marker[MARKER_CALL] = first_call + 1;
-    if (fmi2) {
-        status = ((Fmi2DoStep *)c->do_step)(s->instance, time, c->step_size, 1);
-    } else {
-        bool *flags = s->data->flags;
-        status = ((Fmi3DoStep *)c->do_step)(s->instance, time, c->step_size, true, flags, flags + 1, flags + 2,
-                                            s->data->last_successful_time);
-        if (!is_bad(status) && (flags[0] | flags[1] | flags[2]) && report_bad_status(p, first_call + 2, DISCARD) < 0) return -1;
-    }
-    if (is_bad(status) && report_bad_status(p, first_call + 1, status) < 0) return -1;
-    const int last_call = first_call + (fmi2 ? 2 : 3);
-    marker[MARKER_CALL] = last_call;
-    status = fmi2 ? ((Fmi2GetSet *)c->get)(s->instance, c->get_references, c->get_reference_count, s->get_values)
-                  : ((Fmi3GetSet *)c->get)(s->instance, c->get_references, c->get_reference_count, s->get_values,
-                                           c->get_value_count);
-    if (is_bad(status) && report_bad_status(p, last_call, status) < 0) return -1;
-    return rounds_as_usual(p) ? 0 : report_float_mode(p, first_call + 1);
+    marker[MARKER_CALL] = s->first_call;
+    int status = ((Fmi2GetSet *)c->set)(s->instance, c->set_references, c->set_reference_count, s->set_values);
+    if (is_bad(status) && report_bad_status(p, s->first_call, status) < 0) return -1;
+    marker[MARKER_CALL] = s->first_call + 1;
+    status = ((Fmi2DoStep *)c->do_step)(s->instance, time, c->step_size, 1);
+    if (is_bad(status) && report_bad_status(p, s->first_call + 1, status) < 0) return -1;
+    marker[MARKER_CALL] = s->first_call + 2;
+    status = ((Fmi2GetSet *)c->get)(s->instance, c->get_references, c->get_reference_count, s->get_values);
+    if (is_bad(status) && report_bad_status(p, s->first_call + 2, status) < 0) return -1;
+    return rounds_as_usual(p) ? 0 : report_float_mode(p, s->first_call + 1);
+}
+
+static inline int run_packed_step3(Program *p, const PackedStep *s, double time) {
+    volatile int64_t *marker = p->marker;
+    const StepCalls *c = s->calls;
+    bool *flags = s->flags;
+    marker[MARKER_CALL] = s->first_call;
+    int status = ((Fmi3GetSet *)c->set)(s->instance, c->set_references, c->set_reference_count, s->set_values, c->set_value_count);
+    if (is_bad(status) && report_bad_status(p, s->first_call, status) < 0) return -1;
+    marker[MARKER_CALL] = s->first_call + 1;
+    status = ((Fmi3DoStep *)c->do_step)(s->instance, time, c->step_size, true, flags, flags + 1, flags + 2,
+                                        s->last_successful_time);
+    if (!is_bad(status) && (flags[0] | flags[1] | flags[2]) && report_bad_status(p, s->first_call + 2, DISCARD) < 0) return -1;
+    if (is_bad(status) && report_bad_status(p, s->first_call + 1, status) < 0) return -1;
+    marker[MARKER_CALL] = s->first_call + 3;
+    status = ((Fmi3GetSet *)c->get)(s->instance, c->get_references, c->get_reference_count, s->get_values, c->get_value_count);
+    if (is_bad(status) && report_bad_status(p, s->first_call + 3, status) < 0) return -1;
+    return rounds_as_usual(p) ? 0 : report_float_mode(p, s->first_call + 1);
 }
 
 static inline void copy_indexed(const Transfer *transfer) {
@@ -372,11 +380,12 @@ static int run_macro_step(Program *p, int64_t n, double time) {
     Operation *op = p->operations, *last = op + p->count;
     while (op < last) {
         switch (op->kind) {
+        case BLOCK_COPY: memcpy(op->block.target, op->block.source, op->block.size); op++; continue;
         case INDEXED_COPY: copy_indexed(op++->transfer); continue;
         case TRANSFER: run_transfer(op++->transfer); continue;
         case PACKED_STEPS:
             for (const PackedStep *step = op->packed.first; step < op->packed.end; step++)
-                if (run_packed_step(p, step, time) < 0) return -1;
+                if ((step->calls->fmi_version == 2 ? run_packed_step2(p, step, time) : run_packed_step3(p, step, time)) < 0) return -1;
             break;
         default:
             if (n % op->divisor == 0 && run_step(p, op + 1, p->operations + op->end, time) < 0) return -1;
@@ -471,7 +480,8 @@ static PackedStep pack_step(const Operation *op, const StepCalls *calls) {
     const Operation *set = op + 1, *do_step = op + 2, *get = get_operation(op);
     return (PackedStep){
         .calls = calls, .instance = do_step->instance, .set_values = set->get_set.values, .get_values = get->get_set.values,
-        .data = do_step->do_step.data, .first_call = set->call_number,
+        .flags = do_step->do_step.data->flags, .last_successful_time = do_step->do_step.data->last_successful_time,
+        .first_call = set->call_number,
     };
 }
 
@@ -538,7 +548,7 @@ static int run_macro_steps(Program *p, int64_t first, int64_t count, double orig
         *p->current_time = time;
         if (run_macro_step(p, n, time) < 0) return -1;
         if (p->end_request == END_BEFORE_STEP) return 0;
-        if (float_control() != p->float_control && report_status(p, -1, FLOAT_TRAPS_ENABLED) < 0) return -1;
+        if (sse_control() != p->sse_control && report_status(p, -1, FLOAT_TRAPS_ENABLED) < 0) return -1;
         if (!all_finite(p) && report_status(p, -1, NOT_FINITE) < 0) return -1;
         if (record_row(p, n + 1) < 0) return -1;
         p->marker[MARKER_STEPS] = n + 1;
@@ -557,10 +567,12 @@ static PyObject *run(Program *p, PyObject *arguments) {
     double origin, stride, denominator;
     if (!PyArg_ParseTuple(arguments, "LLddd", &first, &count, &origin, &stride, &denominator)) return NULL;
     p->end_request = CONTINUE;
-    p->float_control = float_control();
+    p->sse_control = sse_control();
+    p->x87_control = x87_control();
     if (!p->is_packed && all_steps_measured(p) && pack_steps(p) < 0) return NULL;
     release_gil(p);
     int failed = run_macro_steps(p, first, count, origin, stride, denominator);
+    if (!failed && x87_control() != p->x87_control) failed = report_status(p, -1, FLOAT_TRAPS_ENABLED);
     acquire_gil(p);
     if (failed) return NULL;
     Py_RETURN_NONE;
@@ -613,6 +625,18 @@ static PyObject *add_transfer(Program *p, PyObject *arguments) {
     };
     bool is_plain = target_kind == source_kind && !target_indices && !factor && !delay;
     if (is_plain && item_size((char)target_kind) == 8) op->kind = INDEXED_COPY;
+    Py_RETURN_NONE;
+}
+
+static PyObject *add_block_copy(Program *p, PyObject *arguments) {
+    unsigned long long target, source;
+    Py_ssize_t size;
+    if (!PyArg_ParseTuple(arguments, "KKn", &target, &source, &size)) return NULL;
+    Operation *op = append_operation(p, BLOCK_COPY, -1);
+    if (!op) return NULL;
+    op->block.target = pointer(target);
+    op->block.source = pointer(source);
+    op->block.size = (size_t)size;
     Py_RETURN_NONE;
 }
 
@@ -782,6 +806,7 @@ static void deallocate(Program *p) {
 
 static PyMethodDef methods[] = {
     {"add_transfer", (PyCFunction)add_transfer, METH_VARARGS, "Add a transfer of output values to inputs."},
+    {"add_block_copy", (PyCFunction)add_block_copy, METH_VARARGS, "Add a copy of consecutive bytes."},
     {"begin_step", (PyCFunction)begin_step, METH_VARARGS,
      "Begin a component's step, which runs in every `divisor`-th macro step."},
     {"end_step", (PyCFunction)end_step, METH_NOARGS, "End the component's step that `begin_step` began."},

@@ -12,6 +12,7 @@ from ..core.errors import InputError
 from ..process.journal import ROW_COUNT
 from .component_step import ScheduledStep
 from .executor import Executor
+from .transfer_calls import contiguous_views
 from .transfer_plan import Transfer
 
 try:
@@ -20,7 +21,9 @@ except ImportError:  # installed without a C compiler
     _native = None  # type: ignore[assignment]  # a module cannot be declared optional
 
 #: number of the interface of `_native.c`; raised with every change of a function, an argument, a code or the marker
-INTERFACE = 2
+INTERFACE = 3
+#: average number of values in contiguous runs from which a run is copied as a block of memory
+MIN_BLOCK_VALUES = 8
 #: most macro steps per call; the first call is shorter, because it measures the durations of the steps
 MAX_STEPS_PER_CALL = 1 << 16
 
@@ -67,6 +70,11 @@ class NativeExecutor(Executor):
     def _add_transfer(self, transfer: Transfer) -> None:
         if transfer.source.dtype.hasobject:
             self._add_object_transfer(self._transfer_call(transfer))
+            return
+        views = contiguous_views(transfer)
+        if views and len(transfer.target_indices) >= MIN_BLOCK_VALUES * len(views):
+            for target, source in views:
+                self._program.add_block_copy(_address(np.asarray(target)), _address(np.asarray(source)), target.nbytes)
             return
         first, count = int(transfer.target_indices[0]), len(transfer.target_indices)
         is_contiguous = np.array_equal(transfer.target_indices, np.arange(first, first + count))

@@ -12,7 +12,7 @@ from typing import Any
 from ..components.fmi import FmuFile, Isolation
 from ..components.input_table import read_input_table
 from ..core.component import Component, Variable, count_scalars
-from ..core.errors import InputError, Problem, did_you_mean
+from ..core.errors import InputError, Problem
 from ..core.size_limits import MAX_SCALARS, require_at_most
 from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System
 from ..engine.pacer import LatePolicy
@@ -217,27 +217,27 @@ class SystemBuilder:
                         text = f'"{port}" is already the name of a component here, so an output port cannot have it'
                         self.problems.append(Problem(text, where))
                     ends = self._port_outputs(child, inner, where)
-                    if not ends:
+                    if ends is None:
                         child.invalid_ports.add(port)
+                        continue
                     aliases |= {alias + rest: end for rest, end in ends.items()}
                     require_at_most(MAX_SCALARS, len(aliases), f"signals of output ports up to {alias}", where)
         return aliases
 
-    def _port_outputs(self, node: Node, inner: str, where: str) -> dict[str, Endpoint]:
-        """Return the outputs of an output port by their names after the prefix; add a problem if there are none."""
+    def _port_outputs(self, node: Node, inner: str, where: str) -> dict[str, Endpoint] | None:
+        """Return the outputs of an output port by their names after the prefix; None if its component is invalid.
+
+        A port without outputs is a problem only where it is used. Therefore a component with fewer outputs can replace another one.
+        """
         try:
             (target,) = resolve_name(node, inner, ("outputs",))
         except UnknownNameError as error:
             if str(error):
                 self.problems.append(Problem(str(error), where))
-            return {}
+            return None
         if target.component not in self.components:
-            return {}
-        component = self.components[target.component]
-        slots = SlotIndex(component, "output").below(target.prefix)
-        if not slots:
-            valid = (variable.name for variable in component.variables if variable.causality == "output")
-            self.problems.append(Problem(f'"{inner}" is no output{did_you_mean(target.prefix, valid)}', where))
+            return None
+        slots = SlotIndex(self.components[target.component], "output").below(target.prefix)
         return {rest: Endpoint(target.component, slot) for rest, slot in slots.items()}
 
     def _columns(self, aliases: Mapping[str, Endpoint]) -> dict[str, Endpoint]:

@@ -337,4 +337,4 @@ def test_an_interrupt_gives_exit_code_130_and_keeps_the_rows(tmp_path):
 def test_a_deeply_nested_setting_is_refused(tmp_path):
     done = cosim("run", scenario(tmp_path), "--set", f"a.k={'[' * 20_000}", cwd=tmp_path)
     assert done.returncode == 2
-    assert done.stderr == "a.k: nested too deep\n"
+    assert done.stderr == "a.k: nested too deeply\n"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from io import BufferedReader
 from itertools import islice
 from pathlib import Path
@@ -38,6 +39,8 @@ CHANGED = Rule("archive.changed", "limits")
 #: rules whose violations do not prevent a run, but may change its results
 RUN_WARNINGS = (rules_structure.OUTPUTS, rules_variables.UNIT)
 _MAX_FINDINGS_PER_CHECK = 100
+#: folders that a running FMU does not use
+_UNUSED_FOLDERS = ("documentation", "sources")
 _CHECKS: Sequence[Callable[[ModelDescription], Iterator[Finding]]] = (
     *rules_model.CHECKS,
     *rules_variables.CHECKS,
@@ -120,7 +123,7 @@ def _has_errors(findings: Sequence[Finding]) -> bool:
 
 
 def extract(path: Path, examination: Examination, folder: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> None:
-    """Extract an examined FMU.
+    """Extract the members of an examined FMU that it can use on this platform.
 
     Args:
         path: The FMU.
@@ -131,15 +134,23 @@ def extract(path: Path, examination: Examination, folder: Path, limits: Prefligh
     Raises:
         InputError: The file was changed after the check, or contains damaged data.
     """
+    assert examination.model is not None  # otherwise the FMU has errors and is not used
+    binary_folder = current_platform().binary_folder(examination.model.major)
     with open_regular_file(path) as file:
         try:
             if _file_identity(file) != examination.file_identity:
                 raise FatalFindingError(CHANGED("the file was changed after it had been examined"))
             archive = Archive(file, limits)
             raise_errors(path, archive.findings)
-            archive.extract(folder)
+            archive.extract(folder, partial(_is_used, binary_folder=binary_folder))
         except FatalFindingError as error:
             raise_errors(path, [error.finding])
+
+
+def _is_used(name: str, binary_folder: str) -> bool:
+    """Return False for sources, documentation and binaries of other platforms."""
+    first, _, rest = name.partition("/")
+    return first not in _UNUSED_FOLDERS and (first != "binaries" or rest.partition("/")[0] == binary_folder)
 
 
 def _file_identity(file: BufferedReader) -> tuple[int, ...]:

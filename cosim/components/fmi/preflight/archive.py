@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BufferedReader
 from pathlib import Path
@@ -109,20 +109,25 @@ class Archive:
             except FatalFindingError as error:
                 yield error.finding
 
-    def extract(self, folder: Path) -> None:
-        """Write all members below a folder, as regular files and folders.
+    def extract(self, folder: Path, is_used: Callable[[str], bool]) -> None:
+        """Write members below a folder, as regular files and folders.
+
+        Args:
+            folder: Folder that receives the files.
+            is_used: Returns whether the member with this name is written.
 
         Raises:
             FatalFindingError: The data of a member are damaged.
         """
-        for entry in self._entries:
-            target = folder / entry.decoded_name
-            if entry.decoded_name.endswith("/"):
-                target.mkdir(parents=True, exist_ok=True)
-                continue
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with target.open("xb") as file:
-                file.writelines(self._read_chunks(entry))
+        made = {""}
+        for entry in filter(lambda entry: is_used(entry.decoded_name), self._entries):
+            parent, _, name = entry.decoded_name.rpartition("/")
+            if parent not in made:
+                (folder / parent).mkdir(parents=True, exist_ok=True)
+                made.add(parent)
+            if name:
+                with (folder / entry.decoded_name).open("xb") as file:
+                    file.writelines(self._read_chunks(entry))
 
     def _read_chunks(self, entry: ZipEntry) -> Iterator[bytes]:
         """Yield the content in chunks, never more than the size in the central directory."""

@@ -306,3 +306,15 @@ def test_extraction_writes_exactly_the_members(good, tmp_path):
     assert not any(p.is_symlink() for p in folder.rglob("*"))
     file.release()
     assert not folder.exists()
+
+
+@pytest.mark.parametrize("unused", ["sources/model.c", "documentation/index.html", "binaries/amiga/model.so"])
+def test_what_a_run_does_not_use_is_not_extracted(good, tmp_path, unused):
+    path = tmp_path / "good.fmu"
+    path.write_bytes(pack_archive([*members(good[2]), Member(unused, b"unused"), Member("binariesX/a", b"used"), EXTRA]))
+    file = FmuFile(path)
+    folder = file.acquire()
+    assert not (folder / unused).parent.exists()
+    assert (folder / "binariesX/a").read_bytes() == b"used"
+    assert (folder / EXTRA.name).is_file()
+    file.release()
