@@ -33,7 +33,7 @@ _SYSTEM_PATHS = ("/usr", "/bin", "/lib", "/lib64", "/etc/ld.so.cache", "/etc/alt
 
 
 class SandboxCommand(click.Command):
-    """Command with the option `--sandbox`, whose value is optional even if an argument follows."""
+    """Command with an option `--sandbox` that needs no value, even if an argument follows."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments after adding the default value to a bare `--sandbox`."""

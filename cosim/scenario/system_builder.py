@@ -227,7 +227,7 @@ class SystemBuilder:
     def _port_outputs(self, node: Node, inner: str, where: str) -> dict[str, Endpoint] | None:
         """Return the outputs of an output port by their names after the prefix; None if its component is invalid.
 
-        A port without outputs is a problem only where it is used. Therefore a component with fewer outputs can replace another one.
+        A port without outputs is a problem only where it is used. Thus a component with fewer outputs can replace another one.
         """
         try:
             (target,) = resolve_name(node, inner, ("outputs",))

@@ -3,9 +3,9 @@
 PythonFMU supports FMI 2.0 only. Its builder runs in a separate process, because it imports the source. The FMU state consists
 of the variables that the class registers: register internal states as `local` variables.
 
-All Python FMUs of a process share one interpreter and one `sys.modules`. Therefore the source becomes a package, whose name
-contains a hash of all contents, and the modules that it imports become members of this package: FMUs with modules of the same
-name do not conflict.
+All Python FMUs of a process share one interpreter and one `sys.modules`. Therefore the source becomes a package, and the modules
+that it imports become members of this package. The name of the package contains a hash of all contents, so that FMUs with
+modules of the same name do not conflict.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ class Column:
 class RowsHeader:
     """Layout of the rows of an unfinished run.
 
-    Row k belongs to communication point n = k * `steps_per_row`, whose time is (`origin` + n * `stride`) / `denominator` (s).
+    Row k belongs to communication point n = k * `steps_per_row`. Its time is (`origin` + n * `stride`) / `denominator` (s).
 
     Attributes:
         origin: See above.

@@ -12,7 +12,7 @@ from .limits import DEFAULT_LIMITS, PreflightLimits
 from .schema import SCHEMA_FILES, check_schema
 from .xml import parse_xml
 
-#: largest model for the check by schemas, whose uniqueness constraints take quadratic time
+#: largest model that is checked by schemas, because their uniqueness constraints take quadratic time
 MAX_SCHEMA_VARIABLES = 10_000
 
 
