@@ -90,6 +90,7 @@ class PreparedRun:
         return list(signal_problems(self.root, "figures", self.settings.columns))
 
     @cached_property
+    @exclusive_process_state()  # paths may be relative, and a component of another thread may change the working directory
     def metadata(self) -> dict[str, Any]:
         """Metadata of the run that are known before it: scenario, system, versions, hashes of all files."""
         return {

@@ -89,7 +89,7 @@ def children() -> list[int]:
     return [int(word) for word in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()]
 
 
-def end_orphans(grace: float = 0.2) -> list[int]:
+def end_orphans(grace: float = 1.0) -> list[int]:
     """Ids of processes that are still there `grace` s after the command; they are ended, generation after generation."""
     left, latest = [], time.monotonic() + grace
     while found := children():
