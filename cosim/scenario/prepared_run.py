@@ -200,5 +200,6 @@ def import_figures(scenario: str | Path, parameters: Mapping[str, Any] | None = 
     return _load_functions([spec for _, spec in accepted(loaded.spec.figures)], loaded.root.folder)
 
 
+@exclusive_process_state()  # as for `PreparedRun.metadata`
 def _load_functions(specs: Sequence[FunctionSpec], folder: Path) -> list[NamedCall]:
     return [(spec.name, load_function(spec.python, folder), spec.arguments) for spec in specs]
