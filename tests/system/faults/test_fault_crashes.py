@@ -251,7 +251,8 @@ def test_a_copy_that_a_python_component_forks_does_not_continue_the_run(runner, 
     assert len(Result.from_csv(tmp_path / "out/result.csv").time) == 4
     assert done.out.count("simulated in") == 1
     assert ("WARNING ticker: do_step forked the process" in done.err) == (isolation == "run")
-    assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
+    assert (done.temporary_files, done.changes) == ([], [])
+    assert done.processes == [] or isolation == "none"  # nobody ends the copies before they have left the run
 
 
 def test_an_fmu_cannot_read_what_is_typed(fmus, runner, tmp_path, version):

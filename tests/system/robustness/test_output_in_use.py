@@ -72,7 +72,7 @@ def test_one_file_of_two_simulations(workplace):
     assert refused(workplace.run(*words, "x.csv"), "x.csv", process.pid)
     assert workplace.run(*words, "y.csv").returncode == 0
     process.send_signal(signal.SIGINT)
-    process.communicate(timeout=30)
+    process.communicate(timeout=120)  # it writes some million numbers
     assert workplace.leftovers() == []
 
 
