@@ -50,7 +50,7 @@ def test_a_crash_over_a_package_names_the_file_of_the_model(tmp_path):
     assert refusal(path).startswith(f"{path}: the Modelica front end failed on this file")
 
 
-@pytest.mark.parametrize("equation", [nested(500, "-(", ")"), nested(300, "abs(", ")"), "  y = u" + "+u" * 500 + ";"])
+@pytest.mark.parametrize("equation", [nested(500, "-(", ")"), nested(500, "abs(", ")"), "  y = u" + "+u" * 500 + ";"])
 def test_an_expression_too_deep_for_the_compiler_is_refused(tmp_path, equation):
     path = model(tmp_path, equation)
     assert refusal(path) == f"{path}: an expression or statement is nested too deeply; divide it into several"
