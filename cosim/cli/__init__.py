@@ -93,13 +93,13 @@ def main(arguments: list[str] | None = None) -> None:
         arguments: words after the program's name; default: those of this process.
     """
     if arguments is None:
-        _avoid_useless_collections()
+        _raise_collection_threshold()
     open_closed_streams()
     sys.stdout, sys.stderr = protected_stream(sys.stdout), protected_stream(sys.stderr)
     sys.exit(_run_command_line(sys.argv[1:] if arguments is None else arguments))
 
 
-def _avoid_useless_collections() -> None:
+def _raise_collection_threshold() -> None:
     """Let the cycle collector run rarely, because almost all objects of a command exist until its process ends."""
     gc.set_threshold(_GC_THRESHOLD)
     atexit.register(gc.freeze)

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import click
 
 from ..core.errors import Problem
-from ..core.printable_text import SPACES, escape_control_characters
+from ..core.text import SPACES, escape_control_characters
 from ..process.standard_streams import unescaped
 
 #: number of warnings collected for the report

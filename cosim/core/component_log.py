@@ -5,8 +5,7 @@ from __future__ import annotations
 import logging
 import time
 
-from .printable_text import SPACES, escape_control_characters
-from .text import shorten
+from .text import SPACES, escape_control_characters, shorten
 
 INFO, WARNING, ERROR = logging.INFO, logging.WARNING, logging.ERROR
 

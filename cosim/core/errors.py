@@ -19,8 +19,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from .printable_text import escape_control_characters
-from .text import MAX_QUOTATION_LENGTH, shorten
+from .text import MAX_QUOTATION_LENGTH, escape_control_characters, shorten
 
 #: exceptions that are not a failure of the foreign code they pass through; all others are, even if not derived from Exception
 PASS_THROUGH_EXCEPTIONS = (KeyboardInterrupt, GeneratorExit)

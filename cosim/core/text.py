@@ -1,4 +1,4 @@
-"""Texts that scenarios, callers and other programs pass in, and the limits of them."""
+"""Texts of scenarios, callers and other programs: limits of length, forbidden characters, escape sequences for printing."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ MAX_TEXT_LENGTH = 1 << 20
 REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 #: longest quotation of a value in a message (characters)
 MAX_QUOTATION_LENGTH = 200
+#: spaces of texts in any language: tab, no-break spaces and the ideographic space
+SPACES = "\t\u00a0\u202f\u3000"
 
 #: NUL ends a text in C and is not allowed in file names; surrogates are not allowed in UTF-8
 _FORBIDDEN_CHARACTERS = re.compile("[\0\ud800-\udfff]")
 
 
 def text_problem(text: str) -> str:
-    r"""Return the reason why a text cannot be stored in an FMU or a file; "" if they can.
+    r"""Return the reason why a text cannot be stored in an FMU or a file; "" if it can.
 
     >>> text_problem("a\0"), text_problem("a")
     ('the character U+0000 is not allowed', '')
@@ -40,3 +42,21 @@ def shorten(text: str, length: int = MAX_QUOTATION_LENGTH) -> str:
     """
     rest = len(text) - length
     return text if rest <= 0 else f"{text[:length]} ... and {rest} character{'' if rest == 1 else 's'} more"
+
+
+def escape_control_characters(text: str, keep: str = "") -> str:
+    r"""Return a text with line breaks, control characters and direction marks as escape sequences such as \x1b.
+
+    These characters could move the cursor of a terminal, change its title, reorder text or fake lines of a log.
+
+    Args:
+        text: The text.
+        keep: Characters that stay as they are.
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in keep else _escape(c) for c in text)
+
+
+def _escape(character: str) -> str:
+    return character.encode("unicode_escape", "surrogatepass").decode("ascii")

@@ -310,7 +310,7 @@ static int64_t run_operation(Program *p, const Operation *op, double time) {
     }
 }
 
-/* Whether sums are rounded to nearest and subnormal numbers are kept. This costs less than reading the control register. */
+/* True if sums are rounded to nearest and subnormal numbers are kept. This costs less than reading the control register. */
 static inline bool rounds_as_usual(const Program *p) {
     return p->smallest + p->smallest > (p->one + p->tiny) - (p->one - p->tiny);
 }

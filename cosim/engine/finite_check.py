@@ -16,7 +16,7 @@ class FiniteCheck:
 
     Args:
         plan: the compiled system.
-        runner: knows the present time.
+        runner: provides the present time.
     """
 
     def __init__(self, plan: Plan, runner: StepRunner):

@@ -148,8 +148,12 @@ def free_components(components: Mapping[str, Component]) -> None:
     """
     with ExitStack() as stack:
         for name, component in components.items():
-            stack.enter_context(calling_component(name, "free", "end"))
-            stack.callback(component.free)
+            stack.callback(_free_component, name, component)
+
+
+def _free_component(name: str, component: Component) -> None:
+    with calling_component(name, "free", "end"):
+        component.free()
 
 
 def _space_problems(plan: Plan) -> list[Problem]:

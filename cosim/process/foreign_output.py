@@ -6,7 +6,7 @@ import codecs
 import os
 import sys
 
-from ..core.printable_text import SPACES, escape_control_characters
+from ..core.text import SPACES, escape_control_characters
 
 #: output of foreign code that is forwarded (bytes)
 MAX_OUTPUT_SIZE = 1 << 16

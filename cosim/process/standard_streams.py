@@ -7,7 +7,7 @@ import os
 import sys
 from typing import Any, TextIO
 
-from ..core.printable_text import SPACES, escape_control_characters
+from ..core.text import SPACES, escape_control_characters
 
 
 class _BrokenPipeIgnoringFile(io.FileIO):

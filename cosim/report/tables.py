@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, TextIO
 
-from ..core.printable_text import escape_control_characters
+from ..core.text import escape_control_characters
 from ..process.standard_streams import unescaped
 from ..results.checks import CheckOutcome, Number
 

@@ -46,8 +46,8 @@ def command(directory: Path, force: bool) -> int:
         raise InputError([Problem("exists; --force overwrites it", str(path)) for path in present])
     _write_project(directory)
     outcome = Regression(directory / "scenarios/course.json", directory / "runs/course", update=True).run()
-    for cache in [*directory.rglob("__pycache__")]:
-        shutil.rmtree(cache)
+    for folder in {(directory / name).parent for name in _PROJECT_FILES}:
+        shutil.rmtree(folder / "__pycache__", ignore_errors=True)
     if outcome.code:
         click.echo("\n".join([f"course: {outcome.summary}", *outcome.details]), err=True)
         return outcome.code

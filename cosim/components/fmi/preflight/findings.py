@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from ....core.errors import InputError
-from ....core.printable_text import escape_control_characters
+from ....core.text import escape_control_characters
 
 Severity = Literal["error", "warning"]
 DESCRIPTION_FILE = "modelDescription.xml"
