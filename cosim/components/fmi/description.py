@@ -13,11 +13,12 @@ from typing import Any, get_args
 import numpy as np
 
 from ...core.component import DTYPES, Causality, Variability, Variable
+from ...core.errors import InputError, join_alternatives
 from ...core.time_grid import exact_fraction
 from ...core.units import BASE_UNITS, Unit, named_unit
 from .preflight import DEFAULT_LIMITS, Examination, PreflightLimits, examine, raise_errors
 from .preflight.binary import list_platforms
-from .preflight.model_description import ModelDescription, ModelVariable, UnitDefinition
+from .preflight.model_description import Interface, ModelDescription, ModelVariable, UnitDefinition
 from .preflight.rules_values import dimension_size, read_limit
 from .preflight.values import parse_value
 
@@ -44,7 +45,8 @@ class FmuDescription:
     Attributes:
         fmi_version: `fmiVersion`, such as "2.0".
         model_name: `modelName`.
-        model_identifier: `modelIdentifier` of the Co-Simulation interface.
+        interface: Interface through which the FMU is simulated; the following attributes of capabilities belong to it.
+        model_identifier: `modelIdentifier`.
         instantiation_token: `instantiationToken` of FMI 3.0, `guid` of FMI 2.0.
         description: `description`.
         generation_tool: `generationTool`.
@@ -52,6 +54,7 @@ class FmuDescription:
         value_references: Value references by variable name, including aliases.
         default_experiment: `DefaultExperiment`.
         has_state: `canGetAndSetFMUState`.
+        variable_step: `canHandleVariableCommunicationStepSize`, always true for Model Exchange.
         once_per_process: `canBeInstantiatedOnlyOncePerProcess`.
         needs_execution_tool: `needsExecutionTool`.
         platforms: Platforms with a binary, as the FMU names their folders, and "c-code" if it contains sources.
@@ -59,6 +62,7 @@ class FmuDescription:
 
     fmi_version: str
     model_name: str
+    interface: Interface
     model_identifier: str
     instantiation_token: str
     description: str
@@ -67,6 +71,7 @@ class FmuDescription:
     value_references: Mapping[str, int]
     default_experiment: DefaultExperiment
     has_state: bool
+    variable_step: bool
     once_per_process: bool
     needs_execution_tool: bool
     platforms: Sequence[str]
@@ -87,40 +92,46 @@ def read_description(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> Fm
         limits: Limits of the preflight check.
 
     Raises:
-        InputError: The file is missing, is not a valid or safe FMU, or has no Co-Simulation interface of FMI 2.0 or 3.0.
+        InputError: The file is missing, is not a valid or safe FMU, or has no interface of FMI 2.0 or 3.0 that can be simulated.
     """
     return build_description(path, examine(path, limits))
 
 
-def build_description(path: Path, examination: Examination) -> FmuDescription:
+def build_description(path: Path, examination: Examination, interface: Interface | None = None) -> FmuDescription:
     """Build the description of an examined FMU.
 
     Args:
         path: The FMU, for messages.
         examination: Result of the preflight check.
+        interface: Interface through which the FMU is simulated; by default the preferred one that it has.
 
     Raises:
-        InputError: The examination found errors.
+        InputError: The examination found errors, or the FMU does not have the interface.
     """
     raise_errors(path, examination.findings)
     model = examination.model
     assert model is not None  # otherwise the examination has found an error
-    assert model.co_simulation is not None
+    selected = next(iter(model.interfaces)) if interface is None else interface
+    if selected not in model.interfaces:
+        raise InputError(f'"{path}": has no interface for {selected}, only for {join_alternatives(model.interfaces)}')
+    attributes = model.interfaces[selected]
     units = {unit.name: _build_unit(unit) for unit in model.units}
     variables = [variable for source in model.variables for variable in _build_variables(model, source, units)]
     return FmuDescription(
         model.root["fmiVersion"],
         model.root.get("modelName", ""),
-        model.co_simulation["modelIdentifier"],
+        selected,
+        attributes["modelIdentifier"],
         model.root["guid" if model.major == 2 else "instantiationToken"],
         model.root.get("description", ""),
         model.root.get("generationTool", ""),
         variables,
         {name: int(source.attributes["valueReference"]) for source in model.variables for name in _names_with_aliases(source)},
         _build_default_experiment(model.default_experiment),
-        any(model.co_simulation.get(name) in _TRUE for name in ("canGetAndSetFMUstate", "canGetAndSetFMUState")),
-        model.co_simulation.get("canBeInstantiatedOnlyOncePerProcess") in _TRUE,
-        model.co_simulation.get("needsExecutionTool") in _TRUE,
+        any(attributes.get(name) in _TRUE for name in ("canGetAndSetFMUstate", "canGetAndSetFMUState")),
+        selected == "model-exchange" or attributes.get("canHandleVariableCommunicationStepSize") in _TRUE,
+        attributes.get("canBeInstantiatedOnlyOncePerProcess") in _TRUE,
+        attributes.get("needsExecutionTool") in _TRUE,
         list_platforms(examination.members),
     )
 
@@ -146,13 +157,12 @@ def _build_variables(model: ModelDescription, source: ModelVariable, units: Mapp
             name,
             source.kind,
             _CAUSALITIES[source.causality],
-            _VARIABILITIES[source.variability],
+            _variability(source),
             _parse_start(source),
             _find_unit(source, units),
             tuple(dimension_size(model, dimension) or 0 for dimension in source.dimensions),
             description or descriptions[0] or "",
-            _finite_limit(source, "min"),
-            _finite_limit(source, "max"),
+            *_finite_limits(source),
             _enumeration_items(source),
             source.attribute("relativeQuantity") in _TRUE,
             _C_INT if is_c_int else DTYPES[source.kind],
@@ -181,10 +191,17 @@ def _enumeration_items(source: ModelVariable) -> tuple[tuple[str, int], ...]:
     return tuple((name, int(text)) for name, text in source.declared_type.items)
 
 
-def _finite_limit(source: ModelVariable, name: str) -> float | None:
-    text = source.attribute(name)
-    limit = None if text is None or source.kind == "Boolean" else read_limit(text)
-    return limit if limit is not None and math.isfinite(limit) else None
+def _variability(source: ModelVariable) -> Variability:
+    """Return the variability; only floating-point variables can be continuous."""
+    return _VARIABILITIES[source.variability if source.is_float or source.variability != "continuous" else "discrete"]
+
+
+def _finite_limits(source: ModelVariable) -> tuple[float | None, float | None]:
+    """Return (min, max), None for each limit that is missing or invalid, and for both if min is above max."""
+    texts = (None if source.kind == "Boolean" else source.attribute(name) for name in ("min", "max"))
+    limits = [None if text is None else read_limit(text) for text in texts]
+    low, high = (limit if limit is not None and math.isfinite(limit) else None for limit in limits)
+    return (None, None) if low is not None and high is not None and low > high else (low, high)
 
 
 def _build_default_experiment(experiment: Mapping[str, str]) -> DefaultExperiment:

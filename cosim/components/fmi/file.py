@@ -17,6 +17,7 @@ from .preflight import (
     DEFAULT_LIMITS,
     RUN_WARNINGS,
     Examination,
+    Interface,
     PreflightLimits,
     examine,
     extract,
@@ -42,14 +43,15 @@ class FmuFile:
     removes the folder. The FMU passes the preflight check before anything is extracted.
     """
 
-    def __init__(self, path: Path, limits: PreflightLimits = DEFAULT_LIMITS):
+    def __init__(self, path: Path, limits: PreflightLimits = DEFAULT_LIMITS, interface: Interface | None = None):
         """Prepare access to an FMU; the file is not opened yet.
 
         Args:
             path: The FMU.
             limits: Limits of the preflight check.
+            interface: Interface of all instances; by default Co-Simulation if the FMU has it, else Model Exchange.
         """
-        self.path, self.limits = path, limits
+        self.path, self.limits, self._interface = path, limits, interface
         self._folder: LockedFolder | _BorrowedFolder | None = None
         self._reference_count = 0
         #: FMPy's slave object with the loaded library, None while no instance has loaded it
@@ -65,7 +67,7 @@ class FmuFile:
     @cached_property
     def description(self) -> FmuDescription:
         """Model description; InputError if the preflight check found errors."""
-        return build_description(self.path, self.examination)
+        return build_description(self.path, self.examination, self._interface)
 
     @property
     def run_warning(self) -> str:
@@ -88,7 +90,8 @@ class FmuFile:
         Raises:
             InputError: The FMU has errors, no binary for this platform, or one that cannot be loaded.
         """
-        raise_errors(self.path, [*self.examination.findings, *self.examination.binary_findings])
+        raise_errors(self.path, self.examination.findings)
+        raise_errors(self.path, self.examination.binary_findings[self.description.interface])
 
     def acquire(self) -> Path:
         """Extract the FMU if necessary and return the folder, which exists until the matching `release`.

@@ -10,6 +10,7 @@ from ...core.component import NativeDoStep, PreparedCall, StepResult
 from .c_functions import function_address
 from .function_calls import DISCARD
 from .instance import FmuInstance
+from .preflight.functions import ACCESSORS
 
 #: fmi2True
 _TRUE = ctypes.c_int.from_param(1)
@@ -22,7 +23,7 @@ class Fmi2Instance(FmuInstance):
 
     prefix, major = "fmi2", 2
     _instantiate_function = "fmi2Instantiate"
-    accessors = {"Float64": "Real", "Int32": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
+    accessors = ACCESSORS[2]
 
     def _fmpy_class(self) -> type:
         from fmpy.fmi2 import FMU2Slave

@@ -6,11 +6,12 @@ import ctypes
 from collections.abc import Sequence
 from typing import Any
 
-from ...core.component import DTYPES, NativeDoStep, NativeFlagCheck, PreparedCall, StepResult
+from ...core.component import NativeDoStep, NativeFlagCheck, PreparedCall, StepResult
 from ...core.errors import ComponentError
 from .c_functions import as_pointer, function_address
 from .function_calls import DISCARD, OK
 from .instance import FmuInstance
+from .preflight.functions import ACCESSORS
 
 #: largest accepted size of one Binary value (bytes)
 MAX_BINARY_SIZE = 1 << 28
@@ -25,7 +26,7 @@ class Fmi3Instance(FmuInstance):
 
     prefix, major = "fmi3", 3
     _instantiate_function = "fmi3InstantiateCoSimulation"
-    accessors = {name: name for name in DTYPES} | {"Enumeration": "Int64"}
+    accessors = ACCESSORS[3]
 
     def _fmpy_class(self) -> type:
         from fmpy.fmi3 import FMU3Slave

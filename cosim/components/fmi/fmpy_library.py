@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import ctypes
+import inspect
 from pathlib import Path
-from typing import Any
+from types import UnionType
+from typing import Any, get_args
 
 from ...core.errors import InputError
 from .c_functions import FunctionTable
 from .description import FmuDescription
 from .file import FmuFile
 from .preflight.fmu_platform import current_platform
+
+
+class MissingFunctionError(Exception):
+    """Name of a function that the library does not export."""
 
 
 def load_library(file: FmuFile, folder: Path, slave_class: type) -> Any:
@@ -32,9 +38,6 @@ def load_library(file: FmuFile, folder: Path, slave_class: type) -> Any:
     except Exception as error:
         reason = str(error).replace(f"{folder}/", "")
         raise InputError(f'the binary of "{file.path}" cannot be loaded: {reason}') from None
-    for function in slave._functions.values():
-        if function.restype is ctypes.c_int:
-            function.errcheck = _reject_negative_status
     slave.functions = FunctionTable(slave.dll)
     return slave
 
@@ -48,14 +51,38 @@ def _create_slave(slave_class: type, description: FmuDescription, folder: Path) 
         guid=description.instantiation_token,
         unzipDirectory=str(folder),
         dll=ctypes.cdll.LoadLibrary(str(library)),
-        requireFunctions=True,
+        modelIdentifier=description.model_identifier,
         fmiCallLogger=None,
         callbacks=None,
         component=None,
-        _functions={},
     )
-    slave._loadFunctions()
+    slave._functions = _SlaveFunctions(slave_class, slave.dll)
     return slave
+
+
+class _SlaveFunctions(dict[str, Any]):
+    """C functions as FMPy's slave object calls them, by name; each is created on first use.
+
+    FMPy itself creates all functions of the standard at once, which takes milliseconds and fails if one of them is missing.
+    """
+
+    def __init__(self, slave_class: type, library: ctypes.CDLL):
+        super().__init__()
+        self._slave_class, self._library = slave_class, library
+
+    def __missing__(self, name: str) -> Any:
+        try:
+            function: Any = self._library[name]
+        except AttributeError:
+            raise MissingFunctionError(name) from None
+        signature = inspect.signature(getattr(self._slave_class, name))
+        types = [parameter.annotation for parameter in list(signature.parameters.values())[1:]]
+        function.argtypes = [get_args(kind)[0] if isinstance(kind, UnionType) else kind for kind in types]
+        function.restype = ctypes.c_char_p if signature.return_annotation is bytes else signature.return_annotation
+        if function.restype is ctypes.c_int:
+            function.errcheck = _reject_negative_status
+        self[name] = function
+        return function
 
 
 def _reject_negative_status(status: int, function: Any, _: Any) -> int:

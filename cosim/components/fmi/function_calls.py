@@ -11,6 +11,7 @@ from ...core.errors import ComponentError
 from ...process import float_mode
 from ...process.journal import calling_component
 from .file import FmuFile
+from .fmpy_library import MissingFunctionError
 
 #: names of fmi2Status and fmi3Status by value; "pending" exists in FMI 2.0 only
 STATUS_NAMES = ("OK", "warning", "discard", "error", "fatal", "pending")
@@ -47,7 +48,7 @@ class FunctionCaller:
             The result of the function, or None for `unavailable_status`.
 
         Raises:
-            ComponentError: The function returned a bad status.
+            ComponentError: The function returned a bad status, or the library does not export it.
         """
         from fmpy.fmi1 import FMICallException
 
@@ -59,6 +60,10 @@ class FunctionCaller:
                 if error.status == unavailable_status:
                     return None
                 raise self.status_error(error.function, error.status) from None
+            except MissingFunctionError:
+                if unavailable_status is not None:
+                    return None
+                raise ComponentError(self.name, name, "the library does not export this function") from None
         self.restore_float_mode(name)
         return result
 

@@ -119,7 +119,7 @@ class FmuInstance(FunctionCaller, Component):
     def _check_version(self) -> None:
         """Call fmi*GetVersion (and fmi2GetTypesPlatform), and log a warning about each unexpected return value."""
         texts = {}
-        for name in (name for name in EXPECTED_TEXTS if name.startswith(self.prefix)):
+        for name in (name for name in EXPECTED_TEXTS if name.startswith(self.prefix) and hasattr(self._fmu.dll, name)):
             function = self._fmu.dll[name]
             function.restype = ctypes.c_char_p
             with calling_component(self.name, name, "load"):

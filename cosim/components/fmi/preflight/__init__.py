@@ -17,7 +17,8 @@ from .binary import check_binary
 from .findings import DESCRIPTION_FILE, FatalFindingError, Finding, Rule, raise_errors
 from .fmu_platform import current_platform
 from .limits import DEFAULT_LIMITS, PreflightLimits
-from .model_description import ModelDescription
+from .model_description import Interface, ModelDescription
+from .rules_archive import NAME_FORM, REPEATED_FOLDER
 from .xml import parse_xml
 from .xml_reader import check_repeated_elements, read_model
 
@@ -27,6 +28,7 @@ __all__ = [
     "RUN_WARNINGS",
     "Examination",
     "Finding",
+    "Interface",
     "PreflightLimits",
     "examine",
     "extract",
@@ -37,7 +39,14 @@ __all__ = [
 MISSING = Rule("archive.description", "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5")
 CHANGED = Rule("archive.changed", "limits")
 #: rules whose violations do not prevent a run, but may change its results
-RUN_WARNINGS = (rules_structure.OUTPUTS, rules_variables.UNIT)
+RUN_WARNINGS = frozenset(
+    {
+        *(NAME_FORM, REPEATED_FOLDER, rules_structure.OUTPUTS),
+        *(rules_model.EMPTY_TOKEN, rules_model.IDENTIFIER, rules_model.EXPERIMENT_VALUE),
+        *(rules_variables.UNIT, rules_variables.COMBINATION, rules_variables.CONTINUOUS, rules_variables.INITIAL_RULE),
+        *(rules_variables.DECLARED, rules_values.MISSING, rules_values.RANGE, rules_values.LIMIT),
+    }
+)
 _MAX_FINDINGS_PER_CHECK = 100
 #: folders that a running FMU does not use
 _UNUSED_FOLDERS = ("documentation", "sources")
@@ -58,14 +67,14 @@ class Examination:
         members: Names of the members of the archive.
         model: Model description, None if it cannot be read.
         findings: Findings that do not depend on the platform.
-        binary_findings: Findings about the binary for this platform.
+        binary_findings: Findings about the binary for this platform, by interface.
     """
 
     file_identity: tuple[int, ...] = ()
     members: Sequence[str] = ()
     model: ModelDescription | None = None
     findings: list[Finding] = field(default_factory=list)
-    binary_findings: list[Finding] = field(default_factory=list)
+    binary_findings: dict[Interface, list[Finding]] = field(default_factory=dict)
 
 
 def examine(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> Examination:
@@ -108,12 +117,15 @@ def _examine_archive(archive: Archive, limits: PreflightLimits, result: Examinat
         result.findings += islice(check(model), _MAX_FINDINGS_PER_CHECK)
     result.findings += islice(rules_values.check_dimensions(model, limits), _MAX_FINDINGS_PER_CHECK)
     if not _has_errors(result.findings):
-        result.binary_findings += _binary_findings(archive, model, limits)
+        for interface in model.interfaces:
+            result.binary_findings[interface] = list(_binary_findings(archive, model, interface, limits))
 
 
-def _binary_findings(archive: Archive, model: ModelDescription, limits: PreflightLimits) -> Iterator[Finding]:
+def _binary_findings(
+    archive: Archive, model: ModelDescription, interface: Interface, limits: PreflightLimits
+) -> Iterator[Finding]:
     try:
-        yield from check_binary(archive, model, current_platform(), limits)
+        yield from check_binary(archive, model, interface, current_platform(), limits)
     except FatalFindingError as error:
         yield error.finding
 

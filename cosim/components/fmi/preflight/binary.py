@@ -11,9 +11,10 @@ from . import elf, macho, pe
 from .archive import Archive
 from .findings import Finding, Rule, escape_unprintable
 from .fmu_platform import FmuPlatform
+from .functions import called_functions, standard_functions
 from .library import EXPECTED_TEXTS, InvalidLibraryError, SharedLibrary
 from .limits import PreflightLimits
-from .model_description import ModelDescription
+from .model_description import Interface, ModelDescription
 
 _BINARIES = "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5.1"
 _FUNCTIONS = "FMI 2.0.5 sections 2.1 and 4.2, FMI 3.0.2 section 2.5"
@@ -21,6 +22,7 @@ PLATFORM = Rule("binary.platform", _BINARIES)
 PRESENT = Rule("binary.present", _BINARIES)
 FORMAT = Rule("binary.format", _BINARIES)
 FUNCTIONS = Rule("binary.functions", _FUNCTIONS)
+UNUSED_FUNCTIONS = Rule("binary.unused-functions", _FUNCTIONS, "warning")
 SIZE = Rule("binary.size", "limits")
 NEEDED = Rule("binary.needed", _BINARIES, "warning")
 VERSION = Rule("binary.version", "FMI 2.0.5 section 2.1.4, FMI 3.0.2 section 2.2.4", "warning")
@@ -31,43 +33,6 @@ _READERS: Mapping[str, Callable[[bytes, str], SharedLibrary]] = {
     ".dylib": macho.read_library,
 }
 _LIBRARY_SUFFIXES = (".so", ".dll", ".dylib")
-_STATE_FUNCTIONS = ("FreeFMUState", "GetFMUState", "SerializeFMUState", "SerializedFMUStateSize", "SetFMUState")
-_COMMON_FUNCTIONS = (
-    *("DoStep", "EnterInitializationMode", "ExitInitializationMode", "FreeInstance", "GetBoolean", "GetDirectionalDerivative"),
-    *("GetString", "GetVersion", "Reset", "SetBoolean", "SetDebugLogging", "SetString", "Terminate"),
-)
-_FMI2_FUNCTIONS = (
-    *("CancelStep", "DeSerializeFMUstate", "GetBooleanStatus", "GetInteger", "GetIntegerStatus", "GetReal"),
-    *("GetRealOutputDerivatives", "GetRealStatus", "GetStatus", "GetStringStatus", "GetTypesPlatform", "Instantiate"),
-    *("SetInteger", "SetReal", "SetRealInputDerivatives", "SetupExperiment"),
-)
-_FMI3_FUNCTIONS = (
-    *("ActivateModelPartition", "CompletedIntegratorStep", "DeserializeFMUState", "EnterConfigurationMode"),
-    *("EnterContinuousTimeMode", "EnterEventMode", "EnterStepMode", "EvaluateDiscreteStates", "ExitConfigurationMode"),
-    *("GetAdjointDerivative", "GetContinuousStateDerivatives", "GetContinuousStates", "GetEventIndicators"),
-    *("GetIntervalDecimal", "GetIntervalFraction", "GetNominalsOfContinuousStates", "GetNumberOfContinuousStates"),
-    *("GetNumberOfEventIndicators", "GetNumberOfVariableDependencies", "GetOutputDerivatives", "GetShiftDecimal"),
-    *("GetShiftFraction", "GetVariableDependencies", "InstantiateCoSimulation", "InstantiateModelExchange"),
-    *("InstantiateScheduledExecution", "SetContinuousStates", "SetIntervalDecimal", "SetIntervalFraction"),
-    *("SetShiftDecimal", "SetShiftFraction", "SetTime", "UpdateDiscreteStates"),
-)
-_FMI3_TYPES = ("Binary", "Clock", "Float32", "Float64", *(f"{s}Int{bits}" for s in ("", "U") for bits in (8, 16, 32, 64)))
-#: functions that a Co-Simulation FMU must export, by FMI major version
-REQUIRED_FUNCTIONS = {
-    2: frozenset(
-        f"fmi2{name}"
-        for name in (*_COMMON_FUNCTIONS, *_FMI2_FUNCTIONS, *(name.replace("FMUState", "FMUstate") for name in _STATE_FUNCTIONS))
-    ),
-    3: frozenset(
-        f"fmi3{name}"
-        for name in (
-            *_COMMON_FUNCTIONS,
-            *_FMI3_FUNCTIONS,
-            *_STATE_FUNCTIONS,
-            *(f"{v}{kind}" for v in ("Get", "Set") for kind in _FMI3_TYPES),
-        )
-    ),
-}
 
 
 def list_platforms(names: Iterable[str]) -> list[str]:
@@ -85,12 +50,15 @@ def list_platforms(names: Iterable[str]) -> list[str]:
     return [*sorted(folders), *(["c-code"] if sources else [])]
 
 
-def check_binary(archive: Archive, model: ModelDescription, machine: FmuPlatform, limits: PreflightLimits) -> Iterator[Finding]:
-    """Check that the library for a platform exists, is complete, and exports the functions that FMI requires.
+def check_binary(
+    archive: Archive, model: ModelDescription, interface: Interface, machine: FmuPlatform, limits: PreflightLimits
+) -> Iterator[Finding]:
+    """Check that the library for a platform exists, is complete, and exports the functions that the importer calls.
 
     Args:
         archive: The FMU.
         model: Its model description.
+        interface: Interface whose library is checked.
         machine: The platform.
         limits: Limits of the preflight check.
 
@@ -103,7 +71,7 @@ def check_binary(archive: Archive, model: ModelDescription, machine: FmuPlatform
         names = folder if folder == machine.platform_tuple else f"{machine.platform_tuple} ({folder})"
         yield PLATFORM(f"has no binary for {names}; it has: {', '.join(platforms) or 'no binaries'}")
         return
-    identifier = (model.co_simulation or {}).get("modelIdentifier", "")
+    identifier = model.interfaces[interface].get("modelIdentifier", "")
     member = f"binaries/{folder}/{identifier}{machine.suffix}"
     if member not in archive.members:
         found = ", ".join(name for name in archive.members if name.startswith(f"binaries/{folder}/"))
@@ -111,17 +79,22 @@ def check_binary(archive: Archive, model: ModelDescription, machine: FmuPlatform
     elif archive.members[member].size > limits.max_library_size:
         yield SIZE(f"the library has {archive.members[member].size} bytes, expected at most {limits.max_library_size}", member)
     else:
-        yield from _check_library(archive, member, model.major, machine)
+        yield from _check_library(archive, member, model, interface, machine)
 
 
-def _check_library(archive: Archive, member: str, major: int, machine: FmuPlatform) -> Iterator[Finding]:
+def _check_library(
+    archive: Archive, member: str, model: ModelDescription, interface: Interface, machine: FmuPlatform
+) -> Iterator[Finding]:
     try:
         library = _READERS[machine.suffix](archive.read(member), machine.architecture)
     except InvalidLibraryError as error:
         yield FORMAT(f"the library cannot be loaded: it {error}", member)
         return
-    if missing := sorted(REQUIRED_FUNCTIONS[major] - library.exports):
+    called = called_functions(model, interface)
+    if missing := sorted(called - library.exports):
         yield FUNCTIONS(f"the library does not export {abbreviate_names(missing, limit=5)}", member)
+    if unused := sorted(standard_functions(model.major, interface) - called - library.exports):
+        yield UNUSED_FUNCTIONS(f"the library does not export {abbreviate_names(unused, limit=5)}", member)
     for text in version_deviations(library.constant_texts):
         yield VERSION(text, member)
     for name in library.needed_libraries:

@@ -23,7 +23,7 @@ class PreflightLimits:
     max_library_size: int = 1 << 28
     #: size of an XML file (bytes) and number of its tags
     max_xml_size: int = 1 << 25
-    max_xml_tags: int = 500_000
+    max_xml_tags: int = 1_000_000
     #: length of one attribute or text in an XML file (characters)
     max_text_length: int = MAX_TEXT_LENGTH
     #: number of elements of one array variable

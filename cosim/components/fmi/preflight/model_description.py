@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
+
+#: interface of an FMU through which it is simulated
+Interface = Literal["co-simulation", "model-exchange"]
 
 #: (causality, variability) -> allowed values of `initial`, the default first (FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.4)
 _EXACT, _DERIVED, _ANY = ("exact",), ("calculated", "approx"), ("calculated", "exact", "approx")
@@ -136,7 +140,7 @@ class ModelDescription:
     Attributes:
         major: FMI major version.
         root: XML attributes of the root element.
-        co_simulation: XML attributes of the Co-Simulation interface, or None without one.
+        interfaces: XML attributes of the interfaces through which the FMU can be simulated, the preferred one first.
         default_experiment: XML attributes of the default experiment.
         variables: Model variables in order.
         types: Declared types.
@@ -149,7 +153,7 @@ class ModelDescription:
 
     major: int
     root: Mapping[str, str]
-    co_simulation: Mapping[str, str] | None
+    interfaces: Mapping[Interface, Mapping[str, str]]
     default_experiment: Mapping[str, str]
     variables: Sequence[ModelVariable]
     types: Sequence[TypeDefinition]

@@ -14,7 +14,9 @@ from .zip_format import ZipEntry
 
 _ZIP = "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5"
 NAME = Rule("archive.name", _ZIP)
+NAME_FORM = Rule("archive.name-form", _ZIP, "warning")
 COLLISION = Rule("archive.collision", _ZIP)
+REPEATED_FOLDER = Rule("archive.repeated-folder", _ZIP, "warning")
 KIND = Rule("archive.kind", _ZIP)
 ENCRYPTION = Rule("archive.encryption", _ZIP)
 COMPRESSION = Rule("archive.compression", _ZIP)
@@ -52,13 +54,17 @@ def _check_name(entry: ZipEntry) -> Iterator[Finding]:
         yield NAME("its name is marked as UTF-8 but is not UTF-8", name)
     if not name.isprintable():
         yield NAME("its name contains control characters or other non-printable characters", name)
-    if "\\" in name or ":" in name:
-        yield NAME('its name contains a backslash or a colon, expected a relative path with "/"', name)
+    if "\\" in entry.raw_name:
+        yield NAME_FORM('its name contains a backslash, which is read as "/"', name)
+    if entry.raw_name.startswith("./"):
+        yield NAME_FORM('its name begins with "./", which is ignored', name)
+    if ":" in name:
+        yield NAME("its name contains a colon, expected a relative path", name)
     if name.count("/") > _MAX_DEPTH:
         yield NAME(f"is nested {name.count('/')} folders deep, expected at most {_MAX_DEPTH}", name)
         return
     parts = name.removesuffix("/").split("/")
-    if not {"", ".", ".."}.isdisjoint(parts):
+    if name != "./" and not {"", ".", ".."}.isdisjoint(parts):
         yield NAME('its name contains an empty, "." or ".." part, expected a relative path', name)
     if len(entry.name) > _MAX_PATH_LENGTH or any(len(os.fsencode(part)) > _MAX_NAME_LENGTH for part in parts):
         yield NAME(f"its name is longer than {_MAX_NAME_LENGTH} bytes (a path: {_MAX_PATH_LENGTH})", name)
@@ -95,7 +101,8 @@ def check_collisions(names: Sequence[str]) -> Iterator[Finding]:
         folded = _fold_case(name)
         if folded in first_names:
             first = first_names[folded]
-            yield COLLISION("occurs twice" if first == name else f'differs only in case or Unicode form from "{first}"', name)
+            rule = REPEATED_FOLDER if first == name and name.endswith("/") else COLLISION
+            yield rule("occurs twice" if first == name else f'differs only in case or Unicode form from "{first}"', name)
         first_names.setdefault(folded, name)
     files = {folded for folded, name in first_names.items() if not name.endswith("/")}
     for folded, name in first_names.items():

@@ -20,14 +20,16 @@ _EXPERIMENT = "FMI 2.0.5 section 2.2.5, FMI 3.0.2 section 2.4.6"
 
 NAME = Rule("model.name", _ROOT, "warning")
 TOKEN = Rule("model.token", _ROOT)
-INTERFACE = Rule("model.co-simulation", _INTERFACE)
-IDENTIFIER = Rule("model.identifier", _INTERFACE)
+EMPTY_TOKEN = Rule("model.empty-token", _ROOT, "warning")
+INTERFACE = Rule("model.interface", _INTERFACE)
+LIBRARY_NAME = Rule("model.library-name", _INTERFACE)
+IDENTIFIER = Rule("model.identifier", _INTERFACE, "warning")
 UNIT_NAME = Rule("unit.unique", _UNITS)
 UNIT_BASE = Rule("unit.base", _UNITS)
 TYPE_NAME = Rule("type.unique", _TYPES)
 TYPE_KIND = Rule("type.kind", _TYPES, "warning")
 ITEMS = Rule("type.items", _TYPES)
-EXPERIMENT_VALUE = Rule("experiment.value", _EXPERIMENT)
+EXPERIMENT_VALUE = Rule("experiment.value", _EXPERIMENT, "warning")
 EXPERIMENT = Rule("experiment.order", _EXPERIMENT, "warning")
 CATEGORIES = Rule("categories.unique", _CATEGORIES, "warning")
 
@@ -35,20 +37,25 @@ _C_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 def check_names(model: ModelDescription) -> Iterator[Finding]:
-    """Check the attributes of the root element and of the Co-Simulation interface."""
+    """Check the attributes of the root element and of the interfaces."""
     line = model.lines[""]
     attribute = "guid" if model.major == 2 else "instantiationToken"
-    if not model.root.get(attribute):
+    token = model.root.get(attribute)
+    if token is None:
         yield TOKEN(f"lacks the attribute {attribute}", DESCRIPTION_FILE, line)
+    elif not token:
+        yield EMPTY_TOKEN(f"the attribute {attribute} is empty", DESCRIPTION_FILE, line)
     if not model.root.get("modelName"):
         yield NAME("lacks the attribute modelName", DESCRIPTION_FILE, line)
-    if model.co_simulation is None:
-        yield INTERFACE("offers no Co-Simulation interface", DESCRIPTION_FILE, line)
-        return
-    line = model.lines["CoSimulation"]
-    identifier = model.co_simulation.get("modelIdentifier", "")
-    if not _C_IDENTIFIER.fullmatch(identifier):
-        yield IDENTIFIER(f'found modelIdentifier "{identifier}", expected a C identifier', DESCRIPTION_FILE, line)
+    if not model.interfaces:
+        yield INTERFACE("offers neither Co-Simulation nor Model Exchange", DESCRIPTION_FILE, line)
+    for name, attributes in model.interfaces.items():
+        line = model.lines["CoSimulation" if name == "co-simulation" else "ModelExchange"]
+        identifier = attributes.get("modelIdentifier", "")
+        if not identifier or not {"/", "\\"}.isdisjoint(identifier):
+            yield LIBRARY_NAME(f'found modelIdentifier "{identifier}", expected a file name', DESCRIPTION_FILE, line)
+        elif not _C_IDENTIFIER.fullmatch(identifier):
+            yield IDENTIFIER(f'found modelIdentifier "{identifier}", expected a C identifier', DESCRIPTION_FILE, line)
 
 
 def check_units(model: ModelDescription) -> Iterator[Finding]:

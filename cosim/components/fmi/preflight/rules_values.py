@@ -13,15 +13,14 @@ from .values import parse_float, parse_value
 _START = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.5"
 _DIMENSION = "FMI 3.0.2 section 2.4.7.2"
 
-MISSING = Rule("start.missing", _START)
+MISSING = Rule("start.missing", _START, "warning")
 UNEXPECTED = Rule("start.unwanted", _START, "warning")
 VALUE = Rule("start.value", _START)
 FINITE = Rule("start.finite", _START)
 INFINITE = Rule("start.infinite", _START, "warning")
-RANGE = Rule("start.range", _START)
-OWN_RANGE = Rule("start.own-range", _START, "warning")
+RANGE = Rule("start.range", _START, "warning")
 COUNT = Rule("start.count", "FMI 3.0.2 section 2.4.7.5")
-LIMIT = Rule("variable.limits", _START)
+LIMIT = Rule("variable.limits", _START, "warning")
 LIMIT_VALUE = Rule("variable.limit-value", _START, "warning")
 DIMENSION = Rule("variable.dimension", _DIMENSION)
 SIZE = Rule("variable.size", "limits")
@@ -62,7 +61,7 @@ def _check_start_values(variable: ModelVariable) -> Iterator[Finding]:
             text = f"found start value {word}, expected a finite number"
             yield _variable_finding(INFINITE if is_allowed else FINITE, variable, text)
         elif not low <= number <= high:
-            yield _variable_finding(_range_rule(variable), variable, f"found start value {word}, expected {low:g} to {high:g}")
+            yield _variable_finding(RANGE, variable, f"found start value {word}, expected {low:g} to {high:g}")
     yield from _check_enumeration_start(variable)
 
 
@@ -98,18 +97,13 @@ def read_limit(text: str) -> float | None:
     return None if math.isnan(limit) else limit
 
 
-def _range_rule(variable: ModelVariable) -> Rule:
-    """Return the rule for a start value out of range: an error only for values that the importer sets."""
-    return RANGE if variable.causality in ("input", "parameter", "structuralParameter") else OWN_RANGE
-
-
 def _check_enumeration_start(variable: ModelVariable) -> Iterator[Finding]:
     if variable.kind == "Enumeration" and variable.declared_type and variable.declared_type.items:
         values = {item[1].strip() for item in variable.declared_type.items}
         for word in variable.start_words or ():
             if word not in values:
                 text = f'found start value {word}, expected an item of "{variable.declared_type.name}"'
-                yield _variable_finding(_range_rule(variable), variable, text)
+                yield _variable_finding(RANGE, variable, text)
 
 
 def check_dimensions(model: ModelDescription, limits: PreflightLimits) -> Iterator[Finding]:

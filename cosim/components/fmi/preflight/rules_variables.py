@@ -21,16 +21,17 @@ UNIQUE = Rule("variable.unique", _VARIABLES)
 CONVENTION = Rule("variable.convention", "FMI 2.0.5 section 2.2.9, FMI 3.0.2 section 2.4.7.5.1", "warning")
 KIND = Rule("variable.type", _VARIABLES)
 ATTRIBUTE_VALUE = Rule("variable.word", _ATTRIBUTES)
-COMBINATION = Rule("variable.combination", _ATTRIBUTES)
-CONTINUOUS = Rule("variable.continuous", _ATTRIBUTES)
+COMBINATION = Rule("variable.combination", _ATTRIBUTES, "warning")
+CONTINUOUS = Rule("variable.continuous", _ATTRIBUTES, "warning")
 IMPLIED = Rule("variable.implied-continuous", _ATTRIBUTES, "warning")
-INITIAL_RULE = Rule("variable.initial", _TYPE_SPECIFIC)
+INITIAL_RULE = Rule("variable.initial", _TYPE_SPECIFIC, "warning")
 INITIAL_NOT_ALLOWED = Rule("variable.initial-not-allowed", _TYPE_SPECIFIC, "warning")
 INDEPENDENT = Rule("variable.independent", _ATTRIBUTES, "warning")
 REFERENCE = Rule("reference.value", _ATTRIBUTES)
 SHARED = Rule("reference.shared", _ATTRIBUTES)
 ALIAS = Rule("reference.alias", _ATTRIBUTES, "warning")
-DECLARED = Rule("variable.declared-type", _TYPE_SPECIFIC)
+DECLARED = Rule("variable.declared-type", _TYPE_SPECIFIC, "warning")
+OTHER_TYPE = Rule("variable.other-type", _TYPE_SPECIFIC)
 UNIT = Rule("variable.unit", _UNITS, "warning")
 DISPLAY_UNIT = Rule("variable.display-unit", _UNITS, "warning")
 DERIVATIVE = Rule("variable.derivative", _TYPE_SPECIFIC)
@@ -102,7 +103,8 @@ def _check_combination(model: ModelDescription, variable: ModelVariable) -> Iter
         yield _variable_finding(COMBINATION, variable, text)
         return
     if variability == "continuous" and variable.kind and not variable.is_float:
-        yield _variable_finding(CONTINUOUS, variable, f'type {variable.kind} is not allowed with variability="continuous"')
+        text = f'type {variable.kind} is not allowed with variability="continuous"; it is treated as discrete'
+        yield _variable_finding(CONTINUOUS, variable, text)
     if model.major == 2 and "variability" not in variable.attributes and variable.kind and not variable.is_float:
         text = f"lacks the attribute variability; its default is continuous, but {variable.kind} is treated as discrete"
         yield _variable_finding(IMPLIED, variable, text)
@@ -175,7 +177,7 @@ def _check_declared_type(model: ModelDescription, variable: ModelVariable) -> It
         yield _variable_finding(DECLARED, variable, f'found declaredType="{name}", which is not defined{hint}')
     elif variable.kind and variable.declared_type.kind not in ("", variable.kind):
         text = f'the type "{name}" is {variable.declared_type.kind}, but the variable is {variable.kind}'
-        yield _variable_finding(DECLARED, variable, text)
+        yield _variable_finding(OTHER_TYPE, variable, text)
 
 
 def _check_units(variable: ModelVariable, units: dict[str, Sequence[str]]) -> Iterator[Finding]:

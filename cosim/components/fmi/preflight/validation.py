@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 
 from . import Examination, examine
@@ -30,7 +31,7 @@ def validate_fmu(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> Sequen
         InputError: The file does not exist or cannot be read.
     """
     examination = examine(path, limits)
-    findings = [*examination.findings, *examination.binary_findings]
+    findings = [*examination.findings, *chain.from_iterable(examination.binary_findings.values())]
     if examination.members:
         with open_regular_file(path) as file:
             archive = Archive(file, limits)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from .findings import DESCRIPTION_FILE, FatalFindingError, Finding, Rule
-from .model_description import ModelDescription, ModelVariable, TypeDefinition, UnitDefinition, Unknown
+from .model_description import Interface, ModelDescription, ModelVariable, TypeDefinition, UnitDefinition, Unknown
 
 _ROOT = "FMI 2.0.5 section 2.2.1, FMI 3.0.2 section 2.4.1"
 ROOT = Rule("model.root", _ROOT)
@@ -33,6 +33,8 @@ _FMI2_STRUCTURE = {
 _FMI3_STRUCTURE = {
     name: name for name in ("Output", "ContinuousStateDerivative", "ClockedState", "InitialUnknown", "EventIndicator")
 }
+#: elements of the interfaces, the preferred one first
+_INTERFACES: Mapping[Interface, str] = {"co-simulation": "CoSimulation", "model-exchange": "ModelExchange"}
 _FIXED_CAUSALITIES = ("parameter", "calculatedParameter", "structuralParameter")
 #: without "3.0-beta", because the C functions changed until 3.0
 _SUPPORTED_VERSION = re.compile(r"2\.0(\.[0-9]+)?|3\.[0-9]+(\.[0-9]+)?")
@@ -54,13 +56,12 @@ def read_model(root: Any) -> ModelDescription:
         found = "lacks the attribute fmiVersion" if version is None else f"is an FMI {version} FMU"
         raise FatalFindingError(VERSION(f"{found}; FMI 2.0 and 3.0 are supported", DESCRIPTION_FILE, root.sourceline))
     major = int(version[0])
-    interface = root.find("CoSimulation")
     types = [_read_type(element, major) for element in root.iterfind("TypeDefinitions/*")]
     types_by_name = {definition.name: definition for definition in types}
     return ModelDescription(
         major,
         _read_attributes(root),
-        None if interface is None else _read_attributes(interface),
+        {name: _read_attributes(root.find(tag)) for name, tag in _INTERFACES.items() if root.find(tag) is not None},
         _read_attributes(root.find("DefaultExperiment")),
         [_read_variable(element, major, types_by_name) for element in root.iterfind("ModelVariables/*")],
         types,
@@ -128,7 +129,8 @@ def _default_variability(kind: str, causality: str, major: int) -> str:
 def _read_starts(element: Any, kind: str, text: str | None, major: int) -> Sequence[str] | None:
     """Return the words of a start value; String and Binary variables of FMI 3.0 have one element per value."""
     if kind in ("String", "Binary") and major == 3:
-        return [child.get("value", "") for child in element.iterfind("Start")] or None
+        values = [child.get("value", "") for child in element.iterfind("Start")]
+        return values or (None if text is None or kind == "Binary" else [text])  # Dymola 2023x writes an attribute
     if text is None:
         return None
     return [text] if kind == "String" else text.split()

@@ -57,12 +57,18 @@ class ZipEntry:
     offset: int
 
     @property
-    def decoded_name(self) -> str:
+    def raw_name(self) -> str:
         """Name as text: UTF-8 if it is valid UTF-8, else code page 437."""
         try:
             return self.name.decode()
         except UnicodeDecodeError:
             return self.name.decode("cp437")
+
+    @property
+    def decoded_name(self) -> str:
+        """Name as path with "/" between its parts and without "./" at its beginning; the folder "./" keeps its name."""
+        name = self.raw_name.replace("\\", "/")
+        return name.removeprefix("./") or name
 
 
 def read_central_directory(file: BufferedReader, max_entries: int) -> tuple[list[ZipEntry], int]:

@@ -22,7 +22,7 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const 
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
-    if (strcmp(guid, "probe")) {
+    if (*guid && strcmp(guid, "probe")) {
         callbacks->logger(callbacks->componentEnvironment, name, fmi2Error, "error", "wrong GUID");
         return NULL;
     }

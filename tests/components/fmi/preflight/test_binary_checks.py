@@ -8,13 +8,13 @@ import sys
 import fmpy
 import pytest
 from bad_fmus import find_problems, members, pack_archive, refusal_message
-from fmpy.fmi2 import FMU2Slave
-from fmpy.fmi3 import FMU3Slave
+from fmpy.fmi2 import FMU2Model, FMU2Slave
+from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from cosim.components.fmi import FmuFile
 from cosim.components.fmi.preflight import elf
-from cosim.components.fmi.preflight.binary import REQUIRED_FUNCTIONS
 from cosim.components.fmi.preflight.fmu_platform import FmuPlatform, current_platform
+from cosim.components.fmi.preflight.functions import standard_functions
 from cosim.core import resources
 from cosim.export.fmu.compiler import find_compiler
 
@@ -118,8 +118,8 @@ def test_a_missing_function_is_named(good, fmu):
 
 def test_many_missing_functions_are_counted(fmu, tmp_path):
     text = refusal_message(fmu(compiled(tmp_path, "empty", "int unrelated(void) { return 0; }\n").read_bytes()))
-    assert "does not export fmi2CancelStep, " in text
-    assert f"and {len(REQUIRED_FUNCTIONS[2]) - 5} more" in text
+    assert "does not export fmi2DoStep, " in text
+    assert "and 13 more [binary.functions" in text
 
 
 def test_hidden_and_undefined_functions_do_not_count(tmp_path):
@@ -148,17 +148,32 @@ def test_exports_are_those_listed_by_nm(path):
     file.release()
 
 
-@pytest.mark.parametrize(("version", "slave", "prefix"), [(2, FMU2Slave, "fmi2"), (3, FMU3Slave, "fmi3")])
-def test_the_required_functions_are_those_of_fmpy(version, slave, prefix):
-    assert {name for name in dir(slave) if name.startswith(prefix)} == REQUIRED_FUNCTIONS[version]
+FMPY_CLASSES = [
+    (2, "co-simulation", FMU2Slave),
+    (2, "model-exchange", FMU2Model),
+    (3, "co-simulation", FMU3Slave),
+    (3, "model-exchange", FMU3Model),
+]
+
+
+@pytest.mark.parametrize(("version", "interface", "fmpy_class"), FMPY_CLASSES)
+def test_the_standard_functions_are_those_of_fmpy(version, interface, fmpy_class):
+    assert {name for name in dir(fmpy_class) if name.startswith(f"fmi{version}")} == standard_functions(version, interface)
 
 
 def test_a_missing_dependency_is_a_warning(fmu, tmp_path):
     compiled(tmp_path, "libnowhere", "int other(void) { return 1; }\n")
     user = compiled(tmp_path, "user", "extern int other(void); int use(void) { return other(); }\n", f"-L{tmp_path}", "-lnowhere")
     findings = find_problems(fmu(user.read_bytes()))
-    assert [(f.rule.name, f.rule.severity) for f in findings] == [("binary.functions", "error"), ("binary.needed", "warning")]
-    assert "needs the library libnowhere.so, which was not found on this machine" in findings[1].message
+    assert [(f.rule.name, f.rule.severity) for f in findings] == [
+        ("binary.functions", "error"),
+        ("binary.unused-functions", "warning"),
+        ("binary.needed", "warning"),
+    ]
+    assert (
+        "needs the library libnowhere.so, which was not found on this machine"
+        in next(f for f in findings if f.rule.name == "binary.needed").message
+    )
 
 
 WRONG_VERSIONS = {

@@ -72,4 +72,5 @@ def test_styles_of_exporters_are_accepted(style, good, tmp_path):
     path.write_bytes(pack_archive(members(good[2] | {"modelDescription.xml": DESCRIPTIONS[style]})))
     FmuFile(path).check_binary()
     assert FmuFile(path).description.variables
-    assert {finding.rule.severity for finding in find_problems(path)} <= {"warning"}
+    findings = [finding for finding in find_problems(path) if finding.rule.name != "binary.functions"]  # of the other interface
+    assert {finding.rule.severity for finding in findings} <= {"warning"}

@@ -10,8 +10,9 @@ from bad_fmus import members, pack_archive
 
 from cosim.components.fmi.preflight import DEFAULT_LIMITS, examine, macho, open_regular_file
 from cosim.components.fmi.preflight.archive import Archive
-from cosim.components.fmi.preflight.binary import REQUIRED_FUNCTIONS, check_binary
+from cosim.components.fmi.preflight.binary import check_binary
 from cosim.components.fmi.preflight.fmu_platform import FmuPlatform
+from cosim.components.fmi.preflight.functions import standard_functions
 from cosim.components.fmi.preflight.library import InvalidLibraryError, SharedLibrary
 
 FMPY = Path(fmpy.__file__).parent
@@ -65,7 +66,7 @@ def universal_library():
 
 def test_a_real_library_exports_the_functions_of_fmi(library, architecture):
     exports = macho.read_library(library, architecture).exports
-    assert REQUIRED_FUNCTIONS[2] | REQUIRED_FUNCTIONS[3] <= exports
+    assert standard_functions(2, "co-simulation") | standard_functions(3, "co-simulation") <= exports
 
 
 def test_symbol_table_and_export_trie_agree(library, architecture):
@@ -83,7 +84,7 @@ def test_the_part_for_the_architecture_is_read_from_a_universal_library(library,
 
 def test_a_missing_function_is_named(library, architecture):
     changed = without_commands(library, macho._EXPORT_TRIE_COMMANDS).replace(b"_fmi2DoStep\0", b"_fmi2DoSteq\0")
-    assert REQUIRED_FUNCTIONS[2] - macho.read_library(changed, architecture).exports == {"fmi2DoStep"}
+    assert standard_functions(2, "co-simulation") - macho.read_library(changed, architecture).exports == {"fmi2DoStep"}
 
 
 DAMAGED = {
@@ -125,7 +126,9 @@ def test_an_fmu_is_checked_for_macos(content, good, tmp_path, library, architect
     path = tmp_path / "mac.fmu"
     path.write_bytes(pack_archive(members(files)))
     with open_regular_file(path) as file:
-        findings = list(check_binary(Archive(file, DEFAULT_LIMITS), examine(path).model, machine, DEFAULT_LIMITS))
+        findings = list(
+            check_binary(Archive(file, DEFAULT_LIMITS), examine(path).model, "co-simulation", machine, DEFAULT_LIMITS)
+        )
     assert [finding.rule.name for finding in findings] == (["binary.format"] if content else [])
 
 

@@ -8,8 +8,9 @@ from bad_fmus import read_members
 
 from cosim.components.fmi.preflight import DEFAULT_LIMITS, examine, open_regular_file, pe
 from cosim.components.fmi.preflight.archive import Archive
-from cosim.components.fmi.preflight.binary import REQUIRED_FUNCTIONS, check_binary
+from cosim.components.fmi.preflight.binary import check_binary
 from cosim.components.fmi.preflight.fmu_platform import FmuPlatform
+from cosim.components.fmi.preflight.functions import standard_functions
 from cosim.components.fmi.preflight.library import InvalidLibraryError
 from cosim.core import resources
 
@@ -29,17 +30,19 @@ def patched(content, offset, form, value):
 
 
 def test_a_real_library_exports_the_functions_of_fmi(library):
-    assert REQUIRED_FUNCTIONS[2] <= pe.read_library(library, "x86_64").exports
+    assert standard_functions(2, "co-simulation") <= pe.read_library(library, "x86_64").exports
 
 
 def test_an_fmu_with_a_windows_library_is_accepted():
     with open_regular_file(FMU) as file:
-        assert list(check_binary(Archive(file, DEFAULT_LIMITS), examine(FMU).model, WINDOWS, DEFAULT_LIMITS)) == []
+        assert (
+            list(check_binary(Archive(file, DEFAULT_LIMITS), examine(FMU).model, "co-simulation", WINDOWS, DEFAULT_LIMITS)) == []
+        )
 
 
 def test_a_missing_function_is_named(library):
     exports = pe.read_library(library.replace(b"fmi2DoStep\0", b"fmi2DoSteq\0"), "x86_64").exports
-    assert REQUIRED_FUNCTIONS[2] - exports == {"fmi2DoStep"}
+    assert standard_functions(2, "co-simulation") - exports == {"fmi2DoStep"}
 
 
 def header(library):
