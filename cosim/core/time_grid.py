@@ -34,6 +34,21 @@ def exact_fraction(value: float | int | str | Fraction) -> Fraction:
     return number
 
 
+def exact_divisor(duration: Fraction, step: Fraction) -> Fraction:
+    """Return the exact divisor of a duration that a rounded decimal number stands for: 1/30 s of 10 s for 0.0333333333333333 s.
+
+    Args:
+        duration: Duration (s).
+        step: Step size (s).
+
+    Returns:
+        `step` itself if it differs from every divisor by more than 1e-12.
+    """
+    count = round(duration / step) if step > 0 else 0
+    divisor = duration / count if count else step
+    return divisor if abs(divisor - step) <= step * Fraction(1, 10**12) else step
+
+
 @dataclass(frozen=True, slots=True)
 class TimeGrid:
     """Communication points start + n * step, n = 0 ... count (seconds, as exact fractions)."""
@@ -47,7 +62,7 @@ class TimeGrid:
 
     @classmethod
     def from_times(cls, start: Fraction, stop: Fraction, step: Fraction) -> TimeGrid:
-        """Return the grid from `start` to `stop`.
+        """Return the grid from `start` to the last whole step at or before `stop`.
 
         Args:
             start: Start time (s).
@@ -55,7 +70,7 @@ class TimeGrid:
             step: Step size (s).
 
         Raises:
-            ValueError: `stop` is less than `start`, or `stop - start` is no multiple of a positive `step`.
+            ValueError: `stop` is less than `start`, `step` is not positive, or no whole step fits between `start` and `stop`.
         """
         if step <= 0:
             raise ValueError(f"the step size must be positive, found {float(step)!r}")
@@ -64,14 +79,19 @@ class TimeGrid:
         count = (stop - start) / step
         if count > MAX_TIME:
             raise ValueError(f"{float(stop - start)!r} s are more than {MAX_TIME} steps of {float(step)!r} s")
-        if count.denominator != 1:
-            raise ValueError(f"{float(stop - start)!r} s is no multiple of the step size {float(step)!r} s")
+        if 0 < count < 1:
+            raise ValueError(f"the duration {float(stop - start)!r} s is shorter than the step size {float(step)!r} s")
         denominator = lcm(start.denominator, step.denominator)
         return cls(start, step, int(count), denominator, int(start * denominator), int(step * denominator))
 
     def time_at(self, n: int) -> float:
         """Return the time of communication point n (s), correctly rounded."""
         return (self._origin + n * self._stride) / self._denominator
+
+    @property
+    def end(self) -> Fraction:
+        """Time of the last communication point (s)."""
+        return self.start + self.count * self.step
 
     @property
     def integer_coefficients(self) -> dict[str, int]:

@@ -86,6 +86,16 @@ class Plan:
         return self.grid.count // self.record_every + 1
 
     @property
+    def end_warning(self) -> str:
+        """Message that the run ends before the stop time, because no shorter step is made; "" if it does not."""
+        end, stop = self.grid.end, self.settings.stop_time
+        if end == stop:
+            return ""
+        periods = " and all periods" if self.system.periods else ""
+        reason = f"the last whole multiple of the step size {float(self.grid.step):.12g} s{periods}"
+        return f"the run ends at t = {float(end):.12g} s, {reason} before the stop time {float(stop):.12g} s"
+
+    @property
     def all_phases(self) -> Iterator[Phase]:
         """All phases, each followed by the phases of its loop."""
         return _flatten_phases(self.phases)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Set
+from dataclasses import replace
 from fractions import Fraction
-from math import inf, ulp
+from math import inf, lcm, ulp
 
 from ..core.component import Variable
 from ..core.errors import InputError, Problem
@@ -22,6 +23,8 @@ MIN_ULPS_PER_STEP = 100
 
 def check_run(system: System, settings: Settings) -> TimeGrid:
     """Check that the system can be simulated with these settings, and return its communication points.
+
+    The last one is the last point at or before the stop time at which the steps of all components end.
 
     Raises:
         InputError: it cannot. The `subject` of each problem names the setting: ("stop_time",), ("components", NAME, "period"),
@@ -43,7 +46,11 @@ def check_run(system: System, settings: Settings) -> TimeGrid:
     problems += _find_event_time_problems(settings.events, grid)
     if problems:
         raise InputError(problems)
-    return grid
+    common = lcm(*(int(period / grid.step) for period in system.periods.values()))
+    if 0 < grid.count < common:
+        text = f"the steps of all components end together only after {float(common * grid.step)!r} s, after the stop time"
+        raise InputError(Problem(text, subject=("stop_time",)))
+    return replace(grid, count=grid.count - grid.count % common)
 
 
 def _find_real_time_problems(settings: Settings) -> Iterator[Problem]:
@@ -109,8 +116,8 @@ def _find_period_problems(system: System, grid: TimeGrid) -> Iterator[Problem]:
         ratio = period / grid.step
         if ratio < 1 or ratio.denominator != 1:
             yield Problem(f"period {float(period)!r} s is no multiple of the step size {step!r} s", subject=subject)
-        elif grid.count % int(ratio):
-            yield Problem(f"the duration {duration!r} s is no multiple of the period {float(period)!r} s", subject=subject)
+        elif 0 < grid.count < ratio:
+            yield Problem(f"the duration {duration!r} s is shorter than the period {float(period)!r} s", subject=subject)
 
 
 def _find_delay_problems(system: System) -> Iterator[Problem]:

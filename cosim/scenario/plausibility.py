@@ -22,7 +22,9 @@ def find_warnings(prepared: PreparedRun) -> list[Problem]:
 
 
 def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield the warnings that concern the results: at most one about connections, and one for each FMU file."""
+    """Yield the warnings that concern the results: the end, connections and each FMU file."""
+    if prepared.plan.end_warning:
+        yield Problem(prepared.plan.end_warning, prepared.root.where("stop_time"))
     yield from _missing_connections(prepared)
     for file in prepared.component_factory.fmus.values():
         if file.run_warning:

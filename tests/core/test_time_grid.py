@@ -3,7 +3,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from cosim.core.time_grid import TimeGrid, exact_fraction
+from cosim.core.time_grid import TimeGrid, exact_divisor, exact_fraction
 
 
 def grid(stop, step, start=0):
@@ -36,9 +36,16 @@ def test_times_of_a_60_hz_grid_are_rounded_once():
     assert not np.array_equal([n * (1 / 60) for n in range(601)], [points.time_at(n) for n in range(601)])
 
 
-def test_a_stop_time_off_the_grid_is_refused():
-    with pytest.raises(ValueError, match=r"0\.027 s is no multiple of the step size 0\.01 s"):
-        grid(0.027, 0.01)
+def test_the_grid_ends_at_the_last_whole_step():
+    assert (grid(0.027, 0.01).count, grid(0.027, 0.01).end) == (2, Fraction(2, 100))
+    with pytest.raises(ValueError, match=r"the duration 0\.027 s is shorter than the step size 0\.1 s"):
+        grid(0.027, 0.1)
+
+
+def test_a_rounded_step_size_stands_for_the_exact_divisor():
+    assert exact_divisor(Fraction(10), exact_fraction("0.0333333333333333")) == Fraction(1, 30)
+    assert exact_divisor(Fraction(10), exact_fraction("0.0333333")) == exact_fraction("0.0333333")
+    assert exact_divisor(Fraction(1), Fraction(1, 100)) == Fraction(1, 100)
 
 
 def test_a_step_of_zero_is_refused():

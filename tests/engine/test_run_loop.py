@@ -81,19 +81,19 @@ def test_events_off_the_grid_or_on_variables_that_cannot_be_set_are_refused():
 
 
 def test_periods_must_fit_the_step_and_the_duration():
-    built = make_system({"a": counter(), "b": counter()}, periods={"a": exact_fraction(1.5), "b": exact_fraction(2)})
+    built = make_system({"a": counter(), "b": counter()}, periods={"a": exact_fraction(1.5), "b": exact_fraction(4)})
     with pytest.raises(InputError) as refusal:
         simulate(built, settings())
     assert [problem.message for problem in refusal.value.problems] == [
         "period 1.5 s is no multiple of the step size 1.0 s",
-        "the duration 3.0 s is no multiple of the period 2.0 s",
+        "the duration 3.0 s is shorter than the period 4.0 s",
     ]
 
 
 def test_a_refused_system_is_freed():
     component = counter()
     with pytest.raises(InputError):
-        simulate(make_system({"a": component}), settings(stop="1/3"))
+        simulate(make_system({"a": component}), settings(stop="-1/3"))
     assert component.calls == ["free"]
 
 
@@ -191,3 +191,19 @@ def test_results_do_not_depend_on_the_floating_point_mode_of_the_caller(probe, c
         assert simulated_bytes() == expected
         assert (is_changed(), enabled_traps()) == mode != (False, 0)
     assert (is_changed(), enabled_traps()) == (False, 0)
+
+
+def test_a_run_ends_at_the_last_common_end_of_all_steps_before_the_stop_time():
+    built = make_system({"a": counter(), "b": counter()}, periods={"b": exact_fraction(2)})
+    plan = compile_plan(built, settings(stop=5.5))
+    assert plan.grid.end == 4
+    assert plan.end_warning == (
+        "the run ends at t = 4 s, the last whole multiple of the step size 1 s and all periods before the stop time 5.5 s"
+    )
+    assert simulate(built, settings(stop=5.5)).recording.time.tolist() == [0, 1, 2, 3, 4]
+
+
+def test_periods_whose_steps_never_end_together_are_refused():
+    built = make_system({"a": counter(), "b": counter()}, periods={"a": exact_fraction(2), "b": exact_fraction(3)})
+    with pytest.raises(InputError, match=r"end together only after 6\.0 s, after the stop time"):
+        simulate(built, settings(stop=5))

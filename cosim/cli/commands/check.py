@@ -46,9 +46,9 @@ def command(scenario: str, settings: tuple[str, ...], connections: bool, isolati
         for problem in warnings:
             click.echo(f"WARNING {problem}", err=True)
         verdict = f"{len(warnings)} warning{'s' * (len(warnings) > 1)}." if warnings else "No warnings."
-        times, steps = prepared.settings, prepared.plan.grid.count
+        times, grid = prepared.settings, prepared.plan.grid
         click.echo(
-            f"\n{prepared.spec.name}: {float(times.start_time):g} s ... {float(times.stop_time):g} s in {steps} steps of "
+            f"\n{prepared.spec.name}: {float(grid.start):g} s ... {float(grid.end):g} s in {grid.count} steps of "
             f"{float(times.step_size):g} s, {len(times.columns)} signals recorded. {verdict}"
         )
     finally:

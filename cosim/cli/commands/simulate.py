@@ -147,6 +147,7 @@ def _compile_system(
     from ...components.fmi import FmuFile, create_component
     from ...core.errors import Problem
     from ...core.system import Connection, Endpoint, System
+    from ...core.time_grid import exact_divisor
     from ...engine.plan import compile_plan
     from ...engine.settings import Settings
     from .. import messages
@@ -156,7 +157,7 @@ def _compile_system(
     experiment = file.description.default_experiment
     start = experiment.start_time or Fraction(0)
     stop = _parse_seconds(stop_time) if stop_time else experiment.stop_time or start + 1
-    step = _parse_seconds(step_size) if step_size else experiment.step_size or (stop - start) / 100
+    step = _parse_seconds(step_size) if step_size else exact_divisor(stop - start, experiment.step_size or (stop - start) / 100)
     components: dict[str, Component] = {FMU_NAME: create_component(file, file.description.model_name, isolation=fmu_isolation)}
     connections, stages = [], [(FMU_NAME,)]
     if input_file:
@@ -169,7 +170,9 @@ def _compile_system(
     outputs = [slot for v in components[FMU_NAME].variables if v.causality == "output" for slot in v.scalar_names]
     columns = {slot: Endpoint(FMU_NAME, slot) for slot in outputs}
     system = System(components, connections, stages, start_values={FMU_NAME: assigned})
-    return compile_plan(system, Settings(start, stop, step, columns))
+    plan = compile_plan(system, Settings(start, stop, step, columns))
+    messages.log_problems([Problem(plan.end_warning)] if plan.end_warning else [])
+    return plan
 
 
 def _read_profile(path: Path, component: Component) -> Component:
