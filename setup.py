@@ -27,17 +27,22 @@ class BuildWithBundle(build_py):
             shutil.copytree(name, target, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
 
 
-def native_executor() -> Extension:
-    """Extension that is optional unless COSIM_REQUIRE_NATIVE is set; without it cosim runs the pure Python executor."""
+def extensions() -> list[Extension]:
+    """Extensions that are optional unless COSIM_REQUIRE_NATIVE is set; without them cosim uses Python with the same results."""
     optional = not os.environ.get("COSIM_REQUIRE_NATIVE")
     flags = [] if sys.platform == "win32" else ["-std=c11", "-O2", "-ffp-contract=off"]
-    return Extension(
-        "cosim.engine._native", ["cosim/engine/_native.c"], extra_compile_args=flags, py_limited_api=True, optional=optional
-    )
+    sources = {
+        "cosim.engine._native": "cosim/engine/_native.c",
+        "cosim.components.fmi.model_exchange._fixed_step": "cosim/components/fmi/model_exchange/_fixed_step.c",
+    }
+    return [
+        Extension(name, [source], extra_compile_args=flags, py_limited_api=True, optional=optional)
+        for name, source in sources.items()
+    ]
 
 
 setup(
     cmdclass={"build_py": BuildWithBundle},
-    ext_modules=[native_executor()],
+    ext_modules=extensions(),
     options={"bdist_wheel": {"py_limited_api": "cp311"}},
 )

@@ -5,13 +5,28 @@ from .description import DefaultExperiment, FmuDescription
 from .file import FmuFile
 from .fmi2 import Fmi2Instance
 from .fmi3 import Fmi3Instance
+from .instance import FmuInstance
+from .instance_settings import InstanceSettings, SolverSettings
 from .isolated import Isolation
 
-__all__ = ["DefaultExperiment", "FmuDescription", "FmuFile", "Isolation", "create_component"]
+__all__ = [
+    "DefaultExperiment",
+    "FmuDescription",
+    "FmuFile",
+    "InstanceSettings",
+    "Isolation",
+    "SolverSettings",
+    "create_component",
+]
+
+DEFAULT_SETTINGS = InstanceSettings()
 
 
 def create_component(
-    file: FmuFile, instance_name: str, logging_on: bool = False, isolation: Isolation | None = None
+    file: FmuFile,
+    instance_name: str,
+    settings: InstanceSettings = DEFAULT_SETTINGS,
+    isolation: Isolation | None = None,
 ) -> Component:
     """Create a component for one instance of an FMU.
 
@@ -20,15 +35,21 @@ def create_component(
     Args:
         file: The FMU; instances of the same FMU share one `FmuFile`.
         instance_name: Name of the FMU instance, used in messages too.
-        logging_on: Value of `loggingOn`, which enables the FMU's debug messages.
+        settings: Tolerance and integration method.
         isolation: Settings of a worker process for the FMU; None runs the FMU in the importer's process.
 
     Raises:
         InputError: The FMU has no usable binary for this platform, or a worker process is not possible on it.
     """
-    instance_class = Fmi2Instance if file.description.major == 2 else Fmi3Instance
+    description = file.description
+    if description.interface == "model-exchange":
+        from .model_exchange import Fmi2Model, Fmi3Model
+
+        instance_class: type[FmuInstance] = Fmi2Model if description.major == 2 else Fmi3Model
+    else:
+        instance_class = Fmi2Instance if description.major == 2 else Fmi3Instance
     if isolation:
         from .isolated.isolated_fmu import IsolatedFmu
 
-        return IsolatedFmu(instance_class, file, instance_name, logging_on, isolation)
-    return instance_class(file, instance_name, logging_on)
+        return IsolatedFmu(instance_class, file, instance_name, settings, isolation)
+    return instance_class(file, instance_name, settings)

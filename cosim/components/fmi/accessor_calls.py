@@ -33,23 +33,30 @@ class AccessorCallFactory:
     accessors: Mapping[str, str]
 
     def prepare(
-        self, verb: Literal["Get", "Set"], ports: Ports, transfer_object: Callable[[str, np.ndarray, int], int]
+        self,
+        verb: Literal["Get", "Set"],
+        ports: Ports,
+        transfer_object: Callable[[str, np.ndarray, int], int],
+        is_selected: Callable[[Variable], bool] = lambda _: True,
     ) -> list[PreparedCall]:
-        """Prepare calls for all bound variables: one for adjacent variables of the same accessor.
+        """Prepare calls for the selected bound variables: one for adjacent variables of the same accessor.
 
         Args:
             verb: Direction of the transfer.
             ports: Bound variables and their arrays.
             transfer_object: Transfers one String or Binary variable, given its name, its array and its index in the array.
+            is_selected: Returns whether a variable is transferred.
         """
         calls: list[PreparedCall] = []
         for dtype, array in ports.arrays.items():
             begin = 0
             same_dtype = [variable for variable in ports.variables if variable.dtype == dtype]
-            for accessor, group in groupby(same_dtype, lambda variable: self.accessors[variable.type]):
+            for (accessor, selected), group in groupby(same_dtype, lambda v: (self.accessors[v.type], is_selected(v))):
                 variables, function = list(group), f"fmi{self.fmi_major}{verb}{accessor}"
                 end = begin + sum(len(variable.scalar_names) for variable in variables)
-                if dtype.hasobject:
+                if not selected:
+                    pass
+                elif dtype.hasobject:
                     indexed = enumerate(variables, begin)
                     calls += [PreparedCall(transfer_object, (v.name, array, index), function) for index, v in indexed]
                 else:

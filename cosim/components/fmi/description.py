@@ -27,15 +27,17 @@ _CAUSALITIES: Mapping[str, Causality] = {name: name for name in get_args(Causali
 _VARIABILITIES: Mapping[str, Variability] = {name: name for name in get_args(Variability)}
 _C_INT = np.dtype(np.int32)
 _TRUE = ("true", "1")
+_EXPERIMENT = ("startTime", "stopTime", "stepSize", "tolerance")
 
 
 @dataclass(frozen=True)
 class DefaultExperiment:
-    """Default experiment of an FMU: exact times (s), None where an attribute is missing."""
+    """Default experiment of an FMU: exact times (s) and relative tolerance, None where an attribute is missing or invalid."""
 
     start_time: Fraction | None = None
     stop_time: Fraction | None = None
     step_size: Fraction | None = None
+    tolerance: float | None = None
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,9 @@ class FmuDescription:
         variable_step: `canHandleVariableCommunicationStepSize`, always true for Model Exchange.
         once_per_process: `canBeInstantiatedOnlyOncePerProcess`.
         needs_execution_tool: `needsExecutionTool`.
+        state_count: Number of continuous states of Model Exchange; FMI 3.0 FMUs return it after their initialization.
+        indicator_count: `numberOfEventIndicators` of FMI 2.0.
+        needs_completed_step: Model Exchange requires fmi*CompletedIntegratorStep.
         platforms: Platforms with a binary, as the FMU names their folders, and "c-code" if it contains sources.
     """
 
@@ -74,6 +79,9 @@ class FmuDescription:
     variable_step: bool
     once_per_process: bool
     needs_execution_tool: bool
+    state_count: int
+    indicator_count: int
+    needs_completed_step: bool
     platforms: Sequence[str]
 
     @property
@@ -132,6 +140,9 @@ def build_description(path: Path, examination: Examination, interface: Interface
         selected == "model-exchange" or attributes.get("canHandleVariableCommunicationStepSize") in _TRUE,
         attributes.get("canBeInstantiatedOnlyOncePerProcess") in _TRUE,
         attributes.get("needsExecutionTool") in _TRUE,
+        sum(unknown.element == "ContinuousStateDerivative" for unknown in model.model_structure),
+        int(model.root.get("numberOfEventIndicators", 0)),
+        _needs_completed_step(model.major, attributes),
         list_platforms(examination.members),
     )
 
@@ -205,12 +216,20 @@ def _finite_limits(source: ModelVariable) -> tuple[float | None, float | None]:
 
 
 def _build_default_experiment(experiment: Mapping[str, str]) -> DefaultExperiment:
-    times = (experiment.get(name) for name in ("startTime", "stopTime", "stepSize"))
-    return DefaultExperiment(*(None if time is None else _parse_time(time) for time in times))
+    numbers = [None if (text := experiment.get(name)) is None else _parse_number(text) for name in _EXPERIMENT]
+    start, stop, step, tolerance = numbers
+    positive_step = step if step and step > 0 else None
+    return DefaultExperiment(start, stop, positive_step, float(tolerance) if tolerance and tolerance > 0 else None)
 
 
-def _parse_time(text: str) -> Fraction | None:
-    """Return an exact time (s), or None if the text is not a finite number."""
+def _needs_completed_step(major: int, attributes: Mapping[str, str]) -> bool:
+    if major == 3:
+        return attributes.get("needsCompletedIntegratorStep") in _TRUE
+    return attributes.get("completedIntegratorStepNotNeeded") not in _TRUE
+
+
+def _parse_number(text: str) -> Fraction | None:
+    """Return an exact number, or None if the text is not a finite number."""
     with suppress(ValueError):
         return exact_fraction(text)
     return None

@@ -24,6 +24,7 @@ class Fmi2Instance(FmuInstance):
     prefix, major = "fmi2", 2
     _instantiate_function = "fmi2Instantiate"
     accessors = ACCESSORS[2]
+    _state_word = "FMUstate"
 
     def _fmpy_class(self) -> type:
         from fmpy.fmi2 import FMU2Slave
@@ -40,20 +41,21 @@ class Fmi2Instance(FmuInstance):
         callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
         callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
         try:
-            self._fmu.instantiate(callbacks=callbacks, loggingOn=self._logging_on)
+            self._fmu.instantiate(callbacks=callbacks)
         except Exception:
             raise self._instantiation_error() from None
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
         """Call fmi2SetupExperiment and fmi2EnterInitializationMode."""
         self._current_time.value = start_time
-        self.call_function("setupExperiment", None, start_time, stop_time)
+        self.call_function("setupExperiment", self.tolerance, start_time, stop_time)
         self.call_function("enterInitializationMode")
 
     def _prepare_do_step(self, step_size: Any, seconds: float) -> list[PreparedCall]:
+        do_step = self._fmu.functions["fmi2DoStep"]
         arguments = (self._instance, self._current_time, step_size, _TRUE)
-        native = NativeDoStep(2, function_address(self._do_step), self._handle, seconds)
-        return [PreparedCall(self._do_step, arguments, "fmi2DoStep", native)]
+        native = NativeDoStep(2, function_address(do_step), self._handle, seconds)
+        return [PreparedCall(do_step, arguments, "fmi2DoStep", native)]
 
     def interpret_status(self, function: str, status: int) -> StepResult:
         """Interpret a bad status: fmi2Discard with `terminated` ends the simulation (FMI 2.0 section 4.2.1).
@@ -74,15 +76,3 @@ class Fmi2Instance(FmuInstance):
     def _get_strings(self, reference: int, _count: int) -> Sequence[bytes | None]:
         texts: Sequence[bytes | None] = self.call_function("getString", [reference])
         return texts
-
-    def get_state(self) -> Any:
-        """Call fmi2GetFMUstate."""
-        return self.call_function("getFMUstate")
-
-    def set_state(self, state: Any) -> None:
-        """Call fmi2SetFMUstate."""
-        self.call_function("setFMUstate", state)
-
-    def free_state(self, state: Any) -> None:
-        """Call fmi2FreeFMUstate."""
-        self.call_function("freeFMUstate", state)

@@ -27,6 +27,7 @@ class Fmi3Instance(FmuInstance):
     prefix, major = "fmi3", 3
     _instantiate_function = "fmi3InstantiateCoSimulation"
     accessors = ACCESSORS[3]
+    _state_word = "FMUState"
 
     def _fmpy_class(self) -> type:
         from fmpy.fmi3 import FMU3Slave
@@ -36,28 +37,27 @@ class Fmi3Instance(FmuInstance):
 
     def _instantiate_fmu(self) -> None:
         try:
-            self._fmu.instantiate(
-                loggingOn=self._logging_on, logMessage=lambda _, status, __, text: self.log_message(status, text)
-            )
+            self._fmu.instantiate(logMessage=lambda _, status, __, text: self.log_message(status, text))
         except Exception:
             raise self._instantiation_error() from None
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
         """Call fmi3EnterInitializationMode."""
         self._current_time.value = start_time
-        self.call_function("enterInitializationMode", None, start_time, stop_time)
+        self.call_function("enterInitializationMode", self.tolerance, start_time, stop_time)
 
     def _prepare_do_step(self, step_size: Any, seconds: float) -> list[PreparedCall]:
+        do_step = self._fmu.functions["fmi3DoStep"]
         # three Booleans and one unused byte, so that one 32-bit read covers all flags
         self._step_flags, self._last_successful_time = (ctypes.c_bool * 4)(), ctypes.c_double()
         self._combined_flags = ctypes.c_uint32.from_buffer(self._step_flags)
         flags, reached = ctypes.addressof(self._step_flags), ctypes.addressof(self._last_successful_time)
         results = [as_pointer(flags + i * ctypes.sizeof(ctypes.c_bool)) for i in range(3)]
         arguments = (self._instance, self._current_time, step_size, _TRUE, *results, as_pointer(reached))
-        native = NativeDoStep(3, function_address(self._do_step), self._handle, seconds, flags, reached)
+        native = NativeDoStep(3, function_address(do_step), self._handle, seconds, flags, reached)
         keep_alive = (self._step_flags, self._last_successful_time)
         return [
-            PreparedCall(self._do_step, arguments, "fmi3DoStep", native, keep_alive),
+            PreparedCall(do_step, arguments, "fmi3DoStep", native, keep_alive),
             PreparedCall(self._check_step_flags, (), _STEP_FLAGS_CHECK, NativeFlagCheck(flags), keep_alive),
         ]
 
@@ -99,15 +99,3 @@ class Fmi3Instance(FmuInstance):
                 reason = f"found a binary of {found}, expected at most {MAX_BINARY_SIZE} bytes"
                 raise ComponentError(self.name, "fmi3GetBinary", reason, self._current_time.value)
         return [ctypes.string_at(pointer, size) if size else b"" for size, pointer in zip(sizes, pointers, strict=True)]
-
-    def get_state(self) -> Any:
-        """Call fmi3GetFMUState."""
-        return self.call_function("getFMUState")
-
-    def set_state(self, state: Any) -> None:
-        """Call fmi3SetFMUState."""
-        self.call_function("setFMUState", state)
-
-    def free_state(self, state: Any) -> None:
-        """Call fmi3FreeFMUState."""
-        self.call_function("freeFMUState", state)

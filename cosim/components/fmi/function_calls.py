@@ -52,7 +52,7 @@ class FunctionCaller:
         """
         from fmpy.fmi1 import FMICallException
 
-        name = function if function.startswith(self.prefix) else self.prefix + function[0].upper() + function[1:]
+        name = self._full_name(function)
         with calling_component(self.name, name, self._deadline_name, self._current_time.value):
             try:
                 result = getattr(self._fmu, function)(*arguments)
@@ -66,6 +66,10 @@ class FunctionCaller:
                 raise ComponentError(self.name, name, "the library does not export this function") from None
         self.restore_float_mode(name)
         return result
+
+    def _full_name(self, function: str) -> str:
+        """Return the name of the C function for FMPy's method, such as "getReal", or for its own name."""
+        return function if function.startswith(self.prefix) else self.prefix + function[0].upper() + function[1:]
 
     def restore_float_mode(self, function: str) -> None:
         """Restore the default floating-point mode if the last call, which was a call of `function`, changed it."""

@@ -25,6 +25,7 @@ from .c_functions import as_double, as_pointer
 from .file import FmuFile
 from .fmpy_library import load_library
 from .function_calls import OK, FunctionCaller
+from .instance_settings import InstanceSettings
 from .preflight.binary import version_deviations
 from .preflight.library import EXPECTED_TEXTS
 
@@ -37,10 +38,12 @@ class FmuInstance(FunctionCaller, Component):
     major: int
     #: FMI 3.0 type names -> the part of fmi*Get..., fmi*Set... after Get and Set
     accessors: Mapping[str, str]
+    #: end of the names of the C functions that save and restore the state
+    _state_word: str
     #: name of the C function that creates an instance
     _instantiate_function: str
 
-    def __init__(self, file: FmuFile, instance_name: str, logging_on: bool):
+    def __init__(self, file: FmuFile, instance_name: str, settings: InstanceSettings):
         """Create the component; see `create_component`.
 
         Raises:
@@ -53,7 +56,9 @@ class FmuInstance(FunctionCaller, Component):
         self.has_state = self.description.has_state
         self._variables_by_name = {variable.name: variable for variable in self.variables}
         self._is_instantiated, self._has_acquired_file = False, False
-        self._logging_on = logging_on
+        self._settings = settings
+        #: relative tolerance that the FMU receives; None: none
+        self.tolerance = settings.tolerance or self.description.default_experiment.tolerance
         file.check_binary()
 
     # -- what differs between the FMI versions ---------------------------------------------------------------------------
@@ -99,14 +104,15 @@ class FmuInstance(FunctionCaller, Component):
             self._instantiate_fmu()
         self._is_instantiated = True
         self._handle: int = self._fmu.component
-        self._do_step = self._fmu.functions[f"{self.prefix}DoStep"]
         self._instance = as_pointer(self._handle)
-        self._current_time, self._step_size = ctypes.c_double(), ctypes.c_double()
-        self._do_step_calls = self._prepare_do_step(self._step_size, 0.0)
+        self._current_time = ctypes.c_double()
         references, functions = self.description.value_references, self._fmu.functions
-        accessor_calls = AccessorCallFactory(self.major, functions, self._handle, references, self.accessors)
-        self._set_calls = accessor_calls.prepare("Set", self._inputs, self._set_object)
-        self._get_calls = accessor_calls.prepare("Get", self._outputs, self._get_object)
+        self._prepare_transfers(AccessorCallFactory(self.major, functions, self._handle, references, self.accessors))
+
+    def _prepare_transfers(self, factory: AccessorCallFactory) -> None:
+        """Prepare the calls that transfer the bound arrays."""
+        self._set_calls = factory.prepare("Set", self._inputs, self._set_object)
+        self._get_calls = factory.prepare("Get", self._outputs, self._get_object)
 
     def _copy_fmpy_slave(self, folder: Path) -> Any:
         """Return FMPy's slave object for this instance, a copy because creating one takes milliseconds."""
@@ -209,8 +215,8 @@ class FmuInstance(FunctionCaller, Component):
 
     def do_step(self, time: float, step_size: float) -> StepResult | None:
         """Call fmi*DoStep."""
-        self._current_time.value, self._step_size.value = time, step_size
-        return self._execute_calls(self._do_step_calls)
+        self._current_time.value = time
+        return self._execute_calls(self._prepare_do_step(as_double(step_size), step_size))
 
     def get_outputs(self) -> None:
         """Call fmi*Get... for all bound outputs."""
@@ -228,3 +234,15 @@ class FmuInstance(FunctionCaller, Component):
     def interpret_status(self, function: str, status: int) -> StepResult:
         """Raise the ComponentError for a bad status of a prepared call."""
         raise self.status_error(function, status)
+
+    def get_state(self) -> Any:
+        """Call fmi*GetFMUState."""
+        return self.call_function(f"get{self._state_word}")
+
+    def set_state(self, state: Any) -> None:
+        """Call fmi*SetFMUState."""
+        self.call_function(f"set{self._state_word}", state)
+
+    def free_state(self, state: Any) -> None:
+        """Call fmi*FreeFMUState."""
+        self.call_function(f"free{self._state_word}", state)

@@ -16,6 +16,7 @@ from ....process.temporary_folders import WORKER_PREFIX, LockedFolder
 from ..file import FmuFile
 from ..function_calls import DISCARD, OK
 from ..instance import FmuInstance
+from ..instance_settings import InstanceSettings
 from .answers import call_names, state_number, step_result, string_values, variable_value
 from .isolation import Isolation
 from .pipes import STEP_COMMAND, STEP_DONE
@@ -35,7 +36,12 @@ class IsolatedFmu(WorkerClient, Component):
     runs_foreign_code = False
 
     def __init__(
-        self, instance_class: type[FmuInstance], file: FmuFile, instance_name: str, logging_on: bool, isolation: Isolation
+        self,
+        instance_class: type[FmuInstance],
+        file: FmuFile,
+        instance_name: str,
+        settings: InstanceSettings,
+        isolation: Isolation,
     ):
         """Create the component; see `create_component`. The worker process is started by `instantiate`.
 
@@ -43,7 +49,7 @@ class IsolatedFmu(WorkerClient, Component):
             instance_class: Class of the instance in the worker process.
             file: The FMU.
             instance_name: Name of the FMU instance.
-            logging_on: Value of `loggingOn`.
+            settings: Tolerance and integration method.
             isolation: Deadlines and sandbox of the worker process.
 
         Raises:
@@ -57,7 +63,7 @@ class IsolatedFmu(WorkerClient, Component):
         self.description = file.description
         self.variables, self.has_state = self.description.variables, self.description.has_state
         self._variables_by_name = {variable.name: variable for variable in self.variables}
-        self._logging_on = logging_on
+        self._settings = settings
         self._temporary_folder: LockedFolder | None = None
         self._result: StepResult | None = None
 
@@ -92,7 +98,7 @@ class IsolatedFmu(WorkerClient, Component):
         setup = self.isolation.worker_setup(folder, temporary, os.getpid())
 
         def serve(commands: int, answers: int) -> None:
-            instance = self._instance_class(self._file.share(), self.name, self._logging_on)
+            instance = self._instance_class(self._file.share(), self.name, self._settings)
             Worker(instance, self._shared_memory, setup).serve(commands, answers, temporary)
 
         self._process = WorkerProcess(self.name, self._shared_memory.journal, serve)

@@ -1,0 +1,157 @@
+/* Explicit integration of a Model Exchange FMU at fixed step size, as a function with the signature of fmi2DoStep.
+
+   The function returns OK at the end of the communication step, and DISCARD after a substep with an event or a failed call; the
+   members `event`, `status` and `failed_function` of the state give the reason. Called again with the same arguments, it
+   continues with the next substep. `advance_in_python` in fixed_step.py makes the same operations in the same order. */
+#define Py_LIMITED_API 0x030b0000
+#define PY_SSIZE_T_CLEAN
+#include <Python.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
+
+enum { OK = 0, WARNING = 1, DISCARD = 2, NOT_A_NUMBER = -1 };
+enum { STATE_EVENT = 1, TIME_EVENT = 2, STEP_EVENT = 4, TERMINATION = 8 };
+enum { SET_TIME, SET_STATES, GET_DERIVATIVES, GET_INDICATORS, COMPLETE_STEP };
+
+/* relative to the substep: a time event so close after its end is reached */
+#define TIME_TOLERANCE 1e-9
+
+/* The same members as `FixedStepState` in fixed_step.py. */
+typedef struct {
+    void *instance;
+    int (*set_time)(void *, double);
+    int (*set_states)(void *, const double *, size_t);
+    int (*get_derivatives)(void *, double *, size_t);
+    int (*get_indicators)(void *, double *, size_t);
+    void *complete_step; /* NULL if the FMU does not need it */
+    int64_t version, stages, state_count, indicator_count;
+    double *states, *derivatives, *start_states, *sum, *indicators, *previous_indicators;
+    double next_event_time, substep_size, time;
+    int64_t substeps, next_substep, event, status, failed_function;
+} State;
+
+#define CALL(ROLE, EXPRESSION)                                                                                             \
+    do {                                                                                                                   \
+        int status_ = (EXPRESSION);                                                                                        \
+        if (status_ != OK && status_ != WARNING) {                                                                         \
+            s->status = status_;                                                                                           \
+            s->failed_function = ROLE;                                                                                     \
+            return DISCARD;                                                                                                \
+        }                                                                                                                  \
+    } while (0)
+
+static int set_states(State *s) {
+    if (s->state_count) CALL(SET_STATES, s->set_states(s->instance, s->states, (size_t)s->state_count));
+    return OK;
+}
+
+static int get_derivatives(State *s) {
+    if (s->state_count) CALL(GET_DERIVATIVES, s->get_derivatives(s->instance, s->derivatives, (size_t)s->state_count));
+    return OK;
+}
+
+static int euler_step(State *s, double end) {
+    if (get_derivatives(s)) return DISCARD;
+    CALL(SET_TIME, s->set_time(s->instance, end));
+    for (int64_t i = 0; i < s->state_count; i++) s->states[i] += s->substep_size * s->derivatives[i];
+    return set_states(s);
+}
+
+/* states = start + weight * derivatives, at `time` */
+static int evaluate_stage(State *s, double time, double weight) {
+    CALL(SET_TIME, s->set_time(s->instance, time));
+    for (int64_t i = 0; i < s->state_count; i++) s->states[i] = s->start_states[i] + weight * s->derivatives[i];
+    if (set_states(s)) return DISCARD;
+    return get_derivatives(s);
+}
+
+static void add_to_sum(State *s, double weight) {
+    for (int64_t i = 0; i < s->state_count; i++) s->sum[i] += weight * s->derivatives[i];
+}
+
+static int runge_kutta_step(State *s, double begin, double end) {
+    double half = 0.5 * s->substep_size;
+    if (get_derivatives(s)) return DISCARD;
+    memcpy(s->start_states, s->states, (size_t)s->state_count * sizeof(double));
+    memcpy(s->sum, s->derivatives, (size_t)s->state_count * sizeof(double));
+    if (evaluate_stage(s, begin + half, half)) return DISCARD;
+    add_to_sum(s, 2.0);
+    if (evaluate_stage(s, begin + half, half)) return DISCARD;
+    add_to_sum(s, 2.0);
+    if (evaluate_stage(s, end, s->substep_size)) return DISCARD;
+    add_to_sum(s, 1.0);
+    double sixth = s->substep_size / 6.0;
+    for (int64_t i = 0; i < s->state_count; i++) s->states[i] = s->start_states[i] + sixth * s->sum[i];
+    return set_states(s);
+}
+
+static int find_state_event(State *s) {
+    size_t count = (size_t)s->indicator_count;
+    if (!count) return OK;
+    CALL(GET_INDICATORS, s->get_indicators(s->instance, s->indicators, count));
+    for (size_t i = 0; i < count; i++) CALL(GET_INDICATORS, s->indicators[i] == s->indicators[i] ? OK : NOT_A_NUMBER);
+    for (size_t i = 0; i < count; i++)
+        if ((s->previous_indicators[i] <= 0) != (s->indicators[i] <= 0)) s->event |= STATE_EVENT;
+    memcpy(s->previous_indicators, s->indicators, count * sizeof(double));
+    return OK;
+}
+
+static int complete_step(State *s) {
+    if (!s->complete_step) return OK;
+    bool event, terminate = false;
+    if (s->version == 3) {
+        bool event_needed = false, ends = false;
+        CALL(COMPLETE_STEP,
+             ((int (*)(void *, bool, bool *, bool *))s->complete_step)(s->instance, true, &event_needed, &ends));
+        event = event_needed, terminate = ends;
+    } else if (s->version == 2) {
+        int event_needed = 0, ends = 0;
+        CALL(COMPLETE_STEP, ((int (*)(void *, int, int *, int *))s->complete_step)(s->instance, 1, &event_needed, &ends));
+        event = event_needed != 0, terminate = ends != 0;
+    } else {
+        char event_needed = 0;
+        CALL(COMPLETE_STEP, ((int (*)(void *, char *))s->complete_step)(s->instance, &event_needed));
+        event = event_needed != 0;
+    }
+    s->event |= (event ? STEP_EVENT : 0) | (terminate ? TERMINATION : 0);
+    return OK;
+}
+
+static int advance(void *state, double time, double step_size, int unused) {
+    State *s = state;
+    (void)unused;
+    while (s->next_substep < s->substeps) {
+        int64_t n = s->next_substep;
+        double begin = time + (double)n * s->substep_size;
+        double end = n + 1 < s->substeps ? time + (double)(n + 1) * s->substep_size : time + step_size;
+        s->event = 0;
+        s->status = OK;
+        if (s->stages == 1 ? euler_step(s, end) : runge_kutta_step(s, begin, end)) return DISCARD;
+        s->time = end;
+        s->next_substep = n + 1;
+        if (find_state_event(s) || complete_step(s)) return DISCARD;
+        if (end >= s->next_event_time - TIME_TOLERANCE * s->substep_size) s->event |= TIME_EVENT;
+        if (s->event) return DISCARD;
+    }
+    s->next_substep = 0;
+    return OK;
+}
+
+static struct PyModuleDef definition = {
+    PyModuleDef_HEAD_INIT, "_fixed_step", "Explicit integration of a Model Exchange FMU at fixed step size.", -1, NULL,
+    NULL, NULL, NULL, NULL};
+
+PyMODINIT_FUNC PyInit__fixed_step(void) {
+    PyObject *module = PyModule_Create(&definition);
+    if (!module) return NULL;
+    PyObject *address = PyLong_FromVoidPtr((void *)(uintptr_t)advance);
+    if (!address || PyModule_AddObjectRef(module, "ADVANCE", address) < 0 ||
+        PyModule_AddIntConstant(module, "STATE_SIZE", sizeof(State)) < 0) {
+        Py_XDECREF(address);
+        Py_DECREF(module);
+        return NULL;
+    }
+    Py_DECREF(address);
+    return module;
+}

@@ -1,0 +1,117 @@
+"""The functions of an FMU in Continuous-Time Mode, prepared for fixed arrays."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ....core.component import SUCCESS_STATUSES
+from ..c_functions import FunctionTable, as_pointer, as_size
+
+
+class IntegrationError(Exception):
+    """Failed call: the function, and the status that it returned or the reason of the failure."""
+
+    def __init__(self, function: str, status: int | None, reason: str = ""):
+        super().__init__(function, status, reason)
+        self.function, self.status, self.reason = function, status, reason
+
+
+class StepCompletion(NamedTuple):
+    """Requests of fmi*CompletedIntegratorStep."""
+
+    event_needed: bool = False
+    terminate_requested: bool = False
+
+
+#: C type of a Boolean by FMI major version
+BOOLEAN: Mapping[int, type[Any]] = {1: ctypes.c_char, 2: ctypes.c_int, 3: ctypes.c_bool}
+
+
+class ContinuousModel:
+    """Right-hand side and event indicators of an FMU instance.
+
+    Attributes:
+        functions: Names of the C functions by their role.
+        states: Continuous states, shape (state_count,).
+        derivatives: Derivatives of the states, shape (state_count,).
+        nominals: Nominal values of the states, shape (state_count,).
+        indicators: Event indicators, shape (indicator_count,).
+        needs_completed_step: The FMU requires fmi*CompletedIntegratorStep.
+    """
+
+    def __init__(
+        self, major: int, library: FunctionTable, handle: int, names: Mapping[str, str], counts: tuple[int, int], completes: bool
+    ):
+        """Prepare the calls.
+
+        Args:
+            major: FMI major version.
+            library: C functions of the FMU's library.
+            handle: Address of the FMU instance.
+            names: Names of the C functions by role: set_time, set_states, get_states, get_derivatives, get_indicators,
+                get_nominals, complete_step.
+            counts: Numbers of continuous states and of event indicators.
+            completes: The FMU requires fmi*CompletedIntegratorStep.
+        """
+        state_count, indicator_count = counts
+        self.major, self.library, self.handle, self.functions = major, library, handle, names
+        self.states, self.derivatives = np.zeros(state_count), np.zeros(state_count)
+        self.nominals, self.indicators = np.ones(state_count), np.zeros(indicator_count)
+        self.needs_completed_step = completes
+        self._instance, self._set_time = as_pointer(handle), library[names["set_time"]]
+        self.get_states = self._array_call("get_states", self.states)
+        self.set_states = self._array_call("set_states", self.states)
+        self.get_derivatives = self._array_call("get_derivatives", self.derivatives)
+        self.get_nominals = self._array_call("get_nominals", self.nominals)
+        self.get_indicators = self._array_call("get_indicators", self.indicators)
+        boolean = BOOLEAN[major]
+        self._flags = (boolean(), boolean())
+        addresses = [as_pointer(ctypes.addressof(flag)) for flag in self._flags]
+        no_set_state = () if major == 1 else ((ctypes.c_int if major == 2 else ctypes.c_bool).from_param(1),)
+        self._completion_arguments = (self._instance, *no_set_state, *addresses[: 1 if major == 1 else 2])
+
+    def is_called(self, role: str) -> bool:
+        """Return whether the function of a role is needed: not without states, indicators or required completion."""
+        needed = {"set_time": True, "complete_step": self.needs_completed_step, "get_indicators": len(self.indicators) > 0}
+        return needed.get(role, len(self.states) > 0)
+
+    def _array_call(self, role: str, values: np.ndarray) -> Callable[[], None]:
+        """Return a function that transfers an array, and that does nothing if the array is empty."""
+        if not len(values):
+            return lambda: None
+        name = self.functions[role]
+        function, arguments = self.library[name], (self._instance, as_pointer(values.ctypes.data), as_size(len(values)))
+
+        def call() -> None:
+            status = function(*arguments)
+            if status not in SUCCESS_STATUSES:
+                raise IntegrationError(name, status)
+
+        return call
+
+    def set_time(self, time: float) -> None:
+        """Set the time (s)."""
+        status = self._set_time(self._instance, ctypes.c_double(time))
+        if status not in SUCCESS_STATUSES:
+            raise IntegrationError(self.functions["set_time"], status)
+
+    def check_indicators(self, indicators: np.ndarray) -> None:
+        """Raise an IntegrationError if an event indicator is NaN, because its events would be missed."""
+        if np.isnan(indicators).any():
+            number = int(np.flatnonzero(np.isnan(indicators))[0]) + 1
+            raise IntegrationError(self.functions["get_indicators"], None, f"event indicator {number} is NaN")
+
+    def complete_step(self) -> StepCompletion:
+        """Call fmi*CompletedIntegratorStep if the FMU requires it."""
+        if not self.needs_completed_step:
+            return StepCompletion()
+        name = self.functions["complete_step"]
+        status = self.library[name](*self._completion_arguments)
+        if status not in SUCCESS_STATUSES:
+            raise IntegrationError(name, status)
+        event, terminate = (flag.value not in (0, b"\0") for flag in self._flags)
+        return StepCompletion(event, terminate)
