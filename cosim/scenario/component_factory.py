@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from ..components.fmi import FmuFile, Isolation, create_component
+from ..components.fmi import FmuFile, InstanceSettings, Interface, Isolation, SolverSettings, create_component
 from ..core.component import Component
 from ..core.errors import InputError
 from ..core.paths import is_file, resolve_path
@@ -25,8 +26,10 @@ class ComponentFactory:
 
     def __init__(self, isolation: Isolation, isolate_fmus: bool, loaded_fmus: Mapping[Path, FmuFile]) -> None:
         self._isolation, self._isolate_fmus, self._loaded_fmus = isolation, isolate_fmus, loaded_fmus
-        #: FMU files in use, by resolved path
-        self.fmus: dict[Path, FmuFile] = {}
+        #: FMU files in use, by resolved path and the interface that the scenario demands
+        self.fmus: dict[tuple[Path, Interface | None], FmuFile] = {}
+        #: solver of each Model Exchange FMU, by full name of its component
+        self.solvers: dict[str, dict[str, Any]] = {}
         #: source files of the components made so far
         self.python_files: list[Path] = []
         self.modelica_files: list[Path] = []
@@ -41,15 +44,22 @@ class ComponentFactory:
         if spec.python is not None:
             return self._load_python(node.folder, spec, full_name)
         path = self._build_modelica(node.folder, spec.modelica or "") if spec.fmu is None else node.folder / spec.fmu
-        key = resolve_path(path)
+        interface: Interface | None = "model-exchange" if spec.solver else None
+        key = resolve_path(path), interface
         used = self.fmus.get(key)
         needs_own_process = used is not None and used.description.once_per_process
         if used is None:
-            self.fmus[key] = self._loaded_fmus.get(key) or FmuFile(path)
+            loaded = None if interface else self._loaded_fmus.get(key[0])
+            self.fmus[key] = loaded or FmuFile(path, interface=interface)
         elif needs_own_process:  # its process must not inherit the library that is loaded in this one
-            self.fmus[key] = FmuFile(path)
+            self.fmus[key] = FmuFile(path, interface=interface)
         isolated = self._isolate_fmus or spec.isolation is not None or needs_own_process
-        return create_component(self.fmus[key], full_name, isolation=self._isolation if isolated else None)
+        solver = SolverSettings(spec.solver.method, spec.solver.step_size) if spec.solver else SolverSettings()
+        settings = InstanceSettings(spec.tolerance, solver)
+        component = create_component(self.fmus[key], full_name, settings, self._isolation if isolated else None)
+        if (description := self.fmus[key].description).interface == "model-exchange":
+            self.solvers[full_name] = settings.describe_solver(description.default_experiment)
+        return component
 
     def _load_python(self, folder: Path, spec: ComponentSpec, full_name: str) -> Component:
         from ..components.python_class import load_component

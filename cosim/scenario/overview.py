@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Iterable, Mapping
 from importlib.metadata import PackageNotFoundError, version
+from types import MappingProxyType
 from typing import Any
 
 from ..core.system import Connection, Group, Stage, System
@@ -15,20 +16,26 @@ from ..engine.transfer_plan import unit_conversion
 _PACKAGES = ("numpy", "scipy", "fmpy", "pybullet", "pybullet-arm64", "pythonfmu")
 
 
-def describe_system(system: System, sources: Mapping[str, str]) -> dict[str, Any]:
+def describe_system(
+    system: System, sources: Mapping[str, str], solvers: Mapping[str, Mapping[str, Any]] = MappingProxyType({})
+) -> dict[str, Any]:
     """Return the components, stages and connections of a system as JSON values.
 
-    - `components`: {"name", "origin", "inputs", "outputs", "period"}: the source in the scenario, the numbers of scalar inputs
-      and outputs, and the period (s; None: every macro step)
+    - `components`: {"name", "origin", "inputs", "outputs", "period", "solver"}: the source in the scenario, the numbers of scalar
+      inputs and outputs, the period (s; None: every macro step), and the solver of a Model Exchange FMU (else no such key)
     - `stages`: lists of component names; a nested system is {"name", "stages"}
     - `connections`: [source, target, unit of the source or "", notes on delay and conversion or ""]
 
     Args:
         system: The system.
         sources: Source of each component.
+        solvers: Solver of each Model Exchange FMU, by name of the component.
     """
     return {
-        "components": [_describe_component(system, name, sources[name]) for name in system.components],
+        "components": [
+            _describe_component(system, name, sources[name]) | ({"solver": solvers[name]} if name in solvers else {})
+            for name in system.components
+        ],
         "stages": _describe_stages(system.stages),
         "connections": [_describe_connection(system, connection) for connection in system.connections],
     }

@@ -97,7 +97,7 @@ class PreparedRun:
             "name": self.spec.name,
             "scenario": self.document.value,
             "scenario_file": str(self.document.file.resolve()),
-            "system": describe_system(self.system, self.sources),
+            "system": describe_system(self.system, self.sources, self.component_factory.solvers),
             **describe_software(),
             "sha256": {name: sha256(file.read_bytes()).hexdigest() for name, file in self.files().items()},
         }
@@ -113,7 +113,7 @@ class PreparedRun:
         modules = (spec.python.rpartition(":")[0] for spec in calls)
         functions = (self.root.folder / module for module in modules if module.endswith(".py"))
         factory, folder = self.component_factory, self.root.folder.resolve()
-        data = {file.resolve() for file in (*own, *factory.fmus, *factory.modelica_files)}
+        data = {file.resolve() for file in (*own, *(path for path, _ in factory.fmus), *factory.modelica_files)}
         files = data | package_files((*functions, *factory.python_files))
         return {relpath(file, folder).replace(os.sep, "/"): file for file in sorted(files, key=str)}
 

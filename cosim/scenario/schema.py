@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, StringConstraints, model_validator
 
+from ..components.fmi.instance_settings import Method
 from ..engine.settings import NonFinitePolicy
 from .schema_types import INVALID, AutoOrBool, BoolOrNumber, Integer, Name, NameList, Period, Seconds, Spec, Value
 
@@ -34,11 +35,34 @@ _COMPONENT_RULES: dict[str, Any] = {
             "if": _has_text("isolation"),
             "then": {"anyOf": [_has_text("fmu"), _has_text("modelica")]},
         },
+        *(
+            {"if": {"required": [key], "properties": {key: {"not": {"type": "null"}}}}, "then": _has_text("fmu")}
+            for key in ("solver", "tolerance")
+        ),
     ],
 }
 _CHECK_RULES: dict[str, Any] = {
     "anyOf": [{"required": [bound], "properties": {bound: {"not": {"type": "null"}}}} for bound in ("min", "max", "equals")]
 }
+
+
+class SolverSpec(Spec):
+    """Integration of a Model Exchange FMU."""
+
+    method: Method = Field(
+        description='"euler", "rk4": explicit methods with fixed step size; "cvode": BDF with variable step size and root finding'
+    )
+    step_size: Period | None = Field(
+        default=None,
+        description="largest step size of a method with fixed step size (s); default: that of the FMU's default experiment, "
+        "or else the time between two steps of the component",
+    )
+
+    @model_validator(mode="after")
+    def _check_step_size(self) -> SolverSpec:
+        if self.step_size is not None and self.method == "cvode":
+            raise ValueError('"step_size" is for methods with fixed step size; "cvode" has a "tolerance"')
+        return self
 
 
 class ComponentSpec(Spec):
@@ -54,6 +78,16 @@ class ComponentSpec(Spec):
     parameters: dict[str, Value] = Field(default={}, description="values of parameters and start values, by variable name")
     period: Period | None = Field(default=None, description="time between two steps (s); default: every macro step")
     isolation: Literal["fmu"] | None = Field(default=None, description="run the FMU in a separate process")
+    solver: SolverSpec | None = Field(
+        default=None,
+        description="simulate by Model Exchange with this solver; default: by Co-Simulation if the FMU has it, else cvode",
+    )
+    tolerance: float | None = Field(
+        default=None,
+        gt=0,
+        allow_inf_nan=False,
+        description="relative tolerance of the FMU and of its solver; default: that of the FMU's default experiment",
+    )
 
     @model_validator(mode="after")
     def _one_source(self) -> ComponentSpec:
@@ -64,6 +98,9 @@ class ComponentSpec(Spec):
             raise ValueError('"arguments" are for components with "python"; variables are set with "parameters"')
         if self.isolation and self.fmu is None and self.modelica is None:
             raise ValueError('"isolation" is for components with "fmu" or "modelica"')
+        for key in ("solver", "tolerance"):
+            if getattr(self, key) is not None and self.fmu is None:
+                raise ValueError(f'"{key}" is for components with "fmu"')
         return self
 
 

@@ -16,7 +16,7 @@ from ..messages import print_line
 from ..unfinished_runs import OutputFiles, writing_results
 
 if TYPE_CHECKING:
-    from ...components.fmi import Isolation
+    from ...components.fmi import FmuComponent, InstanceSettings, Interface, Isolation, Method
     from ...core.component import Component
     from ...core.recording import Recording
     from ...engine.plan import Plan
@@ -38,10 +38,17 @@ FMU_NAME, PROFILE_NAME = "fmu", "profile"
 @click.option(
     "--input-file", type=click.Path(path_type=Path), help='CSV file with the column "time" and columns named like inputs.'
 )
+@click.option(
+    "--solver",
+    type=click.Choice(["euler", "rk4", "cvode"]),
+    help="Simulate by Model Exchange with this method; default: by Co-Simulation if the FMU has it, else with cvode.",
+)
+@click.option("--solver-step-size", help="Largest step size (s) of euler and rk4; default: the FMU's, else --step-size.")
+@click.option("--tolerance", type=click.FloatRange(0, min_open=True), help="Relative tolerance; default: the FMU's.")
 @csv_options
 @supervision.supervision_options
 def command(isolation: str, sandbox: str | None, output_file: Path | None, **options: Any) -> int:
-    """Simulate a single FMU (FMI 2.0 or 3.0 Co-Simulation) from its default start time."""
+    """Simulate a single FMU (Co-Simulation or Model Exchange of FMI 2.0 or 3.0) from its default start time."""
     output = output_file.absolute() if output_file else None
     if strict_sandbox.must_rerun(sandbox):
         return strict_sandbox.rerun_in_bubblewrap(
@@ -67,7 +74,11 @@ def _simulate(
     step_size: str | None,
     start_values: tuple[str, ...],
     input_file: Path | None,
+    solver: Method | None,
+    solver_step_size: str | None,
+    tolerance: float | None,
 ) -> int:
+    from ...components.fmi import InstanceSettings, SolverSettings
     from ...core.errors import InputError
     from ...engine.disk_space import find_space_problems
     from ...engine.run_loop import simulating
@@ -81,7 +92,11 @@ def _simulate(
     messages.print_log()
     if output:
         check_writable(output.parent)
-    plan = _compile_system(fmu, fmu_isolation, stop_time, step_size, parse_settings(start_values), input_file)
+    solver_step = _parse_seconds(solver_step_size) if solver_step_size else None
+    solver_settings = SolverSettings(solver, solver_step) if solver else SolverSettings()
+    settings = InstanceSettings(tolerance, solver_settings)
+    component = _create_component(fmu, "model-exchange" if solver else None, settings, fmu_isolation)
+    plan = _compile_system(component, stop_time, step_size, parse_settings(start_values), input_file)
     if output and shown:
         locks.lock(OutputFiles.of_file(output).lock, shown)
         replaced = output.stat().st_size if output.is_file() else 0
@@ -135,16 +150,27 @@ def _isolation(isolation: str, sandbox: bool) -> Isolation | None:
     return Isolation(sandbox=sandbox) if sandbox or isolation == "fmu" else None
 
 
+def _create_component(
+    fmu: Path, interface: Interface | None, settings: InstanceSettings, isolation: Isolation | None
+) -> FmuComponent:
+    """Create the component of the FMU, and log the warning about it if there is one."""
+    from ...components.fmi import FmuFile, create_component
+    from ...core.errors import Problem
+    from .. import messages
+
+    file = FmuFile(fmu, interface=interface)
+    messages.log_problems([Problem(file.run_warning)] if file.run_warning else [])
+    return create_component(file, file.description.model_name, settings, isolation)
+
+
 def _compile_system(
-    fmu: Path,
-    fmu_isolation: Isolation | None,
+    component: FmuComponent,
     stop_time: str | None,
     step_size: str | None,
     start_values: dict[str, Any],
     input_file: Path | None,
 ) -> Plan:
     """Compile the system of the FMU, and of the input file if there is one."""
-    from ...components.fmi import FmuFile, create_component
     from ...core.errors import Problem
     from ...core.system import Connection, Endpoint, System
     from ...core.time_grid import exact_divisor
@@ -152,13 +178,11 @@ def _compile_system(
     from ...engine.settings import Settings
     from .. import messages
 
-    file = FmuFile(fmu)
-    messages.log_problems([Problem(file.run_warning)] if file.run_warning else [])
-    experiment = file.description.default_experiment
+    experiment = component.description.default_experiment
     start = experiment.start_time or Fraction(0)
     stop = _parse_seconds(stop_time) if stop_time else experiment.stop_time or start + 1
     step = _parse_seconds(step_size) if step_size else exact_divisor(stop - start, experiment.step_size or (stop - start) / 100)
-    components: dict[str, Component] = {FMU_NAME: create_component(file, file.description.model_name, isolation=fmu_isolation)}
+    components: dict[str, Component] = {FMU_NAME: component}
     connections, stages = [], [(FMU_NAME,)]
     if input_file:
         components[PROFILE_NAME] = _read_profile(input_file, components[FMU_NAME])

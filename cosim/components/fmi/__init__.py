@@ -1,20 +1,26 @@
 """FMUs as components; the only package that uses FMPy at run time."""
 
+from typing import Protocol
+
 from ...core.component import Component
 from .description import DefaultExperiment, FmuDescription
 from .file import FmuFile
 from .fmi2 import Fmi2Instance
 from .fmi3 import Fmi3Instance
 from .instance import FmuInstance
-from .instance_settings import InstanceSettings, SolverSettings
+from .instance_settings import InstanceSettings, Method, SolverSettings
 from .isolated import Isolation
+from .preflight import Interface
 
 __all__ = [
     "DefaultExperiment",
+    "FmuComponent",
     "FmuDescription",
     "FmuFile",
     "InstanceSettings",
+    "Interface",
     "Isolation",
+    "Method",
     "SolverSettings",
     "create_component",
 ]
@@ -22,12 +28,22 @@ __all__ = [
 DEFAULT_SETTINGS = InstanceSettings()
 
 
+class FmuComponent(Component, Protocol):
+    """Component of an FMU.
+
+    Attributes:
+        description: Model description of the FMU.
+    """
+
+    description: FmuDescription
+
+
 def create_component(
     file: FmuFile,
     instance_name: str,
     settings: InstanceSettings = DEFAULT_SETTINGS,
     isolation: Isolation | None = None,
-) -> Component:
+) -> FmuComponent:
     """Create a component for one instance of an FMU.
 
     No code of the FMU runs here: its binary is loaded by `Component.instantiate`.

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Literal
+from typing import Any, Literal
+
+from .description import DefaultExperiment
 
 #: integration method: explicit Euler and Runge-Kutta of order 4 at fixed step size, or CVODE with variable step size
 Method = Literal["euler", "rk4", "cvode"]
+#: relative tolerance of a solver with variable step size, if neither the settings nor the FMU have one
+DEFAULT_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,3 +40,18 @@ class InstanceSettings:
 
     tolerance: float | None = None
     solver: SolverSettings = SolverSettings()
+
+    def solver_tolerance(self, experiment: DefaultExperiment) -> float:
+        """Return the relative tolerance of a solver with variable step size for an FMU with this default experiment."""
+        return self.tolerance or experiment.tolerance or DEFAULT_TOLERANCE
+
+    def solver_step_size(self, experiment: DefaultExperiment) -> Fraction | None:
+        """Return the largest step size (s) of a solver with fixed step size; None: the communication step size."""
+        return self.solver.step_size or experiment.step_size
+
+    def describe_solver(self, experiment: DefaultExperiment) -> dict[str, Any]:
+        """Return the method with its tolerance or its largest step size (s; None: the communication step size)."""
+        if self.solver.method == "cvode":
+            return {"method": "cvode", "tolerance": self.solver_tolerance(experiment)}
+        step_size = self.solver_step_size(experiment)
+        return {"method": self.solver.method, "step_size": None if step_size is None else float(step_size)}

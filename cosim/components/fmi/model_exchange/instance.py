@@ -26,8 +26,6 @@ from .fixed_step import FixedStepIntegrator
 from .integrator import EventKind, Integrator
 from .variable_step import VariableStepIntegrator
 
-#: relative tolerance of a solver with variable step size, if neither the settings nor the FMU have one
-DEFAULT_TOLERANCE = 1e-6
 #: largest number of calls of fmi*NewDiscreteStates or fmi3UpdateDiscreteStates at one event
 MAX_EVENT_ITERATIONS = 1000
 #: largest number of events in one communication step
@@ -85,10 +83,10 @@ class ModelExchangeInstance(FmuInstance):
         self._restart(self._current_time.value)
 
     def _create_integrator(self, model: ContinuousModel) -> Integrator:
-        solver = self._settings.solver
-        if solver.method == "cvode":
-            return VariableStepIntegrator(model, self.tolerance or DEFAULT_TOLERANCE)
-        return FixedStepIntegrator(model, solver.method, solver.step_size or self.description.default_experiment.step_size)
+        settings, experiment = self._settings, self.description.default_experiment
+        if settings.solver.method == "cvode":
+            return VariableStepIntegrator(model, settings.solver_tolerance(experiment))
+        return FixedStepIntegrator(model, settings.solver.method, settings.solver_step_size(experiment))
 
     def _count_states(self) -> tuple[int, int]:
         """Return the numbers of continuous states and event indicators."""
