@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import tempfile
-from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, nullcontext
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -110,17 +111,19 @@ class PlanRun:
             ComponentError: a component failed.
             InputError: a component cannot be instantiated.
         """
-        with self._recording_failure(), default_float_mode(), restoring_process_state(self._names):
-            with self._watch.measure("instantiate_seconds"):
-                instantiate_components(self._plan)
-            with self._watch.measure("initialize_seconds"):
-                self.executor.initialize()
-            self._is_initialized = True
+        try:
+            with default_float_mode(), restoring_process_state(self._names):
+                with self._watch.measure("instantiate_seconds"):
+                    instantiate_components(self._plan)
+                with self._watch.measure("initialize_seconds"):
+                    self.executor.initialize()
+        except BaseException as error:
+            self.failure = error
+            raise
+        self._is_initialized = True
         if self._pacer:
             self._pacer.start()
-        if 0 in self._event_points:
-            with self._stepping():
-                self._apply_events(0)
+        self.advance(0)
 
     def advance(self, end: int, observers: Sequence[Observer] = ()) -> None:
         """Run macro steps until communication point `end` is reached or a component requests termination.
@@ -133,19 +136,28 @@ class PlanRun:
             ComponentError: a component failed.
             LateError: the run fell behind real time.
         """
+        state = restoring_process_state(self._names) if self._runs_foreign_code else nullcontext()
+        journal, began = current_journal(), perf_counter()
+        if journal:
+            journal.enter_phase(Phase.STEPPING, journal.deadlines.step)
         try:
-            with self._stepping():
+            with default_float_mode(), state, attributing_forks(self.executor.describe_call):
                 self._run_to_stops(end, observers)
+        except BaseException as error:
+            self.failure = error
+            raise
         finally:
+            self._watch.add("loop_seconds", perf_counter() - began)
+            if journal:
+                journal.enter_phase(Phase.IDLE)
             if self.failure or self.is_finished:
                 self.executor.close()
 
     def _run_to_stops(self, end: int, observers: Sequence[Observer]) -> None:
         """Run up to `end`, interrupted at events and whenever the observers are called."""
-        executor, begin = self.executor, self.executor.completed_steps
-        events = self._event_points[bisect_right(self._event_points, begin) : bisect_right(self._event_points, end)]
+        executor, begin, events = self.executor, self.executor.completed_steps, self._event_points
         observed = range(begin, end, max(1, (end - begin) // 100)) if observers else ()
-        for stop in sorted({*events, *observed, end}) if events or observed else (end,):
+        for stop in sorted({*events[bisect_left(events, begin) : bisect_right(events, end)], *observed, end}):
             if self._pacer or self._step_hook:
                 self._run_in_single_steps(stop)
             else:
@@ -154,7 +166,7 @@ class PlanRun:
                 observe(executor.completed_steps, self._plan.grid.count)
             if executor.termination:
                 return
-            if stop > begin:
+            if stop > begin or not end:
                 self._apply_events(stop)
 
     def _run_in_single_steps(self, stop: int) -> None:
@@ -174,28 +186,6 @@ class PlanRun:
             for name, values in event.values.items():
                 for variable, value in values.items():
                     self._components[name].set(variable, value)
-
-    @contextmanager
-    def _stepping(self) -> Iterator[None]:
-        """Protect the process from the components that step in this block, and attribute their failures."""
-        state = restoring_process_state(self._names) if self._runs_foreign_code else nullcontext()
-        forks, watch = attributing_forks(self.executor.describe_call), self._watch.measure("loop_seconds")
-        if journal := current_journal():
-            journal.enter_phase(Phase.STEPPING, journal.deadlines.step)
-        try:
-            with self._recording_failure(), default_float_mode(), state, forks, watch:
-                yield
-        finally:
-            if journal:
-                journal.enter_phase(Phase.IDLE)
-
-    @contextmanager
-    def _recording_failure(self) -> Iterator[None]:
-        try:
-            yield
-        except BaseException as error:
-            self.failure = error
-            raise
 
     def outcome(self) -> SimulationOutcome:
         """Return everything recorded and measured so far."""

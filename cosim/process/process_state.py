@@ -20,6 +20,14 @@ from ..core import component_log
 from .float_mode import FloatEnvironment
 from .journal import Phase, current_journal
 
+try:
+    from ._process_state import encode as _encode
+except ImportError:  # not Linux, or installed without a C compiler
+
+    def _encode() -> bytes:
+        return b""
+
+
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGSEGV, signal.SIGFPE, signal.SIGABRT, signal.SIGPIPE, signal.SIGCHLD)
 _TIMERS = (signal.ITIMER_REAL, signal.ITIMER_VIRTUAL, signal.ITIMER_PROF)
 _LIMITS = (resource.RLIMIT_AS, resource.RLIMIT_CPU, resource.RLIMIT_DATA, resource.RLIMIT_FSIZE, resource.RLIMIT_NOFILE)
@@ -46,6 +54,20 @@ class ProcessState:
         return [f"{name}{detail}" for name, detail in details if detail is not None]
 
 
+class _StateCache:
+    """The last state that was read with its encoding, because reading one takes much longer than encoding it."""
+
+    def __init__(self) -> None:
+        self._encoding, self._state = b"", ProcessState()
+
+    def read(self) -> tuple[bytes, ProcessState]:
+        """Return the encoding of the present state, b"" without the extension module, and the state."""
+        encoding = _encode()
+        if not encoding or encoding != self._encoding:
+            self._encoding, self._state = encoding, ProcessState()
+        return encoding, self._state
+
+
 @contextmanager
 def restoring_process_state(component: str) -> Iterator[None]:
     """Restore the process state at the end of the block and warn of each change; other threads wait before such a block.
@@ -57,20 +79,22 @@ def restoring_process_state(component: str) -> Iterator[None]:
         component: Name of the component or components that may change the state, for messages.
     """
     with _lock:
-        state, output_files = ProcessState(), _output_files()
+        encoding, state = _state_cache().read()
+        journal = current_journal()
+        output_files = _output_files() if journal else []
         _saved_states.append(state)
         try:
             yield
         finally:
             _saved_states.pop()
-            journal = current_journal()
             if journal and output_files != _output_files():
                 journal.record_call(component, "a call that closed the files of the process")
                 journal.enter_phase(journal.phase if journal.phase == Phase.RESULTS_WRITTEN else Phase.CALLING)
                 os._exit(70)
-            for change in state.restore():
-                text = f"changed {change} of the process; it was changed back"
-                component_log.log_message(component, component_log.WARNING, text)
+            if not encoding or _encode() != encoding:
+                for change in state.restore():
+                    text = f"changed {change} of the process; it was changed back"
+                    component_log.log_message(component, component_log.WARNING, text)
 
 
 @contextmanager
@@ -78,6 +102,11 @@ def exclusive_process_state() -> Iterator[None]:
     """Exclude other threads from this block and from `restoring_process_state` while the block runs."""
     with _lock:
         yield
+
+
+@cache
+def _state_cache() -> _StateCache:
+    return _StateCache()
 
 
 def _release_after_fork() -> None:
