@@ -31,8 +31,9 @@ def extension(name: str) -> Extension:
     """Extension that is optional unless COSIM_REQUIRE_NATIVE is set; without it cosim runs slower, in pure Python."""
     optional = not os.environ.get("COSIM_REQUIRE_NATIVE")
     flags = [] if sys.platform == "win32" else ["-std=c11", "-O2", "-ffp-contract=off"]
+    libraries = [] if sys.platform == "win32" else ["m"]
     source = f"{name.replace('.', '/')}.c"
-    return Extension(name, [source], extra_compile_args=flags, py_limited_api=True, optional=optional)
+    return Extension(name, [source], extra_compile_args=flags, libraries=libraries, py_limited_api=True, optional=optional)
 
 
 #: modules in C; the second one reads the state of a Linux process
