@@ -22,7 +22,7 @@ def _has_text(key: str) -> dict[str, Any]:
     return {"required": [key], "properties": {key: {"type": "string"}}}
 
 
-#: the rules of `ComponentSpec._one_source` and `CheckSpec._check_bounds` that JSON Schema can express
+#: the rules of the validators below that JSON Schema can express
 _COMPONENT_RULES: dict[str, Any] = {
     "oneOf": [_has_text(source) for source in SOURCES],
     "allOf": [
@@ -35,6 +35,11 @@ _COMPONENT_RULES: dict[str, Any] = {
             "then": {"anyOf": [_has_text("fmu"), _has_text("modelica")]},
         },
     ],
+}
+_CONNECTION_RULES: dict[str, Any] = {
+    "anyOf": [
+        {"properties": {end: {"pattern": pattern} for end in ("from", "to")}} for pattern in (r"^[^*]*$", r"^[^*]*\*[^*]*$")
+    ]
 }
 _CHECK_RULES: dict[str, Any] = {
     "anyOf": [{"required": [bound], "properties": {bound: {"not": {"type": "null"}}}} for bound in ("min", "max", "equals")]
@@ -68,13 +73,26 @@ class ComponentSpec(Spec):
 
 
 class ConnectionSpec(Spec):
-    """A connection of an output to an input, or of two prefixes; variables match if their names after the prefixes are equal."""
+    """A connection of an output to an input, of two prefixes, or of two patterns with one "*" each.
 
-    source: str = Field(alias="from", description='output "component.variable", or a prefix of outputs')
-    target: str = Field(alias="to", description='input "component.variable", or a prefix of inputs')
+    Variables below prefixes match if their names after the prefixes are equal; those of patterns, if the text at the "*" is equal.
+    """
+
+    model_config = ConfigDict(json_schema_extra=_CONNECTION_RULES)
+
+    source: str = Field(alias="from", description='output "component.variable", a prefix of outputs, or a pattern')
+    target: str = Field(alias="to", description='input "component.variable", a prefix of inputs, or a pattern')
+    gain: float = Field(default=1.0, description="factor that is applied after the conversion of units")
+    offset: float = Field(default=0.0, description="value that is added after the gain, in the unit of the input")
     delay: Integer = Field(
         default=0, ge=0, le=1_000_000, description="delay in macro steps; the input keeps the initial output until then"
     )
+
+    @model_validator(mode="after")
+    def _same_wildcards(self) -> ConnectionSpec:
+        if self is not INVALID and (self.source.count("*"), self.target.count("*")) not in ((0, 0), (1, 1)):
+            raise ValueError('expected one "*" in each of "from" and "to", or none')
+        return self
 
 
 class IterationSpec(Spec):
