@@ -153,6 +153,8 @@ def check_assignment(
 def _check_value(variable: Variable, value: Any, all_elements: bool = False) -> Any:
     if variable.causality not in ("parameter", "structuralParameter", "input") and variable.start is None:
         raise ValueError(f'"{variable.name}" is of causality {variable.causality} and cannot be set')
+    if variable.variability == "constant":
+        raise ValueError(f'"{variable.name}" is a constant and cannot be set')
     if variable.causality == "structuralParameter" and value != variable.start:
         raise ValueError(
             f'"{variable.name}" is a structural parameter: it stays {json.dumps(variable.start)}, found {_quote(value)}'

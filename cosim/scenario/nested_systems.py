@@ -15,6 +15,7 @@ from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean
 from ..core.size_limits import MAX_LEVELS
 from ..core.text import acceptable_text, shorten, text_problem
+from . import json_pointer
 from .expanded_size import SystemFile, check_expanded_size
 from .json_document import Document, read_document
 from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
@@ -157,7 +158,8 @@ def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = Non
         if text := next(_text_problems([name, value]), ""):
             problems.append(Problem(text, f'setting "{shorten(acceptable_text(name))}"'))
         elif name.startswith("/"):
-            problems += _set_pointer(document, name, value)
+            if text := json_pointer.set_value(document.value, name, value):
+                problems.append(Problem(text, f'setting "{name}"'))
         else:
             variables[name] = value
     reader = _SystemReader()
@@ -219,32 +221,6 @@ def _make_node(file: SystemFile, prefix: str = "") -> Node:
     return node
 
 
-def pointer_keys(pointer: str) -> list[str]:
-    """Return the keys and indices of a JSON pointer (RFC 6901).
-
-    >>> pointer_keys("/components/uav/and~1or")
-    ['components', 'uav', 'and/or']
-    """
-    return [key.replace("~1", "/").replace("~0", "~") for key in pointer[1:].split("/")]
-
-
-def _set_pointer(document: Document, pointer: str, value: Any) -> list[Problem]:
-    """Set a value in the JSON document; only the last key of the pointer may be new."""
-    keys = pointer_keys(pointer)
-    target, where = document.value, f'setting "{pointer}"'
-    for depth, key in enumerate(keys[:-1]):
-        target = _json_child(target, key)
-        if target is None:
-            return [Problem(f'the scenario has no "/{"/".join(keys[: depth + 1])}"', where)]
-    if isinstance(target, dict):
-        target[keys[-1]] = value
-    elif isinstance(target, list) and keys[-1].isdigit() and int(keys[-1]) < len(target):
-        target[int(keys[-1])] = value
-    else:
-        return [Problem(f'the scenario has no "{pointer}"', where)]
-    return []
-
-
 def _text_problems(value: Any) -> Iterator[str]:
     """Yield the problems of the texts in a JSON value."""
     if isinstance(value, str) and (problem := text_problem(value)):
@@ -252,14 +228,6 @@ def _text_problems(value: Any) -> Iterator[str]:
     elif isinstance(value, dict | list):
         for part in value if isinstance(value, list) else (*value, *value.values()):
             yield from _text_problems(part)
-
-
-def _json_child(value: Any, key: str) -> Any:
-    if isinstance(value, dict):
-        return value.get(key)
-    if isinstance(value, list) and key.isdigit() and int(key) < len(value):
-        return value[int(key)]
-    return None
 
 
 def parse_settings(settings: Sequence[str]) -> dict[str, Any]:

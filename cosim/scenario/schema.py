@@ -75,7 +75,7 @@ class ComponentSpec(Spec):
 class ConnectionSpec(Spec):
     """A connection of an output to an input, of two prefixes, or of two patterns with one "*" each.
 
-    Variables below prefixes match if their names after the prefixes are equal; those of patterns, if the text at the "*" is equal.
+    Variables below prefixes match if their names after the prefixes are equal; those of patterns, if the texts at "*" are equal.
     """
 
     model_config = ConfigDict(json_schema_extra=_CONNECTION_RULES)
@@ -151,13 +151,26 @@ class CallSpec(Spec):
     """A Python function that is called with the scenario as its first argument."""
 
     python: str = Field(description='"file.py:function" or "package.module:function"')
-    arguments: dict[str, Any] = Field(default={}, description="keyword arguments of the function")
+    arguments: dict[str, Any] = Field(
+        default={},
+        description='keyword arguments of the function; {"from": "usv.waypoint_x"} is the value of a parameter, and '
+        '{"from": "/components/plant/arguments/platforms"} that of an entry of the scenario',
+    )
+    sources: NameList = Field(
+        default=[],
+        alias="from",
+        description='components ("usv"), prefixes of variables ("plant.uav") or JSON pointers of objects, from which arguments '
+        "that are not given are taken by name",
+    )
 
 
 class FunctionSpec(CallSpec):
     """A Python function that is called with the result: a KPI returns numbers, a figure returns a matplotlib Figure."""
 
     name: Name = Field(description="unique name; that of a KPI is the prefix of its values, that of a figure the file name")
+    optional: bool = Field(
+        default=False, description="leave it out with a warning if an argument names a signal or parameter that does not exist"
+    )
 
 
 class CheckSpec(Spec):
