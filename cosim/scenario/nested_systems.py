@@ -11,13 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from ..components.python_import import package_files
-from ..core import paths, resources
-from ..core.errors import InputError, Problem, did_you_mean
+from ..core import paths
+from ..core.errors import InputError, Problem
 from ..core.size_limits import MAX_LEVELS
 from ..core.text import acceptable_text, shorten, text_problem
 from . import json_pointer
 from .expanded_size import SystemFile, check_expanded_size
-from .json_document import Document, read_document
+from .extension import read_system_document
+from .file_paths import find_scenario
+from .json_document import Document
 from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
 from .validation import validate_document
@@ -109,7 +111,7 @@ class Scenario:
 
         These are the scenario and its nested systems, sources with their packages, input profiles, KPIs and figures.
         """
-        files = [node.document.file for node in self.root.walk()]
+        files = [file for node in self.root.walk() for file in node.document.files]
         files += [self.root.folder / spec.file for _, spec in accepted(self.spec.inputs)]
         functions: list[CallSpec] = [spec for _, spec in (*accepted(self.spec.kpis), *accepted(self.spec.figures))]
         functions += [self.spec.scene] if self.spec.scene else []
@@ -121,22 +123,6 @@ class Scenario:
             else:
                 files.append(node.folder / (spec.fmu or (spec.modelica or "").rpartition(":")[0]))
         return [*files, *package_files(python)]
-
-
-def find_scenario(scenario: str | Path) -> Path:
-    """Return the path of a scenario file that is given by its path or by the name of a shipped scenario.
-
-    Raises:
-        InputError: There is neither such a file nor a shipped scenario of this name.
-    """
-    path = Path(scenario)
-    shipped = resources.root() / "scenarios"
-    if path.suffix == ".json" or paths.is_file(path):
-        return path
-    names = sorted(file.stem for file in shipped.glob("*.json"))
-    if str(scenario) not in names:
-        raise InputError(f'no scenario file and no shipped scenario "{scenario}"{did_you_mean(str(scenario), names)}')
-    return shipped / f"{scenario}.json"
 
 
 def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = None) -> Scenario:
@@ -151,7 +137,7 @@ def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = Non
         InputError: The file does not exist or is not JSON, or the expanded scenario is too large. Other problems are collected in
             the result.
     """
-    document = read_document(find_scenario(scenario))
+    document = read_system_document(find_scenario(scenario))
     problems: list[Problem] = []
     variables: dict[str, Any] = {}
     for name, value in (settings or {}).items():
@@ -207,7 +193,7 @@ class _SystemReader:
                 raise InputError(f'the nested system "{path}" is nested more than {MAX_LEVELS} levels deep')
             if key not in self._files:
                 self._files[key] = None
-                child = self._files[key] = self.read(read_document(file), NestedSpec, ancestors)
+                child = self._files[key] = self.read(read_system_document(file), NestedSpec, ancestors)
         except InputError as error:
             where = parent.document.where(("components", name, "system"))
             self.problems += [Problem(problem.message, problem.where or where) for problem in error.problems]

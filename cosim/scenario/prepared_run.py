@@ -129,7 +129,7 @@ class PreparedRun:
 
         These are the scenario and its nested systems, FMUs, Python and Modelica sources, and input profiles.
         """
-        own = [node.document.file for node in self.root.walk()]
+        own = [file for node in self.root.walk() for file in node.document.files]
         own += [self.root.folder / spec.file for spec in self.spec.inputs]
         calls = (*self.spec.kpis, *self.spec.figures, *([self.spec.scene] if self.spec.scene else []))
         modules = (spec.python.rpartition(":")[0] for spec in calls)

@@ -17,6 +17,12 @@ from .schema_types import INVALID, AutoOrBool, BoolOrNumber, Integer, Name, Name
 SOURCES = ("fmu", "python", "modelica", "system")
 
 
+#: lists whose elements can be changed by an object in a file with "extends", and the key that names their elements
+KEYED_LISTS = {("connections",): "to", ("kpis",): "name", ("figures",): "name", ("checks",): "kpi"}
+#: keys that a file with "extends" does not inherit
+NOT_INHERITED = ("$schema", "name", "description", "reference")
+
+
 def _has_text(key: str) -> dict[str, Any]:
     """Return the JSON Schema of objects with a text under `key`."""
     return {"required": [key], "properties": {key: {"type": "string"}}}
