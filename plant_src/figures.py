@@ -30,7 +30,7 @@ from .figure_style import (
     fit_height,
 )
 from .kpis import waypoints
-from .recorded_motion import horizontal_distance, touchdown_row
+from .recorded_motion import horizontal_distance, touchdown_row, used_waypoints
 
 TIME_AFTER_TOUCHDOWN = 4.0  # s, shown by default
 MIN_PLOTTED_ERROR = 1e-3  # m, lower end of the logarithmic axis
@@ -43,7 +43,7 @@ def paths(
     waypoint_x: Sequence[float] = (),
     waypoint_y: Sequence[float] = (),
     acceptance_radius: float = 0.0,
-    waypoint_count: int | None = None,
+    waypoint_count: float | None = None,
     platforms: Mapping[str, Mapping[str, Sequence[float]]] | None = None,
 ) -> Figure:
     """Draw the paths of a multirotor and a vessel in the horizontal plane; dots mark their first positions.
@@ -66,7 +66,7 @@ def paths(
     axes = figure.add_subplot(aspect="equal", xlabel="x / m", ylabel="y / m")
     for name, platform in (platforms or {}).items():
         _draw_platform(axes, name, platform)
-    _draw_waypoints(axes, waypoint_x[:waypoint_count], waypoint_y[:waypoint_count], acceptance_radius)
+    _draw_waypoints(axes, used_waypoints(waypoint_x, waypoint_y, waypoint_count), acceptance_radius)
     _draw_path(axes, result, deck.removesuffix(".deck"), color=VESSEL_COLOUR, label="vessel")
     _draw_path(axes, result, vehicle, color=MULTIROTOR_COLOUR, label="quadcopter", linestyle=(0, (1.2, 1.0)))
     row = touchdown_row(result, vehicle)
@@ -84,10 +84,10 @@ def _draw_platform(axes: Axes, name: str, platform: Mapping[str, Sequence[float]
     annotate(axes, name, corner, offset=(3, 3), color="#8A7650")
 
 
-def _draw_waypoints(axes: Axes, x: Sequence[float], y: Sequence[float], radius: float) -> None:
-    if len(x):
-        axes.plot(x, y, "+", color="#555555", markersize=5, label="waypoints", zorder=2)
-    for number, (east, north) in enumerate(zip(x, y, strict=True), start=1):
+def _draw_waypoints(axes: Axes, waypoints: Sequence[tuple[float, float]], radius: float) -> None:
+    if waypoints:
+        axes.plot(*zip(*waypoints, strict=True), "+", color="#555555", markersize=5, label="waypoints", zorder=2)
+    for number, (east, north) in enumerate(waypoints, start=1):
         axes.add_patch(Circle((east, north), radius, fill=False, color="#888888", linestyle="--", linewidth=0.7, zorder=2))
         annotate(axes, str(number), (east + 0.7 * radius, north + 0.7 * radius), offset=(1, 1), color="#333333")
 
@@ -198,7 +198,7 @@ def tracking_error(
     waypoint_x: Sequence[float] = (),
     waypoint_y: Sequence[float] = (),
     acceptance_radius: float = 0.0,
-    waypoint_count: int | None = None,
+    waypoint_count: float | None = None,
     limit: float | None = None,
     start: float = 0.0,
 ) -> Figure:

@@ -17,7 +17,7 @@ from cosim.results.checks import Number
 from cosim.results.kpi import Prefix, Signal, better, declared_units, units
 
 from . import deck_frame
-from .recorded_motion import distance_from_line, horizontal_distance, touchdown_row
+from .recorded_motion import distance_from_line, horizontal_distance, touchdown_row, used_waypoints
 
 
 @better(
@@ -180,7 +180,7 @@ def waypoints(
     waypoint_x: Sequence[float],
     waypoint_y: Sequence[float],
     acceptance_radius: float,
-    waypoint_count: int | None = None,
+    waypoint_count: float | None = None,
 ) -> dict[str, Number]:
     """Evaluate which waypoints a vehicle reached in their order.
 
@@ -202,7 +202,7 @@ def waypoints(
         - `all_reached`: true if that is the number of waypoints
         - `time[1]`, `time[2]`, ...: time at which each waypoint was reached (s); NaN if it was not
     """
-    route = list(zip(waypoint_x, waypoint_y, strict=True))[:waypoint_count]
+    route = used_waypoints(waypoint_x, waypoint_y, waypoint_count)
     times, row = [math.nan] * len(route), 0
     position_x, position_y = result[f"{vehicle}.position.x"], result[f"{vehicle}.position.y"]
     for i, (x, y) in enumerate(route):
@@ -227,7 +227,7 @@ def cross_track(
     waypoint_x: Sequence[float],
     waypoint_y: Sequence[float],
     acceptance_radius: float,
-    waypoint_count: int | None = None,
+    waypoint_count: float | None = None,
 ) -> dict[str, Number]:
     """Evaluate the cross-track error of a vehicle on the straight legs between waypoints.
 

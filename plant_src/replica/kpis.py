@@ -13,7 +13,7 @@ from cosim.results.checks import Number
 from cosim.results.kpi import Prefix, units
 
 from ..kpis import waypoints
-from ..recorded_motion import horizontal_distance
+from ..recorded_motion import horizontal_distance, used_waypoints
 
 
 @units(leg="m")
@@ -23,7 +23,7 @@ def overshoots(
     waypoint_x: Sequence[float],
     waypoint_y: Sequence[float],
     acceptance_radius: float,
-    waypoint_count: int | None = None,
+    waypoint_count: float | None = None,
 ) -> dict[str, Number]:
     """Evaluate the largest distance from each leg between waypoints.
 
@@ -45,7 +45,7 @@ def overshoots(
         *_reached_times(waypoints(result, vehicle, waypoint_x, waypoint_y, acceptance_radius, waypoint_count)),
     ]
     position = np.column_stack([result[f"{vehicle}.position.{axis}"] for axis in "xy"])
-    corners = [position[0], *np.column_stack([waypoint_x, waypoint_y])[:waypoint_count]]
+    corners = [position[0], *np.array(used_waypoints(waypoint_x, waypoint_y, waypoint_count))]
     legs = dict.fromkeys((f"leg[{i}]" for i in range(1, len(corners))), math.nan)
     for i, ((begin, end), (a, b)) in enumerate(zip(pairwise(switches), pairwise(corners), strict=False), start=1):
         direction = (b - a) / np.hypot(*(b - a))
@@ -63,7 +63,7 @@ def turns(
     waypoint_y: Sequence[float],
     acceptance_radius: float,
     settling: float,
-    waypoint_count: int | None = None,
+    waypoint_count: float | None = None,
 ) -> dict[str, Number]:
     """Evaluate how a vehicle follows a target on straight legs and in turns at waypoints.
 
