@@ -22,7 +22,8 @@ def find_warnings(prepared: PreparedRun) -> list[Problem]:
 
 
 def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield the warnings that concern the results: the end, connections and each FMU file."""
+    """Yield the warnings that concern the results: functions left out, end of the run, connections, FMU files."""
+    yield from prepared.left_out
     if prepared.plan.end_warning:
         yield Problem(prepared.plan.end_warning, prepared.root.where("stop_time"))
     yield from _missing_connections(prepared)
