@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from ball_fmus import ball, balls
 from plant_validation import MeasurementCheck, ValidationReport
 from probe_fmus import probe, probes
 
@@ -10,7 +11,7 @@ from cosim.core.processors import available_processors
 from cosim.engine import EXECUTORS
 from cosim.engine import native_available as native_available
 
-__all__ = ["executor", "probe", "probes"]
+__all__ = ["ball", "balls", "executor", "probe", "probes"]
 
 
 def pytest_addoption(parser):

@@ -29,7 +29,7 @@ from .variable_step import VariableStepIntegrator
 #: largest number of calls of fmi*NewDiscreteStates or fmi3UpdateDiscreteStates at one event
 MAX_EVENT_ITERATIONS = 1000
 #: largest number of events in one communication step
-MAX_EVENTS_PER_STEP = 100_000
+MAX_EVENTS_PER_STEP = 10_000
 
 
 class ModelState(NamedTuple):

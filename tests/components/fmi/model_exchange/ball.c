@@ -1,0 +1,190 @@
+/* A Model Exchange FMU of FMI 1.0, 2.0 or 3.0 (macro FMI), written by hand: a lag, a bouncing ball and a counter.
+
+   Real: 0 u (input), 1 x (x' = u - x), 2 x', 3 h, 4 h' = v, 5 v, 6 v' = -9.81 or 0, 7 restitution (parameter), 8 time
+   Integer: 10 i_in (discrete input), 11 i_out = 10 i_in after events, 12 count (one more every 0.25 s), 13 last_count (the
+   simulation ends there), 14 fault (parameter): 1 GetDerivatives returns error, 2 the event indicator is NaN, 3 the event
+   iteration never ends, 4 the next time event is always now, 5 GetDerivatives crashes, 6 discarded derivatives, 7 an event
+   after every step */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#if FMI == 3
+#include "fmi3Functions.h"
+#define F(NAME) fmi3##NAME
+typedef fmi3Instance Handle;
+typedef fmi3Status Status;
+typedef fmi3ValueReference Reference;
+typedef fmi3Int32 Integer;
+#else
+#include "fmi2Functions.h"
+#define F(NAME) fmi2##NAME
+typedef fmi2Component Handle;
+typedef fmi2Status Status;
+typedef fmi2ValueReference Reference;
+typedef fmi2Integer Integer;
+#endif
+
+enum { U, X, DX, H, DH, V, DV, RESTITUTION, TIME, REALS };
+enum { I_IN = 10, I_OUT, COUNT, LAST_COUNT, FAULT, INTEGERS_END };
+enum { GOOD = 0, BAD = 3, DISCARDED = 2 };
+
+typedef struct {
+    double r[REALS];
+    Integer i[INTEGERS_END - I_IN];
+    double next_event, time;
+    int steps;
+} Model;
+
+#define INTEGER(m, name) ((m)->i[name - I_IN])
+
+static Handle create(void) {
+    Model *m = calloc(1, sizeof(Model));
+    m->r[X] = m->r[H] = 1;
+    m->r[RESTITUTION] = 0.7;
+    m->r[DV] = -9.81;
+    INTEGER(m, LAST_COUNT) = 1000;
+    m->next_event = 0.25;
+    return m;
+}
+
+static void compute(Model *m) {
+    m->r[DX] = m->r[U] - m->r[X];
+    m->r[DH] = m->r[V];
+    m->r[TIME] = m->time;
+}
+
+static int update(Model *m, int *again, int *ends) {
+    if (m->r[H] <= 0 && m->r[V] < 0) {
+        m->r[H] = 0;
+        m->r[V] *= -m->r[RESTITUTION];
+        if (m->r[V] < 0.1) m->r[V] = m->r[DV] = 0;
+    }
+    if (m->time >= m->next_event) {
+        INTEGER(m, COUNT)++;
+        m->next_event = INTEGER(m, FAULT) == 4 ? m->time : 0.25 * (INTEGER(m, COUNT) + 1);
+    }
+    INTEGER(m, I_OUT) = 10 * INTEGER(m, I_IN);
+    *again = INTEGER(m, FAULT) == 3;
+    *ends = INTEGER(m, COUNT) >= INTEGER(m, LAST_COUNT);
+    return GOOD;
+}
+
+Status F(GetContinuousStates)(Handle c, double x[], size_t n) {
+    Model *m = c;
+    x[0] = m->r[X], x[1] = m->r[H], x[2] = m->r[V];
+    return n == 3 ? GOOD : BAD;
+}
+Status F(SetContinuousStates)(Handle c, const double x[], size_t n) {
+    Model *m = c;
+    m->r[X] = x[0], m->r[H] = x[1], m->r[V] = x[2];
+    return n == 3 ? GOOD : BAD;
+}
+Status F(GetNominalsOfContinuousStates)(Handle c, double x[], size_t n) {
+    x[0] = x[1] = x[2] = 1;
+    return n == 3 ? GOOD : BAD;
+}
+static Status derivatives(Model *m, double dx[]) {
+    if (INTEGER(m, FAULT) == 1 && m->time > 0.5) return BAD;
+    if (INTEGER(m, FAULT) == 6 && m->time > 0.5) return DISCARDED;
+    if (INTEGER(m, FAULT) == 5 && m->time > 0.5) *(volatile int *)8 = 1;
+    compute(m);
+    dx[0] = m->r[DX], dx[1] = m->r[DH], dx[2] = m->r[DV];
+    return GOOD;
+}
+Status F(GetEventIndicators)(Handle c, double z[], size_t n) {
+    Model *m = c;
+    z[0] = INTEGER(m, FAULT) == 2 && m->time > 0.5 ? NAN : m->r[H] <= 0 && m->r[V] >= 0 ? 1e-9 : m->r[H];
+    return n == 1 ? GOOD : BAD;
+}
+Status F(SetTime)(Handle c, double time) {
+    ((Model *)c)->time = time;
+    return GOOD;
+}
+Status F(EnterEventMode)(Handle c) { return GOOD; }
+Status F(EnterContinuousTimeMode)(Handle c) { return GOOD; }
+Status F(ExitInitializationMode)(Handle c) { return GOOD; }
+Status F(Terminate)(Handle c) { return GOOD; }
+Status F(Reset)(Handle c) { return GOOD; }
+void F(FreeInstance)(Handle c) { free(c); }
+const char *F(GetVersion)(void) { return FMI == 3 ? "3.0" : "2.0"; }
+
+#define ACCESS(NAME, TYPE, MEMBER, FIRST, EXTRA)                                                                           \
+    Status F(Get##NAME)(Handle c, const Reference vr[], size_t n, TYPE v[] EXTRA) {                                        \
+        compute(c);                                                                                                        \
+        for (size_t k = 0; k < n; k++) v[k] = ((Model *)c)->MEMBER[vr[k] - FIRST];                                         \
+        return GOOD;                                                                                                       \
+    }                                                                                                                      \
+    Status F(Set##NAME)(Handle c, const Reference vr[], size_t n, const TYPE v[] EXTRA) {                                  \
+        for (size_t k = 0; k < n; k++) ((Model *)c)->MEMBER[vr[k] - FIRST] = v[k];                                         \
+        return GOOD;                                                                                                       \
+    }
+#define COUNT_ARGUMENT , size_t count
+
+Status F(GetState)(Handle c, void **state) {
+    if (!*state) *state = malloc(sizeof(Model));
+    memcpy(*state, c, sizeof(Model));
+    return GOOD;
+}
+
+#if FMI == 3
+ACCESS(Float64, double, r, 0, COUNT_ARGUMENT)
+ACCESS(Int32, Integer, i, I_IN, COUNT_ARGUMENT)
+
+fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+                                          fmi3Boolean logging, fmi3InstanceEnvironment environment,
+                                          fmi3LogMessageCallback log) {
+    return create();
+}
+Status fmi3EnterInitializationMode(Handle c, bool has_tolerance, double tolerance, double start, bool has_stop, double stop) {
+    ((Model *)c)->time = start;
+    return GOOD;
+}
+Status fmi3GetContinuousStateDerivatives(Handle c, double dx[], size_t n) { return derivatives(c, dx); }
+Status fmi3GetNumberOfContinuousStates(Handle c, size_t *n) { return *n = 3, GOOD; }
+Status fmi3GetNumberOfEventIndicators(Handle c, size_t *n) { return *n = 1, GOOD; }
+Status fmi3CompletedIntegratorStep(Handle c, bool no_set_state, bool *event, bool *ends) {
+    *event = INTEGER((Model *)c, FAULT) == 7;
+    *ends = false;
+    return GOOD;
+}
+Status fmi3UpdateDiscreteStates(Handle c, bool *again, bool *ends, bool *nominals, bool *values, bool *has_next, double *next) {
+    int more, last;
+    update(c, &more, &last);
+    *again = more, *ends = last, *nominals = false, *values = true, *has_next = true;
+    *next = ((Model *)c)->next_event;
+    return GOOD;
+}
+Status fmi3GetFMUState(Handle c, fmi3FMUState *state) { return fmi3GetState(c, state); }
+Status fmi3SetFMUState(Handle c, fmi3FMUState state) { return memcpy(c, state, sizeof(Model)), GOOD; }
+Status fmi3FreeFMUState(Handle c, fmi3FMUState *state) { return free(*state), *state = NULL, GOOD; }
+#else
+ACCESS(Real, double, r, 0, )
+ACCESS(Integer, Integer, i, I_IN, )
+
+fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                              const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
+    return type == fmi2ModelExchange ? create() : NULL;
+}
+Status fmi2SetupExperiment(Handle c, fmi2Boolean has_tolerance, double tolerance, double start, fmi2Boolean has_stop, double stop) {
+    ((Model *)c)->time = start;
+    return GOOD;
+}
+Status fmi2EnterInitializationMode(Handle c) { return GOOD; }
+Status fmi2GetDerivatives(Handle c, double dx[], size_t n) { return derivatives(c, dx); }
+Status fmi2CompletedIntegratorStep(Handle c, fmi2Boolean no_set_state, fmi2Boolean *event, fmi2Boolean *ends) {
+    *event = INTEGER((Model *)c, FAULT) == 7;
+    *ends = fmi2False;
+    return GOOD;
+}
+Status fmi2NewDiscreteStates(Handle c, fmi2EventInfo *info) {
+    memset(info, 0, sizeof *info);
+    update(c, &info->newDiscreteStatesNeeded, &info->terminateSimulation);
+    info->valuesOfContinuousStatesChanged = info->nextEventTimeDefined = fmi2True;
+    info->nextEventTime = ((Model *)c)->next_event;
+    return GOOD;
+}
+Status fmi2GetFMUstate(Handle c, fmi2FMUstate *state) { return fmi2GetState(c, state); }
+Status fmi2SetFMUstate(Handle c, fmi2FMUstate state) { return memcpy(c, state, sizeof(Model)), GOOD; }
+Status fmi2FreeFMUstate(Handle c, fmi2FMUstate *state) { return free(*state), *state = NULL, GOOD; }
+#endif
