@@ -71,6 +71,35 @@ def _variables_3() -> Iterator[str]:
         yield f'<{kind} name="{name}" valueReference="{reference}" {text}/>'
 
 
+def _variables_1() -> Iterator[str]:
+    for name, (reference, kind, text) in VARIABLES.items():
+        attributes = dict(pair.split("=") for pair in text.split())
+        causality = {'"parameter"': '"internal"', '"local"': '"internal"', '"independent"': '"none"'}.get(
+            attributes["causality"], attributes["causality"]
+        )
+        variability = '"parameter"' if attributes["causality"] == '"parameter"' else attributes.get("variability", '"continuous"')
+        start = f" start={attributes['start']}" if "start" in attributes else ""
+        yield (
+            f'<ScalarVariable name="{name}" valueReference="{reference}" causality={causality} variability={variability}>'
+            f"<{_FMI2_TYPES[kind]}{start}/></ScalarVariable>"
+        )
+    yield ('<ScalarVariable name="minus_x" valueReference="1" causality="output" alias="negatedAlias"><Real/></ScalarVariable>')
+
+
+def description_1(interface: str) -> str:
+    """Return modelDescription.xml of the FMI 1.0 FMU for "ME" or "CS"."""
+    capabilities = (
+        '<CoSimulation_StandAlone><Capabilities canHandleVariableCommunicationStepSize="true"/></CoSimulation_StandAlone>'
+    )
+    implementation = f"<Implementation>{capabilities}</Implementation>" if interface == "CS" else ""
+    return (
+        '<?xml version="1.0" encoding="ISO-8859-1"?>\n<fmiModelDescription fmiVersion="1.0" modelName="Ball" '
+        'modelIdentifier="ball" guid="ball" numberOfContinuousStates="3" numberOfEventIndicators="1">\n'
+        '<DefaultExperiment startTime="0" stopTime="2" tolerance="1e-8"/>\n'
+        f"<ModelVariables>\n{chr(10).join(_variables_1())}\n</ModelVariables>\n{implementation}</fmiModelDescription>\n"
+    )
+
+
 def _structure(version: int) -> str:
     indices = {name: index for index, name in enumerate(VARIABLES, 1)}
     outputs = [name for name, (_, _, text) in VARIABLES.items() if "output" in text]
@@ -85,15 +114,15 @@ def _structure(version: int) -> str:
     )
 
 
-def build_ball_fmu(version: int, folder: Path) -> Path:
-    """Build the FMU of an FMI major version."""
+def build_ball_fmu(version: int, folder: Path, interface: str = "ME") -> Path:
+    """Build the FMU of an FMI major version; only that of FMI 1.0 has the interface "CS"."""
     compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
-    library, target = folder / f"ball{version}.so", folder / f"ball{version}.fmu"
+    library, target = folder / f"ball{version}.so", folder / f"ball{version}{interface}.fmu"
     options = ["-shared", "-fPIC", "-O2", f"-DFMI={version}", f"-I{HEADERS}"]
     subprocess.run([compiler, *options, SOURCE, "-o", library, "-lm"], check=True)
     with ZipFile(target, "w") as archive:
-        archive.writestr("modelDescription.xml", model_description(version))
-        archive.write(library, f"binaries/{fmpy.platform if version == 2 else fmpy.platform_tuple}/ball.so")
+        archive.writestr("modelDescription.xml", description_1(interface) if version == 1 else model_description(version))
+        archive.write(library, f"binaries/{fmpy.platform_tuple if version == 3 else fmpy.platform}/ball.so")
     return target
 
 
@@ -101,10 +130,10 @@ def build_ball_fmu(version: int, folder: Path) -> Path:
 def balls(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
     """Paths of the FMUs by FMI major version."""
     folder = tmp_path_factory.mktemp("balls")
-    return {version: build_ball_fmu(version, folder) for version in (2, 3)}
+    return {version: build_ball_fmu(version, folder) for version in (1, 2, 3)}
 
 
-@pytest.fixture(params=[2, 3], ids=["FMI2", "FMI3"])
+@pytest.fixture(params=[1, 2, 3], ids=["FMI1", "FMI2", "FMI3"])
 def ball(request: pytest.FixtureRequest, balls: dict[int, Path]) -> Path:
     """Path of the FMU, for each FMI version."""
     path: Path = balls[request.param]

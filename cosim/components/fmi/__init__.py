@@ -1,10 +1,12 @@
 """FMUs as components; the only package that uses FMPy at run time."""
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from ...core.component import Component
 from .description import DefaultExperiment, FmuDescription
 from .file import FmuFile
+from .fmi1 import Fmi1Instance
 from .fmi2 import Fmi2Instance
 from .fmi3 import Fmi3Instance
 from .instance import FmuInstance
@@ -59,11 +61,12 @@ def create_component(
     """
     description = file.description
     if description.interface == "model-exchange":
-        from .model_exchange import Fmi2Model, Fmi3Model
+        from .model_exchange import Fmi1Model, Fmi2Model, Fmi3Model
 
-        instance_class: type[FmuInstance] = Fmi2Model if description.major == 2 else Fmi3Model
+        classes: Sequence[type[FmuInstance]] = (Fmi1Model, Fmi2Model, Fmi3Model)
     else:
-        instance_class = Fmi2Instance if description.major == 2 else Fmi3Instance
+        classes = (Fmi1Instance, Fmi2Instance, Fmi3Instance)
+    instance_class = classes[description.major - 1]
     if isolation:
         from .isolated.isolated_fmu import IsolatedFmu
 

@@ -19,7 +19,8 @@ class AccessorCallFactory:
     """Factory of the prepared get and set calls of one FMU instance.
 
     Attributes:
-        fmi_major: FMI major version, 2 or 3.
+        fmi_major: FMI major version.
+        prefix: Prefix of the C functions.
         functions: C functions of the FMU's library.
         instance: Address of the FMU instance (fmi2Component, fmi3Instance).
         value_references: Value references by variable name.
@@ -27,6 +28,7 @@ class AccessorCallFactory:
     """
 
     fmi_major: int
+    prefix: str
     functions: FunctionTable
     instance: int
     value_references: Mapping[str, int]
@@ -52,7 +54,7 @@ class AccessorCallFactory:
             begin = 0
             same_dtype = [variable for variable in ports.variables if variable.dtype == dtype]
             for (accessor, selected), group in groupby(same_dtype, lambda v: (self.accessors[v.type], is_selected(v))):
-                variables, function = list(group), f"fmi{self.fmi_major}{verb}{accessor}"
+                variables, function = list(group), f"{self.prefix}{verb}{accessor}"
                 end = begin + sum(len(variable.scalar_names) for variable in variables)
                 if not selected:
                     pass
@@ -77,7 +79,7 @@ class AccessorCallFactory:
         if self.fmi_major > 2:
             arguments += (as_size(len(values)),)
         native = NativeGetSet(
-            self.fmi_major,
+            max(self.fmi_major, 2),  # the functions of FMI 1.0 have the arguments of FMI 2.0
             function_address(function),
             self.instance,
             references_address,

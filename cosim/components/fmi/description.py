@@ -49,18 +49,19 @@ class FmuDescription:
         model_name: `modelName`.
         interface: Interface through which the FMU is simulated; the following attributes of capabilities belong to it.
         model_identifier: `modelIdentifier`.
-        instantiation_token: `instantiationToken` of FMI 3.0, `guid` of FMI 2.0.
+        instantiation_token: `instantiationToken` of FMI 3.0, `guid` of FMI 1.0 and 2.0.
         description: `description`.
         generation_tool: `generationTool`.
         variables: All variables, including the aliases of FMI 3.0.
         value_references: Value references by variable name, including aliases.
+        negated: Names of the variables of FMI 1.0 whose values have the opposite sign of their value reference's.
         default_experiment: `DefaultExperiment`.
         has_state: `canGetAndSetFMUState`.
         variable_step: `canHandleVariableCommunicationStepSize`, always true for Model Exchange.
         once_per_process: `canBeInstantiatedOnlyOncePerProcess`.
         needs_execution_tool: `needsExecutionTool`.
         state_count: Number of continuous states of Model Exchange; FMI 3.0 FMUs return it after their initialization.
-        indicator_count: `numberOfEventIndicators` of FMI 2.0.
+        indicator_count: `numberOfEventIndicators` of FMI 1.0 and 2.0.
         needs_completed_step: Model Exchange requires fmi*CompletedIntegratorStep.
         platforms: Platforms with a binary, as the FMU names their folders, and "c-code" if it contains sources.
     """
@@ -74,6 +75,7 @@ class FmuDescription:
     generation_tool: str
     variables: Sequence[Variable]
     value_references: Mapping[str, int]
+    negated: frozenset[str]
     default_experiment: DefaultExperiment
     has_state: bool
     variable_step: bool
@@ -86,7 +88,7 @@ class FmuDescription:
 
     @property
     def major(self) -> int:
-        """FMI major version, 2 or 3."""
+        """FMI major version: 1, 2 or 3."""
         return int(self.fmi_version.split(".")[0])
 
 
@@ -124,23 +126,26 @@ def build_description(path: Path, examination: Examination, interface: Interface
         raise InputError(f'"{path}": has no interface for {selected}, only for {join_alternatives(model.interfaces)}')
     attributes = model.interfaces[selected]
     units = {unit.name: _build_unit(unit) for unit in model.units}
-    variables = [variable for source in model.variables for variable in _build_variables(model, source, units)]
+    sources = [(source, variable) for source in model.variables for variable in _build_variables(model, source, units)]
+    by_name = {variable.name: (source, variable) for source, variable in reversed(sources)}  # the first one of each name
+    variables = [variable for source, variable in sources if by_name[variable.name][1] is variable]
     return FmuDescription(
         model.root["fmiVersion"],
         model.root.get("modelName", ""),
         selected,
         attributes["modelIdentifier"],
-        model.root["guid" if model.major == 2 else "instantiationToken"],
+        model.root["instantiationToken" if model.major == 3 else "guid"],
         model.root.get("description", ""),
         model.root.get("generationTool", ""),
         variables,
-        {name: int(source.attributes["valueReference"]) for source in model.variables for name in _names_with_aliases(source)},
+        {variable.name: int(by_name[variable.name][0].attributes["valueReference"]) for variable in variables},
+        frozenset(source.name for source in model.variables if source.attributes.get("alias") == "negatedAlias"),
         _build_default_experiment(model.default_experiment),
         any(attributes.get(name) in _TRUE for name in ("canGetAndSetFMUstate", "canGetAndSetFMUState")),
         selected == "model-exchange" or attributes.get("canHandleVariableCommunicationStepSize") in _TRUE,
         attributes.get("canBeInstantiatedOnlyOncePerProcess") in _TRUE,
         attributes.get("needsExecutionTool") in _TRUE,
-        sum(unknown.element == "ContinuousStateDerivative" for unknown in model.model_structure),
+        _count_states(model),
         int(model.root.get("numberOfEventIndicators", 0)),
         _needs_completed_step(model.major, attributes),
         list_platforms(examination.members),
@@ -161,7 +166,7 @@ def _names_with_aliases(source: ModelVariable) -> list[str]:
 
 def _build_variables(model: ModelDescription, source: ModelVariable, units: Mapping[str, Unit]) -> list[Variable]:
     """Build a variable and its aliases."""
-    is_c_int = model.major == 2 and source.kind in ("Boolean", "Enumeration")
+    is_c_int = (source.kind == "Enumeration" and model.major < 3) or (source.kind == "Boolean" and model.major == 2)
     descriptions = [source.attribute("description"), *(alias.get("description") for alias in source.aliases)]
     return [
         Variable(
@@ -220,6 +225,12 @@ def _build_default_experiment(experiment: Mapping[str, str]) -> DefaultExperimen
     start, stop, step, tolerance = numbers
     positive_step = step if step and step > 0 else None
     return DefaultExperiment(start, stop, positive_step, float(tolerance) if tolerance and tolerance > 0 else None)
+
+
+def _count_states(model: ModelDescription) -> int:
+    if model.major == 1:
+        return int(model.root.get("numberOfContinuousStates", 0))
+    return sum(unknown.element == "ContinuousStateDerivative" for unknown in model.model_structure)
 
 
 def _needs_completed_step(major: int, attributes: Mapping[str, str]) -> bool:

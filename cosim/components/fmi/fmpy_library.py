@@ -13,6 +13,7 @@ from .c_functions import FunctionTable
 from .description import FmuDescription
 from .file import FmuFile
 from .preflight.fmu_platform import current_platform
+from .preflight.functions import function_prefix
 
 
 class MissingFunctionError(Exception):
@@ -56,7 +57,7 @@ def _create_slave(slave_class: type, description: FmuDescription, folder: Path) 
         callbacks=None,
         component=None,
     )
-    slave._functions = _SlaveFunctions(slave_class, slave.dll)
+    slave._functions = _SlaveFunctions(slave_class, slave.dll, function_prefix(description.major, description.model_identifier))
     return slave
 
 
@@ -66,13 +67,13 @@ class _SlaveFunctions(dict[str, Any]):
     FMPy itself creates all functions of the standard at once, which takes milliseconds and fails if one of them is missing.
     """
 
-    def __init__(self, slave_class: type, library: ctypes.CDLL):
+    def __init__(self, slave_class: type, library: ctypes.CDLL, prefix: str):
         super().__init__()
-        self._slave_class, self._library = slave_class, library
+        self._slave_class, self._library, self._prefix = slave_class, library, prefix
 
     def __missing__(self, name: str) -> Any:
         try:
-            function: Any = self._library[name]
+            function: Any = self._library[self._prefix + name[len("fmi1") :]]
         except AttributeError:
             raise MissingFunctionError(name) from None
         signature = inspect.signature(getattr(self._slave_class, name))

@@ -42,6 +42,8 @@ class FmuInstance(FunctionCaller, Component):
     _state_word: str
     #: name of the C function that creates an instance
     _instantiate_function: str
+    #: name of the C function that frees it, if it is not fmi*FreeInstance
+    _free_function = ""
 
     def __init__(self, file: FmuFile, instance_name: str, settings: InstanceSettings):
         """Create the component; see `create_component`.
@@ -83,6 +85,11 @@ class FmuInstance(FunctionCaller, Component):
         """Prepare doStep from `self._current_time`, with the step size as ctypes argument and in seconds."""
         raise NotImplementedError
 
+    @property
+    def _c_prefix(self) -> str:
+        """Prefix of the C functions."""
+        return self.prefix
+
     # -- life cycle ------------------------------------------------------------------------------------------------------
 
     def instantiate(self) -> None:
@@ -107,7 +114,9 @@ class FmuInstance(FunctionCaller, Component):
         self._instance = as_pointer(self._handle)
         self._current_time = ctypes.c_double()
         references, functions = self.description.value_references, self._fmu.functions
-        self._prepare_transfers(AccessorCallFactory(self.major, functions, self._handle, references, self.accessors))
+        self._prepare_transfers(
+            AccessorCallFactory(self.major, self._c_prefix, functions, self._handle, references, self.accessors)
+        )
 
     def _prepare_transfers(self, factory: AccessorCallFactory) -> None:
         """Prepare the calls that transfer the bound arrays."""
@@ -155,8 +164,9 @@ class FmuInstance(FunctionCaller, Component):
     def free(self) -> None:
         """Call fmi*FreeInstance, unless an instance of the FMU has returned fatal, and release the FMU file."""
         if self._is_instantiated and not self._file.has_fatal_error:
-            with calling_component(self.name, f"{self.prefix}FreeInstance", "end"):
-                getattr(self._fmu, f"{self.prefix}FreeInstance")(self._handle)
+            name = self._free_function or f"{self.prefix}FreeInstance"
+            with calling_component(self.name, name, "end"):
+                getattr(self._fmu, name)(self._handle)
         self._is_instantiated = False
         if self._has_acquired_file:
             self._has_acquired_file = False

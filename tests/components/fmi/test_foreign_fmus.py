@@ -182,7 +182,7 @@ def test_other_files_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ((b'fmiVersion="2.0"', b'fmiVersion="1.0"'), r"is an FMI 1\.0 FMU; FMI 2\.0 and 3\.0 are supported"),
+        ((b'fmiVersion="2.0"', b'fmiVersion="1.1"'), r"is an FMI 1\.1 FMU; FMI 1\.0, 2\.0 and 3\.0 are supported"),
         ((b'guid="probe"', b""), "lacks the attribute guid"),
         ((b"<CoSimulation", b"<CoSimulation><"), "is not well-formed XML: "),
         ((b'start="1" min', b'start="one" min'), 'start value "one" of variable "y_start" is not a valid Float64'),

@@ -1,4 +1,4 @@
-"""Model Exchange instances of FMI 2.0 and FMI 3.0: the importer integrates the states and handles the events."""
+"""Model Exchange instances: the importer integrates the states and handles the events."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from ....core.errors import ComponentError
 from ....core.system import FLOAT_TYPES
 from ..accessor_calls import AccessorCallFactory
 from ..file import FmuFile
+from ..fmi1 import Fmi1Instance
 from ..fmi2 import Fmi2Instance
 from ..fmi3 import Fmi3Instance
 from ..function_calls import OK
@@ -76,7 +77,7 @@ class ModelExchangeInstance(FmuInstance):
         if self._terminates:
             reason = "the FMU requested termination in the initial event"
             raise ComponentError(self.name, self._full_name(self._update_method), reason, self._current_time.value)
-        names = {role: self._full_name(name) for role, name in self._function_names.items()}
+        names = {role: self._c_prefix + name for role, name in self._function_names.items()}
         counts, completes = self._count_states(), self.description.needs_completed_step
         model = ContinuousModel(self.major, self._fmu.functions, self._handle, names, counts, completes)
         self._integrator = self._create_integrator(model)
@@ -108,21 +109,34 @@ class ModelExchangeInstance(FmuInstance):
             ComponentError: A call failed, or the iteration did not end.
         """
         for _ in range(MAX_EVENT_ITERATIONS):
-            again, terminate, _, _, has_next, next_time = self.call_function(self._update_method)
+            again, terminate, has_next, next_time = self._update_discrete_states()
             self._next_event_time = next_time if has_next else math.inf
             if terminate:
                 self._terminates = True
                 return
             if not again:
-                self.call_function("enterContinuousTimeMode")
+                self._enter_mode("enterContinuousTimeMode")
                 return
         reason = f"the event iteration did not end after {MAX_EVENT_ITERATIONS} calls"
         raise ComponentError(self.name, self._full_name(self._update_method), reason, self._current_time.value)
 
+    def _update_discrete_states(self) -> tuple[bool, bool, bool, float]:
+        """Update the discrete states once.
+
+        Returns:
+            Another update is needed, termination is requested, there is a next time event, and its time (s).
+        """
+        again, terminate, _, _, has_next, next_time = self.call_function(self._update_method)
+        return again, terminate, has_next, next_time
+
+    def _enter_mode(self, method: str) -> None:
+        """Enter Event Mode or Continuous-Time Mode by FMPy's method."""
+        self.call_function(method)
+
     def _handle_event(self, change: Callable[[], object] = lambda: None) -> None:
         """Handle an event at the present time of the integration; `change` sets variables in Event Mode."""
         assert self._integrator is not None
-        self.call_function("enterEventMode")
+        self._enter_mode("enterEventMode")
         change()
         self._iterate_event()
         if not self._terminates:
@@ -266,6 +280,33 @@ _COMMON_NAMES = {
     "get_nominals": "GetNominalsOfContinuousStates",
     "complete_step": "CompletedIntegratorStep",
 }
+
+
+class Fmi1Model(ModelExchangeInstance, Fmi1Instance):
+    """Model Exchange instance of an FMI 1.0 FMU, which has no modes."""
+
+    _instantiate_function, _free_function = "fmi1InstantiateModel", "fmi1FreeModelInstance"
+    _function_names = {**_COMMON_NAMES, "get_derivatives": "GetDerivatives", "get_nominals": "GetNominalContinuousStates"}
+    _update_method = "eventUpdate"
+
+    def _fmpy_class(self) -> type:
+        from fmpy.fmi1 import FMU1Model
+
+        model_class: type = FMU1Model
+        return model_class
+
+    def enter_initialization_mode(self, start_time: float, _stop_time: float) -> None:
+        """Call fmiSetTime and fmiInitialize."""
+        self._current_time.value = start_time
+        self.call_function("setTime", start_time)
+        self.call_function("initialize", self.tolerance is not None, self.tolerance or 0.0)
+
+    def _update_discrete_states(self) -> tuple[bool, bool, bool, float]:
+        converged, _, _, terminate, has_next, next_time = self.call_function("eventUpdate")
+        return not converged, terminate, has_next, next_time
+
+    def _enter_mode(self, method: str) -> None:
+        """Do nothing: FMI 1.0 has no modes."""
 
 
 class Fmi2Model(ModelExchangeInstance, Fmi2Instance):

@@ -43,7 +43,13 @@ RUN_WARNINGS = frozenset(
     {
         *(NAME_FORM, REPEATED_FOLDER, rules_structure.OUTPUTS),
         *(rules_model.EMPTY_TOKEN, rules_model.IDENTIFIER, rules_model.EXPERIMENT_VALUE),
-        *(rules_variables.UNIT, rules_variables.COMBINATION, rules_variables.CONTINUOUS, rules_variables.INITIAL_RULE),
+        *(
+            rules_variables.UNIQUE,
+            rules_variables.UNIT,
+            rules_variables.COMBINATION,
+            rules_variables.CONTINUOUS,
+            rules_variables.INITIAL_RULE,
+        ),
         *(rules_variables.DECLARED, rules_values.MISSING, rules_values.RANGE, rules_values.LIMIT),
     }
 )

@@ -90,10 +90,10 @@ def _check_library(
     except InvalidLibraryError as error:
         yield FORMAT(f"the library cannot be loaded: it {error}", member)
         return
-    called = called_functions(model, interface)
+    called, identifier = called_functions(model, interface), model.interfaces[interface]["modelIdentifier"]
     if missing := sorted(called - library.exports):
         yield FUNCTIONS(f"the library does not export {abbreviate_names(missing, limit=5)}", member)
-    if unused := sorted(standard_functions(model.major, interface) - called - library.exports):
+    if unused := sorted(standard_functions(model.major, interface, identifier) - called - library.exports):
         yield UNUSED_FUNCTIONS(f"the library does not export {abbreviate_names(unused, limit=5)}", member)
     for text in version_deviations(library.constant_texts):
         yield VERSION(text, member)

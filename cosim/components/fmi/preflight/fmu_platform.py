@@ -37,7 +37,7 @@ class FmuPlatform:
 
     def binary_folder(self, major: int) -> str:
         """Return the name of the folder below `binaries` for an FMI major version."""
-        return self.fmi2_platform if major == 2 else self.platform_tuple
+        return self.platform_tuple if major == 3 else self.fmi2_platform
 
 
 def current_platform() -> FmuPlatform:

@@ -11,6 +11,7 @@ _FMI2_ACCESSORS = {"Float64": "Real", "Int32": "Integer", "Enumeration": "Intege
 _FMI3_TYPES = ("Binary", "Boolean", "Clock", "Float32", "Float64", "String")
 _FMI3_INTEGERS = tuple(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64))
 ACCESSORS: Mapping[int, Mapping[str, str]] = {
+    1: _FMI2_ACCESSORS,
     2: _FMI2_ACCESSORS,
     3: {name: name for name in (*_FMI3_TYPES, *_FMI3_INTEGERS)} | {"Enumeration": "Int64"},
 }
@@ -33,6 +34,18 @@ _FMI2_INTERFACES: Mapping[Interface, Sequence[str]] = {
         *("GetEventIndicators", "GetNominalsOfContinuousStates", "NewDiscreteStates", "SetContinuousStates", "SetTime"),
     ),
 }
+_FMI1_INTERFACES: Mapping[Interface, Sequence[str]] = {
+    "co-simulation": (
+        *("CancelStep", "DoStep", "FreeSlaveInstance", "GetBooleanStatus", "GetIntegerStatus", "GetRealOutputDerivatives"),
+        *("GetRealStatus", "GetStatus", "GetStringStatus", "GetTypesPlatform", "InitializeSlave", "InstantiateSlave"),
+        *("ResetSlave", "SetRealInputDerivatives", "TerminateSlave"),
+    ),
+    "model-exchange": (
+        *("CompletedIntegratorStep", "EventUpdate", "FreeModelInstance", "GetContinuousStates", "GetDerivatives"),
+        *("GetEventIndicators", "GetModelTypesPlatform", "GetNominalContinuousStates", "GetStateValueReferences"),
+        *("Initialize", "InstantiateModel", "SetContinuousStates", "SetTime", "Terminate"),
+    ),
+}
 _FMI3_ONLY = (
     *("ActivateModelPartition", "CompletedIntegratorStep", "DoStep", "EnterConfigurationMode", "EnterContinuousTimeMode"),
     *("EnterEventMode", "EnterStepMode", "EvaluateDiscreteStates", "ExitConfigurationMode", "GetAdjointDerivative"),
@@ -50,6 +63,11 @@ _INTEGRATION = (
 )
 #: functions that the importer calls, without those of variables and states
 _CALLED: Mapping[tuple[int, Interface], Sequence[str]] = {
+    (1, "co-simulation"): ("DoStep", "FreeSlaveInstance", "InitializeSlave", "InstantiateSlave", "TerminateSlave"),
+    (1, "model-exchange"): (
+        *("CompletedIntegratorStep", "EventUpdate", "FreeModelInstance", "GetContinuousStates", "GetDerivatives"),
+        *("GetEventIndicators", "Initialize", "InstantiateModel", "SetContinuousStates", "SetTime", "Terminate"),
+    ),
     (2, "co-simulation"): ("Instantiate", "SetupExperiment", *_INITIALIZATION, "DoStep"),
     (3, "co-simulation"): ("InstantiateCoSimulation", *_INITIALIZATION, "DoStep"),
     (2, "model-exchange"): (
@@ -63,19 +81,28 @@ _CALLED: Mapping[tuple[int, Interface], Sequence[str]] = {
 }
 
 
-def standard_functions(major: int, interface: Interface) -> frozenset[str]:
+def function_prefix(major: int, identifier: str) -> str:
+    """Return the prefix of the C functions: only those of FMI 1.0 begin with the model identifier."""
+    return f"{identifier}_fmi" if major == 1 else f"fmi{major}"
+
+
+def standard_functions(major: int, interface: Interface, identifier: str = "") -> frozenset[str]:
     """Return the functions that the standard requires a library to export.
 
     Args:
         major: FMI major version.
         interface: Interface of the FMU.
+        identifier: `modelIdentifier` of the FMU.
     """
     accessors = (verb + name for verb in ("Get", "Set") for name in ACCESSORS[major].values())
+    prefix = function_prefix(major, identifier)
+    if major == 1:
+        return frozenset(prefix + name for name in ("GetVersion", "SetDebugLogging", *_FMI1_INTERFACES[interface], *accessors))
     if major == 2:
         specific: Sequence[str] = ("GetTypesPlatform", "Instantiate", "SetupExperiment", *_FMI2_INTERFACES[interface])
     else:
         specific = _FMI3_ONLY
-    return frozenset(f"fmi{major}{name}" for name in (*_COMMON, *_STATE[major], *specific, *accessors))
+    return frozenset(prefix + name for name in (*_COMMON, *_STATE[major], *specific, *accessors))
 
 
 def called_functions(model: ModelDescription, interface: Interface) -> frozenset[str]:
@@ -89,7 +116,8 @@ def called_functions(model: ModelDescription, interface: Interface) -> frozenset
     attributes = model.interfaces[interface]
     if any(attributes.get(flag) in ("true", "1") for flag in ("canGetAndSetFMUstate", "canGetAndSetFMUState")):
         names.update(name for name in _STATE[model.major] if "erialize" not in name)
-    return frozenset(f"fmi{model.major}{name}" for name in names)
+    prefix = function_prefix(model.major, attributes["modelIdentifier"])
+    return frozenset(prefix + name for name in names)
 
 
 def _accessors_of_variables(model: ModelDescription) -> Iterator[str]:

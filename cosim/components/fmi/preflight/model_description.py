@@ -165,7 +165,7 @@ class ModelDescription:
 
     def __post_init__(self) -> None:
         """Index the variables: FMI 2.0 refers to them by their index from 1, FMI 3.0 by value reference."""
-        if self.major == 2:
+        if self.major < 3:
             references = [str(index) for index in range(1, len(self.variables) + 1)]
         else:
             references = [variable.attributes.get("valueReference", "").strip() for variable in self.variables]

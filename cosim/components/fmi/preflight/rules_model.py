@@ -39,7 +39,7 @@ _C_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 def check_names(model: ModelDescription) -> Iterator[Finding]:
     """Check the attributes of the root element and of the interfaces."""
     line = model.lines[""]
-    attribute = "guid" if model.major == 2 else "instantiationToken"
+    attribute = "instantiationToken" if model.major == 3 else "guid"
     token = model.root.get(attribute)
     if token is None:
         yield TOKEN(f"lacks the attribute {attribute}", DESCRIPTION_FILE, line)
@@ -50,7 +50,7 @@ def check_names(model: ModelDescription) -> Iterator[Finding]:
     if not model.interfaces:
         yield INTERFACE("offers neither Co-Simulation nor Model Exchange", DESCRIPTION_FILE, line)
     for name, attributes in model.interfaces.items():
-        line = model.lines["CoSimulation" if name == "co-simulation" else "ModelExchange"]
+        line = model.lines["" if model.major == 1 else "CoSimulation" if name == "co-simulation" else "ModelExchange"]
         identifier = attributes.get("modelIdentifier", "")
         if not identifier or not {"/", "\\"}.isdisjoint(identifier):
             yield LIBRARY_NAME(f'found modelIdentifier "{identifier}", expected a file name', DESCRIPTION_FILE, line)

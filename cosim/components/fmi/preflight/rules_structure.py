@@ -46,6 +46,8 @@ def _check_dependency_kinds(unknown: Unknown) -> Iterator[Finding]:
 
 def check_completeness(model: ModelDescription) -> Iterator[Finding]:
     """Check that each list of the model structure contains exactly the required variables."""
+    if model.major == 1:
+        return  # it has no model structure
     lists = {element: _variables_in(model, element) for element in ("Output", "ContinuousStateDerivative", "InitialUnknown")}
     outputs = [variable for variable in model.variables if variable.causality == "output"]
     yield from _check_list(OUTPUTS, "output", lists["Output"], outputs)

@@ -31,7 +31,7 @@ _NON_NUMERIC_TYPES = ("String", "Binary", "Clock", "")
 def check_starts(model: ModelDescription) -> Iterator[Finding]:
     """Check that start values exist where required, are valid, and are between min and max."""
     for variable in model.variables:
-        if variable.kind not in ("Clock", ""):
+        if variable.kind not in ("Clock", "") and model.major > 1:  # FMI 1.0 requires no start values
             yield from _check_start_presence(variable)
         if variable.kind not in _NON_NUMERIC_TYPES:
             yield from _check_start_values(variable)

@@ -17,7 +17,7 @@ _TYPE_SPECIFIC = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.5"
 _UNITS = "FMI 2.0.5 section 2.2.2, FMI 3.0.2 section 2.4.3"
 
 NAME = Rule("variable.name", _VARIABLES)
-UNIQUE = Rule("variable.unique", _VARIABLES)
+UNIQUE = Rule("variable.unique", _VARIABLES, "warning")
 CONVENTION = Rule("variable.convention", "FMI 2.0.5 section 2.2.9, FMI 3.0.2 section 2.4.7.5.1", "warning")
 KIND = Rule("variable.type", _VARIABLES)
 ATTRIBUTE_VALUE = Rule("variable.word", _ATTRIBUTES)
@@ -62,7 +62,7 @@ def check_identity(model: ModelDescription) -> Iterator[Finding]:
         elif is_structured and not _STRUCTURED_NAME.fullmatch(name):
             yield CONVENTION(f'the name "{name}" does not follow the structured naming convention', DESCRIPTION_FILE, line)
         if name in first_lines:
-            text = f'the variable name "{name}" is already used in line {first_lines[name]}, expected a unique name'
+            text = f'the variable name "{name}" is already used in line {first_lines[name]}; this one is ignored'
             yield UNIQUE(text, DESCRIPTION_FILE, line)
         first_lines.setdefault(name, line)
 
@@ -126,10 +126,10 @@ def check_references(model: ModelDescription) -> Iterator[Finding]:
             message = f'found valueReference="{text}", expected an integer from 0 to 4294967295'
             yield _variable_finding(REFERENCE, variable, message)
         else:
-            kind = _ACCESSOR_TYPES.get(variable.kind, variable.kind) if model.major == 2 else ""
+            kind = _ACCESSOR_TYPES.get(variable.kind, variable.kind) if model.major < 3 else ""
             groups[kind, int(text)].append(variable)
     for group in groups.values():
-        if len(group) > 1:
+        if len(group) > 1 and model.major > 1:  # FMI 1.0 allows aliases of all variables
             yield from _check_shared_references(group) if model.major == 3 else _check_aliases(group)
 
 
@@ -170,7 +170,7 @@ def check_declarations(model: ModelDescription) -> Iterator[Finding]:
 def _check_declared_type(model: ModelDescription, variable: ModelVariable) -> Iterator[Finding]:
     name = variable.attributes.get("declaredType")
     if name is None:
-        if variable.kind == "Enumeration":
+        if variable.kind == "Enumeration" and model.major > 1:
             yield _variable_finding(DECLARED, variable, "is an enumeration without declaredType")
     elif variable.declared_type is None:
         hint = did_you_mean(name, (definition.name for definition in model.types[:_MAX_HINT_CANDIDATES]))

@@ -12,9 +12,10 @@ from lxml import etree
 
 from .findings import DESCRIPTION_FILE, Finding, Rule
 
-SCHEMA = Rule("xml.schema", "XML schemas of FMI 2.0.5 and 3.0.2", "warning")
+SCHEMA = Rule("xml.schema", "XML schemas of FMI 1.0.1, 2.0.5 and 3.0.2", "warning")
 #: (FMI major version, member of the archive) -> schema file of FMPy
 SCHEMA_FILES = {
+    (1, DESCRIPTION_FILE): "fmi1/fmiModelDescription.xsd",
     (2, DESCRIPTION_FILE): "fmi2/fmi2ModelDescription.xsd",
     (3, DESCRIPTION_FILE): "fmi3/fmi3ModelDescription.xsd",
     (3, "sources/buildDescription.xml"): "fmi3/fmi3BuildDescription.xsd",

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from . import fmi1_reader
 from .findings import DESCRIPTION_FILE, FatalFindingError, Finding, Rule
 from .model_description import Interface, ModelDescription, ModelVariable, TypeDefinition, UnitDefinition, Unknown
 
@@ -17,6 +18,7 @@ REPEATED = Rule("model.repeated", _ROOT)
 
 #: names of type elements -> FMI 3.0 type names, by FMI major version
 TYPE_NAMES = {
+    1: {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String", "Enumeration": "Enumeration"},
     2: {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String", "Enumeration": "Enumeration"},
     3: {
         **{f"Float{bits}": f"Float{bits}" for bits in (32, 64)},
@@ -37,7 +39,7 @@ _FMI3_STRUCTURE = {
 _INTERFACES: Mapping[Interface, str] = {"co-simulation": "CoSimulation", "model-exchange": "ModelExchange"}
 _FIXED_CAUSALITIES = ("parameter", "calculatedParameter", "structuralParameter")
 #: without "3.0-beta", because the C functions changed until 3.0
-_SUPPORTED_VERSION = re.compile(r"2\.0(\.[0-9]+)?|3\.[0-9]+(\.[0-9]+)?")
+_SUPPORTED_VERSION = re.compile(r"1\.0|2\.0(\.[0-9]+)?|3\.[0-9]+(\.[0-9]+)?")
 
 
 def read_model(root: Any) -> ModelDescription:
@@ -54,22 +56,26 @@ def read_model(root: Any) -> ModelDescription:
     version = root.get("fmiVersion")
     if version is None or not _SUPPORTED_VERSION.fullmatch(version):
         found = "lacks the attribute fmiVersion" if version is None else f"is an FMI {version} FMU"
-        raise FatalFindingError(VERSION(f"{found}; FMI 2.0 and 3.0 are supported", DESCRIPTION_FILE, root.sourceline))
+        raise FatalFindingError(VERSION(f"{found}; FMI 1.0, 2.0 and 3.0 are supported", DESCRIPTION_FILE, root.sourceline))
     major = int(version[0])
     types = [_read_type(element, major) for element in root.iterfind("TypeDefinitions/*")]
     types_by_name = {definition.name: definition for definition in types}
     return ModelDescription(
         major,
         _read_attributes(root),
-        {name: _read_attributes(root.find(tag)) for name, tag in _INTERFACES.items() if root.find(tag) is not None},
+        fmi1_reader.read_interfaces(root) if major == 1 else _read_interfaces(root),
         _read_attributes(root.find("DefaultExperiment")),
         [_read_variable(element, major, types_by_name) for element in root.iterfind("ModelVariables/*")],
         types,
-        [_read_unit(element) for element in root.iterfind("UnitDefinitions/Unit")],
+        list(fmi1_reader.read_units(root) if major == 1 else map(_read_unit, root.iterfind("UnitDefinitions/Unit"))),
         list(_read_structure(root, major)),
         [element.get("name", "") for element in root.iterfind("LogCategories/Category")],
         {"": root.sourceline} | {element.tag: element.sourceline for element in root},
     )
+
+
+def _read_interfaces(root: Any) -> dict[Interface, dict[str, str]]:
+    return {name: _read_attributes(root.find(tag)) for name, tag in _INTERFACES.items() if root.find(tag) is not None}
 
 
 def check_repeated_elements(root: Any) -> Iterator[Finding]:
@@ -90,20 +96,25 @@ def _read_attributes(element: Any) -> dict[str, str]:
 
 def _type_element(element: Any, major: int) -> Any:
     """Return the element with the type of a variable or type definition: a child in FMI 2.0, the element itself in FMI 3.0."""
-    return element if major == 3 else next((child for child in element if child.tag in TYPE_NAMES[2]), element)
+    return (
+        element if major == 3 else next((child for child in element if child.tag.removesuffix("Type") in TYPE_NAMES[2]), element)
+    )
 
 
 def _read_type(element: Any, major: int) -> TypeDefinition:
     type_element = _type_element(element, major)
     kind = TYPE_NAMES[major].get(type_element.tag if major == 2 else type_element.tag.removesuffix("Type"), "")
     attributes = _read_attributes(type_element) | _read_attributes(element)
-    items = [(item.get("name", ""), item.get("value", "")) for item in type_element.iterfind("Item")]
+    numbered = enumerate(type_element.iterfind("Item"), 1)  # FMI 1.0 has no values
+    items = [(item.get("name", ""), item.get("value", str(n) if major == 1 else "")) for n, item in numbered]
     return TypeDefinition(element.get("name", ""), kind, attributes, items, element.sourceline)
 
 
 def _read_variable(element: Any, major: int, types_by_name: Mapping[str, TypeDefinition]) -> ModelVariable:
     type_element = _type_element(element, major)
     attributes = _read_attributes(type_element) | _read_attributes(element)
+    if major == 1:
+        attributes = fmi1_reader.translate_variable(attributes)
     kind = TYPE_NAMES[major].get(type_element.tag, "")
     causality = attributes.get("causality", "local")
     return ModelVariable(
@@ -143,9 +154,9 @@ def _read_unit(element: Any) -> UnitDefinition:
 
 
 def _read_structure(root: Any, major: int) -> Iterator[Unknown]:
-    for name, path in (_FMI2_STRUCTURE if major == 2 else _FMI3_STRUCTURE).items():
+    for name, path in (_FMI3_STRUCTURE if major == 3 else _FMI2_STRUCTURE).items():
         for element in root.iterfind(f"ModelStructure/{path}"):
-            yield _read_unknown(element, name, "index" if major == 2 else "valueReference")
+            yield _read_unknown(element, name, "valueReference" if major == 3 else "index")
 
 
 def _read_unknown(element: Any, name: str, reference_attribute: str) -> Unknown:

@@ -1,4 +1,5 @@
-/* A Model Exchange FMU of FMI 1.0, 2.0 or 3.0 (macro FMI), written by hand: a lag, a bouncing ball and a counter.
+/* A Model Exchange FMU of FMI 1.0, 2.0 or 3.0 (macro FMI), written by hand: a lag, a bouncing ball and a counter. With FMI 1.0
+   it is a Co-Simulation FMU too, which makes one Euler step per communication step.
 
    Real: 0 u (input), 1 x (x' = u - x), 2 x', 3 h, 4 h' = v, 5 v, 6 v' = -9.81 or 0, 7 restitution (parameter), 8 time
    Integer: 10 i_in (discrete input), 11 i_out = 10 i_in after events, 12 count (one more every 0.25 s), 13 last_count (the
@@ -9,7 +10,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#if FMI == 3
+#if FMI == 1
+#define F(NAME) ball_fmi##NAME
+typedef void *Handle;
+typedef int Status, Integer;
+typedef unsigned Reference;
+#elif FMI == 3
 #include "fmi3Functions.h"
 #define F(NAME) fmi3##NAME
 typedef fmi3Instance Handle;
@@ -80,7 +86,12 @@ Status F(SetContinuousStates)(Handle c, const double x[], size_t n) {
     m->r[X] = x[0], m->r[H] = x[1], m->r[V] = x[2];
     return n == 3 ? GOOD : BAD;
 }
-Status F(GetNominalsOfContinuousStates)(Handle c, double x[], size_t n) {
+#if FMI == 1
+#define fmi1_GetNominals ball_fmiGetNominalContinuousStates
+#else
+#define fmi1_GetNominals F(GetNominalsOfContinuousStates)
+#endif
+Status fmi1_GetNominals(Handle c, double x[], size_t n) {
     x[0] = x[1] = x[2] = 1;
     return n == 3 ? GOOD : BAD;
 }
@@ -107,7 +118,7 @@ Status F(ExitInitializationMode)(Handle c) { return GOOD; }
 Status F(Terminate)(Handle c) { return GOOD; }
 Status F(Reset)(Handle c) { return GOOD; }
 void F(FreeInstance)(Handle c) { free(c); }
-const char *F(GetVersion)(void) { return FMI == 3 ? "3.0" : "2.0"; }
+const char *F(GetVersion)(void) { return FMI == 3 ? "3.0" : FMI == 2 ? "2.0" : "1.0"; }
 
 #define ACCESS(NAME, TYPE, MEMBER, FIRST, EXTRA)                                                                           \
     Status F(Get##NAME)(Handle c, const Reference vr[], size_t n, TYPE v[] EXTRA) {                                        \
@@ -127,7 +138,68 @@ Status F(GetState)(Handle c, void **state) {
     return GOOD;
 }
 
-#if FMI == 3
+#if FMI == 1
+ACCESS(Real, double, r, 0, )
+ACCESS(Integer, Integer, i, I_IN, )
+
+typedef struct {
+    void (*logger)(void *, const char *, int, const char *, const char *, ...);
+    void *(*allocate)(size_t, size_t);
+    void (*free)(void *);
+    void (*finished)(void *, int);
+} Callbacks;
+typedef struct {
+    char converged, references_changed, values_changed, ends, has_next;
+    double next_event;
+} EventInfo;
+
+void *ball_fmiInstantiateModel(const char *name, const char *guid, Callbacks callbacks, char logging) {
+    callbacks.logger(NULL, name, 0, "info", "a ball of FMI 1.0");
+    return create();
+}
+void ball_fmiFreeModelInstance(void *c) { free(c); }
+int ball_fmiCompletedIntegratorStep(void *c, char *event) {
+    *event = INTEGER((Model *)c, FAULT) == 7;
+    return GOOD;
+}
+int ball_fmiEventUpdate(void *c, char intermediate, EventInfo *info) {
+    int again, ends;
+    update(c, &again, &ends);
+    info->converged = !again, info->values_changed = 1, info->ends = (char)ends, info->has_next = 1;
+    info->next_event = ((Model *)c)->next_event;
+    return GOOD;
+}
+int ball_fmiInitialize(void *c, char has_tolerance, double tolerance, EventInfo *info) {
+    return ball_fmiEventUpdate(c, 0, info);
+}
+int ball_fmiGetDerivatives(void *c, double dx[], size_t n) { return derivatives(c, dx); }
+
+void *ball_fmiInstantiateSlave(const char *name, const char *guid, const char *location, const char *mime, double timeout,
+                               char visible, char interactive, Callbacks callbacks, char logging) {
+    return strncmp(location, "file:///", 8) ? NULL : create();
+}
+int ball_fmiInitializeSlave(void *c, double start, char has_stop, double stop) {
+    ((Model *)c)->time = start;
+    return GOOD;
+}
+int ball_fmiTerminateSlave(void *c) { return GOOD; }
+void ball_fmiFreeSlaveInstance(void *c) { free(c); }
+int ball_fmiDoStep(void *c, double time, double step, char new_step) {
+    Model *m = c;
+    int again, ends;
+    if (new_step != 1) return BAD;
+    if (INTEGER(m, FAULT) == 6 && time > 0.5) return DISCARDED;
+    compute(m);
+    m->r[X] += step * m->r[DX], m->r[H] += step * m->r[DH], m->r[V] += step * m->r[DV];
+    m->time = time + step;
+    update(m, &again, &ends);
+    return GOOD;
+}
+int ball_fmiGetRealStatus(void *c, int kind, double *value) {
+    *value = ((Model *)c)->time;
+    return kind == 2 ? GOOD : BAD;
+}
+#elif FMI == 3
 ACCESS(Float64, double, r, 0, COUNT_ARGUMENT)
 ACCESS(Int32, Integer, i, I_IN, COUNT_ARGUMENT)
 

@@ -7,6 +7,15 @@ from cosim.components.fmi import FmuFile
 
 #: case -> (FMI version, text of the valid description, its replacement, rule, line, part of the message)
 WARNINGS = {
+    "alias twice": (
+        3,
+        'start="1"/>',
+        'start="1"><Alias name="u"/></Float64>',
+        "variable.unique",
+        13,
+        'name "u" is already used in line 11',
+    ),
+    "name twice": (2, 'name="y" ', 'name="u" ', "variable.unique", 14, 'the variable name "u" is already used in line 13'),
     "stop time": (2, 'stopTime="2"', 'stopTime="NaN"', "experiment.value", 11, 'found stopTime="NaN", expected a finite number'),
     "step size": (3, 'stepSize="0.01"', 'stepSize="fast"', "experiment.value", 8, 'found stepSize="fast"'),
     "fixed input": (
