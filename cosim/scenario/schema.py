@@ -297,7 +297,9 @@ class ScenarioSpec(SystemSpec):
         description="name of the scenario and of its results folder"
     )
     start_time: Seconds = Field(default=Fraction(0), description="s")
-    stop_time: Seconds = Field(description="s; the duration is a multiple of the step size")
+    stop_time: Seconds = Field(
+        description="s; the run ends at the last whole multiple of the step size and of all periods at or before it"
+    )
     step_size: Period = Field(description="macro step: time between two communication points (s)")
     record: RecordSpec = Field(
         default=RecordSpec(), description="recorded signals; default: all outputs at every communication point"
