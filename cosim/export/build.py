@@ -11,9 +11,8 @@ from typing import Any
 
 from ..core.errors import InputError, Problem, did_you_mean
 from ..core.json_values import parse_object
-from ..core.resources import cache_directory
-from ..process.output_lock import LOCK_FILE, waiting_for_lock
-from ..results.files import remove_files, writing_atomically
+from ..results.files import writing_atomically
+from .cache import cached_file, file_hash
 from .sources import SOURCE_KINDS, Source, classify_source, export_source, find_sources, resolve_source_path, tool_versions
 
 #: FMI version -> folder of the FMUs
@@ -107,32 +106,7 @@ def cached_fmu(source: Path, model: str | None) -> Path:
     exporter = sorted(path for path in Path(__file__).parent.rglob("*") if path.suffix in (".py", ".c", ".h"))
     contents = [(str(path), file_hash(path)) for path in [*files, *exporter]]
     key = sha256(json.dumps([str(source.resolve()), model, tool_versions(classified), contents]).encode())
-    target = cache_directory() / "fmus" / key.hexdigest()[:24] / f"{classified.name}.fmu"
-    if not _is_intact(target):
-        _build_in_cache(source, model, target)
-    return target
-
-
-def _build_in_cache(source: Path, model: str | None, target: Path) -> None:
-    """Build a cached FMU and its digest, unless another process does it while this one waits."""
-    with waiting_for_lock(target.parent / LOCK_FILE):
-        if not _is_intact(target):
-            remove_files(target.parent, target.name)
-            build_to(source, model, target)
-            with writing_atomically(_digest_file(target)) as temporary:
-                temporary.write_text(file_hash(target))
-
-
-def _is_intact(fmu: Path) -> bool:
-    """Return whether a cached FMU exists and has the digest with which it was written."""
-    try:
-        return file_hash(fmu).encode() == _digest_file(fmu).read_bytes()
-    except OSError:
-        return False
-
-
-def _digest_file(fmu: Path) -> Path:
-    return fmu.with_suffix(".sha256")
+    return cached_file(key.hexdigest()[:24], f"{classified.name}.fmu", lambda target: build_to(source, model, target))
 
 
 def fmu_files(source: Source, root: Path) -> dict[int, Path]:
@@ -188,8 +162,3 @@ def _manifest_entry(source: Source, files: Iterable[Path], fmus: Mapping[int, Pa
 def _file_hashes(files: Iterable[Path], root: Path) -> dict[str, str]:
     root = root.resolve()
     return {path.resolve().relative_to(root).as_posix(): file_hash(path) for path in files}
-
-
-def file_hash(path: Path) -> str:
-    """Return the SHA-256 digest of a file as hexadecimal text."""
-    return sha256(path.read_bytes()).hexdigest()

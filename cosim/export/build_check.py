@@ -9,7 +9,8 @@ from typing import Any
 
 from ..core.errors import CosimError, Problem
 from .behaviour import compare_fmus
-from .build import file_hash, fmu_files, read_manifest
+from .build import fmu_files, read_manifest
+from .cache import file_hash
 from .sources import Source, export_source, find_sources
 
 

@@ -50,9 +50,9 @@ class ComponentFactory:
         needs_own_process = used is not None and used.description.once_per_process
         if used is None:
             loaded = None if interface else self._loaded_fmus.get(key[0])
-            self.fmus[key] = loaded or FmuFile(path, interface=interface)
+            self.fmus[key] = loaded or self._open_fmu(path, interface)
         elif needs_own_process:  # its process must not inherit the library that is loaded in this one
-            self.fmus[key] = FmuFile(path, interface=interface)
+            self.fmus[key] = self._open_fmu(path, interface)
         isolated = self._isolate_fmus or spec.isolation is not None or needs_own_process
         solver = SolverSettings(spec.solver.method, spec.solver.step_size) if spec.solver else SolverSettings()
         settings = InstanceSettings(spec.tolerance, solver)
@@ -60,6 +60,16 @@ class ComponentFactory:
         if (description := self.fmus[key].description).interface == "model-exchange":
             self.solvers[full_name] = settings.describe_solver(description.default_experiment)
         return component
+
+    @staticmethod
+    def _open_fmu(path: Path, interface: Interface | None) -> FmuFile:
+        """Open an FMU; if it has only sources, compile it."""
+        file = FmuFile(path, interface=interface)
+        if not file.must_be_compiled:
+            return file
+        from ..export.foreign.source_fmus import compiled_fmu
+
+        return FmuFile(compiled_fmu(file), interface=interface)
 
     def _load_python(self, folder: Path, spec: ComponentSpec, full_name: str) -> Component:
         from ..components.python_class import load_component

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from cosim.core.errors import InputError, OutputError
-from cosim.export.build import _is_intact, cached_fmu
+from cosim.export.build import cached_fmu
+from cosim.export.cache import _is_intact
 from cosim.export.fmu.archive import write_archive
 
 MODELICA = """

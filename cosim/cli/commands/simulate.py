@@ -156,9 +156,12 @@ def _create_component(
     """Create the component of the FMU, and log the warning about it if there is one."""
     from ...components.fmi import FmuFile, create_component
     from ...core.errors import Problem
+    from ...export.foreign.source_fmus import compiled_fmu
     from .. import messages
 
     file = FmuFile(fmu, interface=interface)
+    if file.must_be_compiled:
+        file = FmuFile(compiled_fmu(file), interface=interface)
     messages.log_problems([Problem(file.run_warning)] if file.run_warning else [])
     return create_component(file, file.description.model_name, settings, isolation)
 

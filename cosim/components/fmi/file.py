@@ -24,6 +24,7 @@ from .preflight import (
     open_regular_file,
     raise_errors,
 )
+from .preflight.fmu_platform import current_platform
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,13 @@ class FmuFile:
     def description(self) -> FmuDescription:
         """Model description; InputError if the preflight check found errors."""
         return build_description(self.path, self.examination, self._interface)
+
+    @property
+    def must_be_compiled(self) -> bool:
+        """True for an FMU of FMI 2.0 or 3.0 that has sources but no binary for this platform."""
+        description = self.description
+        has_binary = current_platform().binary_folder(description.major) in description.platforms
+        return not has_binary and "c-code" in description.platforms and description.major > 1
 
     @property
     def run_warning(self) -> str:
