@@ -11,16 +11,37 @@ from typing import TYPE_CHECKING, Any
 from .core.version import __version__
 
 if TYPE_CHECKING:
-    from .api import load, run
+    from .api import Simulation, load, run
+    from .core import units
+    from .core.component import Component, Variable
     from .core.errors import CheckError, ComponentError, CosimError, InputError
     from .results import Result
+    from .results.kpi import Prefix, Signal, better
 
-__all__ = ["CheckError", "ComponentError", "CosimError", "InputError", "Result", "__version__", "load", "run"]
+__all__ = [
+    "CheckError",
+    "Component",
+    "ComponentError",
+    "CosimError",
+    "InputError",
+    "Prefix",
+    "Result",
+    "Signal",
+    "Simulation",
+    "Variable",
+    "__version__",
+    "better",
+    "load",
+    "run",
+    "units",
+]
 
 #: module of each name that is imported on first use, because `import cosim` must be fast
 _MODULES = {
-    **dict.fromkeys(("load", "run"), "api"),
+    **dict.fromkeys(("Simulation", "load", "run"), "api"),
+    **dict.fromkeys(("Component", "Variable"), "core.component"),
     **dict.fromkeys(("CheckError", "ComponentError", "CosimError", "InputError"), "core.errors"),
+    **dict.fromkeys(("Prefix", "Signal", "better"), "results.kpi"),
     "Result": "results",
 }
 
@@ -31,6 +52,8 @@ def __dir__() -> list[str]:
 
 def __getattr__(name: str) -> Any:
     """Import a public name on first use."""
+    if name == "units":
+        return import_module(".core.units", __name__)
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f".{_MODULES[name]}", __name__), name)

@@ -52,9 +52,6 @@ class NativeExecutor(Executor):
         current_time = ctypes.addressof(self._runner.current_time)
         self._program = _native.Program(current_time, self.marker.ctypes.data, self._on_status)
         self._program_start = self.completed_steps
-        for transfer in (transfer for phase in self.plan.phases for transfer in phase.transfers):
-            if transfer.delay and not transfer.source.dtype.hasobject:
-                self._delay_lines[transfer].align_ring(self.completed_steps)
         for phase, steps in zip(self.plan.phases, self._schedule.phases, strict=True):
             for transfer in phase.transfers:
                 self._add_transfer(transfer)
@@ -64,6 +61,10 @@ class NativeExecutor(Executor):
         doubles, singles = (_address_and_length(by_item_size.get(size, np.zeros(0))) for size in (8, 4))
         self._program.set_monitored_floats(*doubles, *singles)
         self._add_recording()
+
+    def _native_transfers(self, transfer: Transfer) -> int:
+        in_loop = all(transfer not in phase.transfers for phase in self.plan.phases)
+        return 0 if in_loop or transfer.source.dtype.hasobject else self.completed_steps - self._program_start
 
     # -- adding operations ---------------------------------------------------------------------------------------------
 

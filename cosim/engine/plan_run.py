@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import tempfile
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, nullcontext
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core import component_log
 from ..core.component import Component
-from ..core.errors import InputError, Problem, join_alternatives
+from ..core.errors import ComponentError, InputError, Problem, join_alternatives
 from ..core.recording import Recording
 from ..core.stopwatch import Stopwatch
 from ..process.float_mode import default_float_mode
@@ -23,6 +23,7 @@ from ..process.forks import attributing_forks, report_forks
 from ..process.journal import MARKER_SIZE, Phase, calling_component, current_journal, suspending_deadline
 from ..process.process_state import restoring_process_state
 from . import Executor, Plan, Recorder, Termination, executor_class
+from .component_states import ComponentStates, SavedState
 from .disk_space import find_space_problems
 from .initialization import instantiate_components
 from .pacer import Pacer
@@ -98,6 +99,7 @@ class PlanRun:
         self._runs_foreign_code = any(component.runs_foreign_code for component in self._components.values())
         self._event_points = sorted(n for n in plan.events if n < plan.grid.count)
         self._is_initialized = self._is_closed = False
+        self._states = ComponentStates(self._components, self.accessing)
 
     @property
     def is_finished(self) -> bool:
@@ -187,6 +189,44 @@ class PlanRun:
                 for variable, value in values.items():
                     self._components[name].set(variable, value)
 
+    @contextmanager
+    def accessing(self, component: str, function: str) -> Iterator[None]:
+        """Protect the process from a component whose function is called between two steps in this block.
+
+        Raises:
+            ComponentError: the component failed, which ends the simulation.
+        """
+        time = self.executor.time
+        try:
+            with default_float_mode(), restoring_process_state(component), calling_component(component, function, "step", time):
+                yield
+        except ComponentError as error:
+            self.failure = error
+            raise
+
+    def save(self) -> SavedState:
+        """Return the present state of the executor and of all components.
+
+        Raises:
+            InputError: a component cannot return to a state.
+            ComponentError: a component failed.
+        """
+        return SavedState(self._states, self.executor.save(), self._states.save())
+
+    def restore(self, saved: SavedState) -> None:
+        """Return to a state that `save` returned; the rows recorded since then are forgotten.
+
+        Raises:
+            InputError: the state belongs to another simulation, or to this one before it was reset.
+            ComponentError: a component failed.
+        """
+        if saved.owner is not self._states:
+            raise InputError("the state was saved by another simulation, or by this one before it was reset")
+        self._states.restore(saved.components)
+        self.executor.restore(saved.executor)
+        if self._pacer:
+            self._pacer.start(self.executor.completed_steps)
+
     def outcome(self) -> SimulationOutcome:
         """Return everything recorded and measured so far."""
         report_forks()
@@ -209,7 +249,11 @@ class PlanRun:
         self.executor.close()
         try:
             with default_float_mode(), restoring_process_state(self._names):
-                _end_components(self._components, terminate=self._is_initialized and not self.failure)
+                try:
+                    if not self.failure:
+                        self._states.free_all()
+                finally:
+                    _end_components(self._components, terminate=self._is_initialized and not self.failure)
         finally:
             report_forks()
 

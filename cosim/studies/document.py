@@ -14,7 +14,7 @@ from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean
 from ..core.size_limits import MAX_RUNS, require_at_most
 from ..scenario.json_document import Document, json_path, read_document
-from ..scenario.nested_systems import find_scenario, pointer_keys
+from ..scenario.nested_systems import find_scenario, load_scenario, pointer_keys
 from ..scenario.validation import schema_problems
 from .schema import StudySpec
 
@@ -115,7 +115,18 @@ def read_study(file: str | Path, kind: type[S], max_runs: int = MAX_RUNS) -> Stu
         study_file.scenario  # noqa: B018  (raises InputError if there is no such scenario)
     except InputError as error:
         raise InputError([replace(problem, where=document.where(("scenario",))) for problem in error.problems]) from None
+    if (seeds := document.value.get("seeds")) and "set" not in seeds:
+        return StudyFile(kind.model_validate({**document.value, "seeds": {**seeds, "set": _seed_pointers(study_file)}}), document)
     return study_file
+
+
+def _seed_pointers(study_file: StudyFile[Any]) -> list[str]:
+    """Return the JSON pointers that the scenario lists as its seeds."""
+    pointers = {name: value for name, value in study_file.spec.settings.items() if name.startswith("/")}
+    if not (seeds := load_scenario(study_file.scenario, pointers).spec.seeds):
+        text = 'the key "set" is missing, and the scenario has no "seeds"'
+        raise InputError(Problem(text, study_file.document.where(("seeds",))))
+    return seeds
 
 
 def _check_counts(spec: StudySpec, document: Document, max_runs: int) -> None:
