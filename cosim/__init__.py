@@ -12,11 +12,10 @@ from .core.version import __version__
 
 if TYPE_CHECKING:
     from .api import Simulation, load, run
-    from .core import units
     from .core.component import Component, Variable
     from .core.errors import CheckError, ComponentError, CosimError, InputError
     from .results import Result
-    from .results.kpi import Prefix, Signal, better
+    from .results.kpi import Prefix, Signal, better, units
 
 __all__ = [
     "CheckError",
@@ -41,7 +40,7 @@ _MODULES = {
     **dict.fromkeys(("Simulation", "load", "run"), "api"),
     **dict.fromkeys(("Component", "Variable"), "core.component"),
     **dict.fromkeys(("CheckError", "ComponentError", "CosimError", "InputError"), "core.errors"),
-    **dict.fromkeys(("Prefix", "Signal", "better"), "results.kpi"),
+    **dict.fromkeys(("Prefix", "Signal", "better", "units"), "results.kpi"),
     "Result": "results",
 }
 
@@ -52,8 +51,6 @@ def __dir__() -> list[str]:
 
 def __getattr__(name: str) -> Any:
     """Import a public name on first use."""
-    if name == "units":
-        return import_module(".core.units", __name__)
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f".{_MODULES[name]}", __name__), name)

@@ -49,6 +49,10 @@ class ComponentStates:
         self._saved: dict[int, Mapping[str, Any]] = {}
         self._discarded: list[int] = []
 
+    def __len__(self) -> int:
+        """Return the number of saved states."""
+        return len(self._saved)
+
     def save(self) -> ComponentState:
         """Save the present state of all components.
 

@@ -68,6 +68,11 @@ class Executor(ABC):
         """A component's request to end the simulation, if there was one."""
         return self._runner.termination
 
+    @property
+    def is_finished(self) -> bool:
+        """True at the last communication point, and after a component has requested termination."""
+        return self._runner.completed_steps >= self.plan.grid.count or self._runner.termination is not None
+
     def describe_call(self) -> tuple[str, str]:
         """Return component and function of the present call of the stepping loop."""
         number, names = int(self.marker[CALL_NUMBER]), self._schedule.call_names
@@ -110,13 +115,14 @@ class Executor(ABC):
             raise
 
     def _run_until(self, end: int) -> None:
-        while self.completed_steps < end and not self.termination:
+        runner = self._runner
+        while (n := runner.completed_steps) < end and not runner.termination:
             try:
-                self._run_macro_steps(self.completed_steps, min(end, self.recorder.last_point_in_chunk(self.completed_steps)))
+                self._run_macro_steps(n, min(end, self.recorder.last_point_in_chunk(n)))
                 if enabled_traps():
                     self._restore_float_traps(self.completed_steps)
             finally:
-                self.recorder.set_row_count(int(self.marker[ROW_COUNT]))
+                self.recorder.set_row_count(runner.recorded_rows)
 
     def save(self) -> ExecutorState:
         """Return the numbers of steps and rows, the values of all inputs and outputs, and those in the delays."""

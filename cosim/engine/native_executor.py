@@ -12,6 +12,8 @@ from ..core.errors import InputError
 from ..process.journal import ROW_COUNT
 from .component_step import ScheduledStep
 from .executor import Executor
+from .plan import Plan
+from .recorder import Recorder
 from .transfer_calls import contiguous_views
 from .transfer_plan import Transfer
 
@@ -47,6 +49,10 @@ def native_available() -> bool:
 
 class NativeExecutor(Executor):
     """Executor that runs everything except Python components in C."""
+
+    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None):
+        super().__init__(plan, recorder, marker)
+        self._time_coefficients = plan.grid.float_coefficients(plan.grid.count)
 
     def _prepare(self) -> None:
         current_time = ctypes.addressof(self._runner.current_time)
@@ -130,7 +136,7 @@ class NativeExecutor(Executor):
 
     def _run_macro_steps(self, first: int, end: int) -> None:
         grid = self.plan.grid
-        coefficients = grid.float_coefficients(end)
+        coefficients = self._time_coefficients or grid.float_coefficients(end)
         count = min(end - first, self._steps_per_call(first)) if coefficients else 1
         self._program.set_row_address(self.recorder.next_row_address)
         self._program.run(first, count, *(coefficients or (grid.time_at(first), 0.0, 1.0)))
