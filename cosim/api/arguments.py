@@ -48,7 +48,7 @@ def check_load_arguments(scenario: Any, parameters: Any, options: Mapping[str, A
     check_names("parameters", parameters)
     for name in ("stop_time", "step_size"):
         expect(name, options[name], _is_optional(options[name], _is_number_or_text), "seconds as a number or a text")
-    expect("real_time", options["real_time"], _is_optional(options["real_time"], _is_number), "a number or None")
+    expect("real_time", options["real_time"], _is_optional(options["real_time"], is_number), "a number or None")
     for name, literal in (("late", LatePolicy), ("isolation", IsolationMode)):
         valid = get_args(literal)
         expect(name, options[name], options[name] in valid, f"one of {', '.join(map(repr, valid))}")
@@ -60,12 +60,13 @@ def is_integer(value: Any) -> bool:
     return hasattr(value, "__index__") and not isinstance(value, bool)
 
 
-def _is_number(value: Any) -> bool:
+def is_number(value: Any) -> bool:
+    """Return whether a value is a number of Python or NumPy, and no Boolean."""
     return hasattr(value, "__float__") and not isinstance(value, bool | str)
 
 
 def _is_number_or_text(value: Any) -> bool:
-    return isinstance(value, str) or _is_number(value)
+    return isinstance(value, str) or is_number(value)
 
 
 def _is_optional(value: Any, is_valid: Callable[[Any], bool]) -> bool:
