@@ -66,11 +66,11 @@ class Document:
             known = known[:-1]
         return f"{self.position(self.offsets.get(known, 0))}: {json_path(path)}"
 
-    def refuse_objects(self, reason: str) -> None:
-        """Raise InputError with this reason if components are Python classes or objects."""
-        if self.objects:
-            names = ", ".join(self.objects)
-            raise InputError(f"{reason} {names} {'are Python objects' if len(self.objects) > 1 else 'is a Python object'}")
+    def refuse_objects(self, reason: str, classes: bool) -> None:
+        """Raise InputError with this reason if components are Python objects, or (if `classes`) Python classes."""
+        if names := [name for name, target in self.objects.items() if classes or not callable(target)]:
+            kind = "class or object" if classes else "object"
+            raise InputError([Problem(f"{reason}: found a Python {kind}", self.where(("components", names[0], "python")))])
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -167,7 +167,11 @@ def load_scenario(scenario: str | Path | Mapping[str, Any], settings: Mapping[st
 def _find_seed_problems(document: Document, spec: SystemSpec) -> Iterator[Problem]:
     """Yield a problem for each JSON pointer of "seeds" that no value can be set at."""
     for i, pointer in enumerate(spec.seeds if isinstance(spec, ScenarioSpec) else ()):
-        if problem := json_pointer.set_value(copy.deepcopy(document.value), pointer, 0):
+        if not pointer.startswith("/"):
+            yield Problem(
+                f'expected a JSON pointer, which begins with "/"; found "{shorten(pointer)}"', document.where(("seeds", i))
+            )
+        elif problem := json_pointer.set_value(copy.deepcopy(document.value), pointer, 0):
             yield Problem(problem, document.where(("seeds", i)))
 
 

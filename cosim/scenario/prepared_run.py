@@ -194,7 +194,8 @@ def load(
         with watch.measure("parse_seconds"):
             loaded = load_scenario(scenario, settings)
         if isolation == "fmu" or sandbox:
-            loaded.root.document.refuse_objects('only "isolation" of single components is possible in this process:')
+            reason = 'expected a file, because Python objects exist in this process only; set "isolation" of single FMUs instead'
+            loaded.root.document.refuse_objects(reason, classes=True)
         builder = SystemBuilder(loaded, isolation == "fmu", sandbox, loaded_fmus)
         try:
             with watch.measure("instantiate_seconds"):
