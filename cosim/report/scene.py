@@ -83,7 +83,8 @@ def static_method(component: Mapping[str, Any], folder: Path, name: str) -> Call
         InputError: The file or the class does not exist.
     """
     reference = component.get("python")
-    method = getattr_static(load_object(reference, folder), name, None) if isinstance(reference, str) else None
+    is_file = isinstance(reference, str) and ".py:" in reference  # else a Python class or object of a scenario that was a dict
+    method = getattr_static(load_object(reference, folder), name, None) if is_file else None
     return method if isinstance(method, staticmethod) else None
 
 
