@@ -10,6 +10,7 @@ from ..components.fmi import FmuFile, InstanceSettings, Interface, Isolation, So
 from ..core.component import Component
 from ..core.errors import InputError
 from ..core.paths import is_file, resolve_path
+from ..export.foreign.source_fmus import usable_fmu
 from .nested_systems import Node
 from .schema import ComponentSpec
 
@@ -42,41 +43,33 @@ class ComponentFactory:
         """
         spec, full_name = node.spec.components[name], node.full_name(name)
         if spec.python is not None:
-            return self._load_python(node.folder, spec, full_name)
+            return self._load_python(node, name, spec, full_name)
         path = self._build_modelica(node.folder, spec.modelica or "") if spec.fmu is None else node.folder / spec.fmu
-        interface: Interface | None = "model-exchange" if spec.solver else None
+        solver = SolverSettings(spec.solver.method, spec.solver.step_size) if spec.solver else None
+        settings = InstanceSettings(spec.tolerance, solver)
+        interface = settings.interface
         key = resolve_path(path), interface
         used = self.fmus.get(key)
         needs_own_process = used is not None and used.description.once_per_process
         if used is None:
             loaded = None if interface else self._loaded_fmus.get(key[0])
-            self.fmus[key] = loaded or self._open_fmu(path, interface)
+            self.fmus[key] = loaded or usable_fmu(path, interface)
         elif needs_own_process:  # its process must not inherit the library that is loaded in this one
-            self.fmus[key] = self._open_fmu(path, interface)
+            self.fmus[key] = usable_fmu(path, interface)
         isolated = self._isolate_fmus or spec.isolation is not None or needs_own_process
-        solver = SolverSettings(spec.solver.method, spec.solver.step_size) if spec.solver else SolverSettings()
-        settings = InstanceSettings(spec.tolerance, solver)
         component = create_component(self.fmus[key], full_name, settings, self._isolation if isolated else None)
         if (description := self.fmus[key].description).interface == "model-exchange":
             self.solvers[full_name] = settings.describe_solver(description.default_experiment)
         return component
 
-    @staticmethod
-    def _open_fmu(path: Path, interface: Interface | None) -> FmuFile:
-        """Open an FMU; if it has only sources, compile it."""
-        file = FmuFile(path, interface=interface)
-        if not file.must_be_compiled:
-            return file
-        from ..export.foreign.source_fmus import compiled_fmu
-
-        return FmuFile(compiled_fmu(file), interface=interface)
-
-    def _load_python(self, folder: Path, spec: ComponentSpec, full_name: str) -> Component:
-        from ..components.python_class import load_component
+    def _load_python(self, node: Node, name: str, spec: ComponentSpec, full_name: str) -> Component:
+        from ..components.python_class import create_python_component, load_component
 
         assert spec.python is not None
-        self.python_files.append(folder / spec.python.rpartition(":")[0])
-        return load_component(spec.python, folder, full_name, spec.arguments)
+        if name in node.document.objects:
+            return create_python_component(node.document.objects[name], spec.python, full_name, spec.arguments)
+        self.python_files.append(node.folder / spec.python.rpartition(":")[0])
+        return load_component(spec.python, node.folder, full_name, spec.arguments)
 
     def _build_modelica(self, folder: Path, reference: str) -> Path:
         """Return the FMU of "file.mo:Model", from the user's cache if source and tools are unchanged."""

@@ -14,6 +14,8 @@ from ..components.fmi.instance_settings import Method
 from ..engine.settings import NonFinitePolicy
 from .schema_types import INVALID, AutoOrBool, BoolOrNumber, Integer, Name, NameList, Period, Seconds, Spec, Value
 
+#: pattern of the names of scenarios
+SCENARIO_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$"
 #: keys of the sources of a component
 SOURCES = ("fmu", "python", "modelica", "system")
 
@@ -293,7 +295,7 @@ class NestedSpec(SystemSpec):
 class ScenarioSpec(SystemSpec):
     """A scenario: a system of components, its times, recorded signals, events, KPIs, checks and figures."""
 
-    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$")] = Field(
+    name: Annotated[str, StringConstraints(pattern=SCENARIO_NAME)] = Field(
         description="name of the scenario and of its results folder"
     )
     start_time: Seconds = Field(default=Fraction(0), description="s")
@@ -311,6 +313,10 @@ class ScenarioSpec(SystemSpec):
     figures: list[FunctionSpec] = Field(default=[], description="functions that draw figures from the result")
     scene: CallSpec | None = Field(default=None, description="function that returns the scene of the 3-D replay")
     reference: ReferenceSpec | None = Field(default=None, description="recorded trajectory for comparisons")
+    seeds: list[str] = Field(
+        default=[],
+        description='JSON pointers of the entries that a seed sets, such as "/components/plant/arguments/environment/seed"',
+    )
     deadlines: DeadlinesSpec = Field(default=DeadlinesSpec(), description="time limits of calls in supervised runs")
     non_finite: NonFinitePolicy = Field(
         default="error",

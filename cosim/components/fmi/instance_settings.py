@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any, Literal
 
 from .description import DefaultExperiment
+from .preflight import Interface
 
 #: integration method: explicit Euler and Runge-Kutta of order 4 at fixed step size, or CVODE with variable step size
 Method = Literal["euler", "rk4", "cvode"]
@@ -35,11 +36,21 @@ class InstanceSettings:
     Attributes:
         tolerance: Relative tolerance that the FMU receives, and that of a solver with variable step size; by default that of the
             default experiment. Without any, the FMU receives none, and the solver uses 1e-6.
-        solver: Integration method of a Model Exchange FMU.
+        solver: Integration method, which selects Model Exchange; None: Co-Simulation, or cvode if the FMU does not offer it.
     """
 
     tolerance: float | None = None
-    solver: SolverSettings = SolverSettings()
+    solver: SolverSettings | None = None
+
+    @property
+    def interface(self) -> Interface | None:
+        """Interface that the settings select; None: the preferred one of the FMU."""
+        return "model-exchange" if self.solver else None
+
+    @property
+    def method(self) -> Method:
+        """Integration method of a Model Exchange FMU."""
+        return self.solver.method if self.solver else "cvode"
 
     def solver_tolerance(self, experiment: DefaultExperiment) -> float:
         """Return the relative tolerance of a solver with variable step size for an FMU with this default experiment."""
@@ -47,11 +58,11 @@ class InstanceSettings:
 
     def solver_step_size(self, experiment: DefaultExperiment) -> Fraction | None:
         """Return the largest step size (s) of a solver with fixed step size; None: the communication step size."""
-        return self.solver.step_size or experiment.step_size
+        return (self.solver and self.solver.step_size) or experiment.step_size
 
     def describe_solver(self, experiment: DefaultExperiment) -> dict[str, Any]:
         """Return the method with its tolerance or its largest step size (s; None: the communication step size)."""
-        if self.solver.method == "cvode":
+        if self.method == "cvode":
             return {"method": "cvode", "tolerance": self.solver_tolerance(experiment)}
         step_size = self.solver_step_size(experiment)
-        return {"method": self.solver.method, "step_size": None if step_size is None else float(step_size)}
+        return {"method": self.method, "step_size": None if step_size is None else float(step_size)}

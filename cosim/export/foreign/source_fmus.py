@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ...components.fmi import FmuFile
+from ...components.fmi import FmuFile, Interface
 from ...components.fmi.preflight import open_regular_file
 from ...components.fmi.preflight.archive import Archive
 from ...components.fmi.preflight.findings import DESCRIPTION_FILE, FatalFindingError
@@ -47,7 +47,21 @@ class _Configuration:
     definitions: Sequence[str] = ()
 
 
-def compiled_fmu(file: FmuFile) -> Path:
+def usable_fmu(path: Path, interface: Interface | None) -> FmuFile:
+    """Open an FMU; if it has sources but no binary for this machine, compile them.
+
+    Args:
+        path: The FMU.
+        interface: Interface of its instances; None: the preferred one of the FMU.
+
+    Raises:
+        InputError: The FMU cannot be read, or its sources cannot be compiled.
+    """
+    file = FmuFile(path, interface=interface)
+    return FmuFile(_compiled_fmu(file), interface=interface) if file.must_be_compiled else file
+
+
+def _compiled_fmu(file: FmuFile) -> Path:
     """Return a copy of an FMU that also contains the binaries for this machine, compiled from its sources.
 
     Args:

@@ -85,9 +85,9 @@ class ModelExchangeInstance(FmuInstance):
 
     def _create_integrator(self, model: ContinuousModel) -> Integrator:
         settings, experiment = self._settings, self.description.default_experiment
-        if settings.solver.method == "cvode":
+        if settings.method == "cvode":
             return VariableStepIntegrator(model, settings.solver_tolerance(experiment))
-        return FixedStepIntegrator(model, settings.solver.method, settings.solver_step_size(experiment))
+        return FixedStepIntegrator(model, settings.method, settings.solver_step_size(experiment))
 
     def _count_states(self) -> tuple[int, int]:
         """Return the numbers of continuous states and event indicators."""
@@ -211,7 +211,7 @@ class ModelExchangeInstance(FmuInstance):
         self._current_time = current_time
         if not self._inputs.variables:
             inputs: Sequence[PreparedCall] = ()
-        elif self._discrete_calls or self._settings.solver.method == "cvode":
+        elif self._discrete_calls or self._settings.method == "cvode":
             inputs = [PreparedCall(self._apply_inputs, (), "inputs")]
         else:
             inputs = self._continuous_calls

@@ -23,7 +23,7 @@ SIGNALS = ["ball.x", "ball.h", "ball.v", "ball.count", "ball.i_out"]
 
 
 def component(path, method="cvode", step_size=None, tolerance=None, isolation=None):
-    settings = InstanceSettings(tolerance, SolverSettings(method, step_size and exact_fraction(step_size)))
+    settings = InstanceSettings(tolerance, SolverSettings(method, exact_fraction(step_size) if step_size else None))
     return create_component(FmuFile(path), "ball", settings, isolation)
 
 
