@@ -1,6 +1,6 @@
 """Table of the FMUs in a folder that cosim and other importers simulate with all defaults.
 
-    python tests/benchmarks/fmu_coverage.py FOLDER [--environments DIR] [--only NAME ...] [--document FILE]
+    python tests/benchmarks/fmu_coverage.py FOLDER [--environments DIR] [--only NAME ...] [--document FILE] [--json FILE]
 
 Tries each *.fmu below FOLDER in a process of its own with each importer, from the start to the stop time of its default
 experiment. An importer counts as successful if it reaches the stop time. Creates a virtual environment for each other importer
@@ -159,13 +159,16 @@ def main() -> None:
     parser.add_argument("--environments", type=Path, default=Path.home() / ".cache/cosim-peers")
     parser.add_argument("--only", nargs="*", default=list(PEERS), metavar="NAME", help=f"of {', '.join(PEERS)}")
     parser.add_argument("--document", type=Path)
-    parser.add_argument("--json", type=Path, help="file for all outcomes with the messages")
+    parser.add_argument("--json", type=Path, help="file for all outcomes; if it exists, those of the other importers are kept")
     arguments = parser.parse_args()
     pythons = {name: environment(arguments.environments / PEERS[name][1][0], PEERS[name][1]) for name in arguments.only}
+    known = json.loads(arguments.json.read_text()) if arguments.json and arguments.json.exists() else {}
     rows: list[tuple[Subject, dict[str, Attempt]]] = []
     for path in sorted(arguments.folder.rglob("*.fmu")):
         subject = read_subject(path.resolve(), arguments.folder.resolve())
-        attempts = {name: attempt(command) for name, command in importer_commands(subject, pythons).items()}
+        earlier = {name: Attempt(*known[subject.label][name]) for name in pythons if name in known.get(subject.label, {})}
+        commands = importer_commands(subject, pythons)
+        attempts = {name: earlier.get(name) or attempt(command) for name, command in commands.items()}
         rows.append((subject, attempts))
         print(
             subject.label, *("+" if a.reached_end else "-" for a in attempts.values()), attempts["cosim"].reason[:150], flush=True

@@ -116,7 +116,7 @@ def test_a_wrong_base_is_refused(folder, extend, extends, problem):
 
 
 def test_problems_name_the_file_that_contains_the_value(folder, base, extend):
-    base.write_text(json.dumps({**json.loads(base.read_text()), "step_size": 0.7, "colour": "red"}, indent=0))
+    base.write_text(json.dumps({**json.loads(base.read_text()), "step_size": 1000, "colour": "red"}, indent=0))
     own, inherited, unknown = sorted(folder.problems_of(extend(components={"b": {"parameters": {"q": 1}}})), reverse=True)
     assert own.startswith("scenario.json:1:")
     assert '$.components.b.parameters.q: component "b" has no variable "q"' in own
