@@ -146,7 +146,8 @@ class VariableStepIntegrator(Integrator):
             if self._must_restart:
                 self._model.get_nominals()
                 nominals = np.abs(self._model.nominals) if len(self._model.states) else np.ones(1)
-                self._cvode.restart(self._time, self._tolerance, self._tolerance * nominals)
+                valid = np.where((nominals > 0) & np.isfinite(nominals), nominals, 1.0)  # some FMUs return 0
+                self._cvode.restart(self._time, self._tolerance, self._tolerance * valid)
                 self._must_restart = False
             flag, self._time = self._cvode.step(target)
             kind = EventKind.STATE if flag == ROOT_FOUND else kind

@@ -5,7 +5,7 @@
    Integer: 10 i_in (discrete input), 11 i_out = 10 i_in after events, 12 count (one more every 0.25 s), 13 last_count (the
    simulation ends there), 14 fault (parameter): 1 GetDerivatives returns error, 2 the event indicator is NaN, 3 the event
    iteration never ends, 4 the next time event is always now, 5 GetDerivatives crashes, 6 discarded derivatives, 7 an event
-   after every step */
+   after every step, 8 nominal values of 0 */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -92,7 +92,7 @@ Status F(SetContinuousStates)(Handle c, const double x[], size_t n) {
 #define fmi1_GetNominals F(GetNominalsOfContinuousStates)
 #endif
 Status fmi1_GetNominals(Handle c, double x[], size_t n) {
-    x[0] = x[1] = x[2] = 1;
+    x[0] = x[1] = x[2] = INTEGER((Model *)c, FAULT) == 8 ? 0 : 1;
     return n == 3 ? GOOD : BAD;
 }
 static Status derivatives(Model *m, double dx[]) {

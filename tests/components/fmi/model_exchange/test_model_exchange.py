@@ -177,6 +177,7 @@ FAULTS = {
     (6, "rk4"): "Derivatives failed at t = 0.5 s: status 2 (discard)",
     (7, "cvode"): "more than 10000 events in one communication step",
     (7, "euler"): None,
+    (8, "cvode"): None,
 }
 
 
