@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import click
 
 from ...core.component import Variable
 from ..messages import print_line
+
+_INTERFACE_NAMES: Mapping[str, str] = {"co-simulation": "Co-Simulation", "model-exchange": "Model Exchange"}
 
 
 @click.command()
@@ -21,6 +24,7 @@ def command(fmu: Path, with_locals: bool) -> None:
     about = file.description
     experiment = about.default_experiment
     capabilities = {
+        "variable step size": about.variable_step,
         "state can be saved and restored": about.has_state,
         "one instance per process": about.once_per_process,
         "needs an external tool": about.needs_execution_tool,
@@ -28,11 +32,13 @@ def command(fmu: Path, with_locals: bool) -> None:
     rows = {
         "model": about.model_name,
         "description": about.description,
-        "FMI version": f"{about.fmi_version} Co-Simulation",
+        "FMI version": f"{about.fmi_version} {' and '.join(_INTERFACE_NAMES[name] for name in about.interfaces)}",
         "made by": about.generation_tool,
         "platforms": ", ".join(about.platforms),
         "step size": f"{float(experiment.step_size):g} s" if experiment.step_size else "",
         "stop time": f"{float(experiment.stop_time):g} s" if experiment.stop_time else "",
+        "tolerance": f"{experiment.tolerance:g}" if experiment.tolerance else "",
+        "states": str(about.state_count) if about.interface == "model-exchange" else "",
         "capabilities": ", ".join(name for name, has in capabilities.items() if has),
         "sha256": file.sha256,
     }

@@ -47,6 +47,7 @@ class FmuDescription:
     Attributes:
         fmi_version: `fmiVersion`, such as "2.0".
         model_name: `modelName`.
+        interfaces: All interfaces through which the FMU can be simulated, the preferred one first.
         interface: Interface through which the FMU is simulated; the following attributes of capabilities belong to it.
         model_identifier: `modelIdentifier`.
         instantiation_token: `instantiationToken` of FMI 3.0, `guid` of FMI 1.0 and 2.0.
@@ -68,6 +69,7 @@ class FmuDescription:
 
     fmi_version: str
     model_name: str
+    interfaces: Sequence[Interface]
     interface: Interface
     model_identifier: str
     instantiation_token: str
@@ -132,6 +134,7 @@ def build_description(path: Path, examination: Examination, interface: Interface
     return FmuDescription(
         model.root["fmiVersion"],
         model.root.get("modelName", ""),
+        tuple(model.interfaces),
         selected,
         attributes["modelIdentifier"],
         model.root["instantiationToken" if model.major == 3 else "guid"],

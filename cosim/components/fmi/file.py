@@ -27,6 +27,7 @@ from .preflight import (
     open_regular_file,
     raise_errors,
 )
+from .preflight.binary import can_be_compiled
 from .preflight.fmu_platform import current_platform
 
 
@@ -107,7 +108,7 @@ class FmuFile:
         """True for an FMU of FMI 2.0 or 3.0 that has sources but no binary for this platform."""
         description = self.description
         has_binary = current_platform().binary_folder(description.major) in description.platforms
-        return not has_binary and "c-code" in description.platforms and description.major > 1
+        return not has_binary and can_be_compiled(description.major, description.platforms)
 
     @property
     def run_warning(self) -> str:

@@ -61,6 +61,10 @@ def _create_slave(slave_class: type, description: FmuDescription, folder: Path) 
     return slave
 
 
+#: annotations of FMPy's methods -> types of the results in C; most statuses have the annotation c_int
+_RESULT_TYPES = {bytes: ctypes.c_char_p, int: ctypes.c_int}
+
+
 class _SlaveFunctions(dict[str, Any]):
     """C functions as FMPy's slave object calls them, by name; each is created on first use.
 
@@ -79,7 +83,7 @@ class _SlaveFunctions(dict[str, Any]):
         signature = inspect.signature(getattr(self._slave_class, name))
         types = [parameter.annotation for parameter in list(signature.parameters.values())[1:]]
         function.argtypes = [get_args(kind)[0] if isinstance(kind, UnionType) else kind for kind in types]
-        function.restype = ctypes.c_char_p if signature.return_annotation is bytes else signature.return_annotation
+        function.restype = _RESULT_TYPES.get(signature.return_annotation, signature.return_annotation)
         if function.restype is ctypes.c_int:
             function.errcheck = _reject_negative_status
         self[name] = function

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 
 from ....core.errors import abbreviate_names
@@ -19,6 +19,7 @@ from .model_description import Interface, ModelDescription
 _BINARIES = "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5.1"
 _FUNCTIONS = "FMI 2.0.5 sections 2.1 and 4.2, FMI 3.0.2 section 2.5"
 PLATFORM = Rule("binary.platform", _BINARIES)
+SOURCES_ONLY = Rule("binary.sources-only", _BINARIES, "warning")
 PRESENT = Rule("binary.present", _BINARIES)
 FORMAT = Rule("binary.format", _BINARIES)
 FUNCTIONS = Rule("binary.functions", _FUNCTIONS)
@@ -50,6 +51,16 @@ def list_platforms(names: Iterable[str]) -> list[str]:
     return [*sorted(folders), *(["c-code"] if sources else [])]
 
 
+def can_be_compiled(major: int, platforms: Collection[str]) -> bool:
+    """Return whether an FMU without a binary for this machine has sources of an FMI version whose headers are known.
+
+    Args:
+        major: FMI major version.
+        platforms: Result of `list_platforms`.
+    """
+    return major > 1 and "c-code" in platforms
+
+
 def check_binary(
     archive: Archive, model: ModelDescription, interface: Interface, machine: FmuPlatform, limits: PreflightLimits
 ) -> Iterator[Finding]:
@@ -69,6 +80,9 @@ def check_binary(
     platforms = list_platforms(archive.members)
     if folder not in platforms:
         names = folder if folder == machine.platform_tuple else f"{machine.platform_tuple} ({folder})"
+        if can_be_compiled(model.major, platforms):
+            yield SOURCES_ONLY(f"has no binary for {names}; its sources are compiled when it is used")
+            return
         yield PLATFORM(f"has no binary for {names}; it has: {', '.join(platforms) or 'no binaries'}")
         return
     identifier = model.interfaces[interface].get("modelIdentifier", "")
