@@ -67,7 +67,7 @@ class PythonFmuComponent(Component):
     def __init__(self, slave: Fmi2Slave, instance_name: str):
         self._slave, self._name, self._time = slave, instance_name, 0.0
         self._pythonfmu_variables: dict[str, ScalarVariable] = {v.name: v for v in slave.vars.values()}
-        units = checked_units(getattr(slave, "units", {}), {v.name: _fmi_type(v) for v in slave.vars.values()})
+        units = checked_units(getattr(type(slave), "units", {}), {v.name: _fmi_type(v) for v in slave.vars.values()})
         self.variables = [_to_variable(v, units.get(v.name)) for v in slave.vars.values()]
         self._setters: list[tuple[Callable[[Any], None], np.ndarray, int]] = []
         self._getters: list[tuple[str, Callable[[], Any], type, Callable[[Any], Any], np.ndarray, int]] = []

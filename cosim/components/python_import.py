@@ -16,7 +16,7 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
-from ..core.errors import PASS_THROUGH_EXCEPTIONS, InputError, Problem, did_you_mean, describe_exception
+from ..core.errors import PASS_THROUGH_EXCEPTIONS, InputError, Problem, describe_exception, did_you_mean
 from ..core.paths import is_file, resolve_path
 from .sibling_imports import read_with_relative_imports, with_imported_siblings
 
@@ -92,7 +92,7 @@ def _import_file(path: Path) -> ModuleType:
 class _FolderFinder(MetaPathFinder):
     """Finder of files in folders that are no packages, below the namespace packages of `_import_file`."""
 
-    def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> ModuleSpec | None:
+    def find_spec(self, name: str, path: Sequence[str] | None, _target: object = None) -> ModuleSpec | None:
         """Return the spec of a file; None for packages and files in packages, which Python's own finder finds."""
         if not name.startswith(_NAMESPACE_PREFIX) or not path or (Path(path[0]) / "__init__.py").is_file():
             return None

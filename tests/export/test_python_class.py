@@ -11,7 +11,7 @@ from fmpy.validation import validate_fmu
 from cosim.components.fmi import FmuFile, create_component
 from cosim.core.component import Ports
 from cosim.core.errors import InputError
-from cosim.export.foreign.python_class import write_python_fmu
+from cosim.export.build import build_to
 
 SOURCE = '''
 from types import SimpleNamespace
@@ -50,8 +50,7 @@ def source(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def python_fmu(source):
-    write_python_fmu(source, source.with_suffix(".fmu"))
-    return source.with_suffix(".fmu")
+    return build_to(source, None, source.with_suffix(".fmu"))
 
 
 def test_it_validates_without_problems(python_fmu):
@@ -68,15 +67,14 @@ def test_it_computes_what_the_class_computes(python_fmu):
 
 
 def test_the_same_source_gives_the_same_bytes(source, python_fmu, tmp_path):
-    write_python_fmu(source, tmp_path / "again.fmu")
-    assert (tmp_path / "again.fmu").read_bytes() == python_fmu.read_bytes()
+    assert build_to(source, None, tmp_path / "again.fmu").read_bytes() == python_fmu.read_bytes()
 
 
 def test_another_source_has_another_guid(python_fmu, tmp_path):
     other = tmp_path / "leaky_integrator.py"
     other.write_text(SOURCE.replace("!= 0", "> 0"))
-    write_python_fmu(other, tmp_path / "o.fmu")
-    assert read_model_description(tmp_path / "o.fmu").guid != read_model_description(python_fmu).guid
+    changed = build_to(other, None, tmp_path / "o.fmu")
+    assert read_model_description(changed).guid != read_model_description(python_fmu).guid
 
 
 def test_the_description_is_completed(python_fmu):
@@ -128,4 +126,4 @@ def test_a_class_that_cannot_be_exported_is_refused(tmp_path, text, message):
     path = tmp_path / "empty.py"
     path.write_text(text)
     with pytest.raises(InputError, match=message):
-        write_python_fmu(path, tmp_path / "empty.fmu")
+        build_to(path, None, tmp_path / "empty.fmu")

@@ -30,7 +30,9 @@ if TYPE_CHECKING:
     help="File or folder that the Python class reads at run time, for --output; repeatable. The class finds it below "
     "`self.resources` or beside its own file.",
 )
-def command(sources: tuple[Path, ...], check: bool, output: Path | None, modelica_compiler: str, include: tuple[Path, ...]) -> int:
+def command(
+    sources: tuple[Path, ...], check: bool, output: Path | None, modelica_compiler: str, include: tuple[Path, ...]
+) -> int:
     """Export controllers and plants to fmus/.
 
     SOURCES are .mo or .py files, or folders of controllers in C; default: all controllers and plants. The FMUs are written to

@@ -1,7 +1,7 @@
 """Program that builds an FMU of a Python source with PythonFMU; it runs in its own process, because it imports the source.
 
-Arguments: the folder with all files, the name of the package that the folder becomes, the name of the source in it, and the folder
-for the FMU and for `units.json`, the attribute `units` of the class.
+Arguments: the folder with all files, the name of the package that the folder becomes, the name of the source in it, and the
+folder for the FMU and for `units.json`, the attribute `units` of the class.
 """
 
 from __future__ import annotations

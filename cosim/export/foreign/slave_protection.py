@@ -41,8 +41,8 @@ def with_exception_log(slave_class: type[Fmi2Slave]) -> type[Fmi2Slave]:
 def keep_alive(module_globals: object) -> None:
     """Add a reference to the globals of the entry module.
 
-    PythonFMU 0.7.0 executes the entry at each instantiation and then releases its globals once more than it acquired them. Without
-    this reference, an instantiation after some others uses memory that is free.
+    PythonFMU 0.7.0 executes the entry at each instantiation and then releases its globals once more than it acquired them.
+    Without this reference, a later instantiation uses memory that is free.
     """
     _kept.append(module_globals)
 
