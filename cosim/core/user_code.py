@@ -23,15 +23,21 @@ def innermost_user_line(frames: Iterable[tuple[str, int | None]]) -> str:
     return next((f"{Path(file).name}:{line}" for file, line in frames if _is_user_file(file)), "")
 
 
+def is_cosim_file(file: str) -> bool:
+    """Return whether a file belongs to the package `cosim`, without the shipped vehicles and controllers."""
+    return Path(file).is_relative_to(_PACKAGE) and not Path(file).is_relative_to(_BUNDLE)
+
+
 @cache
 def _is_user_file(file: str) -> bool:
     path = Path(file)
-    if file.startswith("<") or path.parent.name == "pythonfmu":  # exported Python FMUs contain a copy of PythonFMU
-        return False
-    return path.is_relative_to(_BUNDLE) or not any(path.is_relative_to(folder) for folder in _library_folders())
+    if path.is_relative_to(_BUNDLE):
+        return True
+    # exported Python FMUs contain a copy of PythonFMU
+    is_library = path.parent.name == "pythonfmu" or any(path.is_relative_to(folder) for folder in _library_folders())
+    return not (file.startswith("<") or is_library or is_cosim_file(file))
 
 
 @cache
-def _library_folders() -> tuple[Path, ...]:
-    folders = (sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib"))
-    return (_PACKAGE, *{Path(folder) for folder in folders})
+def _library_folders() -> set[Path]:
+    return {Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")}

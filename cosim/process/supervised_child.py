@@ -14,6 +14,7 @@ from .forks import watch_forks
 from .journal import EXIT_CODE, Journal, Phase
 from .limits import detach, lower_limit
 from .process_state import reserve_descriptors
+from .python_stack import write_stack_on_signals
 from .standard_streams import protected_stream
 
 #: limit of the private memory of a supervised run (bytes); mapped files of rows do not count
@@ -33,6 +34,7 @@ def run_child(entry: Callable[[], int], journal: Journal, output: int, temporary
     code = 70
     try:
         _isolate(output, supervisor)
+        write_stack_on_signals(temporary_folder)
         tempfile.tempdir = os.environ["TMPDIR"] = temporary_folder
         journal.exclude_from_forks()
         watch_forks()
