@@ -34,7 +34,7 @@ def supervise(work, journal: Journal):
         finally:
             os._exit(0)
     os.close(writer)
-    return _Supervisor(child, journal, reader).wait_for_child()
+    return _Supervisor(child, journal, reader, "").wait_for_child()
 
 
 @pytest.fixture
