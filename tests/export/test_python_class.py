@@ -10,7 +10,7 @@ from fmpy.validation import validate_fmu
 
 from cosim.components.fmi import FmuFile, create_component
 from cosim.core.component import Ports
-from cosim.core.errors import InputError
+from cosim.core.errors import ComponentError, InputError
 from cosim.export.build import build_to
 
 SOURCE = '''
@@ -127,3 +127,87 @@ def test_a_class_that_cannot_be_exported_is_refused(tmp_path, text, message):
     path.write_text(text)
     with pytest.raises(InputError, match=message):
         build_to(path, None, tmp_path / "empty.fmu")
+
+
+READER = """
+from pathlib import Path
+
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+from gains import GAIN
+
+
+class Reader(Fmi2Slave):
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        self.u = 0.0
+        self.y = GAIN * float((Path(self.resources) / "offset.txt").read_text())
+        self.z = 2 * float((Path(__file__).parent / "tables/offset.txt").read_text())
+        self.register_variable(Real("u", causality=Fmi2Causality.input))
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+        self.register_variable(Real("z", causality=Fmi2Causality.output))
+
+    def do_step(self, time, step_size):
+        self.y = self.y / (1 - self.u)
+        return True
+"""
+
+
+@pytest.fixture(scope="module")
+def reader_fmu(tmp_path_factory):
+    folder, other = tmp_path_factory.mktemp("own"), tmp_path_factory.mktemp("other")
+    (folder / "reader.py").write_text(READER)
+    (folder / "gains.py").write_text("GAIN = 3.0\n")
+    (folder / "unused.py").write_text("")
+    (folder / "tables").mkdir()
+    for file in (folder / "tables/offset.txt", other / "offset.txt"):
+        file.write_text("2.0")
+    return build_to(folder / "reader.py", None, folder / "r.fmu", include=[folder / "tables", other / "offset.txt"])
+
+
+def test_imported_modules_and_included_files_travel_with_the_fmu(reader_fmu):
+    result = simulate_fmu(str(reader_fmu), stop_time=1.0, output=["y", "z"])
+    assert (result["y"][-1], result["z"][-1]) == (6.0, 4.0)
+    with ZipFile(reader_fmu) as archive:
+        names = {name.removeprefix("resources/") for name in archive.namelist()}
+    assert {"reader.py", "gains.py", "offset.txt", "tables/offset.txt"} <= names
+    assert "unused.py" not in names
+
+
+def test_an_exception_in_an_fmu_is_told_with_text_and_line(reader_fmu):
+    component = create_component(FmuFile(reader_fmu), "one")
+    component.bind(Ports((), {}), Ports((), {}))
+    component.instantiate()
+    component.enter_initialization_mode(0.0, 1.0)
+    component.set("u", 1.0)
+    component.exit_initialization_mode()
+    message = (
+        r"one: fmi2DoStep failed at t = 0 s: status 4 \(fatal\): ZeroDivisionError: float division by zero \(reader\.py:20\)"
+    )
+    with pytest.raises(ComponentError, match=message):
+        component.do_step(0.0, 0.1)
+
+
+def test_an_exception_in_the_constructor_is_told_with_text_and_line(tmp_path):
+    source = tmp_path / "reader.py"
+    guarded = 'self.u = 1.0 / (kwargs["instance_name"] != "one")'
+    source.write_text(SOURCE.replace("self.gain, ", f"{guarded}\n        self.gain, "))
+    component = create_component(FmuFile(build_to(source, None, tmp_path / "r.fmu")), "one")
+    component.bind(Ports((), {}), Ports((), {}))
+    with pytest.raises(ComponentError, match=r"one: fmi2Instantiate failed: .*ZeroDivisionError.*\(reader\.py:12\)"):
+        component.instantiate()
+
+
+def test_an_fmu_can_be_instantiated_many_times(reader_fmu):
+    """The wrapper of PythonFMU releases the globals of the FMU's entry once too often at each instantiation."""
+    for _ in range(20):
+        component = create_component(FmuFile(reader_fmu), "one")
+        component.bind(Ports((), {}), Ports((), {}))
+        component.instantiate()
+        component.free()
+
+
+def test_only_python_classes_include_files(tmp_path):
+    (tmp_path / "modelDescription.xml").touch()
+    with pytest.raises(InputError, match="only the FMU of a Python class can include files"):
+        build_to(tmp_path / "modelDescription.xml", None, tmp_path / "x.fmu", include=[tmp_path])

@@ -21,11 +21,9 @@ import os
 
 __path__, __package__ = [os.path.dirname(__file__)], __name__
 
-from .slave_protection import keep_alive, with_exception_log
-from .{source} import {name} as _{name}
+from .slave_protection import load_class
 
-keep_alive(globals())
-{name} = with_exception_log(_{name})
+{name} = load_class(globals(), "{source}", "{name}")
 """
 
 
