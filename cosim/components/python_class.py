@@ -33,7 +33,8 @@ def load_component(reference: str, folder: Path, instance_name: str, arguments: 
 
         if "instance_name" in arguments:
             raise InputError(f'{reference} receives its "instance_name" from the scenario; remove it from the arguments')
-        return PythonFmuComponent(_construct(factory, reference, instance_name=instance_name, **arguments), instance_name)
+        named = {"instance_name": instance_name, **_resources(factory), **arguments}
+        return PythonFmuComponent(_construct(factory, reference, **named), instance_name)
     component: Component = _construct(factory, reference, instance_name, **arguments)
     type_name = type(component).__name__
     if problems := [Problem(f"{reference} creates a {type_name}: {text}") for text in find_violations(component)]:
@@ -48,6 +49,13 @@ def _is_pythonfmu_class(factory: object) -> bool:
     """
     package = sys.modules.get("pythonfmu")
     return package is not None and inspect.isclass(factory) and issubclass(factory, package.Fmi2Slave)
+
+
+def _resources(factory: type) -> dict[str, str]:
+    """Return the argument `resources` for a PythonFMU class that accepts it: the folder of its file, as in an exported FMU."""
+    parameters = inspect.signature(factory).parameters
+    accepted = "resources" in parameters or any(one.kind is one.VAR_KEYWORD for one in parameters.values())
+    return {"resources": str(Path(inspect.getfile(factory)).parent)} if accepted else {}
 
 
 def _construct(factory: Callable[..., Any], reference: str, /, *positional: Any, **named: Any) -> Any:
