@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sysconfig
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
@@ -40,4 +39,6 @@ def _is_user_file(file: str) -> bool:
 
 @cache
 def _library_folders() -> set[Path]:
+    import sysconfig  # takes some milliseconds, and only failures need it
+
     return {Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")}

@@ -9,6 +9,7 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 from cosim.components.fmi import FmuFile, create_component
+from cosim.components.python_class import load_component
 from cosim.core.component import Ports
 from cosim.core.errors import ComponentError, InputError
 from cosim.export.build import build_to
@@ -172,6 +173,16 @@ def test_imported_modules_and_included_files_travel_with_the_fmu(reader_fmu):
         names = {name.removeprefix("resources/") for name in archive.namelist()}
     assert {"reader.py", "gains.py", "offset.txt", "tables/offset.txt"} <= names
     assert "unused.py" not in names
+
+
+def test_the_class_finds_its_files_in_process_too(tmp_path):
+    (tmp_path / "tables").mkdir()
+    for name in ("offset.txt", "tables/offset.txt"):
+        (tmp_path / name).write_text("2.0")
+    (tmp_path / "gains.py").write_text("GAIN = 3.0\n")
+    (tmp_path / "reader.py").write_text(READER)
+    component = load_component("reader.py:Reader", tmp_path, "reader", {})
+    assert (component.get("y"), component.get("z")) == (6.0, 4.0)
 
 
 def test_an_exception_in_an_fmu_is_told_with_text_and_line(reader_fmu):
