@@ -18,8 +18,10 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 
 @pytest.fixture(autouse=True)
-def short_timeout(monkeypatch):
+def settings(monkeypatch):
+    """A short timeout; and no search for orphans, which would end other children of this process, such as servers of tests."""
     monkeypatch.setattr("cosim.process.supervisor.STOP_TIMEOUT", 0.2)
+    monkeypatch.setattr("cosim.process.supervisor._child_processes", list)
 
 
 def supervise(work, journal: Journal):
