@@ -55,7 +55,8 @@ def _resources(factory: type) -> dict[str, str]:
     """Return the argument `resources` for a PythonFMU class that accepts it: the folder of its file, as in an exported FMU."""
     parameters = inspect.signature(factory).parameters
     accepted = "resources" in parameters or any(one.kind is one.VAR_KEYWORD for one in parameters.values())
-    return {"resources": str(Path(inspect.getfile(factory)).parent)} if accepted else {}
+    file = getattr(sys.modules.get(factory.__module__), "__file__", None)
+    return {"resources": str(Path(file).parent)} if accepted and file else {}
 
 
 def _construct(factory: Callable[..., Any], reference: str, /, *positional: Any, **named: Any) -> Any:

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from tempfile import TemporaryFile
 
 import pytest
 
@@ -36,7 +37,8 @@ def supervise(work, journal: Journal):
         finally:
             os._exit(0)
     os.close(writer)
-    return _Supervisor(child, journal, reader, "").wait_for_child()
+    with TemporaryFile() as stack:
+        return _Supervisor(child, journal, reader, stack.fileno()).wait_for_child()
 
 
 @pytest.fixture
