@@ -26,6 +26,8 @@ _CAUSALITIES: Mapping[str, Causality] = {name: name for name in get_args(Causali
 _VARIABILITIES: Mapping[str, Variability] = {name: name for name in get_args(Variability)}
 _C_INT = np.dtype(np.int32)
 _TRUE = ("true", "1")
+#: standard names of the log categories of errors (FMI 2.0 section 2.2.4, FMI 3.0 section 2.4.5)
+_ERROR_CATEGORIES = ("logStatusError", "logStatusFatal")
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ class FmuDescription:
         once_per_process: `canBeInstantiatedOnlyOncePerProcess`.
         needs_execution_tool: `needsExecutionTool`.
         platforms: Platforms with a binary, as the FMU names their folders, and "c-code" if it contains sources.
+        error_categories: Those of FMI's log categories of errors that the FMU declares.
     """
 
     fmi_version: str
@@ -70,6 +73,7 @@ class FmuDescription:
     once_per_process: bool
     needs_execution_tool: bool
     platforms: Sequence[str]
+    error_categories: Sequence[str]
 
     @property
     def major(self) -> int:
@@ -122,6 +126,7 @@ def build_description(path: Path, examination: Examination) -> FmuDescription:
         model.co_simulation.get("canBeInstantiatedOnlyOncePerProcess") in _TRUE,
         model.co_simulation.get("needsExecutionTool") in _TRUE,
         list_platforms(examination.members),
+        [name for name in model.log_categories if name in _ERROR_CATEGORIES],
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from copy import copy
 from math import nan
 from pathlib import Path
@@ -62,7 +63,7 @@ class FmuInstance(FunctionCaller, Component):
         """Import FMPy's class of a slave of this FMI version."""
         raise NotImplementedError
 
-    def _instantiate_fmu(self) -> None:
+    def _instantiate_fmu(self, logging_on: bool) -> None:
         """Call fmi2Instantiate or fmi3InstantiateCoSimulation."""
         raise NotImplementedError
 
@@ -95,8 +96,12 @@ class FmuInstance(FunctionCaller, Component):
                 self._fmu = self._copy_fmpy_slave(folder)
             if not is_loaded:
                 self._check_version()
+        logs_only_errors = bool(self.description.error_categories) and not self._logging_on
+        self._hides_information = logs_only_errors
         with restoring_process_state(self.name), calling_component(self.name, self._instantiate_function, "load"):
-            self._instantiate_fmu()
+            self._instantiate_fmu(self._logging_on or logs_only_errors)
+        if logs_only_errors:
+            self._limit_log_to_errors()
         self._is_instantiated = True
         self._handle: int = self._fmu.component
         self._do_step = self._fmu.functions[f"{self.prefix}DoStep"]
@@ -126,6 +131,14 @@ class FmuInstance(FunctionCaller, Component):
                 texts[name] = function()
         for text in version_deviations(texts):
             component_log.log_message(self.name, component_log.WARNING, text)
+
+    def _limit_log_to_errors(self) -> None:
+        """Call fmi*SetDebugLogging, so that the FMU gives the reason of an error; a refusal leaves its log as it is."""
+        from fmpy.fmi1 import FMICallException
+
+        name = f"{self.prefix}SetDebugLogging"
+        with calling_component(self.name, name, "load"), suppress(FMICallException):
+            self._fmu.setDebugLogging(True, self.description.error_categories)
 
     def _instantiation_error(self) -> ComponentError:
         return ComponentError(self.name, self._instantiate_function, self._last_message or "the FMU gave no reason")

@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from ...components.python_import import package_root
+from ...components.python_import import package_files, package_root
 from ...core import paths, resources
 from ...core.errors import InputError, Problem
 from ...core.version import __version__
@@ -133,10 +133,10 @@ def _strings(value: Any) -> Iterator[str]:
 
 
 def _package_files(path: Path) -> Iterator[Path]:
-    """Yield a file, or if it belongs to a Python package, all files of its outermost package including data files."""
+    """Yield a file and those beside it that it imports, or all files of its outermost Python package including data files."""
     root = package_root(path)
     if path.suffix != ".py" or root == path.parent:
-        yield path
+        yield from package_files([path]) if path.suffix == ".py" else [path]
         return
     package = root / path.relative_to(root).parts[0]
     yield from (each for each in package.rglob("*") if each.is_file() and "__pycache__" not in each.parts)
