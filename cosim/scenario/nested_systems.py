@@ -17,8 +17,9 @@ from ..core.errors import InputError, Problem
 from ..core.size_limits import MAX_LEVELS
 from ..core.text import acceptable_text, shorten, text_problem
 from . import json_pointer
+from .dict_document import document_of_dict
 from .expanded_size import SystemFile, check_expanded_size
-from .extension import read_system_document
+from .extension import expand_document, read_system_document
 from .file_paths import change_paths, change_pointed, find_scenario, relocating
 from .json_document import Document
 from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
@@ -136,11 +137,20 @@ class Scenario:
         return [*files, *package_files(python)]
 
 
-def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = None, folder: Path | None = None) -> Scenario:
+def open_scenario(scenario: str | Path | Mapping[str, Any]) -> Document:
+    """Return the expanded JSON document of a scenario: of a file, of a shipped scenario, or of a dict."""
+    if isinstance(scenario, Mapping):
+        return expand_document(document_of_dict(scenario))
+    return read_system_document(find_scenario(scenario))
+
+
+def load_scenario(
+    scenario: str | Path | Mapping[str, Any], settings: Mapping[str, Any] | None = None, folder: Path | None = None
+) -> Scenario:
     """Read a scenario and its nested systems.
 
     Args:
-        scenario: A path, or the name of a shipped scenario.
+        scenario: A path, the name of a shipped scenario, or the content of a scenario file.
         settings: Values that the caller changes. A name that starts with "/" is a JSON pointer into the scenario file; any
             other name is that of a variable.
         folder: The folder that paths in the values of JSON pointers start from; None: the working directory.
@@ -149,7 +159,7 @@ def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = Non
         InputError: The file does not exist or is not JSON, or the expanded scenario is too large. Other problems are collected in
             the result.
     """
-    document = read_system_document(find_scenario(scenario))
+    document = open_scenario(scenario)
     problems: list[Problem] = []
     variables: dict[str, Any] = {}
     change = relocating(Path(), None) if folder is None else relocating(folder, document.file.parent)
@@ -164,7 +174,19 @@ def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = Non
     reader = _SystemReader()
     file = reader.read(document, ScenarioSpec, ())
     check_expanded_size(file)
-    return Scenario(_make_node(file), problems + reader.problems, variables)
+    seeds = _find_seed_problems(document, file.spec)
+    return Scenario(_make_node(file), [*problems, *reader.problems, *seeds], variables)
+
+
+def _find_seed_problems(document: Document, spec: SystemSpec) -> Iterator[Problem]:
+    """Yield a problem for each JSON pointer of "seeds" that no value can be set at."""
+    for i, pointer in enumerate(spec.seeds if isinstance(spec, ScenarioSpec) else ()):
+        if not pointer.startswith("/"):
+            yield Problem(
+                f'expected a JSON pointer, which begins with "/"; found "{shorten(pointer)}"', document.where(("seeds", i))
+            )
+        elif problem := json_pointer.set_value(copy.deepcopy(document.value), pointer, 0):
+            yield Problem(problem, document.where(("seeds", i)))
 
 
 class _SystemReader:

@@ -274,6 +274,10 @@ class ScenarioSpec(SystemSpec):
     figures: list[FunctionSpec] = Field(default=[], description="functions that draw figures from the result")
     scene: CallSpec | None = Field(default=None, description="function that returns the scene of the 3-D replay")
     reference: ReferenceSpec | None = Field(default=None, description="recorded trajectory for comparisons")
+    seeds: list[str] = Field(
+        default=[],
+        description='JSON pointers of the entries that a seed sets, such as "/components/plant/arguments/environment/seed"',
+    )
     deadlines: DeadlinesSpec = Field(default=DeadlinesSpec(), description="time limits of calls in supervised runs")
     non_finite: NonFinitePolicy = Field(
         default="error",

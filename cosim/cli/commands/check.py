@@ -32,7 +32,7 @@ def command(
     --isolation and --sandbox only affect the printed processes. The JSON of --expanded has absolute paths: a file with it is a
     scenario that runs anywhere on this machine.
     """
-    from ...api import load
+    from ...scenario import load
     from ...scenario.nested_systems import load_scenario, parse_settings
     from ...scenario.plausibility import find_warnings
 
