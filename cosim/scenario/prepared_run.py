@@ -163,6 +163,7 @@ def load(
     late: LatePolicy = "warn",
     isolation: IsolationMode = "none",
     sandbox: bool = False,
+    settings_folder: Path | None = None,
     loaded_fmus: Mapping[Path, FmuFile] = MappingProxyType({}),
 ) -> PreparedRun:
     """Read, connect and check a scenario.
@@ -179,6 +180,7 @@ def load(
             an FMU that allows one instance per process is used again.
         sandbox: Run every FMU in a separate process that reads and writes only its own files, has no network and starts no
             programs.
+        settings_folder: Folder that paths in `parameters` start from; None: the working directory.
         loaded_fmus: FMU files that have already been read, by resolved path.
 
     Returns:
@@ -192,7 +194,7 @@ def load(
     watch = Stopwatch()
     with watch.measure("load_seconds"):
         with watch.measure("parse_seconds"):
-            loaded = load_scenario(scenario, settings)
+            loaded = load_scenario(scenario, settings, settings_folder)
         if isolation == "fmu" or sandbox:
             reason = 'expected a file, because Python objects exist in this process only; set "isolation" of single FMUs instead'
             loaded.root.document.refuse_objects(reason, classes=True)

@@ -76,14 +76,14 @@ def absolute_paths(scenario: Path, settings: Mapping[str, Any]) -> list[Problem]
     """Return a problem for each absolute path in the scenario, which another machine would not have."""
     return [
         Problem(f'absolute path "{path}" cannot be shipped to a cluster; expected a path relative to this file', where)
-        for node in load_scenario(scenario, _pointer_settings(settings)).root.walk()
+        for node in load_scenario(scenario, _pointer_settings(settings), scenario.parent).root.walk()
         for path, where in _named_files(node)
         if Path(path).is_absolute() and paths.is_file(Path(path))
     ]
 
 
 def _scenario_files(scenario: Path, settings: Mapping[str, Any]) -> Iterator[Path]:
-    root = load_scenario(scenario, _pointer_settings(settings)).root
+    root = load_scenario(scenario, _pointer_settings(settings), scenario.parent).root
     for node in root.walk():
         yield from (file.resolve() for file in node.document.files)
         yield from _existing_files(node.folder, (name for name, _ in _named_files(node)))

@@ -132,7 +132,8 @@ def _set_deadline(context: StudyContext) -> None:
 
 
 def _prepare_job(context: StudyContext, job: Job, fmu_files: FmuFiles) -> PreparedRun:
-    prepared = load(context.scenario, job.settings, loaded_fmus={path: file.share() for path, file in fmu_files.items()})
+    shared = {path: file.share() for path, file in fmu_files.items()}
+    prepared = load(context.scenario, job.settings, settings_folder=context.scenario.parent, loaded_fmus=shared)
     if journal := current_journal():
         journal.deadlines = Deadlines(**prepared.spec.deadlines.model_dump())
     return prepared
