@@ -1,4 +1,4 @@
-"""What this process remembers of FMU files from run to run: examinations by content, and extracted folders."""
+"""Memory of a process about FMU files: examinations by content, and extracted folders."""
 
 from __future__ import annotations
 
