@@ -83,8 +83,9 @@ def static_method(component: Mapping[str, Any], folder: Path, name: str) -> Call
         InputError: The file or the class does not exist.
     """
     reference = component.get("python")
-    is_file = isinstance(reference, str) and ".py:" in reference  # else a Python class or object of a scenario that was a dict
-    method = getattr_static(load_object(reference, folder), name, None) if is_file else None
+    if not isinstance(reference, str) or ".py:" not in reference:  # a Python class or object of a scenario that was a dict
+        return None
+    method = getattr_static(load_object(reference, folder), name, None)
     return method if isinstance(method, staticmethod) else None
 
 
