@@ -35,9 +35,8 @@ def find_function_problems(
         for i, function in functions:
             if text := function_problem(function, root.folder):
                 yield Problem(text, root.where(kind, i))
-        names = [function.name for _, function in functions]
-        for i, function in functions:
-            if function.name in names[:i]:
+        for n, (i, function) in enumerate(functions):
+            if any(function.name == other.name for _, other in functions[:n]):
                 yield Problem(f'the name "{function.name}" is used more than once', root.where(kind, i, "name"))
     if spec.scene and (text := function_problem(spec.scene, root.folder)):
         yield Problem(text, root.where("scene"))

@@ -20,7 +20,7 @@ from . import json_pointer
 from .dict_document import document_of_dict
 from .expanded_size import SystemFile, check_expanded_size
 from .extension import expand_document, read_system_document
-from .file_paths import find_scenario
+from .file_paths import change_paths, change_pointed, find_scenario, relocating
 from .json_document import Document
 from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
@@ -107,6 +107,16 @@ class Scenario:
         """Specification of the scenario file."""
         assert isinstance(self.root.spec, ScenarioSpec)
         return self.root.spec
+
+    def expanded(self) -> dict[str, Any]:
+        """Return the scenario as one JSON object without "extends", with the values of the caller and absolute paths."""
+        value: dict[str, Any] = copy.deepcopy(self.root.document.value)
+        for name, setting in self.assignments.items():
+            component, _, variable = name.partition(".")
+            parameters = value["components"][component].setdefault("parameters", {})
+            parameters.pop(variable, None)
+            parameters[variable] = setting
+        return change_paths(value, relocating(self.root.folder, None))
 
     def files(self) -> list[Path]:
         """Return all files that the scenario names, whether they exist or not.
@@ -240,6 +250,8 @@ def _text_problems(value: Any) -> Iterator[str]:
 def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
     """Return the values of `NAME=value` texts by name. A value that is not JSON is taken as text.
 
+    Paths in the values of JSON pointers start from the working directory.
+
     Raises:
         InputError: A text has no name or no "=", or a number is not finite.
     """
@@ -254,6 +266,8 @@ def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
             parsed[name] = _parse_json_or_text(value)
             if not _is_finite(parsed[name]):
                 problems.append(Problem(f"expected finite numbers, found {shorten(value)}", name))
+            elif name.startswith("/"):
+                parsed[name] = change_pointed(name, parsed[name], relocating(Path(), None))
         except RecursionError:
             problems.append(Problem("nested too deeply", name))
     if problems:

@@ -13,6 +13,8 @@ from pydantic import ConfigDict, Field, StringConstraints, model_validator
 from ..engine.settings import NonFinitePolicy
 from .schema_types import INVALID, AutoOrBool, BoolOrNumber, Integer, Name, NameList, Period, Seconds, Spec, Value
 
+#: pattern of the names of scenarios
+SCENARIO_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$"
 #: keys of the sources of a component
 SOURCES = ("fmu", "python", "modelica", "system")
 
@@ -256,7 +258,7 @@ class NestedSpec(SystemSpec):
 class ScenarioSpec(SystemSpec):
     """A scenario: a system of components, its times, recorded signals, events, KPIs, checks and figures."""
 
-    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$")] = Field(
+    name: Annotated[str, StringConstraints(pattern=SCENARIO_NAME)] = Field(
         description="name of the scenario and of its results folder"
     )
     start_time: Seconds = Field(default=Fraction(0), description="s")
