@@ -159,6 +159,7 @@ def _signal_prefixes(signals: Collection[str]) -> list[str]:
     return list(dict.fromkeys(name[: match.start()] for name in signals for match in re.finditer(r"[.\[]", name)))
 
 
+@lru_cache(64)  # definitions are cached, so that equal ones are identical
 def _kpi_value_names(function: ast.FunctionDef) -> list[str]:
     """Return the names of a KPI's values without indices, or nothing if its last `return` does not write them as literals.
 
