@@ -11,7 +11,8 @@ from typing import Any, TypedDict, Unpack
 
 from .core.errors import ComponentError, CosimError, InputError, Problem
 from .engine.pacer import LatePolicy
-from .engine.run_loop import Observer, SimulationOutcome, StepHook, simulating
+from .engine.plan_run import Observer, SimulationOutcome, StepHook
+from .engine.run_loop import simulating
 from .results import Kpis, Result
 from .results.checks import CheckOutcome, evaluate_all_checks, evaluate_checks
 from .results.kpi import evaluate_kpis, kpi_senses, kpi_units

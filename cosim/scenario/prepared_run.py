@@ -19,7 +19,7 @@ from ..core.stopwatch import Stopwatch
 from ..core.system import System
 from ..engine.pacer import LatePolicy
 from ..engine.plan import Plan
-from ..engine.run_loop import free_components
+from ..engine.plan_run import free_components
 from ..engine.settings import Settings
 from ..process.float_mode import default_float_mode
 from ..process.process_state import exclusive_process_state
