@@ -97,8 +97,8 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
     yield "rows", str(len(result.time))
     if events := result.metadata.get("live_events"):
         yield "set by hand", f"{len(events)} time{'s' * (len(events) != 1)}"
-    if termination := result.metadata.get("terminated_by"):
-        yield "ended by", f"{termination['component']} at {termination['time']:g} s"
+    if result.termination:
+        yield "end", result.termination
 
 
 def _kpi_row(name: str, value: Number, units: Mapping[str, str]) -> KpiRow:

@@ -124,12 +124,14 @@ class Contacts:
         ]
         flags = [FLAG_COUNT * vehicle + TOUCHING for vehicle in vehicles]
         flags += [FLAG_COUNT * vehicle + ON_VESSEL for vehicle in on_vessels]
-        bodies = [self._bodies.get(number) for number in pair]
+        a, b = (self._bodies.get(number) for number in pair)
         self._pairs[pair] = _Pair(
             [self._force_ends[vehicle] - 1 for vehicle in vehicles],
             flags,
-            *(body.commanded_twist if body else _NO_MOTION for body in bodies),
-            *(0.0 if isinstance(body, PlanarBody) else 1.0 for body in bodies),
+            a.commanded_twist if a else _NO_MOTION,
+            b.commanded_twist if b else _NO_MOTION,
+            0.0 if isinstance(a, PlanarBody) else 1.0,
+            0.0 if isinstance(b, PlanarBody) else 1.0,
             self._failures.largest_harmless_speed(pair) ** 2,
         )
         return self._pairs[pair]
