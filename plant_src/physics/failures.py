@@ -4,22 +4,27 @@ A collision is a crash if it can change the velocity of the vehicle by more than
 perfectly inelastic collision of the two centres of mass: the relative velocity before the step, times the mass of the other body
 over the mass of both. At a platform it is the whole velocity. A vehicle that slides over a platform at speed has crashed, too.
 A multirotor that touches something upside down, and a vessel that is upside down, have crashed. A multirotor is ditched
-if its centre of mass is below the water.
+if its centre of mass is below the water and no vessel carries it.
 """
 
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from ..placement import VehiclePlacement
+from ..vehicles.common.step_status import MAY_FAIL
 from .body import ContactBody
 
 #: indices of the flags of a vehicle, in the order of its Boolean variables
 TOUCHING, ON_VESSEL, CRASHED, DITCHED = range(4)
 FLAG_COUNT = 4
+
+_unpack_pose = struct.Struct("7d").unpack_from
 
 #: function from x and y (m) to the height of the water surface there (m)
 WaterLevel = Callable[[float, float], float]
@@ -32,6 +37,7 @@ class Failures:
         bodies: Contact body of each vehicle.
         vehicles: Settings of each vehicle.
         flags: All flags, shape (vehicles, FLAG_COUNT).
+        step_status: Status of the last step of each vehicle.
         platform_names: Name of each platform by its number in Bullet.
 
     Attributes:
@@ -44,9 +50,14 @@ class Failures:
         bodies: Sequence[ContactBody],
         vehicles: Sequence[VehiclePlacement],
         flags: np.ndarray,
+        step_status: np.ndarray,
         platform_names: Mapping[int, str],
     ):
         self._bodies, self._flags = bodies, flags
+        # memoryviews: access to a few numbers is faster than with NumPy
+        self._step_status: Any = step_status.data
+        self._flag_data: Any = flags.reshape(-1).data
+        self._outputs: list[Any] = [body.outputs.data for body in bodies]
         self.permanent_flags = np.zeros_like(flags)
         self.alarm = False
         self._names = {**platform_names, **{body.body_id: body.name for body in bodies}}
@@ -84,16 +95,20 @@ class Failures:
 
     def examine(self, water_level: WaterLevel) -> list[str]:
         """Find ditched and capsized vehicles, and return a message for each failure since the last call."""
-        self.alarm = False
-        for vehicle, body in enumerate(self._bodies):
-            x, y, z, _, qx, qy, _ = body.outputs[:7].tolist()
-            is_vessel = body.model.is_vessel
-            if qx**2 + qy**2 > 0.5 and (is_vessel or self._flags[vehicle, TOUCHING]):
-                self._record(vehicle, CRASHED, "capsized" if is_vessel else "upside down in contact")
-            if not is_vessel and z < (level := water_level(x, y)):
-                self._record(vehicle, DITCHED, f"{level - z:.2f} m below the water")
+        for vehicle, status in enumerate(self._step_status):
+            if status >= MAY_FAIL:
+                self._examine(vehicle, water_level)
         messages, self._messages, self.alarm = self._messages, [], False
         return messages
+
+    def _examine(self, vehicle: int, water_level: WaterLevel) -> None:
+        is_touching, is_on_vessel, _, is_ditched = self._flag_data[FLAG_COUNT * vehicle : FLAG_COUNT * (vehicle + 1)]
+        x, y, z, _, qx, qy, _ = _unpack_pose(self._outputs[vehicle])
+        is_vessel = self._bodies[vehicle].model.is_vessel
+        if qx * qx + qy * qy > 0.5 and (is_vessel or is_touching):
+            self._record(vehicle, CRASHED, "capsized" if is_vessel else "upside down in contact")
+        if not (is_vessel or is_on_vessel or is_ditched) and z < (level := water_level(x, y)):
+            self._record(vehicle, DITCHED, f"{level - z:.2f} m below the water")
 
     def restore(self, flags: np.ndarray) -> None:
         """Restore the failures from all flags of a saved state."""

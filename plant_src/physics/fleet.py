@@ -82,7 +82,7 @@ class Fleet:
             for vehicle, arrays in zip(vehicles, memory.of_vehicle, strict=True)
         ]
         self.inputs, self.outputs = memory.of_all_vehicles["inputs"], memory.of_all_vehicles["outputs"]
-        self.failures = Failures(self.bodies, vehicles, flags, platform_names)
+        self.failures = Failures(self.bodies, vehicles, flags, memory.of_all_vehicles["step_status"], platform_names)
         self.contacts = Contacts(client, self.bodies, self.outputs, flags, self.failures)
         movable = [body.bounding_box(vehicle.body) for body, vehicle in zip(self.bodies, vehicles, strict=True)]
         fixed = [_platform_bounding_box(platform) for platform in platforms]
