@@ -10,7 +10,7 @@ import json
 import math
 import re
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -37,6 +37,10 @@ class Document:
     file: Path
     text: str
     value: Any = None
+    #: Python classes and objects by the names of the components that they implement; only in a scenario that is a dict
+    objects: Mapping[str, Any] = field(default_factory=dict)
+    #: the scenario is a dict and no file; `file` lies in the folder from which relative paths start
+    is_dict: bool = False
     offsets: dict[JsonPath, int] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
     #: paths of the values with these problems; they hold placeholders
@@ -44,10 +48,18 @@ class Document:
 
     def where(self, path: Sequence[str | int]) -> str:
         """Return "file:line:column: $.json.path", with the position of the deepest part of `path` that exists."""
+        if self.is_dict:
+            return f"scenario: {json_path(path)}"
         known = tuple(path)
         while known and known not in self.offsets:
             known = known[:-1]
         return f"{self.position(self.offsets.get(known, 0))}: {json_path(path)}"
+
+    def refuse_objects(self, reason: str) -> None:
+        """Raise InputError with this reason if components are Python classes or objects."""
+        if self.objects:
+            names = ", ".join(self.objects)
+            raise InputError(f"{reason} {names} {'are Python objects' if len(self.objects) > 1 else 'is a Python object'}")
 
     def position(self, offset: int) -> str:
         """Return "file:line:column" of an offset in the text."""
@@ -84,7 +96,16 @@ def read_document(file: Path) -> Document:
         raise InputError(f'cannot read "{file}": {error.strerror}') from None
     except UnicodeDecodeError as error:
         raise InputError(f'"{file}" is not UTF-8 text: {error.reason} at byte {error.start}') from None
-    document = Document(file, text)
+    return parse_document(Document(file, text))
+
+
+def parse_document(document: Document) -> Document:
+    """Read the value of a document from its text.
+
+    Raises:
+        InputError: The text is not JSON.
+    """
+    text = document.text
     parser = _JsonParser(document)
     document.value, end = parser.value(_skip_whitespace(text, 0), ())
     if _skip_whitespace(text, end) != len(text):

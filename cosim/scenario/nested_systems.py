@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean
 from ..core.size_limits import MAX_LEVELS
 from ..core.text import acceptable_text, shorten, text_problem
+from .dict_document import document_of_dict
 from .expanded_size import SystemFile, check_expanded_size
 from .json_document import Document, read_document
 from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
@@ -108,7 +110,7 @@ class Scenario:
 
         These are the scenario and its nested systems, sources with their packages, input profiles, KPIs and figures.
         """
-        files = [node.document.file for node in self.root.walk()]
+        files = [node.document.file for node in self.root.walk() if not node.document.is_dict]
         files += [self.root.folder / spec.file for _, spec in accepted(self.spec.inputs)]
         functions: list[CallSpec] = [spec for _, spec in (*accepted(self.spec.kpis), *accepted(self.spec.figures))]
         functions += [self.spec.scene] if self.spec.scene else []
@@ -138,11 +140,16 @@ def find_scenario(scenario: str | Path) -> Path:
     return shipped / f"{scenario}.json"
 
 
-def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = None) -> Scenario:
+def open_scenario(scenario: str | Path | Mapping[str, Any]) -> Document:
+    """Return the JSON document of a scenario: of a file, of a shipped scenario, or of a dict."""
+    return document_of_dict(scenario) if isinstance(scenario, Mapping) else read_document(find_scenario(scenario))
+
+
+def load_scenario(scenario: str | Path | Mapping[str, Any], settings: Mapping[str, Any] | None = None) -> Scenario:
     """Read a scenario and its nested systems.
 
     Args:
-        scenario: A path, or the name of a shipped scenario.
+        scenario: A path, the name of a shipped scenario, or the content of a scenario file.
         settings: Values that the caller changes. A name that starts with "/" is a JSON pointer into the scenario file; any
             other name is that of a variable.
 
@@ -150,7 +157,7 @@ def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = Non
         InputError: The file does not exist or is not JSON, or the expanded scenario is too large. Other problems are collected in
             the result.
     """
-    document = read_document(find_scenario(scenario))
+    document = open_scenario(scenario)
     problems: list[Problem] = []
     variables: dict[str, Any] = {}
     for name, value in (settings or {}).items():
@@ -163,7 +170,15 @@ def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = Non
     reader = _SystemReader()
     file = reader.read(document, ScenarioSpec, ())
     check_expanded_size(file)
-    return Scenario(_make_node(file), problems + reader.problems, variables)
+    seeds = _find_seed_problems(document, file.spec)
+    return Scenario(_make_node(file), [*problems, *reader.problems, *seeds], variables)
+
+
+def _find_seed_problems(document: Document, spec: SystemSpec) -> Iterator[Problem]:
+    """Yield a problem for each JSON pointer of "seeds" that no value can be set at."""
+    for i, pointer in enumerate(spec.seeds if isinstance(spec, ScenarioSpec) else ()):
+        for problem in _set_pointer(Document(document.file, "", copy.deepcopy(document.value)), pointer, 0):
+            yield replace(problem, where=document.where(("seeds", i)))
 
 
 class _SystemReader:

@@ -107,7 +107,7 @@ class PreparedRun:
 
         These are the scenario and its nested systems, FMUs, Python and Modelica sources, and input profiles.
         """
-        own = [node.document.file for node in self.root.walk()]
+        own = [node.document.file for node in self.root.walk() if not node.document.is_dict]
         own += [self.root.folder / spec.file for spec in self.spec.inputs]
         calls = (*self.spec.kpis, *self.spec.figures, *([self.spec.scene] if self.spec.scene else []))
         modules = (spec.python.rpartition(":")[0] for spec in calls)
@@ -132,7 +132,7 @@ class PreparedRun:
 @default_float_mode()
 @exclusive_process_state()
 def load(
-    scenario: str | Path,
+    scenario: str | Path | Mapping[str, Any],
     parameters: Mapping[str, Any] | None = None,
     *,
     stop_time: float | str | None = None,
@@ -146,7 +146,7 @@ def load(
     """Read, connect and check a scenario.
 
     Args:
-        scenario: Path of a scenario file, or the name of a shipped scenario.
+        scenario: Path of a scenario file, the name of a shipped scenario, or the content of a scenario file.
         parameters: Values that replace those of the file. A key is the name of a variable ("uav.vtol.landing_time") or the JSON
             pointer of any entry ("/components/plant/arguments/environment/seed").
         stop_time: End of the simulation (s), a number or a fraction such as "1/3"; None: as in the file.
@@ -171,6 +171,8 @@ def load(
     with watch.measure("load_seconds"):
         with watch.measure("parse_seconds"):
             loaded = load_scenario(scenario, settings)
+        if isolation == "fmu" or sandbox:
+            loaded.root.document.refuse_objects('only "isolation" of single components is possible in this process:')
         builder = SystemBuilder(loaded, isolation == "fmu", sandbox, loaded_fmus)
         try:
             with watch.measure("instantiate_seconds"):

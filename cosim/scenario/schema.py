@@ -249,6 +249,10 @@ class ScenarioSpec(SystemSpec):
     figures: list[FunctionSpec] = Field(default=[], description="functions that draw figures from the result")
     scene: CallSpec | None = Field(default=None, description="function that returns the scene of the 3-D replay")
     reference: ReferenceSpec | None = Field(default=None, description="recorded trajectory for comparisons")
+    seeds: list[Annotated[str, StringConstraints(pattern="^/")]] = Field(
+        default=[],
+        description='JSON pointers of the entries that a seed sets, such as "/components/plant/arguments/environment/seed"',
+    )
     deadlines: DeadlinesSpec = Field(default=DeadlinesSpec(), description="time limits of calls in supervised runs")
     stop_when: list[StopSpec] = Field(default=[], description="conditions that end the run before the stop time")
     non_finite: NonFinitePolicy = Field(

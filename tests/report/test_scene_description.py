@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from cosim.api import load
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.resources import root
 from cosim.report.scene import build_scene
+from cosim.scenario import load
 
 SHIPPED = sorted((root() / "scenarios").glob("*.json"))
 

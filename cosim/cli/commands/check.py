@@ -27,7 +27,7 @@ def command(scenario: str, settings: tuple[str, ...], connections: bool, isolati
     conversions. Probable mistakes are warnings: a forgotten connection, a missing reference, an event after the end.
     --isolation and --sandbox only affect the printed processes.
     """
-    from ...api import load
+    from ...scenario import load
     from ...scenario.nested_systems import parse_settings
     from ...scenario.plausibility import find_warnings
 
