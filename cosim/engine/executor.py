@@ -33,6 +33,8 @@ class ExecutorState(NamedTuple):
     outputs: Sequence[np.ndarray]
     #: values in the delays, the oldest ones first
     rings: Sequence[np.ndarray]
+    #: since when each stop condition has been met
+    condition_begins: Sequence[int | None]
 
 
 class Executor(ABC):
@@ -139,7 +141,8 @@ class Executor(ABC):
         self._rebuild()
         rings = [line.ring.copy() for line in self._delay_lines.values()]
         inputs, outputs = self.plan.inputs.copy_values(), self.plan.outputs.copy_values()
-        return ExecutorState(self.completed_steps, self.recorder.row_count, self.termination, inputs, outputs, rings)
+        begins = list(self.stop_conditions.begins)
+        return ExecutorState(self.completed_steps, self.recorder.row_count, self.termination, inputs, outputs, rings, begins)
 
     def restore(self, state: ExecutorState) -> None:
         """Restore a state that `save` returned; the components are restored separately."""
@@ -149,6 +152,7 @@ class Executor(ABC):
         self.plan.outputs.restore_values(state.outputs)
         self.recorder.rewind(state.row_count)
         self._runner.termination = state.termination
+        self.stop_conditions.restore(state.condition_begins)
         self._runner.current_time.value = self.plan.grid.time_at(state.completed_steps)
         self.marker[STEP_COUNT], self.marker[ROW_COUNT] = state.completed_steps, state.row_count
         self._prepare()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,9 +85,17 @@ class StopConditions:
             begin = self.begins[k] = n if begin is None else begin
             if n - begin >= self._holds[k] and met is None:
                 met = self._describe(self._conditions[k], begin, n)
+        self._set_wake_point()
+        return met
+
+    def restore(self, begins: Sequence[int | None]) -> None:
+        """Restore a state."""
+        self.begins = list(begins)
+        self._set_wake_point()
+
+    def _set_wake_point(self) -> None:
         pending = (begin + hold for begin, hold in zip(self.begins, self._holds, strict=True) if begin is not None)
         self.wake_point = min(pending, default=NEVER)
-        return met
 
     def _describe(self, condition: StopCondition, begin: int, end: int) -> MetCondition:
         parts = condition.expression.alternatives

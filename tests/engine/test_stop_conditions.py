@@ -13,8 +13,8 @@ from systems import endpoint, make_system
 from cosim.core.component import StepResult, Variable
 from cosim.core.expressions import parse_condition
 from cosim.core.time_grid import exact_fraction
-from cosim.engine import EXECUTORS
-from cosim.engine.plan_run import SimulationOutcome
+from cosim.engine import EXECUTORS, compile_plan
+from cosim.engine.plan_run import PlanRun, SimulationOutcome
 from cosim.engine.run_loop import simulate
 from cosim.engine.settings import Event, Settings, StopCondition
 
@@ -123,3 +123,26 @@ def test_the_request_of_a_component_at_the_same_point_counts(kind: Any) -> None:
     component._step = lambda _values, time, step: StepResult(time + step, terminate_requested=True)
     outcome = run(component, stop("a.y >= 0", hold=0.1), kind=kind)
     assert outcome.termination == ("a", 0.1, True, None)
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+@pytest.mark.parametrize("saved_at", [3, 6, 8])
+def test_a_restored_run_ends_at_the_same_point(kind: Any, saved_at: int) -> None:
+    """The condition has been met since point 5; the run ends at point 9, also after a later end was undone."""
+    component = series([0.0] * 5 + [1.0] * 60)
+    columns = {name: endpoint(name) for name in ("a.y", "a.flag")}
+    stops = [stop("a.y > 0", hold=0.4)]
+    settings = Settings(Fraction(0), Fraction(5), Fraction(1, 10), columns, stop_conditions=stops, executor=kind)
+    simulation = PlanRun(compile_plan(make_system({"a": component}), settings))
+    try:
+        simulation.initialize()
+        simulation.advance(saved_at)
+        state = simulation.save()
+        for _ in range(2):
+            simulation.advance(50)
+            assert simulation.executor.completed_steps == 9
+            assert simulation.executor.termination is not None
+            simulation.restore(state)
+            assert simulation.executor.termination is None
+    finally:
+        simulation.close()
