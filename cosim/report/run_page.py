@@ -68,6 +68,7 @@ def render_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Ite
     return render_page(
         "report.html",
         about=about,
+        crash=result.termination if result.crashed else "",
         checks=len(outcomes),
         failed=sum(not outcome.passed for outcome in outcomes),
         facts=list(_facts(result)),
