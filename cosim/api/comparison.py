@@ -11,7 +11,7 @@ from ..core.errors import InputError
 from ..results import Result
 from ..results.comparison import Comparison, Tolerance
 from ..results.comparison import compare as compare_results
-from ..scenario.nested_systems import find_scenario, load_scenario
+from ..scenario import find_scenario, load_scenario
 from .arguments import expect, is_number
 
 #: a result, a CSV file, or a folder that `cosim run` has written

@@ -57,9 +57,9 @@ def _evaluate_run(result: Result, prepared: PreparedRun) -> Execution:
     kpis = Kpis()
     failures: list[BaseException] = []
     functions = prepared.kpis()
-    for i, kpi in enumerate(functions):
+    for kpi in functions:
         try:
-            with _adding_location(prepared, "kpis", i):
+            with _adding_location(prepared, "kpis", prepared.index_of_kpi(kpi[0])):
                 kpis.update(evaluate_kpis(result, [kpi]))
         except (CosimError, KeyboardInterrupt) as error:
             failures.append(error)
@@ -77,7 +77,7 @@ def evaluate_scenario_checks(prepared: PreparedRun, result: Result) -> list[Chec
         result: A result with KPIs.
 
     Returns:
-        The outcome of each check, in the order of the scenario.
+        The outcome of each check, in the order of the scenario. A check of an optional KPI that was left out is not met.
 
     Raises:
         InputError: A check names a KPI that the result does not have.
@@ -85,7 +85,8 @@ def evaluate_scenario_checks(prepared: PreparedRun, result: Result) -> list[Chec
     outcomes = []
     for i, check in enumerate(prepared.checks):
         with _adding_location(prepared, "checks", i):
-            outcomes += evaluate_checks(result.kpis, [check])
+            is_optional = check["kpi"].partition(".")[0] in prepared.optional_kpis
+            outcomes += (evaluate_all_checks if is_optional else evaluate_checks)(result.kpis, [check])
     return outcomes
 
 

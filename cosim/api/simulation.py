@@ -183,7 +183,7 @@ class Simulation:
             settings = dict.fromkeys(self.prepared.spec.seeds, int(seed))
         with self._lock:
             self._refuse_recursion()
-            self.prepared.document.refuse_objects("reset() makes new components, but")
+            self.prepared.document.refuse_objects("expected a class, of which reset() makes a new object", classes=False)
             self.close()
             self._open({**settings, **(parameters or {})})
 
@@ -257,7 +257,7 @@ class Simulation:
                 self._ends[:] = [run.close]
                 run.initialize()
             elif run.failure:
-                raise InputError(f"the simulation failed: {run.failure or 'interrupted'}; reset() starts it again")
+                raise InputError(f"the simulation failed: {str(run.failure) or 'interrupted'}; reset() starts it again")
         return run
 
     def _refuse_recursion(self) -> None:

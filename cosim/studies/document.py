@@ -13,9 +13,11 @@ from pydantic import ValidationError
 from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean
 from ..core.size_limits import MAX_RUNS, require_at_most
+from ..scenario import load_scenario
 from ..scenario.dict_document import document_of_dict
+from ..scenario.file_paths import find_scenario
 from ..scenario.json_document import Document, json_path, read_document
-from ..scenario.nested_systems import find_scenario, load_scenario, pointer_keys
+from ..scenario.json_pointer import pointer_keys
 from ..scenario.validation import schema_problems
 from .schema import StudySpec
 

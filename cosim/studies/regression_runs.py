@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from ..core import resources
 from ..core.errors import InputError
-from ..scenario.nested_systems import find_scenario
+from ..scenario import find_scenario
 from .regression import EXPECTATION_KEYS, Regression, RegressionOutcome, has_keys
 
 T = TypeVar("T")

@@ -100,6 +100,6 @@ def test_a_scenario_can_be_ended_earlier():
 def test_scenarios_satisfy_the_published_schema(path):
     import jsonschema
 
-    from cosim.scenario import json_schema
+    from cosim.scenario.extension_schema import editor_schema
 
-    jsonschema.validate(json.loads(path.read_text()), json_schema(nested=path.parent.name == "systems"))
+    jsonschema.validate(json.loads(path.read_text()), editor_schema(nested=path.parent.name == "systems"))
