@@ -98,7 +98,8 @@ def write_outputs(outcome: RunOutcome) -> int:
     else:
         for write in _COMPLETE_RUN_WRITERS:
             write(outcome)
-        code = 0 if all(check.passed for check in outcome.checks) else 3
+        passed = not outcome.result.crashed and all(check.passed for check in outcome.checks)
+        code = 0 if passed else 3
     for write in _EVERY_RUN_WRITERS:
         write(outcome)
     return code

@@ -68,6 +68,7 @@ def render_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Ite
     return render_page(
         "report.html",
         about=about,
+        crash=result.termination if result.crashed else "",
         checks=len(outcomes),
         failed=sum(not outcome.passed for outcome in outcomes),
         facts=list(_facts(result)),
@@ -108,8 +109,8 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
     yield "rows", str(len(result.time))
     if events := result.metadata.get("live_events"):
         yield "set by hand", f"{len(events)} time{'s' * (len(events) != 1)}"
-    if termination := result.metadata.get("terminated_by"):
-        yield "ended by", f"{termination['component']} at {termination['time']:g} s"
+    if result.termination:
+        yield "end", result.termination
 
 
 def _kpi_row(name: str, value: Number, units: Mapping[str, str]) -> KpiRow:

@@ -113,9 +113,14 @@ class Result:
 
     @property
     def termination(self) -> str:
-        """Sentence that names the component that ended the run and the time; "" if none did."""
+        """Sentence that names the component or the condition that ended the run before the stop time; "" if none did."""
         terminated_by = self.metadata.get("terminated_by")
         return describe_termination(**terminated_by) if terminated_by else ""
+
+    @property
+    def crashed(self) -> bool:
+        """True if a condition with the outcome "crash" ended the run."""
+        return (self.metadata.get("terminated_by") or {}).get("outcome") == "crash"
 
     def __repr__(self) -> str:
         """Return name, size, failure, termination, failed checks and KPIs, in several lines."""
@@ -231,9 +236,14 @@ class Result:
         return cls(read_csv(path))
 
 
-def describe_termination(component: str, time: float) -> str:
-    """Return a sentence that says that a component ended the run at `time` (s)."""
-    return f"{component} requested the end of the simulation at t = {time:.12g} s"
+def describe_termination(
+    time: float, component: str = "", condition: str = "", outcome: str = "", cause: str = "", since: float = 0.0
+) -> str:
+    """Return a sentence that says what ended the run at `time` (s): a component, or a condition met since `since` (s)."""
+    if component:
+        return f"{component} requested the end of the simulation at t = {time:.12g} s"
+    end = "crashed" if outcome == "crash" else "decided"
+    return f"{end} at t = {since:.12g} s, ended at t = {time:.12g} s: {condition} ({cause})"
 
 
 def write_run(result: Result, directory: str | Path) -> None:

@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, StringConstraints, model_validator
 
-from ..engine.settings import NonFinitePolicy
-from .schema_types import INVALID, AutoOrBool, BoolOrNumber, Integer, Name, NameList, Period, Seconds, Spec, Value
+from ..engine.settings import NonFinitePolicy, StopOutcome
+from .schema_types import INVALID, AutoOrBool, BoolOrNumber, Duration, Integer, Name, NameList, Period, Seconds, Spec, Value
 
 #: pattern of the names of scenarios
 SCENARIO_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$"
@@ -20,7 +20,13 @@ SOURCES = ("fmu", "python", "modelica", "system")
 
 
 #: lists whose elements can be changed by an object in a file with "extends", and the key that names their elements
-KEYED_LISTS = {("connections",): "to", ("kpis",): "name", ("figures",): "name", ("checks",): "kpi"}
+KEYED_LISTS = {
+    ("connections",): "to",
+    ("kpis",): "name",
+    ("figures",): "name",
+    ("checks",): "kpi",
+    ("stop_when",): "name",
+}
 #: keys that a file with "extends" does not inherit
 NOT_INHERITED = ("$schema", "name", "description", "reference")
 
@@ -143,6 +149,20 @@ class EventSpec(Spec):
 
     time: Seconds = Field(description="a communication point (s)")
     values: dict[str, Value] = Field(alias="set", description="values of tunable parameters and unconnected inputs, by name")
+
+
+class StopSpec(Spec):
+    """A condition that ends the run before the stop time.
+
+    The run ends at the first recorded point at which the condition has been met for its hold time without interruption.
+    """
+
+    name: Name = Field(description="unique name for messages")
+    when: str = Field(description='condition on recorded signals, such as "uav.crashed or uav.position.z < 0 and uav.mode >= 2"')
+    for_: Duration = Field(default=Fraction(0), alias="for", description="hold time (s)")
+    outcome: StopOutcome = Field(
+        default="decided", description="decided: nothing that matters follows; crash: a failure, exit code 3 of `cosim run`"
+    )
 
 
 class InputSpec(Spec):
@@ -279,6 +299,7 @@ class ScenarioSpec(SystemSpec):
         description='JSON pointers of the entries that a seed sets, such as "/components/plant/arguments/environment/seed"',
     )
     deadlines: DeadlinesSpec = Field(default=DeadlinesSpec(), description="time limits of calls in supervised runs")
+    stop_when: list[StopSpec] = Field(default=[], description="conditions that end the run before the stop time")
     non_finite: NonFinitePolicy = Field(
         default="error",
         description="treatment of NaN and infinity. error: on a connected output they end the run, on a recorded one they give a "

@@ -35,6 +35,12 @@ def _check_positive(value: Fraction) -> Fraction:
     return value
 
 
+def _check_not_negative(value: Fraction) -> Fraction:
+    if value < 0:
+        raise ValueError("expected 0 s or more")
+    return value
+
+
 def _check_value(value: Any) -> Any:
     values = value if isinstance(value, list) else [value]
     if not values or not all(isinstance(v, bool | int | float | str) for v in values):
@@ -79,6 +85,18 @@ Period = Annotated[
             "anyOf": [
                 {"type": "number", "exclusiveMinimum": 0, "maximum": MAX_TIME},
                 {"type": "string", "pattern": _POSITIVE_TIME_PATTERN},
+            ]
+        }
+    ),
+]
+Duration = Annotated[
+    Seconds,
+    AfterValidator(_check_not_negative),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "minimum": 0, "maximum": MAX_TIME},
+                {"type": "string", "pattern": rf"^\+?{_UNSIGNED_TIME}"},
             ]
         }
     ),

@@ -27,6 +27,7 @@ from .nested_systems import Node, Scenario
 from .recorded_signals import SignalSelector
 from .schema import SystemSpec
 from .schema_types import accepted
+from .stop_conditions import StopConditionReader
 from .wiring import Wiring
 
 #: prefix of the components made from input profiles: inputs.0, inputs.1, ...
@@ -76,13 +77,17 @@ class SystemBuilder:
             aliases,
             _parallel_mode(self.spec),
         )
+        columns = self._columns(aliases)
+        stops = StopConditionReader(self.root, self.spec, self.components, columns, not self._has_missing_signals)
+        self.problems += stops.problems
         settings = Settings(
             self.spec.start_time,
             self.spec.stop_time,
             self.spec.step_size,
-            self._columns(aliases),
+            columns,
             self.spec.record.interval,
             list(self._events()),
+            stops.conditions,
             non_finite=self.spec.non_finite,
             real_time=real_time,
             late=late,

@@ -140,7 +140,8 @@ class _FinishedRun:
         from ..results.checks import evaluate_all_checks
 
         kpis = {name: math.nan if value is None else value for name, value in self.result.kpis.items()}
-        return [str(outcome) for outcome in evaluate_all_checks(kpis, self.checks) if not outcome.passed]
+        crash = [self.result.termination] if self.result.crashed else []
+        return crash + [str(outcome) for outcome in evaluate_all_checks(kpis, self.checks) if not outcome.passed]
 
     @property
     def reference_path(self) -> Path:

@@ -70,7 +70,7 @@ def command(isolation: str, sandbox: str | None, view: bool, view_port: int, **o
 
     SCENARIO is a JSON file or the name of a shipped scenario. Writes result.csv, kpis.json, run.json, figures and report.html
     to the output directory. Exit code 0: the run ended and all checks passed; 1: a component failed, the results until then
-    are kept; 2: the scenario was refused; 3: a check failed.
+    are kept; 2: the scenario was refused; 3: a check failed, or a condition with the outcome "crash" ended the run.
     """
     run_options = RunOptions(**options, isolation="fmu" if isolation == "fmu" else "none", sandbox=bool(sandbox))
     if view:

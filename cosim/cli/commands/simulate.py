@@ -96,7 +96,7 @@ def _simulate(
         if not output:
             _print_final_values(run.recording)
         if run.termination:
-            click.echo(describe_termination("the FMU", run.termination.time), err=True)
+            click.echo(describe_termination(run.termination.time, "the FMU"), err=True)
         return supervision.results_written(0)
 
 
