@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import sys
 from collections.abc import Iterable
+from typing import Any
 
 import click
 
@@ -42,6 +44,13 @@ def print_log(level: int = logging.INFO) -> list[str]:
 def print_line(text: str) -> None:
     """Print a text that may contain foreign text as one line of standard output; line breaks in it are escaped."""
     click.echo(escape_control_characters(text, keep=SPACES))
+
+
+def print_json(value: Any) -> None:
+    """Print a value as JSON; NumPy values become numbers, and NaN and infinity become null."""
+    from ..results.files import to_json_types
+
+    click.echo(json.dumps(to_json_types(value), indent=2, ensure_ascii=False))
 
 
 def print_verdict(passed: bool) -> None:

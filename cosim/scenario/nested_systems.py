@@ -129,13 +129,12 @@ def find_scenario(scenario: str | Path) -> Path:
         InputError: There is neither such a file nor a shipped scenario of this name.
     """
     path = Path(scenario)
-    shipped = resources.root() / "scenarios"
     if path.suffix == ".json" or paths.is_file(path):
         return path
-    names = sorted(file.stem for file in shipped.glob("*.json"))
+    names = resources.shipped_names("scenarios/*.json")
     if str(scenario) not in names:
         raise InputError(f'no scenario file and no shipped scenario "{scenario}"{did_you_mean(str(scenario), names)}')
-    return shipped / f"{scenario}.json"
+    return resources.root() / "scenarios" / f"{scenario}.json"
 
 
 def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = None) -> Scenario:

@@ -86,7 +86,7 @@ def read_role(role: str) -> Role:
 
 def role_names() -> list[str]:
     """Return the names of the shipped roles."""
-    return sorted(path.stem for path in (resources.root() / "scenarios/roles").glob("*.json"))
+    return resources.shipped_names("scenarios/roles/*.json")
 
 
 def _find_role(role: str) -> Path:

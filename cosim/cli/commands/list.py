@@ -1,0 +1,32 @@
+"""`cosim list`: what cosim ships."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import click
+
+from ..messages import print_json
+from ..shipped import CATALOGUE
+
+
+@click.command()
+@click.argument("kinds", metavar="[KIND...]", nargs=-1, type=click.Choice(list(CATALOGUE)))
+@click.option("--json", "as_json", is_flag=True, help="Print a JSON object with a list of entries per KIND.")
+def command(kinds: tuple[str, ...], as_json: bool) -> None:
+    """List what cosim ships, with one line each; KIND: scenarios, sweeps, models, roles or kpis.
+
+    A scenario, sweep or role can be named without a path: `cosim run NAME`, `cosim sweep NAME`, `cosim tune NAME`,
+    `cosim bench-controller --role NAME`. Models are the vehicles of the plant. KPIs are functions for the key "kpis" of a scenario.
+    The JSON output also contains the file of each entry.
+    """
+    entries = {kind: list(CATALOGUE[kind]()) for kind in kinds or CATALOGUE}
+    if as_json:
+        print_json({kind: [asdict(entry) for entry in found] for kind, found in entries.items()})
+        return
+    for i, (kind, found) in enumerate(entries.items()):
+        if len(entries) > 1:
+            click.echo(f"{chr(10) if i else ''}{kind}")
+        width = max(len(entry.name) for entry in found)
+        for entry in found:
+            click.echo(f"  {entry.name:{width}}  {entry.description}")
