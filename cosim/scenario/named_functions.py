@@ -14,8 +14,9 @@ from typing import Any
 from ..components.python_import import load_object
 from ..core.errors import Problem, did_you_mean
 from ..core.paths import is_file
+from .evaluation_schema import CallSpec, FunctionSpec
 from .nested_systems import Node
-from .schema import CallSpec, FunctionSpec, ScenarioSpec
+from .schema import ScenarioSpec
 from .schema_types import accepted
 
 

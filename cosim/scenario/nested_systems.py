@@ -15,9 +15,10 @@ from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean
 from ..core.size_limits import MAX_LEVELS
 from ..core.text import acceptable_text, shorten, text_problem
+from .evaluation_schema import CallSpec
 from .expanded_size import SystemFile, check_expanded_size
 from .json_document import Document, read_document
-from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
+from .schema import NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
 from .validation import validate_document
 

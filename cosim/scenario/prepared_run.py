@@ -24,11 +24,12 @@ from ..engine.settings import Settings
 from ..process.float_mode import default_float_mode
 from ..process.process_state import exclusive_process_state
 from .component_factory import ComponentFactory
+from .evaluation_schema import FunctionSpec
 from .json_document import Document
 from .named_functions import load_function, signal_problems
 from .nested_systems import Node, load_scenario
 from .overview import describe_software, describe_system
-from .schema import FunctionSpec, ScenarioSpec
+from .schema import ScenarioSpec
 from .schema_types import accepted
 from .system_builder import PROFILE_PREFIX, SystemBuilder
 

@@ -7,7 +7,16 @@ from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, StringConstraints, WithJsonSchema, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    WithJsonSchema,
+    model_validator,
+)
 
 from ..core.time_grid import MAX_TIME, exact_fraction
 
@@ -108,6 +117,18 @@ class InvalidElement:
 
 
 INVALID: Any = InvalidElement()
+
+
+def key(description: str, example: Any, *, unit: str = "", **rules: Any) -> Any:
+    """Return the field of a key with its documentation in the JSON Schema.
+
+    Args:
+        description: Meaning of the value.
+        example: A valid value.
+        unit: Unit of the value.
+        **rules: Default, alias and limits, as of `pydantic.Field`.
+    """
+    return Field(description=description, examples=[example], json_schema_extra={"unit": unit} if unit else None, **rules)
 
 
 class Spec(BaseModel):

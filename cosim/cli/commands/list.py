@@ -16,9 +16,9 @@ from ..shipped import CATALOGUE
 def command(kinds: tuple[str, ...], as_json: bool) -> None:
     """List what cosim ships, with one line each; KIND: scenarios, sweeps, models, roles or kpis.
 
-    A scenario, sweep or role can be named without a path: `cosim run NAME`, `cosim sweep NAME`, `cosim tune NAME`,
-    `cosim bench-controller --role NAME`. Models are the vehicles of the plant. KPIs are functions for the key "kpis" of a scenario.
-    The JSON output also contains the file of each entry.
+    Scenarios, sweeps, tunings and roles are given to commands by name: `cosim run NAME`, `cosim sweep NAME`, `cosim tune NAME`,
+    `cosim bench-controller --role NAME`. Models are the vehicles of the plant. KPIs are functions for the key "kpis" of
+    scenarios. The JSON output also contains the file of each entry.
     """
     entries = {kind: list(CATALOGUE[kind]()) for kind in kinds or CATALOGUE}
     if as_json:
