@@ -10,8 +10,6 @@ from markdown_parts import code, page, plain, table
 
 from cosim.cli import COMMANDS, cli
 
-_COMMON_OPTIONS = {"help"}
-
 
 def commands_page() -> str:
     """Return the page with all commands, their arguments and options."""
@@ -40,6 +38,6 @@ def _options(context: click.Context) -> str:
     records = [
         (option, option.get_help_record(context))
         for option in context.command.get_params(context)
-        if isinstance(option, click.Option) and option.name not in _COMMON_OPTIONS
+        if isinstance(option, click.Option) and "--help" not in option.opts
     ]
     return table(("option", "purpose"), ((code(record[0]), plain(record[1])) for _, record in records if record))

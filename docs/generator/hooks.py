@@ -16,6 +16,8 @@ from schema_keys import scenario_keys_page, study_keys_page
 ROOT = Path(__file__).parents[2]
 #: documents outside of docs/ that the navigation contains; others are found by links
 STARTS = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "plant_src/README.md")
+#: files that the theme loads
+ASSETS = ("docs/generator/assets/iframe-worker.js", "docs/generator/assets/site.css")
 #: generated pages
 REFERENCE = {
     "commands": commands_page,
@@ -57,7 +59,7 @@ def repository_files(generated: Mapping[str, str]) -> list[str]:
     Raises:
         FileNotFoundError: A document links to another document that does not exist.
     """
-    pending = [*generated, *STARTS, *(str(path.relative_to(ROOT)) for path in (ROOT / "docs").rglob("*.md"))]
+    pending = [*generated, *STARTS, *ASSETS, *(str(path.relative_to(ROOT)) for path in (ROOT / "docs").rglob("*.md"))]
     found: set[str] = set()
     while pending:
         name = pending.pop()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
+_SPECIAL = re.compile(r"[*_\[\]<>|\\]")
 GENERATED = "*This page is generated from the code.*"
 
 
@@ -24,7 +25,7 @@ def code(text: object) -> str:
 def plain(text: str) -> str:
     """Return a text in which no character but those of `code` is Markdown or HTML."""
     parts = re.split(r"(`[^`]+`)", text)
-    return "".join(part if i % 2 else re.sub(r"([*_\[\]<>|\\])", r"\\\1", part) for i, part in enumerate(parts))
+    return "".join(part if i % 2 else _SPECIAL.sub(lambda found: f"&#{ord(found[0])};", part) for i, part in enumerate(parts))
 
 
 def page(title: str, *parts: str) -> str:

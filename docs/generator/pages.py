@@ -33,7 +33,7 @@ _CAUSALITIES = ("input", "output", "parameter")
 
 def python_page() -> str:
     """Return the page with the public names of the package `cosim`."""
-    names = [f"cosim.{name}" for name in cosim.__all__ if name != "__version__"]
+    names = [f"cosim.{name}" for name in sorted(cosim.__all__, key=str.swapcase) if name != "__version__"]
     return page("Python", *_definitions(names), "## Components and KPIs", *_definitions(EXTENSIONS))
 
 
