@@ -9,7 +9,7 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, TextIO
 
 import click
 
@@ -57,7 +57,10 @@ class _LazyGroup(click.Group):
         """Import the command called `name`; None if there is none."""
         if name not in COMMANDS:
             return None
+        from .output_options import add_verbosity_options
+
         command: click.Command = import_module(f".commands.{COMMANDS[name][0]}", __name__).command
+        add_verbosity_options(command)
         return command
 
     def format_commands(self, _ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -68,15 +71,25 @@ class _LazyGroup(click.Group):
 
 @dataclass
 class CommandLine:
-    """Arguments of this call of `cosim`, and its option --debug once click has parsed it."""
+    """Arguments of this call of `cosim`, and its options once click has parsed them.
+
+    Attributes:
+        arguments: words after the program's name.
+        debug: --debug was given.
+        verbosity: -1 with --quiet, 1 with --verbose.
+        data: stream for the text of --json; None: standard output.
+    """
 
     arguments: tuple[str, ...] = ()
     debug: bool = False
+    verbosity: int = 0
+    data: TextIO | None = None
 
 
 def current_command_line() -> CommandLine:
-    """Return the command line of the running command; an empty one if the command was called without the group `cosim`."""
-    return click.get_current_context().find_root().ensure_object(CommandLine)
+    """Return the command line of the running command; an empty one if it was called without the group `cosim`."""
+    context = click.get_current_context(silent=True)
+    return context.find_root().ensure_object(CommandLine) if context else CommandLine()
 
 
 @click.command(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})

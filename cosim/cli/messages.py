@@ -13,7 +13,10 @@ import click
 from ..core.errors import Problem
 from ..core.text import SPACES, escape_control_characters
 from ..process.standard_streams import unescaped
+from . import current_command_line
 
+#: lowest level of printed messages, by `CommandLine.verbosity`
+_LEVELS = {-1: logging.WARNING, 0: logging.INFO, 1: logging.DEBUG}
 #: number of warnings collected for the report
 MAX_WARNINGS = 200
 
@@ -31,13 +34,17 @@ class _WarningCollector(logging.Handler):
             self.texts.append(f"{record.levelname} {record.getMessage()}")
 
 
-def print_log(level: int = logging.INFO) -> list[str]:
-    """Print all following messages of the logger "cosim"; return the list that collects the texts of warnings and errors."""
+def print_log() -> list[str]:
+    """Print the following messages of the logger "cosim" as --quiet or --verbose demand.
+
+    Returns:
+        The list that collects the texts of warnings and errors.
+    """
     handler, collector = logging.StreamHandler(sys.stderr), _WarningCollector()
     handler.setFormatter(logging.Formatter("%(levelname)s %(message)s"))
     logger = logging.getLogger("cosim")
     logger.handlers[:] = [handler, collector]
-    logger.setLevel(level)
+    logger.setLevel(_LEVELS[current_command_line().verbosity])
     return collector.texts
 
 
@@ -50,7 +57,7 @@ def print_json(value: Any) -> None:
     """Print a value as JSON; NumPy values become numbers, and NaN and infinity become null."""
     from ..results.files import to_json_types
 
-    click.echo(json.dumps(to_json_types(value), indent=2, ensure_ascii=False))
+    click.echo(json.dumps(to_json_types(value), indent=2, ensure_ascii=False), file=current_command_line().data)
 
 
 def print_verdict(passed: bool) -> None:

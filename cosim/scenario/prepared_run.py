@@ -17,6 +17,7 @@ from ..components.python_import import package_files
 from ..core.errors import Problem
 from ..core.stopwatch import Stopwatch
 from ..core.system import System
+from ..core.text import count_noun
 from ..engine.pacer import LatePolicy
 from ..engine.plan import Plan
 from ..engine.run_loop import free_components
@@ -53,7 +54,7 @@ class PreparedRun:
     def __repr__(self) -> str:
         system, settings = self.system, self.settings
         times = f"{float(settings.start_time):g} s to {float(settings.stop_time):g} s in steps of {float(settings.step_size):g} s"
-        return f"{self.spec.name}: {', '.join(system.components)}; {len(system.connections)} connections; {times}"
+        return f"{self.spec.name}: {', '.join(system.components)}; {count_noun(len(system.connections), 'connection')}; {times}"
 
     @property
     def system(self) -> System:

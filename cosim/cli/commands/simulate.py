@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ...core.text import count_noun
 from ...process.output_lock import LockKeeper
 from ...process.temporary_folders import temporary_run_folder
 from .. import current_command_line, report_error, strict_sandbox, supervision
@@ -120,7 +121,7 @@ def _write_recording(recording: Recording, output: Path | None, shown: Path | No
         result = Result(recording)
         with writing_results(result, unfinished, shown):
             result.to_csv(output)
-        click.echo(f"{len(recording.time)} rows in {shown}")
+        click.echo(f"{count_noun(len(recording.time), 'row')} in {shown}")
 
 
 def _print_final_values(recording: Recording) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...core.errors import CosimError, InputError
+from ...core.text import count_noun
 from .. import study_options
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def _print_best(tuning: Tuning, best: Trial, folder: Path) -> None:
     if not best.feasible:
         click.echo(_failure_text(tuning, best), err=True)
     settings = {**tuning.spec.settings, **tuning.spec.cases[0], **tuning.settings(best.parameters)}
-    click.echo(f"{len(tuning.trials)} points evaluated; trials.csv and best.json in {folder}")
+    click.echo(f"{count_noun(len(tuning.trials), 'point')} evaluated; trials.csv and best.json in {folder}")
     click.echo(format_run_command(tuning.study_file.scenario, settings))
 
 
