@@ -105,11 +105,8 @@ class Regression:
             return RegressionOutcome(self.file.stem, 3, "a failed run becomes no reference", tuple(failed))
         written = write_reference(run.result, run.reference_path, run.tolerances)
         size = run.reference_path.stat().st_size / 1000
-        return RegressionOutcome(
-            self.file.stem,
-            0,
-            f"{count_noun(len(written), 'signal')}, {count_noun(len(written.time), 'row')}, {size:.0f} kB in {run.reference_path}",
-        )
+        amount = f"{count_noun(len(written), 'signal')}, {count_noun(len(written.time), 'row')}"
+        return RegressionOutcome(self.file.stem, 0, f"{amount}, {size:.0f} kB in {run.reference_path}")
 
 
 @dataclass(frozen=True)

@@ -156,7 +156,7 @@ def test_all_rows_of_a_finished_run_are_kept(tmp_path):
     run = "$COSIM run robust.json --no-report --output-dir"
     done = on_small_disk(workplace, "5m", f"{run} out; code=$?", RECOVER, f"{run} whole >&2")
     assert done.returncode == 1, done.stderr
-    assert "; 200001 rows are kept: free about " in done.stderr
+    assert "; kept 200001 rows: free about " in done.stderr
     for name in ("result.csv", "kpis.json"):
         assert (workplace.out / name).read_bytes() == (workplace.folder / "whole" / name).read_bytes()
     whole, recovered = (json.loads((folder / "run.json").read_text()) for folder in (workplace.folder / "whole", workplace.out))
@@ -170,7 +170,7 @@ def test_one_fmu_alone_on_a_full_disk(tmp_path):
     recover = RECOVER.replace("recover out", "recover out/x.csv")
     done = on_small_disk(workplace, "5500k", simulate, "test -e out/x.csv && code=97", recover)
     assert done.returncode == 1, done.stderr
-    assert "; 100001 rows are kept: free about " in done.stderr
+    assert "; kept 100001 rows: free about " in done.stderr
     assert [path.name for path in workplace.out.iterdir()] == ["x.csv"]
     assert len(cosim.Result.from_csv(workplace.out / "x.csv").time) == 100_001
 
