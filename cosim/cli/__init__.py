@@ -136,22 +136,31 @@ def run_guarded(command: Callable[[], int], command_line: CommandLine) -> int:
 
 def report_error(error: BaseException, command_line: CommandLine) -> int:
     """Print an error to standard error, with its traceback after --debug, and return the exit code for it."""
-    if isinstance(error, KeyboardInterrupt | click.exceptions.Abort):
-        click.echo("interrupted", err=True)
-        return 130
     if isinstance(error, click.ClickException):
         error.show()
         return error.exit_code
-    if command_line.debug:
+    interrupted = isinstance(error, KeyboardInterrupt | click.exceptions.Abort)
+    if command_line.debug and not interrupted:
         traceback.print_exception(error)
-    if isinstance(error, CosimError):
-        click.echo(str(error), err=True)
+    if interrupted:
+        text = "interrupted"
+    elif isinstance(error, CosimError):
+        text = str(error)
+    elif isinstance(error, OSError):
+        text = f"operating system error: {error}"
+    else:
+        text = f"internal error: {type(error).__name__}: {error}  (`cosim --debug ...` prints the traceback)"
+    click.echo(text, err=True)
+    return exit_code_of(error)
+
+
+def exit_code_of(error: BaseException) -> int:
+    """Return the exit code for an error."""
+    if isinstance(error, KeyboardInterrupt | click.exceptions.Abort):
+        return 130
+    if isinstance(error, click.ClickException | CosimError):
         return error.exit_code
-    if isinstance(error, OSError):
-        click.echo(f"operating system error: {error}", err=True)
-        return 1
-    click.echo(f"internal error: {type(error).__name__}: {error}  (`cosim --debug ...` prints the traceback)", err=True)
-    return 70
+    return 1 if isinstance(error, OSError) else 70
 
 
 def _exit_code(value: Any) -> int:
