@@ -57,10 +57,8 @@ class _LazyGroup(click.Group):
         """Import the command called `name`; None if there is none."""
         if name not in COMMANDS:
             return None
-        from .output_options import add_verbosity_options
-
         command: click.Command = import_module(f".commands.{COMMANDS[name][0]}", __name__).command
-        add_verbosity_options(command)
+        import_module(".output_options", __name__).add_verbosity_options(command)
         return command
 
     def format_commands(self, _ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from ..core import resources
 from ..core.json_values import parse_object
 
-#: files whose public functions are KPIs
-_KPI_FILES = ("cosim/kpis.py", "plant_src/kpis.py", "plant_src/manoeuvres.py")
+#: module of the KPIs of any signal
+_KPI_MODULE = "cosim.kpis"
 
 
 @dataclass(frozen=True)
@@ -35,21 +36,33 @@ def _list_documents(pattern: str) -> Iterator[Entry]:
 
 
 def _list_models() -> Iterator[Entry]:
-    """Yield the vehicles of the plant, with the titles of their README files."""
-    for path in sorted(resources.root().glob("plant_src/vehicles/*/README.md")):
-        yield Entry(path.parent.name, path.read_text(encoding="utf-8").partition("\n")[0].lstrip("# "), str(path))
+    """Yield the models that are exported from equations and have a README file, with its title."""
+    from ..export.sources import find_sources
+
+    for source in find_sources(resources.root()):
+        readme = source.path.parent / "README.md"
+        if source.kind.name == "equations" and readme.is_file():
+            yield Entry(source.name, readme.read_text(encoding="utf-8").partition("\n")[0].lstrip("# "), str(readme))
 
 
 def _list_kpis() -> Iterator[Entry]:
-    """Yield the public functions of the KPI files, with the first sentences of their docstrings."""
-    for file in _KPI_FILES:
-        in_package = file.startswith("cosim/")
-        path = (resources.package_folder().parent if in_package else resources.root()) / file
-        module = file.removesuffix(".py").replace("/", ".")
+    """Yield the public functions of the files from which shipped scenarios name KPIs, and the first lines of their docstrings."""
+    for name, path in sorted(_kpi_files().items()):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
                 text = (ast.get_docstring(node) or "").partition("\n")[0]
-                yield Entry(f"{module if in_package else file}:{node.name}", text, str(path))
+                yield Entry(f"{name}:{node.name}", text, str(path))
+
+
+def _kpi_files() -> dict[str, Path]:
+    """Return the files of KPI functions by their names relative to the folder of shipped files, or as modules."""
+    folder, files = resources.root() / "scenarios", {_KPI_MODULE: resources.package_folder() / "kpis.py"}
+    for scenario in folder.glob("*.json"):
+        for kpi in parse_object(scenario.read_text(encoding="utf-8")).get("kpis", []):
+            path = (folder / kpi["python"].rpartition(":")[0]).resolve()
+            if path.suffix == ".py":
+                files[path.relative_to(resources.root().resolve()).as_posix()] = path
+    return files
 
 
 #: function that yields the entries of each kind

@@ -106,7 +106,7 @@ def _kpi_parts(entry: Entry) -> Iterator[str]:
     function = load_object(f"{path.name}:{name}", path.parent)
     units, senses = getattr(function, "units", {}), getattr(function, "better", {})
     rows = ((code(value), code(units.get(value, "")), senses.get(value, "")) for value in dict.fromkeys((*units, *senses)))
-    yield f"::: {path.parent.name}.{path.stem}.{name}"
+    yield f"::: {entry.name.partition(':')[0].removesuffix('.py').replace('/', '.')}.{name}"
     yield table(("value", "unit", "better"), rows)
 
 
