@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..messages import print_json
+from ..output_options import json_option
+
 if TYPE_CHECKING:
     from ...results import Result
     from ...results.comparison import Comparison, Tolerance
@@ -25,8 +28,18 @@ if TYPE_CHECKING:
 @click.option(
     "--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw the worst signals in their tubes (PNG or SVG)."
 )
+@json_option(
+    "an object with passed and signals, a list of signal, passed, problem, time (s) and excess (half heights of the tube)"
+)
 def command(
-    result: Path, reference: Path, absolute: float, relative: float, time: float, signals: tuple[str, ...], plot: Path | None
+    result: Path,
+    reference: Path,
+    absolute: float,
+    relative: float,
+    time: float,
+    signals: tuple[str, ...],
+    plot: Path | None,
+    as_json: bool,
 ) -> int:
     """Compare RESULT with REFERENCE, signal by signal.
 
@@ -47,7 +60,11 @@ def command(
     comparison = compare(actual, expected, tolerances)
     if plot:
         _draw_tubes(actual, expected, tolerances, comparison, plot)
-    click.echo(str(comparison), err=not comparison.passed)
+    if as_json:
+        verdicts = [{**verdict._asdict(), "passed": verdict.passed} for verdict in comparison.verdicts]
+        print_json({"passed": comparison.passed, "signals": verdicts})
+    else:
+        click.echo(str(comparison), err=not comparison.passed)
     return 0 if comparison.passed else 3
 
 

@@ -7,12 +7,13 @@ from dataclasses import asdict
 import click
 
 from ..messages import print_json
+from ..output_options import json_option
 from ..shipped import CATALOGUE
 
 
 @click.command()
 @click.argument("kinds", metavar="[KIND...]", nargs=-1, type=click.Choice(list(CATALOGUE)))
-@click.option("--json", "as_json", is_flag=True, help="Print a JSON object with a list of entries per KIND.")
+@json_option("an object with a list of entries (name, description, file) for each KIND")
 def command(kinds: tuple[str, ...], as_json: bool) -> None:
     """List what cosim ships, with one line each; KIND: scenarios, sweeps, models, roles or kpis.
 

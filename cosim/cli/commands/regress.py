@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -12,8 +13,11 @@ import click
 from ...core import resources
 from ...core.errors import InputError
 from ...core.processors import available_processors
+from ...core.text import count_noun
 from ...studies.regression import EXPECTATION_KEYS, Regression, RegressionOutcome, has_keys
-from ..messages import print_verdict
+from .. import current_command_line
+from ..messages import print_json, print_verdict
+from ..output_options import json_option
 
 if TYPE_CHECKING:
     from ...report.junit import JUnitCase
@@ -32,7 +36,10 @@ EXIT_CODE_SEVERITY = (130, 70, 2, 1, 3, 0)
     "--output-dir", type=click.Path(path_type=Path), default=Path("runs"), show_default=True, help="Folder for the results."
 )
 @click.option("--jobs", type=click.IntRange(min=1), help="Number of scenarios at a time; default: one per processor.")
-def command(scenarios: tuple[Path, ...], update: bool, junit: Path | None, output_dir: Path, jobs: int | None) -> int:
+@json_option("an object with failed, their number, and scenarios, a list of name, code, summary, details and seconds")
+def command(
+    scenarios: tuple[Path, ...], update: bool, junit: Path | None, output_dir: Path, jobs: int | None, as_json: bool
+) -> int:
     """Run all scenarios that have checks or a reference, and compare their results with these.
 
     SCENARIO is a file or the name of a shipped scenario; DIR stands for its files *.json; default: the folder scenarios/. Each
@@ -48,15 +55,18 @@ def command(scenarios: tuple[Path, ...], update: bool, junit: Path | None, outpu
     work = [Regression(file, output_dir / file.stem, update) for file in files]
     outcomes = []
     for outcome in run_in_parallel([each.run for each in work], jobs or available_processors()):
-        _print_outcome(outcome)
         outcomes.append(outcome)
+        if not as_json:
+            _print_outcome(outcome)
     if junit:
         from ...report.junit import write_junit
 
         write_junit("cosim regress", [_junit_case(outcome) for outcome in outcomes], junit)
     failed = sum(outcome.code != 0 for outcome in outcomes)
-    count = "1 scenario" if len(outcomes) == 1 else f"{len(outcomes)} scenarios"
-    click.echo(f"{count}, {failed} failed" if failed else f"{count}, all passed")
+    if as_json:
+        print_json({"failed": failed, "scenarios": [asdict(outcome) for outcome in outcomes]})
+    else:
+        click.echo(f"{count_noun(len(outcomes), 'scenario')}, {f'{failed} failed' if failed else 'all passed'}")
     return min((outcome.code for outcome in outcomes), key=EXIT_CODE_SEVERITY.index)
 
 
@@ -107,6 +117,9 @@ def run_in_parallel(work: Sequence[Callable[[], T]], jobs: int) -> Iterator[T]:
 
 
 def _print_outcome(outcome: RegressionOutcome) -> None:
+    if outcome.code and current_command_line().verbosity < 0:
+        for line in outcome.details:
+            click.echo(f"{outcome.name}: {line}", err=True)
     print_verdict(outcome.code == 0)
     click.echo(f"  {outcome.name:<28} {outcome.summary:<24} {outcome.seconds:5.1f} s")
     for line in outcome.details:
