@@ -58,7 +58,7 @@ def print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:
         *(("check",) if with_checks else ()),
     ):
         table.add_column(
-            cell_text(header), justify="right" if header in (candidate, "shipped", "last run") else "left", no_wrap=True
+            cell_text(header), justify="right" if header in (candidate, "shipped", "last run") else "left", overflow="fold"
         )
     for row in rows:
         cells = [row.name, row.unit, _format_value(row.candidate), _format_value(row.shipped)]

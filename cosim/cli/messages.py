@@ -29,9 +29,11 @@ class _WarningCollector(logging.Handler):
         self.texts: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Collect a message unless there are too many."""
+        """Collect a message; the last one says that more were only printed."""
         if len(self.texts) < MAX_WARNINGS:
             self.texts.append(f"{record.levelname} {record.getMessage()}")
+        elif len(self.texts) == MAX_WARNINGS:
+            self.texts.append("more warnings were printed and are not listed here")
 
 
 def print_log() -> list[str]:

@@ -86,7 +86,8 @@ def _metadata_with_defaults(result: Result) -> dict[str, Any]:
         "sha256": {},
     }
     about = to_json_types({**missing, **result.metadata})
-    return {**about, "sha256": dict(islice(about["sha256"].items(), MAX_HASHES))}
+    hashes = about["sha256"]
+    return {**about, "sha256": dict(islice(hashes.items(), MAX_HASHES)), "file_count": len(hashes)}
 
 
 def _facts(result: Result) -> Iterator[tuple[str, str]]:

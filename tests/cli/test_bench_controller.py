@@ -114,7 +114,7 @@ def test_another_build_of_the_shipped_controller_is_neither_better_nor_worse(fol
 
 def test_worse_and_better_controllers_are_marked(folder):
     path = lazy(folder)
-    worse = bench(folder, path)
+    worse = bench(folder, path, "--verbose")
     assert worse.returncode == 3
     assert "FAILED  sail" in worse.stdout
     assert "waypoints.all_reached is false, expected equals true" in worse.stdout
@@ -123,7 +123,7 @@ def test_worse_and_better_controllers_are_marked(folder):
     assert "last run" not in worse.stdout
     path.write_text(path.read_text().replace("0.02", "0.7"))
     shipped = (folder / "runs/bench/shipped/sail/run.json").stat().st_mtime_ns
-    better = bench(folder, path)
+    better = bench(folder, path, "--verbose")
     assert (folder / "runs/bench/shipped/sail/run.json").stat().st_mtime_ns == shipped  # nothing has changed there
     assert better.returncode == 0
     assert words(better, "waypoints.reached")[1:] == ["2", "2", "1", "better"]

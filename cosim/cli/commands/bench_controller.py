@@ -16,6 +16,7 @@ from ...core.processors import available_processors
 from .. import current_command_line, supervision
 from ..bench_table import print_comparison, print_ranking
 from ..bench_trial import ControllerTrial, TrialResult, run_trials
+from ..completion import complete_role, complete_scenario
 from ..messages import print_json, print_verdict
 from ..output_options import json_option
 from .regress import EXIT_CODE_SEVERITY, check_unique_names, default_folder, find_scenario_files
@@ -31,7 +32,10 @@ _PREPARED_FILE = "bench.json"
 @click.command()
 @click.argument("controller")
 @click.option(
-    "--role", required=True, help="Role of the controller: usv_autopilot, uav_position, ..., or the path of a role's JSON file."
+    "--role",
+    required=True,
+    shell_complete=complete_role,
+    help="Role of the controller (see `cosim list roles`), or the path of a role's JSON file.",
 )
 @click.option("--set", "settings", multiple=True, metavar="NAME=value", help="Set a parameter of the controller.")
 @click.option(
@@ -39,6 +43,7 @@ _PREPARED_FILE = "bench.json"
     multiple=True,
     metavar="DIR|SCENARIO",
     type=click.Path(path_type=Path),
+    shell_complete=complete_scenario,
     help="Scenarios to run; default: the folder scenarios/ here, else the shipped ones.",
 )
 @click.option(

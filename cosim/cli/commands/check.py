@@ -11,6 +11,7 @@ from ...core.errors import InputError, Problem
 from ...core.system import Group, Stage
 from ...core.text import count_noun
 from .. import strict_sandbox, supervision
+from ..completion import complete_scenario
 from ..messages import print_json
 from ..output_options import json_option
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=strict_sandbox.SandboxCommand)
-@click.argument("scenario")
+@click.argument("scenario", shell_complete=complete_scenario)
 @click.option("--set", "settings", multiple=True, metavar="NAME=value", help="As for `cosim run`.")
 @click.option("--connections/--no-connections", default=True, help="List every connection.")
 @json_option(

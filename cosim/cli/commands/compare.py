@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..completion import complete_scenario
 from ..messages import print_json
 from ..output_options import json_option
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("result", type=click.Path(path_type=Path))
-@click.argument("reference", type=click.Path(path_type=Path))
+@click.argument("reference", type=click.Path(path_type=Path), shell_complete=complete_scenario)
 @click.option("--absolute", default=0.0, help="Tolerance of values, in the unit of each signal.")
 @click.option("--relative", default=0.0, help="Tolerance of values, relative to the range of each signal in the reference.")
 @click.option("--time", default=0.0, help="Tolerance of time (s).")
@@ -28,9 +29,7 @@ if TYPE_CHECKING:
 @click.option(
     "--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw the worst signals in their tubes (PNG or SVG)."
 )
-@json_option(
-    "an object with passed and signals, a list of signal, passed, problem, time (s) and excess (half heights of the tube)"
-)
+@json_option("an object with passed and signals, a list of signal, passed, problem, time (s) and excess")
 def command(
     result: Path,
     reference: Path,

@@ -25,8 +25,8 @@ _MAX_START_LENGTH = 40
 @click.argument("fmu", type=click.Path(path_type=Path))
 @click.option("--locals", "with_locals", is_flag=True, help="Also list local variables.")
 @json_option(
-    "an object with properties and variables, a list of name, type, causality, variability, unit, shape, start, minimum, maximum, "
-    "items and description"
+    "an object with properties and variables, a list of name, type, causality, variability, unit, shape, start, minimum, "
+    "maximum, items and description"
 )
 def command(fmu: Path, with_locals: bool, as_json: bool) -> None:
     """Print the properties and variables of FMU: version, capabilities, platforms, inputs, outputs and parameters."""

@@ -16,6 +16,7 @@ from ...core.processors import available_processors
 from ...core.text import count_noun
 from ...studies.regression import EXPECTATION_KEYS, Regression, RegressionOutcome, has_keys
 from .. import current_command_line
+from ..completion import complete_scenario
 from ..messages import print_json, print_verdict
 from ..output_options import json_option
 
@@ -29,7 +30,9 @@ EXIT_CODE_SEVERITY = (130, 70, 2, 1, 3, 0)
 
 
 @click.command()
-@click.argument("scenarios", nargs=-1, metavar="[DIR|SCENARIO...]", type=click.Path(path_type=Path))
+@click.argument(
+    "scenarios", nargs=-1, metavar="[DIR|SCENARIO...]", type=click.Path(path_type=Path), shell_complete=complete_scenario
+)
 @click.option("--update", is_flag=True, help="Write new references from these runs.")
 @click.option("--junit", type=click.Path(path_type=Path), metavar="FILE.xml", help="Also write the outcomes as JUnit XML.")
 @click.option(

@@ -15,6 +15,7 @@ from ...core.errors import CosimError, InputError, Problem
 from ...core.json_values import parse_object
 from ...process.output_lock import LockKeeper
 from .. import live, strict_sandbox, supervision
+from ..completion import complete_scenario
 from ..csv_options import csv_options
 from ..failed_runs import save_after_crash
 from ..output_options import json_option
@@ -33,7 +34,7 @@ RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run
 
 
 @click.command(cls=strict_sandbox.SandboxCommand)
-@click.argument("scenario")
+@click.argument("scenario", shell_complete=complete_scenario)
 @click.option("--output-dir", type=click.Path(path_type=Path), help="Folder for the results; default: runs/NAME.")
 @click.option("--stop-time", help="Stop time (s), instead of the scenario's.")
 @click.option("--step-size", help="Macro step size (s), instead of the scenario's.")

@@ -13,6 +13,7 @@ from ...core.errors import CosimError, InputError
 from ...core.processors import available_processors
 from ...core.text import count_noun
 from .. import current_command_line, study_options
+from ..completion import complete_study
 from ..messages import print_json
 from ..output_options import json_option
 
@@ -29,13 +30,13 @@ _MAX_PRINTED = 20
 
 
 @click.command()
-@click.argument("sweep")
+@click.argument("sweep", shell_complete=complete_study)
 @click.option("--output-dir", type=click.Path(path_type=Path), help="Folder for the results; default: runs/NAME.")
 @click.option("--parquet", is_flag=True, help="Also write table.parquet (extra `parquet`).")
 @click.option("--replays", is_flag=True, help="Also write the 3-D replay of one run of each cell of the maps.")
 @json_option(
     "an object with name, folder, runs, finished, failed, failure_causes (cause, runs, first_run) and groups, whose entries have "
-    "labels, runs, distinct, passed, success_rate, interval (95 %) and kpis; the first group is all runs and has statistics of KPIs"
+    "labels, runs, distinct, passed, success_rate, interval (95 %) and kpis; the first group is all runs and has the kpis"
 )
 @study_options.study_options
 def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, as_json: bool, **study: Any) -> int:

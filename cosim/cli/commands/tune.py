@@ -11,6 +11,7 @@ import click
 from ...core.errors import CosimError, InputError
 from ...core.text import count_noun
 from .. import study_options
+from ..completion import complete_study
 
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("tuning", metavar="TUNE")
+@click.argument("tuning", metavar="TUNE", shell_complete=complete_study)
 @click.option("--output-dir", type=click.Path(path_type=Path), help="Folder for the results; default: runs/NAME.")
 @study_options.study_options
 def command(tuning: str, output_dir: Path | None, **study: Any) -> int:
