@@ -58,7 +58,8 @@ def _kpi_files() -> dict[str, Path]:
     """Return the files of KPI functions by their names relative to the folder of shipped files, or as modules."""
     folder, files = resources.root() / "scenarios", {_KPI_MODULE: resources.package_folder() / "kpis.py"}
     for scenario in folder.glob("*.json"):
-        for kpi in parse_object(scenario.read_text(encoding="utf-8")).get("kpis", []):
+        kpis = parse_object(scenario.read_text(encoding="utf-8")).get("kpis", [])
+        for kpi in kpis if isinstance(kpis, list) else ():  # a scenario that extends another may change single KPIs
             path = (folder / kpi["python"].rpartition(":")[0]).resolve()
             if path.suffix == ".py":
                 files[path.relative_to(resources.root().resolve()).as_posix()] = path

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import ConfigDict, model_validator
 
-from .schema_types import INVALID, BoolOrNumber, Name, Spec, key
+from .schema_types import INVALID, BoolOrNumber, Name, NameList, Spec, key
 
 #: the rules of `CheckSpec._check_bounds` that JSON Schema can express
 _CHECK_RULES: dict[str, Any] = {
@@ -19,7 +19,17 @@ class CallSpec(Spec):
 
     python: str = key('"file.py:function" or "package.module:function"', "cosim.kpis:rms")
     arguments: dict[str, Any] = key(
-        "keyword arguments of the function", {"signal": "plant.uav.position.z", "target": 2.0}, default={}
+        'keyword arguments of the function; {"from": "usv.waypoint_x"} is the value of a parameter, and '
+        '{"from": "/components/plant/arguments/platforms"} that of an entry of the scenario',
+        {"signal": "plant.uav.position.z", "target": 2.0},
+        default={},
+    )
+    sources: NameList = key(
+        'components ("usv"), prefixes of variables ("plant.uav") or JSON pointers of objects, from which arguments that are not '
+        "given are taken by name",
+        "usv",
+        default=[],
+        alias="from",
     )
 
 
@@ -27,6 +37,9 @@ class FunctionSpec(CallSpec):
     """A Python function that is called with the result: a KPI returns numbers, a figure returns a matplotlib Figure."""
 
     name: Name = key("unique name; that of a KPI is the prefix of its values, that of a figure the file name", "altitude")
+    optional: bool = key(
+        "leave it out with a warning if an argument names a signal or parameter that does not exist", True, default=False
+    )
 
 
 class CheckSpec(Spec):

@@ -12,10 +12,16 @@ from pydantic import ConfigDict, StringConstraints, model_validator
 
 from ..engine.settings import NonFinitePolicy
 from .evaluation_schema import CallSpec, CheckSpec, FunctionSpec, ReferenceSpec
-from .schema_types import AutoOrBool, Integer, Name, NameList, Period, Seconds, Spec, Value, key
+from .schema_types import INVALID, AutoOrBool, Integer, Name, NameList, Period, Seconds, Spec, Value, complete_schema, key
 
 #: keys of the sources of a component
 SOURCES = ("fmu", "python", "modelica", "system")
+
+
+#: lists whose elements can be changed by an object in a file with "extends", and the key that names their elements
+KEYED_LISTS = {("connections",): "to", ("kpis",): "name", ("figures",): "name", ("checks",): "kpi"}
+#: keys that a file with "extends" does not inherit
+NOT_INHERITED = ("$schema", "name", "description", "reference")
 
 
 def _has_text(key: str) -> dict[str, Any]:
@@ -23,7 +29,7 @@ def _has_text(key: str) -> dict[str, Any]:
     return {"required": [key], "properties": {key: {"type": "string"}}}
 
 
-#: the rules of `ComponentSpec._one_source` that JSON Schema can express
+#: the rules of the validators below that JSON Schema can express
 _COMPONENT_RULES: dict[str, Any] = {
     "oneOf": [_has_text(source) for source in SOURCES],
     "allOf": [
@@ -36,6 +42,11 @@ _COMPONENT_RULES: dict[str, Any] = {
             "then": {"anyOf": [_has_text("fmu"), _has_text("modelica")]},
         },
     ],
+}
+_CONNECTION_RULES: dict[str, Any] = {
+    "anyOf": [
+        {"properties": {end: {"pattern": pattern} for end in ("from", "to")}} for pattern in (r"^[^*]*$", r"^[^*]*\*[^*]*$")
+    ]
 }
 
 
@@ -76,13 +87,26 @@ class ComponentSpec(Spec):
 
 
 class ConnectionSpec(Spec):
-    """A connection of an output to an input, or of two prefixes; variables match if their names after the prefixes are equal."""
+    """A connection of an output to an input, of two prefixes, or of two patterns with one "*" each.
 
-    source: str = key('output "component.variable", or a prefix of outputs', "plant.uav", alias="from")
-    target: str = key('input "component.variable", or a prefix of inputs', "uav.vehicle", alias="to")
+    Variables below prefixes match if their names after the prefixes are equal; those of patterns, if the texts at "*" are equal.
+    """
+
+    model_config = ConfigDict(json_schema_extra=_CONNECTION_RULES)
+
+    source: str = key('output "component.variable", a prefix of outputs, or a pattern', "plant.uav", alias="from")
+    target: str = key('input "component.variable", a prefix of inputs, or a pattern', "uav.vehicle", alias="to")
+    gain: float = key("factor that is applied after the conversion of units", -1.0, default=1.0)
+    offset: float = key("value that is added after the gain", 0.5, unit="that of the input", default=0.0)
     delay: Integer = key(
         "delay; the input keeps the initial output until then", 1, unit="macro steps", default=0, ge=0, le=1_000_000
     )
+
+    @model_validator(mode="after")
+    def _same_wildcards(self) -> ConnectionSpec:
+        if self is not INVALID and (self.source.count("*"), self.target.count("*")) not in ((0, 0), (1, 1)):
+            raise ValueError('expected one "*" in each of "from" and "to", or none')
+        return self
 
 
 class IterationSpec(Spec):
@@ -250,20 +274,3 @@ def json_schema(nested: bool = False) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of scenario files, or of nested-system files."""
     schema = (NestedSpec if nested else ScenarioSpec).model_json_schema(by_alias=True)
     return complete_schema(schema)
-
-
-def complete_schema(schema: dict[str, Any]) -> dict[str, Any]:
-    """Add the version to a JSON Schema, and refuse names that do not match the patterns of names."""
-    _refuse_other_names(schema)
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
-
-
-def _refuse_other_names(schema: Any) -> None:
-    if isinstance(schema, dict):
-        if "patternProperties" in schema:
-            schema["additionalProperties"] = False
-        for value in schema.values():
-            _refuse_other_names(value)
-    elif isinstance(schema, list):
-        for value in schema:
-            _refuse_other_names(value)

@@ -145,3 +145,20 @@ class Spec(BaseModel):
 def accepted(specs: Iterable[S]) -> Iterator[tuple[int, S]]:
     """Yield (index, specification) of the valid elements of a list."""
     return ((i, spec) for i, spec in enumerate(specs) if spec is not INVALID)
+
+
+def complete_schema(schema: dict[str, Any]) -> dict[str, Any]:
+    """Add the version to a JSON Schema, and refuse names that do not match the patterns of names."""
+    _refuse_other_names(schema)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _refuse_other_names(schema: Any) -> None:
+    if isinstance(schema, dict):
+        if "patternProperties" in schema:
+            schema["additionalProperties"] = False
+        for value in schema.values():
+            _refuse_other_names(value)
+    elif isinstance(schema, list):
+        for value in schema:
+            _refuse_other_names(value)

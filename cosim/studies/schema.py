@@ -10,8 +10,7 @@ from pydantic import BaseModel, Field, StringConstraints, model_validator
 
 from ..core.errors import did_you_mean
 from ..scenario.evaluation_schema import CheckSpec
-from ..scenario.schema import complete_schema
-from ..scenario.schema_types import Integer, NameList, Spec
+from ..scenario.schema_types import Integer, NameList, Spec, complete_schema
 from .factor_schema import TRIAL_COLUMNS, FactorSpec, Scale, SettingPaths, check_log_scale, check_order, reject_column_names
 from .setting_conflicts import check_conflicts
 

@@ -26,7 +26,7 @@ from ..unfinished_runs import OutputFiles
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-    from ...engine.run_loop import Observer
+    from ...engine.plan_run import Observer
     from ...report.drawing_process import DrawingProcess
     from ...scenario import PreparedRun
 
