@@ -29,7 +29,11 @@ def print_ranking(ranking: Ranking, candidate: str) -> None:
         checks = f"{found.met} of {count_noun(found.checks, 'check')} met"
         place = 1 if ranking.verdict == "equal" else place
         click.echo(f"{place}. {name:{width}}  {found.passed} of {count_noun(found.scenarios, 'scenario')} passed, {checks}")
-    goals = [f"{goal} {counts['better']} better, {counts['worse']} worse" for goal, counts in ranking.goals.items()]
+    goals = [
+        f"{goal} {counts['better']} better, {counts['worse']} worse"
+        for goal, counts in ranking.goals.items()
+        if any(counts.values())
+    ]
     words = {"above": "is better than", "equal": "equals", "below": "is worse than"}
     click.echo(f"{candidate} {words[ranking.verdict]} the shipped controller" + (f" ({'; '.join(goals)})" if goals else ""))
 

@@ -36,10 +36,11 @@ def find_function_problems(
         for i, function in functions:
             if text := function_problem(function, root.folder):
                 yield Problem(text, root.where(kind, i))
-        names = [function.name for _, function in functions]
+        names: set[str] = set()
         for i, function in functions:
-            if function.name in names[:i]:
+            if function.name in names:
                 yield Problem(f'the name "{function.name}" is used more than once', root.where(kind, i, "name"))
+            names.add(function.name)
     if spec.scene and (text := function_problem(spec.scene, root.folder)):
         yield Problem(text, root.where("scene"))
     if signals is not None:

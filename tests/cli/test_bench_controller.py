@@ -37,7 +37,7 @@ SAIL = {
         {
             "name": "waypoints",
             "python": str(ROOT / "plant_src/kpis.py:waypoints"),
-            "arguments": {"vehicle": "vessel", "x": [4.0, 4.0], "y": [0.0, 4.0], "radius": 0.5},
+            "arguments": {"vehicle": "vessel", "waypoint_x": [4.0, 4.0], "waypoint_y": [0.0, 4.0], "acceptance_radius": 0.5},
         },
         {"name": "away", "python": "cosim.kpis:final", "arguments": {"signal": "usv.distance"}},
     ],
@@ -128,6 +128,21 @@ def test_worse_and_better_controllers_are_marked(folder):
     assert better.returncode == 0
     assert words(better, "waypoints.reached")[1:] == ["2", "2", "1", "better"]
     assert "last run" in better.stdout
+
+
+def test_a_controller_that_fails_checks_ranks_below_however_many_kpis_are_better(folder):
+    path = lazy(folder)
+    worse = bench(folder, path)
+    assert worse.stdout.splitlines()[-3:-1] == [
+        "1. shipped  1 of 1 scenario passed, 2 of 2 checks met",
+        "2. lazy     0 of 1 scenario passed, 0 of 2 checks met",
+    ]
+    assert worse.stdout.splitlines()[-1].startswith(
+        "lazy is worse than the shipped controller (waypoints.reached 0 better, 1 worse;"
+    )
+    assert len(worse.stdout.splitlines()) < 10  # the tables of all KPIs are left out
+    ranking = json.loads(bench(folder, path, "--json").stdout)["ranking"]
+    assert (ranking["verdict"], ranking["candidate"]["met"]) == ("below", 0)
 
 
 def test_all_problems_of_an_unsuitable_controller_are_reported(folder):
