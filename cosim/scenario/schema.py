@@ -12,7 +12,7 @@ from pydantic import ConfigDict, StringConstraints, model_validator
 
 from ..engine.settings import NonFinitePolicy
 from .evaluation_schema import CallSpec, CheckSpec, FunctionSpec, ReferenceSpec
-from .schema_types import INVALID, AutoOrBool, Integer, Name, NameList, Period, Seconds, Spec, Value, complete_schema, key
+from .schema_types import INVALID, AutoOrBool, Integer, Name, NameList, Period, Seconds, Spec, Value, key, schema_of
 
 #: keys of the sources of a component
 SOURCES = ("fmu", "python", "modelica", "system")
@@ -272,5 +272,4 @@ def ports_of(spec: SystemSpec) -> PortsSpec:
 
 def json_schema(nested: bool = False) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of scenario files, or of nested-system files."""
-    schema = (NestedSpec if nested else ScenarioSpec).model_json_schema(by_alias=True)
-    return complete_schema(schema)
+    return schema_of(NestedSpec if nested else ScenarioSpec)

@@ -147,8 +147,15 @@ def accepted(specs: Iterable[S]) -> Iterator[tuple[int, S]]:
     return ((i, spec) for i, spec in enumerate(specs) if spec is not INVALID)
 
 
-def complete_schema(schema: dict[str, Any]) -> dict[str, Any]:
-    """Add the version to a JSON Schema, and refuse names that do not match the patterns of names."""
+def schema_of(model: type[BaseModel]) -> dict[str, Any]:
+    """Return the JSON Schema (2020-12) of a model: entries in the order of the code, names only as their patterns allow."""
+    from pydantic.json_schema import GenerateJsonSchema
+
+    class InOrder(GenerateJsonSchema):
+        def sort(self, value: Any, parent_key: str | None = None) -> Any:  # noqa: ARG002
+            return value
+
+    schema = model.model_json_schema(by_alias=True, schema_generator=InOrder)
     _refuse_other_names(schema)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 

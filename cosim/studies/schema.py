@@ -10,7 +10,7 @@ from pydantic import BaseModel, StringConstraints, model_validator
 
 from ..core.errors import did_you_mean
 from ..scenario.evaluation_schema import CheckSpec
-from ..scenario.schema_types import Integer, NameList, Spec, complete_schema, key
+from ..scenario.schema_types import Integer, NameList, Spec, key, schema_of
 from .factor_schema import TRIAL_COLUMNS, FactorSpec, Scale, SettingPaths, check_log_scale, check_order, reject_column_names
 from .setting_conflicts import check_conflicts
 
@@ -243,4 +243,4 @@ def _has_labels(factor: FactorSpec, sampled: bool) -> bool:
 
 def study_json_schema(kind: type[BaseModel]) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of a sweep or tuning file."""
-    return complete_schema(kind.model_json_schema(by_alias=True))
+    return schema_of(kind)
