@@ -62,6 +62,8 @@ def _cells(about: Schema, required: bool) -> Iterator[str]:
 
 
 def _default(value: Any) -> str:
+    if isinstance(value, dict):
+        value = {name: item for name, item in value.items() if item is not None}
     return "" if value in (None, "", [], {}) else code(value if isinstance(value, str) else json.dumps(value))
 
 
@@ -76,7 +78,8 @@ def _type(schema: Schema) -> str:
         return " or ".join(code(json.dumps(value)) for value in values)
     match schema.get("type"):
         case "array":
-            return f"list of {_type(schema.get('items', {}))}"
+            items = _type(schema.get("items", {}))
+            return f"list of ({items})" if " or " in items else f"list of {items}"
         case "object":
             inner = next(iter(schema.get("patternProperties", {}).values()), schema.get("additionalProperties"))
             return f"object of {_type(inner)}" if isinstance(inner, dict) and inner else "object"
