@@ -17,9 +17,9 @@ from .. import current_command_line, supervision
 from ..bench_table import print_comparison, print_ranking
 from ..bench_trial import ControllerTrial, TrialResult, run_trials
 from ..completion import complete_role, complete_scenario
-from ..messages import print_json, print_verdict
+from ..messages import print_json
 from ..output_options import json_option
-from .regress import EXIT_CODE_SEVERITY, check_unique_names, default_folder, find_scenario_files
+from .regress import EXIT_CODE_SEVERITY, check_unique_names, default_folder, find_scenario_files, print_outcome
 
 if TYPE_CHECKING:
     from ...studies.controller_bench.ranking import Ranking
@@ -135,10 +135,7 @@ def _make_trials(written: Sequence[Mapping[str, str]], folder: Path, shipped: Pa
 
 def _print_trial(result: TrialResult, candidate: str) -> None:
     """Print a line about a scenario and its problems; with --verbose also all KPIs."""
-    print_verdict(result.outcome.code == 0)
-    click.echo(f"  {result.name:<28} {result.outcome.summary:<24} {result.outcome.seconds:5.1f} s")
-    for line in result.outcome.details:
-        click.echo(f"        {line}")
+    print_outcome(result.outcome)
     if current_command_line().verbosity > 0:
         print_comparison(result.rows(), candidate)
 

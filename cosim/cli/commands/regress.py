@@ -60,7 +60,7 @@ def command(
     for outcome in run_in_parallel([each.run for each in work], jobs or available_processors()):
         outcomes.append(outcome)
         if not as_json:
-            _print_outcome(outcome)
+            print_outcome(outcome)
     if junit:
         from ...report.junit import write_junit
 
@@ -119,7 +119,8 @@ def run_in_parallel(work: Sequence[Callable[[], T]], jobs: int) -> Iterator[T]:
         pool.shutdown(cancel_futures=True)
 
 
-def _print_outcome(outcome: RegressionOutcome) -> None:
+def print_outcome(outcome: RegressionOutcome) -> None:
+    """Print a line about a scenario and its problems; with --quiet, print only the problems."""
     if outcome.code and current_command_line().verbosity < 0:
         for line in outcome.details:
             click.echo(f"{outcome.name}: {line}", err=True)
