@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import tempfile
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, nullcontext
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -15,14 +15,15 @@ import numpy as np
 
 from ..core import component_log
 from ..core.component import Component
-from ..core.errors import InputError, Problem, join_alternatives
+from ..core.errors import ComponentError, InputError, Problem, join_alternatives
 from ..core.recording import Recording
 from ..core.stopwatch import Stopwatch
-from ..process.float_mode import default_float_mode
+from ..process.float_mode import default_float_mode, is_default
 from ..process.forks import attributing_forks, report_forks
 from ..process.journal import MARKER_SIZE, Phase, calling_component, current_journal, suspending_deadline
-from ..process.process_state import restoring_process_state
+from ..process.process_state import call_restoring_process_state, restoring_process_state
 from . import Executor, Plan, Recorder, Termination, executor_class
+from .component_states import ComponentStates, SavedState
 from .disk_space import find_space_problems
 from .initialization import instantiate_components
 from .pacer import Pacer
@@ -71,6 +72,7 @@ class PlanRun:
     Attributes:
         executor: steps the components.
         failure: the error that ended the simulation early, if there was one.
+        is_finished: true at the last communication point, and after a component has requested termination.
     """
 
     def __init__(self, plan: Plan, step_hook: StepHook | None = None):
@@ -97,12 +99,8 @@ class PlanRun:
         self._names = join_alternatives(self._components)
         self._runs_foreign_code = any(component.runs_foreign_code for component in self._components.values())
         self._event_points = sorted(n for n in plan.events if n < plan.grid.count)
-        self._is_initialized = self._is_closed = False
-
-    @property
-    def is_finished(self) -> bool:
-        """True at the last communication point, and after a component has requested termination."""
-        return self.executor.completed_steps >= self._plan.grid.count or self.executor.termination is not None
+        self.is_finished = self._is_initialized = self._is_closed = False
+        self._states = ComponentStates(self._components, self.accessing)
 
     def initialize(self) -> None:
         """Bring the components to step mode, record the initial outputs and apply the events at the start time.
@@ -136,13 +134,15 @@ class PlanRun:
             ComponentError: a component failed.
             LateError: the run fell behind real time.
         """
-        state = restoring_process_state(self._names) if self._runs_foreign_code else nullcontext()
         journal, began = current_journal(), perf_counter()
         if journal:
             journal.enter_phase(Phase.STEPPING, journal.deadlines.step)
         try:
-            with default_float_mode(), state, attributing_forks(self.executor.describe_call):
-                self._run_to_stops(end, observers)
+            with nullcontext() if is_default() else default_float_mode(), attributing_forks(self.executor.describe_call):
+                if self._runs_foreign_code:
+                    call_restoring_process_state(self._names, self._run_to_stops, end, observers)
+                else:
+                    self._run_to_stops(end, observers)
         except BaseException as error:
             self.failure = error
             raise
@@ -150,14 +150,16 @@ class PlanRun:
             self._watch.add("loop_seconds", perf_counter() - began)
             if journal:
                 journal.enter_phase(Phase.IDLE)
-            if self.failure or self.is_finished:
+            self.is_finished = self.executor.is_finished
+            if self.failure or (self.is_finished and not self._states):  # else a saved state may be restored
                 self.executor.close()
 
     def _run_to_stops(self, end: int, observers: Sequence[Observer]) -> None:
         """Run up to `end`, interrupted at events and whenever the observers are called."""
         executor, begin, events = self.executor, self.executor.completed_steps, self._event_points
         observed = range(begin, end, max(1, (end - begin) // 100)) if observers else ()
-        for stop in sorted({*events[bisect_left(events, begin) : bisect_right(events, end)], *observed, end}):
+        between = events[bisect_left(events, begin) : bisect_right(events, end)] if events else events
+        for stop in sorted({*between, *observed, end}) if between or observed else (end,):
             if self._pacer or self._step_hook:
                 self._run_in_single_steps(stop)
             else:
@@ -187,6 +189,45 @@ class PlanRun:
                 for variable, value in values.items():
                     self._components[name].set(variable, value)
 
+    @contextmanager
+    def accessing(self, component: str, function: str) -> Iterator[None]:
+        """Protect the process from a component whose function is called between two steps in this block.
+
+        Raises:
+            ComponentError: the component failed, which ends the simulation.
+        """
+        time = self.executor.time
+        try:
+            with default_float_mode(), restoring_process_state(component), calling_component(component, function, "step", time):
+                yield
+        except ComponentError as error:
+            self.failure = error
+            raise
+
+    def save(self) -> SavedState:
+        """Return the present state of the executor and of all components.
+
+        Raises:
+            InputError: a component cannot return to a state.
+            ComponentError: a component failed.
+        """
+        return SavedState(self._states, self.executor.save(), self._states.save())
+
+    def restore(self, saved: SavedState) -> None:
+        """Return to a state that `save` returned; the rows recorded since then are forgotten.
+
+        Raises:
+            InputError: the state belongs to another simulation, or to this one before it was reset.
+            ComponentError: a component failed.
+        """
+        if saved.owner is not self._states:
+            raise InputError("the state was saved by another simulation, or by this one before it was reset")
+        self._states.restore(saved.components)
+        self.executor.restore(saved.executor)
+        self.is_finished = self.executor.is_finished
+        if self._pacer:
+            self._pacer.start(self.executor.completed_steps)
+
     def outcome(self) -> SimulationOutcome:
         """Return everything recorded and measured so far."""
         report_forks()
@@ -209,7 +250,11 @@ class PlanRun:
         self.executor.close()
         try:
             with default_float_mode(), restoring_process_state(self._names):
-                _end_components(self._components, terminate=self._is_initialized and not self.failure)
+                try:
+                    if not self.failure:
+                        self._states.free_all()
+                finally:
+                    _end_components(self._components, terminate=self._is_initialized and not self.failure)
         finally:
             report_forks()
 

@@ -94,7 +94,12 @@ class Recorder:
     def start_chunk(self) -> None:
         """Add a chunk to the row store; call it when the current chunk is full."""
         chunk = self.row_store.add_chunk()
-        self.free_rows, self.chunk = len(chunk), chunk.view(np.uint8) if chunk.dtype.itemsize else np.zeros(0, np.uint8)
+        self.chunk = chunk.view(np.uint8) if chunk.dtype.itemsize else np.zeros(0, np.uint8)
+        self._use_chunk()
+
+    def _use_chunk(self) -> None:
+        """Write the next rows to the current chunk, whose first row is the next one."""
+        self.free_rows = self.row_store.chunk_rows
         self._chunk_end = self.chunk.ctypes.data + len(self.chunk)
         size, first = self.row_store.dtype.itemsize, self.row_count
         if self.whole_buffer:
@@ -125,6 +130,15 @@ class Recorder:
         """Set the number of recorded rows, after an executor has written rows into the chunk."""
         self.free_rows -= rows - self.row_count
         self.row_count = rows
+
+    def rewind(self, rows: int) -> None:
+        """Forget all but the first `rows` rows; results that share memory with the others keep them."""
+        self.chunk, first = self.row_store.rewind(rows).view(np.uint8), rows - rows % self.row_store.chunk_rows
+        self.row_count = first
+        self._use_chunk()
+        self.set_row_count(rows)
+        for column in self._string_columns.values():
+            column.rewind(rows)
 
     @property
     def next_row_address(self) -> int:
@@ -204,6 +218,9 @@ class _StringColumn:
         value = self._values[self._index]
         if not self._changes or self._changes[-1][1] != value:
             self._changes.append((row, value))
+
+    def rewind(self, rows: int) -> None:
+        self._changes = [change for change in self._changes if change[0] < rows]
 
     def column(self, rows: int) -> np.ndarray:
         values = np.empty(rows, object)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
+from typing import Any
 
 from ..core import component_log
 from .journal import Phase, current_journal
@@ -52,22 +53,41 @@ def restoring_process_state(component: str) -> Iterator[None]:
         component: Name of the component or components that may change the state, for messages.
     """
     with _lock:
-        encoding, state = _state_cache().read()
-        output_files = _output_files() if current_journal() else []
-        _saved_states.append(state)
+        saved = _save_state()
         try:
             yield
         finally:
-            _saved_states.pop()
-            journal = current_journal()
-            if journal and output_files != _output_files():
-                journal.record_call(component, "a call that closed the files of the process")
-                journal.enter_phase(journal.phase if journal.phase == Phase.RESULTS_WRITTEN else Phase.CALLING)
-                os._exit(70)
-            if not encoding or _encode() != encoding:
-                for change in state.restore():
-                    text = f"changed {change} of the process; it was changed back"
-                    component_log.log_message(component, component_log.WARNING, text)
+            _restore_state(component, *saved)
+
+
+def call_restoring_process_state(component: str, function: Callable[..., object], *arguments: Any) -> None:
+    """Call a function in a block of `restoring_process_state`; takes half as long."""
+    with _lock:
+        saved = _save_state()
+        try:
+            function(*arguments)
+        finally:
+            _restore_state(component, *saved)
+
+
+def _save_state() -> tuple[bytes, ProcessState, list[tuple[int, int]]]:
+    """Return the present state, its encoding, and the files behind the standard streams of a supervised process."""
+    encoding, state = _state_cache().read()
+    _saved_states.append(state)
+    return encoding, state, _output_files() if current_journal() else []
+
+
+def _restore_state(component: str, encoding: bytes, state: ProcessState, output_files: list[tuple[int, int]]) -> None:
+    _saved_states.pop()
+    journal = current_journal()
+    if journal and output_files != _output_files():
+        journal.record_call(component, "a call that closed the files of the process")
+        journal.enter_phase(journal.phase if journal.phase == Phase.RESULTS_WRITTEN else Phase.CALLING)
+        os._exit(70)
+    if not encoding or _encode() != encoding:
+        for change in state.restore():
+            text = f"changed {change} of the process; it was changed back"
+            component_log.log_message(component, component_log.WARNING, text)
 
 
 @contextmanager

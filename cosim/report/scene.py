@@ -83,7 +83,9 @@ def static_method(component: Mapping[str, Any], folder: Path, name: str) -> Call
         InputError: The file or the class does not exist.
     """
     reference = component.get("python")
-    method = getattr_static(load_object(reference, folder), name, None) if isinstance(reference, str) else None
+    if not isinstance(reference, str) or ".py:" not in reference:  # also a Python class or object of a scenario that is a dict
+        return None
+    method = getattr_static(load_object(reference, folder), name, None)
     return method if isinstance(method, staticmethod) else None
 
 

@@ -5,4 +5,12 @@ from .nested_systems import load_scenario
 from .prepared_run import IsolationMode, PreparedRun, import_figures, load
 from .schema import json_schema
 
-__all__ = ["IsolationMode", "PreparedRun", "find_scenario", "import_figures", "json_schema", "load", "load_scenario"]
+__all__ = [
+    "IsolationMode",
+    "PreparedRun",
+    "find_scenario",
+    "import_figures",
+    "json_schema",
+    "load",
+    "load_scenario",
+]

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,7 @@ def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Doc
     invalid = [path for path, origin in merger.origins.items() if origin.path in origin.document.invalid_paths]
     problems = [*document.problems, *base.problems, *merger.problems]
     bases = (base.file, *base.bases)
-    return Document(document.file, document.text, merged, document.offsets, problems, invalid, merger.origins, bases)
+    return replace(document, value=merged, problems=problems, invalid_paths=invalid, origins=merger.origins, bases=bases)
 
 
 def _read_base(document: Document, name: Any, extending: tuple[Path, ...]) -> Document:

@@ -37,9 +37,10 @@ def find_scenario(scenario: str | Path) -> Path:
     return resources.root() / "scenarios" / f"{scenario}.json"
 
 
-def relocating(old_folder: Path, new_folder: Path) -> PathChange:
-    """Return a function that changes paths relative to one folder into paths relative to another folder."""
-    shift = os.path.relpath(paths.resolve_path(old_folder), paths.resolve_path(new_folder))
+def relocating(old_folder: Path, new_folder: Path | None) -> PathChange:
+    """Return a function that changes paths relative to one folder into paths relative to another one; None: absolute paths."""
+    old = paths.resolve_path(old_folder)
+    shift = old if new_folder is None else os.path.relpath(old, paths.resolve_path(new_folder))
     return lambda text: os.path.normpath(os.path.join(shift, text)).replace(os.sep, "/")  # noqa: PTH118
 
 

@@ -64,25 +64,27 @@ class FunctionResolver:
         found: list[Problem] = []
         resolved = self._resolve_arguments(spec, found, kind, i)
         if not spec.optional:
-            self.problems += found
+            self.problems += [problem for problem in found if problem.message]
             return INVALID if found else resolved
         if self.signals is not None:
             unknown = unknown_signals(resolved, self.root.folder, self.signals)
             found += [Problem(text, self.root.where(kind, i, "arguments", argument)) for argument, text in unknown]
-        if found:
+        if found and found[0].message:
             noun = "KPI" if kind == "kpis" else "figure"
             self.left_out.append(replace(found[0], message=f'{noun} "{spec.name}" is left out: {found[0].message}'))
         return INVALID if found else resolved
 
     def _resolve_arguments(self, spec: C, problems: list[Problem], *path: str | int) -> C:
-        """Return a function with the values of its arguments; arguments without a value are added to `problems`."""
+        """Return a function with the values of its arguments.
+
+        Arguments without a value are added to `problems`, without a message if the reason has already been reported.
+        """
         arguments = dict(spec.arguments)
         for name, argument in spec.arguments.items():
             try:
                 arguments[name] = self._resolve_value(argument)
             except UnknownNameError as error:
-                if str(error):
-                    problems.append(Problem(str(error), self.root.where(*path, "arguments", name)))
+                problems.append(Problem(str(error), self.root.where(*path, "arguments", name)))
         if spec.sources:
             for name, is_required in declared_arguments(spec, self.root.folder).items():
                 if name not in arguments:
@@ -100,8 +102,8 @@ class FunctionResolver:
                 return
             except UnknownNameError as error:
                 errors.append(str(error))
-        if is_required and errors[0]:
-            problems.append(Problem(f"{errors[0]} for the argument {name}", where))
+        if is_required:
+            problems.append(Problem(errors[0] and f"{errors[0]} for the argument {name}", where))
 
     def _resolve_value(self, value: Any) -> Any:
         if isinstance(value, list):

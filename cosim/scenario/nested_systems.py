@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 import re
@@ -16,10 +17,11 @@ from ..core.errors import InputError, Problem
 from ..core.size_limits import MAX_LEVELS
 from ..core.text import acceptable_text, shorten, text_problem
 from . import json_pointer
+from .dict_document import document_of_dict
 from .evaluation_schema import CallSpec
 from .expanded_size import SystemFile, check_expanded_size
-from .extension import read_system_document
-from .file_paths import find_scenario
+from .extension import expand_document, read_system_document
+from .file_paths import change_paths, change_pointed, find_scenario, relocating
 from .json_document import Document
 from .schema import NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
@@ -107,6 +109,16 @@ class Scenario:
         assert isinstance(self.root.spec, ScenarioSpec)
         return self.root.spec
 
+    def expanded(self) -> dict[str, Any]:
+        """Return the scenario as one JSON object without "extends", with the values of the caller and absolute paths."""
+        value: dict[str, Any] = copy.deepcopy(self.root.document.value)
+        for name, setting in self.assignments.items():
+            component, _, variable = name.partition(".")
+            parameters = value["components"][component].setdefault("parameters", {})
+            parameters.pop(variable, None)
+            parameters[variable] = setting
+        return change_paths(value, relocating(self.root.folder, None))
+
     def files(self) -> list[Path]:
         """Return all files that the scenario names, whether they exist or not.
 
@@ -126,11 +138,18 @@ class Scenario:
         return [*files, *package_files(python)]
 
 
-def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = None) -> Scenario:
+def open_scenario(scenario: str | Path | Mapping[str, Any]) -> Document:
+    """Return the expanded JSON document of a scenario: of a file, of a shipped scenario, or of a dict."""
+    if isinstance(scenario, Mapping):
+        return expand_document(document_of_dict(scenario))
+    return read_system_document(find_scenario(scenario))
+
+
+def load_scenario(scenario: str | Path | Mapping[str, Any], settings: Mapping[str, Any] | None = None) -> Scenario:
     """Read a scenario and its nested systems.
 
     Args:
-        scenario: A path, or the name of a shipped scenario.
+        scenario: A path, the name of a shipped scenario, or the content of a scenario file.
         settings: Values that the caller changes. A name that starts with "/" is a JSON pointer into the scenario file; any
             other name is that of a variable.
 
@@ -138,7 +157,7 @@ def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = Non
         InputError: The file does not exist or is not JSON, or the expanded scenario is too large. Other problems are collected in
             the result.
     """
-    document = read_system_document(find_scenario(scenario))
+    document = open_scenario(scenario)
     problems: list[Problem] = []
     variables: dict[str, Any] = {}
     for name, value in (settings or {}).items():
@@ -152,7 +171,19 @@ def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = Non
     reader = _SystemReader()
     file = reader.read(document, ScenarioSpec, ())
     check_expanded_size(file)
-    return Scenario(_make_node(file), problems + reader.problems, variables)
+    seeds = _find_seed_problems(document, file.spec)
+    return Scenario(_make_node(file), [*problems, *reader.problems, *seeds], variables)
+
+
+def _find_seed_problems(document: Document, spec: SystemSpec) -> Iterator[Problem]:
+    """Yield a problem for each JSON pointer of "seeds" that no value can be set at."""
+    for i, pointer in enumerate(spec.seeds if isinstance(spec, ScenarioSpec) else ()):
+        if not pointer.startswith("/"):
+            yield Problem(
+                f'expected a JSON pointer, which begins with "/"; found "{shorten(pointer)}"', document.where(("seeds", i))
+            )
+        elif problem := json_pointer.set_value(copy.deepcopy(document.value), pointer, 0):
+            yield Problem(problem, document.where(("seeds", i)))
 
 
 class _SystemReader:
@@ -220,6 +251,8 @@ def _text_problems(value: Any) -> Iterator[str]:
 def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
     """Return the values of `NAME=value` texts by name. A value that is not JSON is taken as text.
 
+    Paths in the values of JSON pointers start from the working directory.
+
     Raises:
         InputError: A text has no name or no "=", or a number is not finite.
     """
@@ -234,6 +267,8 @@ def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
             parsed[name] = _parse_json_or_text(value)
             if not _is_finite(parsed[name]):
                 problems.append(Problem(f"expected finite numbers, found {shorten(value)}", name))
+            elif name.startswith("/"):
+                parsed[name] = change_pointed(name, parsed[name], relocating(Path(), None))
         except RecursionError:
             problems.append(Problem("nested too deeply", name))
     if problems:

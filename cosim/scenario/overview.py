@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Iterable, Mapping
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -36,13 +37,18 @@ def describe_system(system: System, sources: Mapping[str, str]) -> dict[str, Any
 
 def describe_software() -> dict[str, Any]:
     """Return the versions of cosim, Python and the installed packages of `_PACKAGES`, and the kind of machine."""
+    return {"versions": dict(_versions()), "machine": {"system": platform.system(), "machine": platform.machine()}}
+
+
+@cache
+def _versions() -> dict[str, str]:
     versions = {"cosim": __version__, "python": platform.python_version()}
     for package in _PACKAGES:
         try:
             versions[package] = version(package)
         except PackageNotFoundError:
             continue
-    return {"versions": versions, "machine": {"system": platform.system(), "machine": platform.machine()}}
+    return versions
 
 
 def _describe_component(system: System, name: str, source: str) -> dict[str, Any]:

@@ -156,7 +156,7 @@ class PreparedRun:
 @default_float_mode()
 @exclusive_process_state()
 def load(
-    scenario: str | Path,
+    scenario: str | Path | Mapping[str, Any],
     parameters: Mapping[str, Any] | None = None,
     *,
     stop_time: float | str | None = None,
@@ -170,7 +170,7 @@ def load(
     """Read, connect and check a scenario.
 
     Args:
-        scenario: Path of a scenario file, or the name of a shipped scenario.
+        scenario: Path of a scenario file, the name of a shipped scenario, or the content of a scenario file.
         parameters: Values that replace those of the file. A key is the name of a variable ("uav.vtol.landing_time") or the JSON
             pointer of any entry ("/components/plant/arguments/environment/seed").
         stop_time: End of the simulation (s), a number or a fraction such as "1/3"; None: as in the file.
@@ -195,6 +195,9 @@ def load(
     with watch.measure("load_seconds"):
         with watch.measure("parse_seconds"):
             loaded = load_scenario(scenario, settings)
+        if isolation == "fmu" or sandbox:
+            reason = 'expected a file, because Python objects exist in this process only; set "isolation" of single FMUs instead'
+            loaded.root.document.refuse_objects(reason, classes=True)
         builder = SystemBuilder(loaded, isolation == "fmu", sandbox, loaded_fmus)
         try:
             with watch.measure("instantiate_seconds"):

@@ -14,6 +14,8 @@ from ..engine.settings import NonFinitePolicy
 from .evaluation_schema import CallSpec, CheckSpec, FunctionSpec, ReferenceSpec
 from .schema_types import INVALID, AutoOrBool, Integer, Name, NameList, Period, Seconds, Spec, Value, key, schema_of
 
+#: pattern of the names of scenarios
+SCENARIO_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$"
 #: keys of the sources of a component
 SOURCES = ("fmu", "python", "modelica", "system")
 
@@ -216,7 +218,7 @@ class NestedSpec(SystemSpec):
 class ScenarioSpec(SystemSpec):
     """A scenario: a system of components, its times, recorded signals, events, KPIs, checks and figures."""
 
-    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$")] = key(
+    name: Annotated[str, StringConstraints(pattern=SCENARIO_NAME)] = key(
         "name of the scenario and of its results folder", "demo1_box"
     )
     start_time: Seconds = key("time at the start of the run", 0.0, unit="s", default=Fraction(0))
@@ -255,6 +257,9 @@ class ScenarioSpec(SystemSpec):
         "recorded trajectory for comparisons",
         {"file": "references/demo1_box.csv", "tolerances": {"plant.*": {"absolute": 0.01}}},
         default=None,
+    )
+    seeds: list[str] = key(
+        "JSON pointers of the entries that a seed sets", ["/components/plant/arguments/environment/seed"], default=[]
     )
     deadlines: DeadlinesSpec = key("time limits of calls in supervised runs", {"load": 60.0}, default=DeadlinesSpec())
     non_finite: NonFinitePolicy = key(

@@ -18,7 +18,11 @@ from .setting_conflicts import check_conflicts
 class SeedsSpec(Spec):
     """Replications: every point is run with the same `count` seeds."""
 
-    set: SettingPaths = key("JSON pointers or variables that get the seed", ["/components/plant/arguments/environment/seed"])
+    set: SettingPaths = key(
+        'JSON pointers or variables that get the seed; default: "seeds" of the scenario',
+        ["/components/plant/arguments/environment/seed"],
+        default=[],
+    )
     first: Integer = key("first seed; the others follow", 100, default=1)
     count: Integer = key("number of seeds", 20, ge=1)
 

@@ -17,28 +17,15 @@ from cosim.core import resources
 from cosim.core.component import Variable
 from cosim.studies.controller_bench.role import Role, read_role
 
-#: public classes and functions for authors of components and KPIs
-EXTENSIONS = (
-    "cosim.core.component.Component",
-    "cosim.core.component.Variable",
-    "cosim.core.component.StepResult",
-    "cosim.core.units.parse_unit",
-    "cosim.results.kpi.Signal",
-    "cosim.results.kpi.Prefix",
-    "cosim.results.kpi.units",
-    "cosim.results.kpi.better",
-)
+#: public names that the package `cosim` does not contain
+OTHERS = ("cosim.core.component.StepResult", "cosim.core.units.parse_unit")
 _CAUSALITIES = ("input", "output", "parameter")
 
 
 def python_page() -> str:
     """Return the page with the public names of the package `cosim`."""
     names = [f"cosim.{name}" for name in sorted(cosim.__all__, key=str.swapcase) if name != "__version__"]
-    return page("Python", *_definitions(names), "## Components and KPIs", *_definitions(EXTENSIONS))
-
-
-def _definitions(names: Iterable[str]) -> Iterator[str]:
-    return (f"::: {name}" for name in names)
+    return page("Python", *(f"::: {name}" for name in (*names, *OTHERS)))
 
 
 def variables_page() -> str:

@@ -4,6 +4,7 @@ import pytest
 from systems import connection
 
 import cosim
+from cosim.scenario import load
 
 FOREIGN = """
 from pythonfmu import Fmi2Causality, Fmi2Slave, Integer, Real
@@ -49,7 +50,7 @@ def test_patterns_and_gains_map_a_foreign_controller(folder, pair):
 
 def test_a_connection_of_single_variables_overrides_a_pattern(folder, pair):
     file = folder.scenario(pair, [*MAPPED, connection("pilot.motor2", "plant.ship.motor[1]")])
-    prepared = cosim.load(file)
+    prepared = load(file)
     fed = {str(each.target): str(each.source) for each in prepared.system.connections}
     prepared.free()
     assert fed["plant.ship.motor[1]"] == "pilot.motor2"

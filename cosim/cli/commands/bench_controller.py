@@ -13,13 +13,14 @@ import click
 
 from ...core.errors import InputError, Problem
 from ...core.processors import available_processors
+from ...studies.regression_runs import check_unique_names, default_folder, find_scenario_files
 from .. import current_command_line, supervision
 from ..bench_table import print_comparison, print_ranking
 from ..bench_trial import ControllerTrial, TrialResult, run_trials
 from ..completion import complete_role, complete_scenario
 from ..messages import print_json
 from ..output_options import json_option
-from .regress import EXIT_CODE_SEVERITY, check_unique_names, default_folder, find_scenario_files, print_outcome
+from .regress import EXIT_CODE_SEVERITY, print_outcome
 
 if TYPE_CHECKING:
     from ...studies.controller_bench.ranking import Ranking

@@ -23,22 +23,30 @@ if TYPE_CHECKING:
 @click.argument("scenario", shell_complete=complete_scenario)
 @click.option("--set", "settings", multiple=True, metavar="NAME=value", help="As for `cosim run`.")
 @click.option("--connections/--no-connections", default=True, help="List every connection.")
+@click.option("--expanded", is_flag=True, help="Print the scenario as JSON instead, with what it extends and --set applied.")
 @json_option(
     "an object with name, start_time, stop_time and step_size (s), steps, signals, components, stages, connections (source, "
-    "target, unit, notes), unconnected_inputs and warnings"
+    "target, unit, notes), unconnected_inputs and warnings; with --expanded the scenario"
 )
 @supervision.supervision_options
 def command(
-    scenario: str, settings: tuple[str, ...], connections: bool, as_json: bool, isolation: str, sandbox: str | None
+    scenario: str,
+    settings: tuple[str, ...],
+    connections: bool,
+    expanded: bool,
+    as_json: bool,
+    isolation: str,
+    sandbox: str | None,
 ) -> None:
     """Check SCENARIO without running it and print the expanded system.
 
     SCENARIO is a JSON file or the name of a shipped scenario. Prints components, processes, stages, connections and unit
     conversions. Probable mistakes are warnings: a forgotten connection, a missing reference, an event after the end.
-    --isolation and --sandbox only affect the printed processes.
+    --isolation and --sandbox only affect the printed processes. The JSON of --expanded has absolute paths: a file with it is a
+    scenario that runs anywhere on this machine.
     """
-    from ...api import load
-    from ...scenario.nested_systems import parse_settings
+    from ...scenario import load
+    from ...scenario.nested_systems import load_scenario, parse_settings
     from ...scenario.plausibility import find_warnings
 
     fmu_isolation: Literal["fmu", "none"] = "fmu" if isolation == "fmu" else "none"
@@ -46,6 +54,9 @@ def command(
     try:
         if problems := prepared.figure_problems():
             raise InputError(problems)
+        if expanded:
+            print_json(load_scenario(scenario, parse_settings(settings)).expanded())
+            return
         if as_json:
             print_json(_describe(prepared, find_warnings(prepared)))
             return

@@ -14,7 +14,9 @@ from typing import Any
 
 from ...core.errors import InputError, did_you_mean
 from ...results.files import write_json
+from ...scenario.evaluation_schema import FunctionSpec
 from ...scenario.extension import read_system_document
+from ...scenario.named_functions import declared_arguments
 from ...scenario.nested_systems import load_scenario
 from ...scenario.schema import SOURCES
 from .candidate import CandidateInterface, CandidateSource
@@ -147,7 +149,7 @@ class ControllerSubstitution:
             key: [
                 {**each, "python": absolute_reference(each["python"], folder)}
                 for each in value.get(key, [])
-                if self._all_known(known, each.get("arguments", {}), f'{key[:-1]} "{each["name"]}"')
+                if self._all_known(known, each, folder, f'{key[:-1]} "{each["name"]}"')
             ]
             for key in ("kpis", "figures")
         }
@@ -168,8 +170,13 @@ class ControllerSubstitution:
     def _known_settings(self, known: NameFilter, settings: Mapping[str, Any]) -> dict[str, Any]:
         return {name: value for name, value in settings.items() if self._is_kept(known, name)}
 
-    def _all_known(self, known: NameFilter, arguments: Any, what: str) -> bool:
-        missing = [text for text in _strings(arguments) if not known(text)]
+    def _all_known(self, known: NameFilter, function: Mapping[str, Any], folder: Path, what: str) -> bool:
+        spec = FunctionSpec.model_validate(function)
+        missing = [text for text in _strings(spec.arguments) if not known(text)]
+        if sources := [source for source in spec.sources if not source.startswith("/")]:
+            needed = [name for name, is_required in declared_arguments(spec, folder).items() if is_required]
+            absent = (name for name in needed if name not in spec.arguments)
+            missing += [f"{sources[0]}.{name}" for name in absent if not any(known(f"{source}.{name}") for source in sources)]
         if missing:
             self.notes.append(f'{what} is left out: the candidate has no "{missing[0]}"')
         return not missing

@@ -84,7 +84,7 @@ class Disk(CommandFolder):
         done = self.run("recover", "out")
         assert done.returncode == 0, done.stderr
         rows = kept(self)
-        assert f"; {rows} row" in errors
+        assert f"; kept {rows} row" in errors
         return rows
 
     def _stop(self) -> float:
@@ -181,7 +181,7 @@ def test_a_result_that_cannot_be_written_for_another_reason(workplace):
     done = workplace.run("run", "robust.json", *RUN, "--no-report")
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
-    assert line.endswith("; 101 rows are kept: remove the cause, then call `cosim recover out`")
+    assert line.endswith("; kept 101 rows: remove the cause, then call `cosim recover out`")
     again = workplace.run("recover", "out")
     assert again.returncode == 2
     assert again.stderr.endswith("; remove the cause, then call `cosim recover out`\n")
@@ -198,7 +198,7 @@ def test_a_component_that_fails_on_a_full_disk_is_named(tmp_path):
     done = on_small_disk(workplace, "480k", "$COSIM run robust.json --output-dir out --no-report; code=$?")
     assert done.returncode == 1
     full, failure = done.stderr.splitlines()
-    assert "; 20000 rows are kept: free about " in full
+    assert "; kept 20000 rows: free about " in full
     assert failure.startswith("ticker: do_step failed at t = 199.99 s")
 
 
