@@ -8,6 +8,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..core.text import count_noun
 from ..results import Result
 from ..results.checks import CheckOutcome, Number
 from ..results.files import to_json_types, writing_atomically
@@ -97,7 +98,8 @@ def _metadata_with_defaults(result: Result) -> dict[str, Any]:
         "sha256": {},
     }
     about = to_json_types({**missing, **result.metadata})
-    return {**about, "sha256": dict(islice(about["sha256"].items(), MAX_HASHES))}
+    hashes = about["sha256"]
+    return {**about, "sha256": dict(islice(hashes.items(), MAX_HASHES)), "file_count": len(hashes)}
 
 
 def _facts(result: Result) -> Iterator[tuple[str, str]]:
@@ -108,7 +110,7 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
     yield "signals", str(len(result))
     yield "rows", str(len(result.time))
     if events := result.metadata.get("live_events"):
-        yield "set by hand", f"{len(events)} time{'s' * (len(events) != 1)}"
+        yield "set by hand", count_noun(len(events), "time")
     if result.termination:
         yield "end", result.termination
 
@@ -136,7 +138,7 @@ def _timings(result: Result) -> Iterator[tuple[str, str]]:
         if key in result.timing:
             yield label, f"{1e3 * result.timing[key]:.0f} ms"
     if pace := result.metadata.get("real_time"):
-        yield "real time", f"{pace['late_steps']} of {pace['steps']} steps late"
+        yield "real time", f"{pace['late_steps']} of {count_noun(pace['steps'], 'step')} late"
 
 
 def _figure_element(name: str, svg: str) -> dict[str, Any]:

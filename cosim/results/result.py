@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core.errors import InputError, did_you_mean
 from ..core.recording import Recording
+from ..core.text import count_noun
 from .csv_files import read_csv, write_csv
 from .files import write_json
 
@@ -124,7 +125,7 @@ class Result:
 
     def __repr__(self) -> str:
         """Return name, size, failure, termination, failed checks and KPIs, in several lines."""
-        rows = f"{len(self.time)} rows of {len(self)} signals"
+        rows = f"{count_noun(len(self.time), 'row')} of {count_noun(len(self), 'signal')}"
         span = f", {self.time[0]:g} s to {self.time[-1]:g} s" if len(self.time) else ""
         failure, units = self.metadata.get("failure"), self.metadata.get("kpi_units", {})
         lines = [f"{self.metadata.get('name', 'Result')}: {rows}{span}", *([f"ended early: {failure}"] if failure else [])]
@@ -140,7 +141,10 @@ class Result:
         if not self.checks:
             return []
         failed = [f"  {outcome}" for outcome in self.checks if not outcome.passed]
-        return [f"{len(self.checks) - len(failed)} of {len(self.checks)} checks passed{':' * bool(failed)}", *failed]
+        return [
+            f"{len(self.checks) - len(failed)} of {count_noun(len(self.checks), 'check')} passed{':' * bool(failed)}",
+            *failed,
+        ]
 
     def signals(self, pattern: str = "*") -> list[str]:
         """Return the names of signals that match a pattern, in recorded order.

@@ -18,11 +18,12 @@ from ..core.size_limits import MAX_LEVELS
 from ..core.text import acceptable_text, shorten, text_problem
 from . import json_pointer
 from .dict_document import document_of_dict
+from .evaluation_schema import CallSpec
 from .expanded_size import SystemFile, check_expanded_size
 from .extension import expand_document, read_system_document
 from .file_paths import change_paths, change_pointed, find_scenario, relocating
 from .json_document import Document
-from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
+from .schema import NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
 from .validation import validate_document
 

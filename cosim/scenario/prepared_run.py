@@ -17,6 +17,7 @@ from ..components.python_import import package_files
 from ..core.errors import Problem
 from ..core.stopwatch import Stopwatch
 from ..core.system import System
+from ..core.text import count_noun
 from ..engine.pacer import LatePolicy
 from ..engine.plan import Plan
 from ..engine.plan_run import free_components
@@ -24,11 +25,12 @@ from ..engine.settings import Settings
 from ..process.float_mode import default_float_mode
 from ..process.process_state import exclusive_process_state
 from .component_factory import ComponentFactory
+from .evaluation_schema import FunctionSpec
 from .json_document import Document
 from .named_functions import load_function, signal_problems
 from .nested_systems import Node, load_scenario
 from .overview import describe_software, describe_system
-from .schema import FunctionSpec, ScenarioSpec
+from .schema import ScenarioSpec
 from .schema_types import accepted
 from .system_builder import PROFILE_PREFIX, SystemBuilder
 
@@ -54,7 +56,7 @@ class PreparedRun:
     def __repr__(self) -> str:
         system, settings = self.system, self.settings
         times = f"{float(settings.start_time):g} s to {float(settings.stop_time):g} s in steps of {float(settings.step_size):g} s"
-        return f"{self.spec.name}: {', '.join(system.components)}; {len(system.connections)} connections; {times}"
+        return f"{self.spec.name}: {', '.join(system.components)}; {count_noun(len(system.connections), 'connection')}; {times}"
 
     @property
     def system(self) -> System:

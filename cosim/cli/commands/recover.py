@@ -8,6 +8,7 @@ from shutil import rmtree
 import click
 
 from ...core.errors import CosimError, InputError
+from ...core.text import count_noun
 from ..unfinished_runs import OutputFiles, how_to_recover
 
 
@@ -54,4 +55,4 @@ def _recover(unfinished: Path, target: Path, shown: Path) -> None:
     except CosimError as error:
         raise type(error)(f"{error}; {how_to_recover(result, unfinished, shown, error)}") from None
     rmtree(unfinished)
-    click.echo(f"{len(result.time)} rows until t = {result.time[-1]:g} s in {shown}")
+    click.echo(f"{count_noun(len(result.time), 'row')} until t = {result.time[-1]:g} s in {shown}")
