@@ -1,4 +1,4 @@
-"""Memory of a process about FMU files: examinations by content, and extracted folders."""
+"""FMU files that a process has examined, by content, and their extracted folders."""
 
 from __future__ import annotations
 
