@@ -136,6 +136,9 @@ def report_error(error: BaseException, command_line: CommandLine) -> int:
     if isinstance(error, OSError):
         click.echo(f"operating system error: {error}", err=True)
         return 1
+    if isinstance(error, MemoryError):
+        click.echo("the memory of the process is used up", err=True)
+        return 1
     click.echo(f"internal error: {type(error).__name__}: {error}  (`cosim --debug ...` prints the traceback)", err=True)
     return 70
 

@@ -50,22 +50,24 @@ class ProcessState:
 def restoring_process_state(component: str) -> Iterator[None]:
     """Restore the process state at the end of the block and warn of each change; other threads wait before such a block.
 
-    A supervised process whose standard output or standard error was closed ends here: only its supervisor can still report the
-    component and save the rows.
+    A supervised process that lost its standard output, its standard error or the access to the files of the run ends here: only
+    its supervisor can still report the component and save the rows.
 
     Args:
         component: Name of the component or components that may change the state, for messages.
     """
     with _lock:
-        state, output_files = ProcessState(), _output_files()
+        state, output_files, access = ProcessState(), _output_files(), _file_access()
         _saved_states.append(state)
         try:
             yield
         finally:
             _saved_states.pop()
             journal = current_journal()
-            if journal and output_files != _output_files():
-                journal.record_call(component, "a call that closed the files of the process")
+            closed, denied = output_files != _output_files(), access != _file_access()
+            if journal and (closed or denied):
+                activity = "closed the files of the process" if closed else "gave up the access to the files of the run"
+                journal.record_call(component, f"a call that {activity}")
                 journal.enter_phase(journal.phase if journal.phase == Phase.RESULTS_WRITTEN else Phase.CALLING)
                 os._exit(70)
             for change in state.restore():
@@ -106,6 +108,17 @@ def _output_files() -> list[tuple[int, int]]:
             status = os.fstat(stream.fileno())
             files.append((status.st_dev, status.st_ino))
     return files
+
+
+def _file_access() -> tuple[int, bool]:
+    """Return the inode of the root folder, and whether files can be created in the folder of the run."""
+    journal = current_journal()
+    try:
+        if journal and journal.folder and hasattr(os, "O_TMPFILE"):
+            os.close(os.open(journal.folder, os.O_TMPFILE | os.O_RDWR))  # a file without a name
+    except OSError as error:
+        return os.stat("/").st_ino, error.errno not in (errno.EACCES, errno.EPERM)
+    return os.stat("/").st_ino, True
 
 
 @cache

@@ -8,6 +8,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..core.errors import InputError
 from ..results import Result
 from ..results.checks import CheckOutcome, Number
 from ..results.files import to_json_types, writing_atomically
@@ -51,6 +52,8 @@ def write_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Iter
         InputError: The result has no rows, or the file cannot be written.
         OutputError: The disk is full or failed.
     """
+    if not len(result.time):
+        raise InputError(f"the result {result.metadata.get('name', '')} has no rows, so there is nothing to report")
     about, units = _metadata_with_defaults(result), result.metadata.get("kpi_units", {})
     text = render_page(
         "report.html",

@@ -27,6 +27,8 @@ from .job import Job, Record, StudyContext
 
 #: length kept of the text that components printed in a failed run (bytes)
 _MAX_OUTPUT = 2000
+#: longest time of a timer (s); the system accepts no more than its integers can hold
+_LONGEST_TIMER = 1e9
 
 #: unpacked FMUs by path
 FmuFiles = Mapping[Path, FmuFile]
@@ -125,7 +127,7 @@ def _run_with_replay(replay: ReplayRequest, context: StudyContext, job: Job, fmu
 def _set_deadline(context: StudyContext) -> None:
     if context.deadline:
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
-        signal.setitimer(signal.ITIMER_REAL, context.deadline)
+        signal.setitimer(signal.ITIMER_REAL, min(context.deadline, _LONGEST_TIMER))
 
 
 def _prepare_job(context: StudyContext, job: Job, fmu_files: FmuFiles) -> PreparedRun:
