@@ -112,13 +112,13 @@ def _output_files() -> list[tuple[int, int]]:
 
 def _file_access() -> tuple[int, bool]:
     """Return the inode of the root folder, and whether files can be created in the folder of the run."""
-    journal = current_journal()
+    journal, root = current_journal(), Path("/").stat().st_ino
     try:
         if journal and journal.folder and hasattr(os, "O_TMPFILE"):
             os.close(os.open(journal.folder, os.O_TMPFILE | os.O_RDWR))  # a file without a name
     except OSError as error:
-        return os.stat("/").st_ino, error.errno not in (errno.EACCES, errno.EPERM)
-    return os.stat("/").st_ino, True
+        return root, error.errno not in (errno.EACCES, errno.EPERM)
+    return root, True
 
 
 @cache

@@ -10,7 +10,6 @@ from typing import Any, TextIO
 
 from ..core.text import SPACES, escape_control_characters
 
-
 #: errors of a full or defective disk
 _DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 

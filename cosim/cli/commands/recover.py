@@ -73,6 +73,8 @@ def _read_recording(unfinished: Path, count: int, rows_file: Path, csv: Path) ->
         raise InputError(f'cannot read "{unfinished / HEADER_FILE}": {error}; the rows stay in "{rows_file}"') from error
     rows = len(recording.time)
     if not rows or (rows < count and csv.exists()):
-        hint = f'; "{csv}" has the rows that were written during the run, remove it to write those that can be read' if rows else ""
+        hint = (
+            f'; "{csv}" has the rows that were written during the run, remove it to write those that can be read' if rows else ""
+        )
         raise InputError(f'only {rows} of {count} rows in "{rows_file}" can be read: it or "{HEADER_FILE}" is damaged{hint}')
     return recording
