@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ..core.recording import Recording
     from ..process.journal import Journal
     from ..process.supervisor import SupervisedOutcome
-    from ..scenario.schema import DeadlinesSpec
 
 _isolation = click.option(
     "--isolation",
@@ -100,14 +99,6 @@ def results_written(code: int) -> int:
         journal[EXIT_CODE] = code
         journal.enter_phase(Phase.RESULTS_WRITTEN)
     return code
-
-
-def set_deadlines(deadlines: DeadlinesSpec) -> None:
-    """Announce the deadlines of a scenario to the supervisor."""
-    from ..process.journal import Deadlines, current_journal
-
-    if journal := current_journal():
-        journal.deadlines = Deadlines(deadlines.load, deadlines.initialization, deadlines.step, deadlines.end)
 
 
 def recover_outcome_recording(outcome: SupervisedOutcome) -> Recording:

@@ -9,6 +9,7 @@ from ..components.fmi import FmuFile, Isolation, create_component
 from ..core.component import Component
 from ..core.errors import InputError
 from ..core.paths import is_file, resolve_path
+from ..process.journal import calling_component
 from .nested_systems import Node
 from .schema import ComponentSpec
 
@@ -56,7 +57,8 @@ class ComponentFactory:
 
         assert spec.python is not None
         self.python_files.append(folder / spec.python.rpartition(":")[0])
-        return load_component(spec.python, folder, full_name, spec.arguments)
+        with calling_component(full_name, "loading the class", "load"):
+            return load_component(spec.python, folder, full_name, spec.arguments)
 
     def _build_modelica(self, folder: Path, reference: str) -> Path:
         """Return the FMU of "file.mo:Model", from the user's cache if source and tools are unchanged."""

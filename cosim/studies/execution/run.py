@@ -17,7 +17,7 @@ from ...components.fmi import FmuFile
 from ...core.errors import ComponentError, CosimError, InputError, Problem
 from ...core.json_values import parse_object
 from ...engine.run_loop import simulating
-from ...process.journal import EXIT_CODE, Deadlines, Phase, current_journal
+from ...process.journal import EXIT_CODE, Phase, current_journal
 from ...process.run_files.folder import keeping_run_files
 from ...process.supervisor import SupervisedOutcome, run_supervised
 from ...results import Result
@@ -131,10 +131,7 @@ def _set_deadline(context: StudyContext) -> None:
 
 
 def _prepare_job(context: StudyContext, job: Job, fmu_files: FmuFiles) -> PreparedRun:
-    prepared = load(context.scenario, job.settings, loaded_fmus={path: file.share() for path, file in fmu_files.items()})
-    if journal := current_journal():
-        journal.deadlines = Deadlines(**prepared.spec.deadlines.model_dump())
-    return prepared
+    return load(context.scenario, job.settings, loaded_fmus={path: file.share() for path, file in fmu_files.items()})
 
 
 def _results_written() -> None:
