@@ -11,17 +11,46 @@ from typing import TYPE_CHECKING, Any
 from .core.version import __version__
 
 if TYPE_CHECKING:
-    from .api import load, run
+    from .api import Result, Simulation, load, run
+    from .api.comparison import compare
+    from .api.single_fmu import simulate
+    from .core.component import Component, Variable
     from .core.errors import CheckError, ComponentError, CosimError, InputError
-    from .results import Result
+    from .results.kpi import Prefix, Signal, better, units
+    from .studies.functions import regress, sweep, tune
 
-__all__ = ["CheckError", "ComponentError", "CosimError", "InputError", "Result", "__version__", "load", "run"]
+__all__ = [
+    "CheckError",
+    "Component",
+    "ComponentError",
+    "CosimError",
+    "InputError",
+    "Prefix",
+    "Result",
+    "Signal",
+    "Simulation",
+    "Variable",
+    "__version__",
+    "better",
+    "compare",
+    "load",
+    "regress",
+    "run",
+    "simulate",
+    "sweep",
+    "tune",
+    "units",
+]
 
 #: module of each name that is imported on first use, because `import cosim` must be fast
 _MODULES = {
-    **dict.fromkeys(("load", "run"), "api"),
+    **dict.fromkeys(("Result", "Simulation", "load", "run"), "api"),
+    **dict.fromkeys(("Component", "Variable"), "core.component"),
     **dict.fromkeys(("CheckError", "ComponentError", "CosimError", "InputError"), "core.errors"),
-    "Result": "results",
+    **dict.fromkeys(("Prefix", "Signal", "better", "units"), "results.kpi"),
+    **dict.fromkeys(("regress", "sweep", "tune"), "studies.functions"),
+    "compare": "api.comparison",
+    "simulate": "api.single_fmu",
 }
 
 

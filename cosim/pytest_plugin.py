@@ -24,9 +24,9 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 
 
 def _may_be_scenario(file: Path) -> bool:
-    """Return whether a JSON file contains the key of a scenario; other files, possibly with comments, must not be parsed."""
+    """Return whether a JSON file contains a key of scenarios; other files, possibly with comments, must not be parsed."""
     try:
-        return file.is_file() and b'"components"' in file.read_bytes()
+        return file.is_file() and any(key in file.read_bytes() for key in (b'"components"', b'"extends"'))
     except OSError:
         return False
 

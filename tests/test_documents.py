@@ -51,12 +51,12 @@ def test_json_examples_satisfy_the_schema(text):
 
 def schema(example):
     """The schema of what an example is."""
-    from cosim.scenario import json_schema
+    from cosim.scenario.extension_schema import editor_schema
     from cosim.studies import schema as sweeps
 
     if "factors" in example or "minimize" in example:
         return sweeps.study_json_schema(sweeps.SweepSpec if "factors" in example else sweeps.TuneSpec)
-    return json_schema(nested="ports" in example)
+    return editor_schema(nested="ports" in example)
 
 
 @pytest.mark.parametrize("keeper", ["../controllers/python/course_keeper.py:CourseKeeper", "my_keeper.py:Keeper"])

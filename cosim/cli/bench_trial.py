@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..studies.regression import Regression, RegressionOutcome
-from .commands.regress import run_in_parallel
+from ..studies.regression_runs import run_in_parallel
 
 if TYPE_CHECKING:
     from ..studies.controller_bench.score import KpiComparison, RunKpis

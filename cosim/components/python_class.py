@@ -27,14 +27,36 @@ def load_component(reference: str, folder: Path, instance_name: str, arguments: 
         InputError: The class cannot be imported, does not accept the arguments or cannot be constructed, or the constructed
             object does not conform to `Component`.
     """
-    factory = load_object(reference, folder)
-    if _is_pythonfmu_class(factory):
+    return create_python_component(load_object(reference, folder), reference, instance_name, arguments)
+
+
+def create_python_component(source: Any, reference: str, instance_name: str, arguments: Mapping[str, Any]) -> Component:
+    """Return a component that a Python class (or function) creates, or that an object is.
+
+    Args:
+        source: A PythonFMU class, a class or function that creates a `Component`, or an object of such a class.
+        reference: Description of the source, for messages.
+        instance_name: Name of the component.
+        arguments: Further keyword arguments of the class.
+
+    Raises:
+        InputError: The class does not accept the arguments or cannot be constructed, or the object does not conform to
+            `Component`.
+    """
+    if callable(source):
+        if _is_pythonfmu_class(source) and "instance_name" in arguments:
+            raise InputError(f'{reference} receives its "instance_name" from the scenario; remove it from the arguments')
+        if _is_pythonfmu_class(source):
+            source = _construct(source, reference, instance_name=instance_name, **arguments)
+        else:
+            source = _construct(source, reference, instance_name, **arguments)
+    elif arguments:
+        raise InputError(f'{reference} takes no "arguments", because it has already been constructed')
+    if _is_pythonfmu_class(type(source)):
         from .python_fmu import PythonFmuComponent
 
-        if "instance_name" in arguments:
-            raise InputError(f'{reference} receives its "instance_name" from the scenario; remove it from the arguments')
-        return PythonFmuComponent(_construct(factory, reference, instance_name=instance_name, **arguments), instance_name)
-    component: Component = _construct(factory, reference, instance_name, **arguments)
+        return PythonFmuComponent(source, instance_name)
+    component: Component = source
     type_name = type(component).__name__
     if problems := [Problem(f"{reference} creates a {type_name}: {text}") for text in find_violations(component)]:
         raise InputError(problems)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core.errors import ComponentError
 from ..process.float_mode import enabled_traps
-from ..process.journal import CALL_NUMBER, MARKER_SIZE, ROW_COUNT
+from ..process.journal import CALL_NUMBER, MARKER_SIZE, ROW_COUNT, STEP_COUNT
 from .finite_check import FiniteCheck
 from .initialization import initialize_components
 from .parallel import MEASURED_STEPS, ParallelSteps
@@ -19,6 +20,18 @@ from .schedule import Schedule
 from .step_runner import StepRunner, Termination
 from .transfer_calls import DelayLine, TransferCall, compile_transfer
 from .transfer_plan import Transfer
+
+
+class ExecutorState(NamedTuple):
+    """State of an executor at a communication point."""
+
+    completed_steps: int
+    row_count: int
+    termination: Termination | None
+    inputs: Sequence[np.ndarray]
+    outputs: Sequence[np.ndarray]
+    #: values in the delays, the oldest ones first
+    rings: Sequence[np.ndarray]
 
 
 class Executor(ABC):
@@ -46,9 +59,19 @@ class Executor(ABC):
         return self._runner.completed_steps
 
     @property
+    def time(self) -> float:
+        """Time of the present communication point (s)."""
+        return self.plan.grid.time_at(self.completed_steps)
+
+    @property
     def termination(self) -> Termination | None:
         """A component's request to end the simulation, if there was one."""
         return self._runner.termination
+
+    @property
+    def is_finished(self) -> bool:
+        """True at the last communication point, and after a component has requested termination."""
+        return self._runner.completed_steps >= self.plan.grid.count or self._runner.termination is not None
 
     def describe_call(self) -> tuple[str, str]:
         """Return component and function of the present call of the stepping loop."""
@@ -84,7 +107,7 @@ class Executor(ABC):
                 self._run_until(min(end, MEASURED_STEPS))
                 if self.completed_steps == MEASURED_STEPS:
                     self._parallel_steps.decide(self._schedule, self._step_durations())
-                    self._prepare()
+                    self._rebuild()
             if not self.termination:
                 self._run_until(end)
         except ComponentError:
@@ -92,13 +115,43 @@ class Executor(ABC):
             raise
 
     def _run_until(self, end: int) -> None:
-        while self.completed_steps < end and not self.termination:
+        runner = self._runner
+        while (n := runner.completed_steps) < end and not runner.termination:
             try:
-                self._run_macro_steps(self.completed_steps, min(end, self.recorder.last_point_in_chunk(self.completed_steps)))
+                self._run_macro_steps(n, min(end, self.recorder.last_point_in_chunk(n)))
                 if enabled_traps():
                     self._restore_float_traps(self.completed_steps)
             finally:
-                self.recorder.set_row_count(int(self.marker[ROW_COUNT]))
+                self.recorder.set_row_count(runner.recorded_rows)
+
+    def save(self) -> ExecutorState:
+        """Return the numbers of steps and rows, the values of all inputs and outputs, and those in the delays."""
+        self._rebuild()
+        rings = [line.ring.copy() for line in self._delay_lines.values()]
+        inputs, outputs = self.plan.inputs.copy_values(), self.plan.outputs.copy_values()
+        return ExecutorState(self.completed_steps, self.recorder.row_count, self.termination, inputs, outputs, rings)
+
+    def restore(self, state: ExecutorState) -> None:
+        """Restore a state that `save` returned; the components are restored separately."""
+        for line, ring in zip(self._delay_lines.values(), state.rings, strict=True):
+            line.restore(ring)
+        self.plan.inputs.restore_values(state.inputs)
+        self.plan.outputs.restore_values(state.outputs)
+        self.recorder.rewind(state.row_count)
+        self._runner.termination = state.termination
+        self._runner.current_time.value = self.plan.grid.time_at(state.completed_steps)
+        self.marker[STEP_COUNT], self.marker[ROW_COUNT] = state.completed_steps, state.row_count
+        self._prepare()
+
+    def _rebuild(self) -> None:
+        """Prepare the macro steps again, with the oldest values of every delay first."""
+        for transfer, line in self._delay_lines.items():
+            line.align_ring(self._native_transfers(transfer))
+        self._prepare()
+
+    def _native_transfers(self, _transfer: Transfer) -> int:
+        """Return how often C code has made a delayed transfer since the macro steps were prepared."""
+        return 0
 
     def close(self) -> None:
         """End the threads; no step may be run afterwards."""

@@ -46,6 +46,15 @@ class Layout:
         """Return the offset of a number in the buffer (bytes)."""
         return self._array_offsets[position.dtype] + position.offset * position.dtype.itemsize
 
+    def copy_values(self) -> list[np.ndarray]:
+        """Return a copy of all values, for `restore_values`."""
+        return [array.copy() for array in self.arrays.values()]
+
+    def restore_values(self, values: Sequence[np.ndarray]) -> None:
+        """Restore values that `copy_values` returned."""
+        for array, saved in zip(self.arrays.values(), values, strict=True):
+            array[:] = saved
+
     @cached_property
     def _array_offsets(self) -> dict[Dtype, int]:
         numeric = (dtype for dtype in self.arrays if not dtype.hasobject)

@@ -12,6 +12,8 @@ from ..core.errors import InputError
 from ..process.journal import ROW_COUNT
 from .component_step import ScheduledStep
 from .executor import Executor
+from .plan import Plan
+from .recorder import Recorder
 from .transfer_calls import contiguous_views
 from .transfer_plan import Transfer
 
@@ -48,13 +50,14 @@ def native_available() -> bool:
 class NativeExecutor(Executor):
     """Executor that runs everything except Python components in C."""
 
+    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None):
+        super().__init__(plan, recorder, marker)
+        self._time_coefficients = plan.grid.float_coefficients(plan.grid.count)
+
     def _prepare(self) -> None:
         current_time = ctypes.addressof(self._runner.current_time)
         self._program = _native.Program(current_time, self.marker.ctypes.data, self._on_status)
         self._program_start = self.completed_steps
-        for transfer in (transfer for phase in self.plan.phases for transfer in phase.transfers):
-            if transfer.delay and not transfer.source.dtype.hasobject:
-                self._delay_lines[transfer].align_ring(self.completed_steps)
         for phase, steps in zip(self.plan.phases, self._schedule.phases, strict=True):
             for transfer in phase.transfers:
                 self._add_transfer(transfer)
@@ -64,6 +67,10 @@ class NativeExecutor(Executor):
         doubles, singles = (_address_and_length(by_item_size.get(size, np.zeros(0))) for size in (8, 4))
         self._program.set_monitored_floats(*doubles, *singles)
         self._add_recording()
+
+    def _native_transfers(self, transfer: Transfer) -> int:
+        in_loop = all(transfer not in phase.transfers for phase in self.plan.phases)
+        return 0 if in_loop or transfer.source.dtype.hasobject else self.completed_steps - self._program_start
 
     # -- adding operations ---------------------------------------------------------------------------------------------
 
@@ -129,9 +136,9 @@ class NativeExecutor(Executor):
 
     def _run_macro_steps(self, first: int, end: int) -> None:
         grid = self.plan.grid
-        coefficients = grid.float_coefficients(end)
+        coefficients = self._time_coefficients or grid.float_coefficients(end)
         count = min(end - first, self._steps_per_call(first)) if coefficients else 1
-        self._program.set_row_address(self.recorder.chunk.ctypes.data + self.recorder.chunk_bytes_used)
+        self._program.set_row_address(self.recorder.next_row_address)
         self._program.run(first, count, *(coefficients or (grid.time_at(first), 0.0, 1.0)))
 
     def _steps_per_call(self, first: int) -> int:

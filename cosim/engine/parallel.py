@@ -117,6 +117,7 @@ class ParallelSteps:
             if group.partitions:
                 schedule.phases[index] = [parallel_step, *(s for s in schedule.phases[index] if not releases_gil(s))]
             largest = max(largest, len(group.partitions))
+        self._candidates = {}
         if largest > 1:
             from .thread_pool import ThreadPool
 

@@ -60,8 +60,8 @@ class Recorder:
         self._string_writers: list[RowWriter] = [column.append for column in self._string_columns.values()]
         #: functions that write a row of the current chunk
         self.row_writers: Sequence[RowWriter] = ()
-        #: number of rows that still fit into the current chunk, and the bytes of the chunk
-        self.free_rows, self.chunk = 0, np.zeros(0, np.uint8)
+        #: number of rows that still fit into the current chunk, the bytes of the chunk, and the address of its end
+        self.free_rows, self.chunk, self._chunk_end = 0, np.zeros(0, np.uint8), 0
 
     def _pack_row(self, numeric: Sequence[ArrayPosition]) -> Iterator[RowPart]:
         row_offset = 0
@@ -94,7 +94,13 @@ class Recorder:
     def start_chunk(self) -> None:
         """Add a chunk to the row store; call it when the current chunk is full."""
         chunk = self.row_store.add_chunk()
-        self.free_rows, self.chunk = len(chunk), chunk.view(np.uint8) if chunk.dtype.itemsize else np.zeros(0, np.uint8)
+        self.chunk = chunk.view(np.uint8) if chunk.dtype.itemsize else np.zeros(0, np.uint8)
+        self._use_chunk()
+
+    def _use_chunk(self) -> None:
+        """Write the next rows to the current chunk, whose first row is the next one."""
+        self.free_rows = self.row_store.chunk_rows
+        self._chunk_end = self.chunk.ctypes.data + len(self.chunk)
         size, first = self.row_store.dtype.itemsize, self.row_count
         if self.whole_buffer:
             writers = [_buffer_writer(self.chunk.data, self._plan.outputs.buffer.data, size, first)]
@@ -125,10 +131,19 @@ class Recorder:
         self.free_rows -= rows - self.row_count
         self.row_count = rows
 
+    def rewind(self, rows: int) -> None:
+        """Forget all but the first `rows` rows; results that share memory with the others keep them."""
+        self.chunk, first = self.row_store.rewind(rows).view(np.uint8), rows - rows % self.row_store.chunk_rows
+        self.row_count = first
+        self._use_chunk()
+        self.set_row_count(rows)
+        for column in self._string_columns.values():
+            column.rewind(rows)
+
     @property
-    def chunk_bytes_used(self) -> int:
-        """Number of bytes of the current chunk that are in use."""
-        return len(self.chunk) - self.free_rows * self.row_store.dtype.itemsize
+    def next_row_address(self) -> int:
+        """Address of the next row in the current chunk."""
+        return self._chunk_end - self.free_rows * self.row_store.dtype.itemsize
 
     @property
     def has_strings(self) -> bool:
@@ -203,6 +218,9 @@ class _StringColumn:
         value = self._values[self._index]
         if not self._changes or self._changes[-1][1] != value:
             self._changes.append((row, value))
+
+    def rewind(self, rows: int) -> None:
+        self._changes = [change for change in self._changes if change[0] < rows]
 
     def column(self, rows: int) -> np.ndarray:
         values = np.empty(rows, object)

@@ -71,16 +71,16 @@ def settable_variables(system: System) -> Iterator[tuple[str, Variable]]:
     connected = {connection.target for connection in system.connections}
     for name, component in system.components.items():
         for variable in component.variables:
-            if not _not_settable_reason(name, variable, connected):
+            if not not_settable_reason(name, variable, connected):
                 yield name, variable
 
 
-def _not_settable_reason(name: str, variable: Variable, connected: Set[Endpoint]) -> str:
-    """Return why an event cannot set a variable; "" for tunable parameters and for inputs without a connection."""
+def not_settable_reason(name: str, variable: Variable, connected: Set[Endpoint]) -> str:
+    """Return why a variable cannot be set during a run; "" for tunable parameters and for inputs without a connection."""
     if variable.causality == "input" and any(Endpoint(name, scalar) in connected for scalar in variable.scalar_names):
-        return f"{name}.{variable.name} is fed by a connection, an event cannot set it"
+        return f"{name}.{variable.name} is fed by a connection"
     if variable.causality != "input" and (variable.causality, variable.variability) != ("parameter", "tunable"):
-        return f"{name}.{variable.name} is neither a tunable parameter nor an input, an event cannot set it"
+        return f"{name}.{variable.name} is neither a tunable parameter nor an input"
     return ""
 
 
@@ -90,8 +90,8 @@ def _find_event_problems(system: System, events: Iterable[Event]) -> Iterator[Pr
         for name, values in event.values.items():
             variables = {variable.name: variable for variable in system.components[name].variables}
             for variable_name in values:
-                if reason := _not_settable_reason(name, variables[variable_name], connected):
-                    yield Problem(reason, event.where)
+                if reason := not_settable_reason(name, variables[variable_name], connected):
+                    yield Problem(f"{reason}, an event cannot set it", event.where)
 
 
 def _find_event_time_problems(events: Iterable[Event], grid: TimeGrid) -> Iterator[Problem]:

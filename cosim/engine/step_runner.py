@@ -11,7 +11,7 @@ import numpy as np
 from ..core.component import SUCCESS_STATUSES, PreparedCall, StepResult
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, describe_exception, join_alternatives
 from ..process import float_mode
-from ..process.journal import CALL_NUMBER, STEP_COUNT
+from ..process.journal import CALL_NUMBER, ROW_COUNT, STEP_COUNT
 from .component_step import ScheduledStep
 from .iteration import FixedPointIteration
 from .plan import Step
@@ -42,13 +42,18 @@ class StepRunner:
     def __init__(self, marker: np.ndarray):
         self.current_time = ctypes.c_double()
         self.termination: Termination | None = None
-        self._marker = marker
+        self._marker = marker.data
         self._float_mode = float_mode.FloatModeGuard()
 
     @property
     def completed_steps(self) -> int:
         """Number of macro steps completed so far, which is the number of the current one."""
-        return int(self._marker[STEP_COUNT])
+        return self._marker[STEP_COUNT]
+
+    @property
+    def recorded_rows(self) -> int:
+        """Number of rows recorded so far."""
+        return self._marker[ROW_COUNT]
 
     @property
     def termination_status(self) -> int:

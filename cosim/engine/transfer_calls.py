@@ -81,9 +81,14 @@ class DelayLine:
         """Fill all rows with the current source values."""
         self.ring[:] = self.transfer.source[self.transfer.source_indices]
 
+    def restore(self, ring: np.ndarray) -> None:
+        """Restore a copy of the ring in which the oldest row comes first."""
+        self.ring[:], self._oldest = ring, 0
+
     def align_ring(self, transfers: int) -> None:
         """Rotate the ring so that the oldest row comes first, after `transfers` transfers made by the native executor."""
-        self.ring[:] = np.roll(self.ring, -transfers, 0)
+        self.ring[:] = np.roll(self.ring, -(self._oldest + transfers), 0)
+        self._oldest = 0
 
     def apply(self) -> None:
         """Deliver the oldest values and replace them by the current source values."""

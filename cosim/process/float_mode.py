@@ -27,6 +27,11 @@ def is_changed() -> bool:
     return one + tiny != one - tiny or not smallest + smallest
 
 
+def is_default() -> bool:
+    """Return whether the mode is that of a new process."""
+    return not is_changed() and not enabled_traps()
+
+
 def _find_fegetexcept() -> Callable[[], int]:
     try:
         function: Callable[[], int] = ctypes.PyDLL(None).fegetexcept
@@ -65,7 +70,7 @@ def default_float_mode() -> Iterator[None]:
 
     Some libraries change the mode permanently when they are imported; results must not depend on that.
     """
-    if not is_changed() and not enabled_traps():
+    if is_default():
         yield
         return
     outer = FloatEnvironment()

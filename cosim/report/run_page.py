@@ -40,22 +40,35 @@ class KpiRow(NamedTuple):
 
 
 def write_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Iterable[tuple[str, str]], path: Path) -> None:
-    """Write the report of a run: KPIs, checks, figures, system diagram, scenario, versions, timings, warnings and replay.
-
-    Args:
-        result: The run.
-        outcomes: The outcomes of the scenario's checks.
-        figures: Name and SVG text of each figure; read when the rest of the page is ready, so drawing them may end later.
-        path: The HTML file to write.
+    """Write the report of a run, see `render_report`, to the HTML file `path`.
 
     Raises:
         InputError: The result has no rows, or the file cannot be written.
         OutputError: The disk is full or failed.
     """
+    text = render_report(result, outcomes, figures)
+    with writing_atomically(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def render_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Iterable[tuple[str, str]]) -> str:
+    """Return the report of a run: KPIs, checks, figures, system diagram, scenario, versions, timings, warnings and replay.
+
+    Args:
+        result: The run.
+        outcomes: The outcomes of the scenario's checks.
+        figures: Name and SVG text of each figure; read when the rest of the page is ready, so drawing them may end later.
+
+    Returns:
+        A self-contained HTML page.
+
+    Raises:
+        InputError: The result has no rows.
+    """
     if not len(result.time):
         raise InputError(f"the result {result.metadata.get('name', '')} has no rows, so there is nothing to report")
     about, units = _metadata_with_defaults(result), result.metadata.get("kpi_units", {})
-    text = render_page(
+    return render_page(
         "report.html",
         about=about,
         checks=len(outcomes),
@@ -71,8 +84,6 @@ def write_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Iter
         versions=[*about["versions"].items(), *about["machine"].items()],
         data=embed_json(replay_data([result])),
     )
-    with writing_atomically(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _metadata_with_defaults(result: Result) -> dict[str, Any]:

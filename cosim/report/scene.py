@@ -26,7 +26,7 @@ from typing import Any
 from ..components.python_import import load_object
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, did_you_mean
 from ..results.files import to_json_types
-from ..scenario.json_document import read_document
+from ..scenario.extension import read_system_document
 from ..scenario.named_functions import load_function
 
 LIST_KEYS = ("bodies", "fixed", "markers", "views", "spans", "plots")
@@ -83,7 +83,9 @@ def static_method(component: Mapping[str, Any], folder: Path, name: str) -> Call
         InputError: The file or the class does not exist.
     """
     reference = component.get("python")
-    method = getattr_static(load_object(reference, folder), name, None) if isinstance(reference, str) else None
+    if not isinstance(reference, str) or ".py:" not in reference:  # also a Python class or object of a scenario that is a dict
+        return None
+    method = getattr_static(load_object(reference, folder), name, None)
     return method if isinstance(method, staticmethod) else None
 
 
@@ -97,7 +99,7 @@ def flatten_components(system: Mapping[str, Any], folder: Path) -> Iterator[tupl
             yield name, component, folder
             continue
         file = folder / component["system"]
-        for inner, leaf, leaf_folder in flatten_components(read_document(file).value, file.parent):
+        for inner, leaf, leaf_folder in flatten_components(read_system_document(file).value, file.parent):
             parameters = component.get("parameters", {}).items()
             outer = {key.removeprefix(f"{inner}."): value for key, value in parameters if key.startswith(f"{inner}.")}
             yield f"{name}.{inner}", {**leaf, "parameters": {**leaf.get("parameters", {}), **outer}}, leaf_folder

@@ -32,16 +32,17 @@ def print_kpis(
 
     Args:
         kpis: The values by name.
-        outcomes: The outcomes of the scenario's checks.
+        outcomes: The outcomes of the scenario's checks; a KPI that was not evaluated is shown without a value.
         units: The units by name (see `cosim.results.kpi.kpi_units`).
         file: The output stream; default: standard output.
     """
-    if not kpis:
+    values = {**kpis, **{o.check["kpi"]: o.value for o in outcomes if o.check["kpi"] not in kpis}}
+    if not values:
         return
     file = unescaped(file or sys.stdout)
     plain, coloured = not file.encoding.lower().startswith("utf"), _has_colours(file)
     rows = [("KPI", "value", "unit", "check" if outcomes else "", "")]
-    for name, value in kpis.items():
+    for name, value in values.items():
         checks = [(o.limits, _check_mark(o.passed, plain, coloured)) for o in outcomes if o.check["kpi"] == name] or [("", "")]
         cells = escape_control_characters(name), format_number(value), escape_control_characters((units or {}).get(name, ""))
         rows += [(*(("", "", "") if i else cells), *check) for i, check in enumerate(checks)]

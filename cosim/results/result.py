@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from .csv_files import read_csv, write_csv
 from .files import write_json
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from .checks import CheckOutcome
 
 
@@ -39,6 +41,18 @@ class Kpis(dict[str, float | int | bool]):
 
     def __missing__(self, name: str) -> float | int | bool:
         raise KpiError(f'no KPI "{name}" was computed{did_you_mean(name, self)}')
+
+
+class Presentation:
+    """Functions that show a result. The package `api` sets them, because they belong to a higher layer than results.
+
+    Attributes:
+        plot: Draws the signals with these names.
+        html: Returns the HTML for a cell of a notebook.
+    """
+
+    plot: ClassVar[Callable[[Result, Sequence[str]], Figure]]
+    html: ClassVar[Callable[[Result], str]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -157,6 +171,36 @@ class Result:
         from .parquet_files import write_parquet
 
         write_parquet(self.recording, path)
+
+    def to_dataframe(self) -> Any:
+        """Return a pandas DataFrame with a column for each signal; the index is the time (s).
+
+        The attribute `attrs["units"]` holds the unit of each signal.
+
+        Raises:
+            InputError: The package pandas is not installed (extra `dataframe`).
+        """
+        from .data_frame import to_dataframe
+
+        return to_dataframe(self.recording)
+
+    def plot(self, *signals: str) -> Figure:
+        """Draw signals over time, with one diagram for each unit.
+
+        Args:
+            signals: Names of signals; `*` matches any text.
+
+        Returns:
+            A matplotlib figure, which a notebook shows. `figure.savefig(path)` writes it to a file.
+
+        Raises:
+            InputError: A name matches no numeric signal, or there are too many signals.
+        """
+        return Presentation.plot(self, signals)
+
+    def _repr_html_(self) -> str:
+        """Return the table of KPIs and the report with figures and replay, for a cell of a notebook."""
+        return Presentation.html(self)
 
     def to_mcap(self, path: str | Path, scene: Mapping[str, Any] | None = None) -> None:
         """Write poses, signals and scene to an MCAP file (topics: see `cosim.results.mcap_files`).

@@ -40,7 +40,7 @@ class ComponentFactory:
         """
         spec, full_name = node.spec.components[name], node.full_name(name)
         if spec.python is not None:
-            return self._load_python(node.folder, spec, full_name)
+            return self._load_python(node, name, spec, full_name)
         path = self._build_modelica(node.folder, spec.modelica or "") if spec.fmu is None else node.folder / spec.fmu
         key = resolve_path(path)
         used = self.fmus.get(key)
@@ -52,13 +52,15 @@ class ComponentFactory:
         isolated = self._isolate_fmus or spec.isolation is not None or needs_own_process
         return create_component(self.fmus[key], full_name, isolation=self._isolation if isolated else None)
 
-    def _load_python(self, folder: Path, spec: ComponentSpec, full_name: str) -> Component:
-        from ..components.python_class import load_component
+    def _load_python(self, node: Node, name: str, spec: ComponentSpec, full_name: str) -> Component:
+        from ..components.python_class import create_python_component, load_component
 
         assert spec.python is not None
-        self.python_files.append(folder / spec.python.rpartition(":")[0])
         with calling_component(full_name, "loading the class", "load"):
-            return load_component(spec.python, folder, full_name, spec.arguments)
+            if name in node.document.objects:
+                return create_python_component(node.document.objects[name], spec.python, full_name, spec.arguments)
+            self.python_files.append(node.folder / spec.python.rpartition(":")[0])
+            return load_component(spec.python, node.folder, full_name, spec.arguments)
 
     def _build_modelica(self, folder: Path, reference: str) -> Path:
         """Return the FMU of "file.mo:Model", from the user's cache if source and tools are unchanged."""

@@ -10,11 +10,11 @@ import json
 import math
 import re
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..core.errors import InputError, Problem
 from ..core.paths import open_text
@@ -41,13 +41,45 @@ class Document:
     problems: list[Problem] = field(default_factory=list)
     #: paths of the values with these problems; they hold placeholders
     invalid_paths: list[JsonPath] = field(default_factory=list)
+    #: where each value was written, if the value is merged from several documents
+    origins: Mapping[JsonPath, Origin] = field(default_factory=dict)
+    #: the other files from which the value is merged
+    bases: tuple[Path, ...] = ()
+    #: Python classes and objects by the names of the components that they implement; only in a scenario that is a dict
+    objects: Mapping[str, Any] = field(default_factory=dict)
+    #: the scenario is a dict and no file; `file` lies in the folder from which relative paths start
+    is_dict: bool = False
 
     def where(self, path: Sequence[str | int]) -> str:
-        """Return "file:line:column: $.json.path", with the position of the deepest part of `path` that exists."""
+        """Return "file:line:column: $.json.path", with the position of the deepest part of `path` that exists.
+
+        File and JSON path are those in which the value was written.
+        """
         known = tuple(path)
+        while known and self.origins and known not in self.origins:
+            known = known[:-1]
+        if origin := self.origins.get(known):
+            return origin.document.where((*origin.path, *path[len(known) :]))
+        if self.is_dict:
+            return f"scenario: {json_path(path)}"
         while known and known not in self.offsets:
             known = known[:-1]
         return f"{self.position(self.offsets.get(known, 0))}: {json_path(path)}"
+
+    def refuse_objects(self, reason: str, classes: bool) -> None:
+        """Raise InputError with this reason if components are Python objects, or (if `classes`) Python classes."""
+        if names := [name for name, target in self.objects.items() if classes or not callable(target)]:
+            kind = "class or object" if classes else "object"
+            raise InputError([Problem(f"{reason}: found a Python {kind}", self.where(("components", names[0], "python")))])
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All files from which the value was read."""
+        return self.bases if self.is_dict else (self.file, *self.bases)
+
+    def origin(self, path: JsonPath) -> Origin:
+        """Return where the value at an existing path was written."""
+        return self.origins.get(path) or Origin(self, path)
 
     def position(self, offset: int) -> str:
         """Return "file:line:column" of an offset in the text."""
@@ -58,6 +90,13 @@ class Document:
     def _lines(self) -> list[int]:
         """Offset of the first character of each line."""
         return [0, *(match.end() for match in re.finditer("\n", self.text))]
+
+
+class Origin(NamedTuple):
+    """Place of a value in the document in which it was written."""
+
+    document: Document
+    path: JsonPath
 
 
 def json_path(path: Sequence[str | int]) -> str:
@@ -84,7 +123,16 @@ def read_document(file: Path) -> Document:
         raise InputError(f'cannot read "{file}": {error.strerror}') from None
     except UnicodeDecodeError as error:
         raise InputError(f'"{file}" is not UTF-8 text: {error.reason} at byte {error.start}') from None
-    document = Document(file, text)
+    return parse_document(Document(file, text))
+
+
+def parse_document(document: Document) -> Document:
+    """Read the value of a document from its text.
+
+    Raises:
+        InputError: The text is not JSON.
+    """
+    text = document.text
     parser = _JsonParser(document)
     document.value, end = parser.value(_skip_whitespace(text, 0), ())
     if _skip_whitespace(text, end) != len(text):

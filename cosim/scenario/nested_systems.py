@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 import re
@@ -11,12 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from ..components.python_import import package_files
-from ..core import paths, resources
-from ..core.errors import InputError, Problem, did_you_mean
+from ..core import paths
+from ..core.errors import InputError, Problem
 from ..core.size_limits import MAX_LEVELS
 from ..core.text import acceptable_text, shorten, text_problem
+from . import json_pointer
+from .dict_document import document_of_dict
 from .expanded_size import SystemFile, check_expanded_size
-from .json_document import Document, read_document
+from .extension import expand_document, read_system_document
+from .file_paths import change_paths, change_pointed, find_scenario, relocating
+from .json_document import Document
 from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
 from .validation import validate_document
@@ -103,12 +108,22 @@ class Scenario:
         assert isinstance(self.root.spec, ScenarioSpec)
         return self.root.spec
 
+    def expanded(self) -> dict[str, Any]:
+        """Return the scenario as one JSON object without "extends", with the values of the caller and absolute paths."""
+        value: dict[str, Any] = copy.deepcopy(self.root.document.value)
+        for name, setting in self.assignments.items():
+            component, _, variable = name.partition(".")
+            parameters = value["components"][component].setdefault("parameters", {})
+            parameters.pop(variable, None)
+            parameters[variable] = setting
+        return change_paths(value, relocating(self.root.folder, None))
+
     def files(self) -> list[Path]:
         """Return all files that the scenario names, whether they exist or not.
 
         These are the scenario and its nested systems, sources with their packages, input profiles, KPIs and figures.
         """
-        files = [node.document.file for node in self.root.walk()]
+        files = [file for node in self.root.walk() for file in node.document.files]
         files += [self.root.folder / spec.file for _, spec in accepted(self.spec.inputs)]
         functions: list[CallSpec] = [spec for _, spec in (*accepted(self.spec.kpis), *accepted(self.spec.figures))]
         functions += [self.spec.scene] if self.spec.scene else []
@@ -122,27 +137,18 @@ class Scenario:
         return [*files, *package_files(python)]
 
 
-def find_scenario(scenario: str | Path) -> Path:
-    """Return the path of a scenario file that is given by its path or by the name of a shipped scenario.
-
-    Raises:
-        InputError: There is neither such a file nor a shipped scenario of this name.
-    """
-    path = Path(scenario)
-    shipped = resources.root() / "scenarios"
-    if path.suffix == ".json" or paths.is_file(path):
-        return path
-    names = sorted(file.stem for file in shipped.glob("*.json"))
-    if str(scenario) not in names:
-        raise InputError(f'no scenario file and no shipped scenario "{scenario}"{did_you_mean(str(scenario), names)}')
-    return shipped / f"{scenario}.json"
+def open_scenario(scenario: str | Path | Mapping[str, Any]) -> Document:
+    """Return the expanded JSON document of a scenario: of a file, of a shipped scenario, or of a dict."""
+    if isinstance(scenario, Mapping):
+        return expand_document(document_of_dict(scenario))
+    return read_system_document(find_scenario(scenario))
 
 
-def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = None) -> Scenario:
+def load_scenario(scenario: str | Path | Mapping[str, Any], settings: Mapping[str, Any] | None = None) -> Scenario:
     """Read a scenario and its nested systems.
 
     Args:
-        scenario: A path, or the name of a shipped scenario.
+        scenario: A path, the name of a shipped scenario, or the content of a scenario file.
         settings: Values that the caller changes. A name that starts with "/" is a JSON pointer into the scenario file; any
             other name is that of a variable.
 
@@ -150,20 +156,33 @@ def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = Non
         InputError: The file does not exist or is not JSON, or the expanded scenario is too large. Other problems are collected in
             the result.
     """
-    document = read_document(find_scenario(scenario))
+    document = open_scenario(scenario)
     problems: list[Problem] = []
     variables: dict[str, Any] = {}
     for name, value in (settings or {}).items():
         if text := next(_text_problems([name, value]), ""):
             problems.append(Problem(text, f'setting "{shorten(acceptable_text(name))}"'))
         elif name.startswith("/"):
-            problems += _set_pointer(document, name, value)
+            if text := json_pointer.set_value(document.value, name, value):
+                problems.append(Problem(text, f'setting "{name}"'))
         else:
             variables[name] = value
     reader = _SystemReader()
     file = reader.read(document, ScenarioSpec, ())
     check_expanded_size(file)
-    return Scenario(_make_node(file), problems + reader.problems, variables)
+    seeds = _find_seed_problems(document, file.spec)
+    return Scenario(_make_node(file), [*problems, *reader.problems, *seeds], variables)
+
+
+def _find_seed_problems(document: Document, spec: SystemSpec) -> Iterator[Problem]:
+    """Yield a problem for each JSON pointer of "seeds" that no value can be set at."""
+    for i, pointer in enumerate(spec.seeds if isinstance(spec, ScenarioSpec) else ()):
+        if not pointer.startswith("/"):
+            yield Problem(
+                f'expected a JSON pointer, which begins with "/"; found "{shorten(pointer)}"', document.where(("seeds", i))
+            )
+        elif problem := json_pointer.set_value(copy.deepcopy(document.value), pointer, 0):
+            yield Problem(problem, document.where(("seeds", i)))
 
 
 class _SystemReader:
@@ -205,7 +224,7 @@ class _SystemReader:
                 raise InputError(f'the nested system "{path}" is nested more than {MAX_LEVELS} levels deep')
             if key not in self._files:
                 self._files[key] = None
-                child = self._files[key] = self.read(read_document(file), NestedSpec, ancestors)
+                child = self._files[key] = self.read(read_system_document(file), NestedSpec, ancestors)
         except InputError as error:
             where = parent.document.where(("components", name, "system"))
             self.problems += [Problem(problem.message, problem.where or where) for problem in error.problems]
@@ -219,32 +238,6 @@ def _make_node(file: SystemFile, prefix: str = "") -> Node:
     return node
 
 
-def pointer_keys(pointer: str) -> list[str]:
-    """Return the keys and indices of a JSON pointer (RFC 6901).
-
-    >>> pointer_keys("/components/uav/and~1or")
-    ['components', 'uav', 'and/or']
-    """
-    return [key.replace("~1", "/").replace("~0", "~") for key in pointer[1:].split("/")]
-
-
-def _set_pointer(document: Document, pointer: str, value: Any) -> list[Problem]:
-    """Set a value in the JSON document; only the last key of the pointer may be new."""
-    keys = pointer_keys(pointer)
-    target, where = document.value, f'setting "{pointer}"'
-    for depth, key in enumerate(keys[:-1]):
-        target = _json_child(target, key)
-        if target is None:
-            return [Problem(f'the scenario has no "/{"/".join(keys[: depth + 1])}"', where)]
-    if isinstance(target, dict):
-        target[keys[-1]] = value
-    elif isinstance(target, list) and keys[-1].isdigit() and int(keys[-1]) < len(target):
-        target[int(keys[-1])] = value
-    else:
-        return [Problem(f'the scenario has no "{pointer}"', where)]
-    return []
-
-
 def _text_problems(value: Any) -> Iterator[str]:
     """Yield the problems of the texts in a JSON value."""
     if isinstance(value, str) and (problem := text_problem(value)):
@@ -254,16 +247,10 @@ def _text_problems(value: Any) -> Iterator[str]:
             yield from _text_problems(part)
 
 
-def _json_child(value: Any, key: str) -> Any:
-    if isinstance(value, dict):
-        return value.get(key)
-    if isinstance(value, list) and key.isdigit() and int(key) < len(value):
-        return value[int(key)]
-    return None
-
-
 def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
     """Return the values of `NAME=value` texts by name. A value that is not JSON is taken as text.
+
+    Paths in the values of JSON pointers start from the working directory.
 
     Raises:
         InputError: A text has no name or no "=", or a number is not finite.
@@ -279,6 +266,8 @@ def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
             parsed[name] = _parse_json_or_text(value)
             if not _is_finite(parsed[name]):
                 problems.append(Problem(f"expected finite numbers, found {shorten(value)}", name))
+            elif name.startswith("/"):
+                parsed[name] = change_pointed(name, parsed[name], relocating(Path(), None))
         except RecursionError:
             problems.append(Problem("nested too deeply", name))
     if problems:

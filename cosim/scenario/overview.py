@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Iterable, Mapping
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -36,13 +37,18 @@ def describe_system(system: System, sources: Mapping[str, str]) -> dict[str, Any
 
 def describe_software() -> dict[str, Any]:
     """Return the versions of cosim, Python and the installed packages of `_PACKAGES`, and the kind of machine."""
+    return {"versions": dict(_versions()), "machine": {"system": platform.system(), "machine": platform.machine()}}
+
+
+@cache
+def _versions() -> dict[str, str]:
     versions = {"cosim": __version__, "python": platform.python_version()}
     for package in _PACKAGES:
         try:
             versions[package] = version(package)
         except PackageNotFoundError:
             continue
-    return {"versions": versions, "machine": {"system": platform.system(), "machine": platform.machine()}}
+    return versions
 
 
 def _describe_component(system: System, name: str, source: str) -> dict[str, Any]:
@@ -67,11 +73,19 @@ def _describe_member(member: str | Group) -> Any:
 
 
 def _describe_connection(system: System, connection: Connection) -> list[str]:
+    unit = system.find_element(connection.source).variable.unit
+    notes = connection_notes(system, connection)
+    return [str(connection.source), str(connection.target), unit.name if unit else "", notes]
+
+
+def connection_notes(system: System, connection: Connection) -> str:
+    """Return the delay and all conversions of a connection as text, such as "delay 1, deg to rad"; "" for a plain copy."""
     source, target = system.find_element(connection.source).variable, system.find_element(connection.target).variable
-    unit = source.unit.name if source.unit else ""
     notes = [f"delay {connection.delay}"] if connection.delay else []
     if source.unit and target.unit and unit_conversion(source, target) != (1.0, 0.0):
         notes.append(f"{source.unit.name} to {target.unit.name}")
     if source.type != target.type:
         notes.append(f"{source.type} to {target.type}")
-    return [str(connection.source), str(connection.target), unit, ", ".join(notes)]
+    if connection.is_mapped:
+        notes += [f"gain {connection.gain:g}", *([f"offset {connection.offset:g}"] if connection.offset else [])]
+    return ", ".join(notes)

@@ -13,8 +13,11 @@ from pydantic import ValidationError
 from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean
 from ..core.size_limits import MAX_RUNS, require_at_most
+from ..scenario import load_scenario
+from ..scenario.dict_document import document_of_dict
+from ..scenario.file_paths import find_scenario
 from ..scenario.json_document import Document, json_path, read_document
-from ..scenario.nested_systems import find_scenario, pointer_keys
+from ..scenario.json_pointer import pointer_keys
 from ..scenario.validation import schema_problems
 from .schema import StudySpec
 
@@ -91,18 +94,18 @@ def _value_at(value: Any, path: tuple[str | int, ...]) -> object:
     return value
 
 
-def read_study(file: str | Path, kind: type[S], max_runs: int = MAX_RUNS) -> StudyFile[S]:
+def read_study(file: str | Path | Mapping[str, Any], kind: type[S], max_runs: int = MAX_RUNS) -> StudyFile[S]:
     """Read a sweep or tuning from a file, or a shipped one by its name.
 
     Args:
-        file: path of the file, or name of a shipped study.
+        file: path of the file, name of a shipped study, or content of a study file.
         kind: schema of the file: SweepSpec or TuneSpec.
         max_runs: largest accepted number of runs, and of cells of a map.
 
     Raises:
         InputError: with all problems of the file.
     """
-    document = read_document(_find_study(file))
+    document = _document_of_dict(file) if isinstance(file, Mapping) else read_document(_find_study(file))
     try:
         spec = kind.model_validate(document.value)
     except ValidationError as error:
@@ -115,7 +118,25 @@ def read_study(file: str | Path, kind: type[S], max_runs: int = MAX_RUNS) -> Stu
         study_file.scenario  # noqa: B018  (raises InputError if there is no such scenario)
     except InputError as error:
         raise InputError([replace(problem, where=document.where(("scenario",))) for problem in error.problems]) from None
+    if (seeds := document.value.get("seeds")) and "set" not in seeds:
+        return StudyFile(kind.model_validate({**document.value, "seeds": {**seeds, "set": _seed_pointers(study_file)}}), document)
     return study_file
+
+
+def _document_of_dict(study: Mapping[str, Any]) -> Document:
+    if isinstance(study.get("scenario"), Mapping):
+        text = "a study runs in other processes, in which Python objects do not exist"
+        raise InputError(Problem(f"{text}; expected a scenario file or the name of a shipped scenario, found a dict", "scenario"))
+    return document_of_dict(study)
+
+
+def _seed_pointers(study_file: StudyFile[Any]) -> list[str]:
+    """Return the JSON pointers that the scenario lists as its seeds."""
+    pointers = {name: value for name, value in study_file.spec.settings.items() if name.startswith("/")}
+    if not (seeds := load_scenario(study_file.scenario, pointers).spec.seeds):
+        text = 'the key "set" is missing, and the scenario has no "seeds"'
+        raise InputError(Problem(text, study_file.document.where(("seeds",))))
+    return seeds
 
 
 def _check_counts(spec: StudySpec, document: Document, max_runs: int) -> None:

@@ -27,11 +27,18 @@ EXPECTATION_KEYS = ("checks", "reference")
 
 
 def has_keys(file: Path, *groups: Sequence[str]) -> bool:
-    """Return whether a JSON file has a key of each group; True for an unreadable file, because its run reports the error."""
+    """Return whether a JSON file, or one that it extends, has a key of each group.
+
+    True for an unreadable file, because its run reports the error.
+    """
+    from ..scenario.extension import read_system_document
+
     try:
         with open_text(file, encoding="utf-8-sig") as stream:
             content = json.load(stream)
-    except (OSError, ValueError, RecursionError):
+        if isinstance(content, dict) and "extends" in content:
+            content = read_system_document(file).value
+    except (OSError, ValueError, RecursionError, InputError):
         return True
     return isinstance(content, dict) and all(any(content.get(key) for key in group) for group in groups)
 
@@ -130,10 +137,10 @@ class _FinishedRun:
         return checks
 
     def failed_checks(self) -> list[str]:
-        from ..results.checks import evaluate_checks
+        from ..results.checks import evaluate_all_checks
 
         kpis = {name: math.nan if value is None else value for name, value in self.result.kpis.items()}
-        return [str(outcome) for outcome in evaluate_checks(kpis, self.checks) if not outcome.passed]
+        return [str(outcome) for outcome in evaluate_all_checks(kpis, self.checks) if not outcome.passed]
 
     @property
     def reference_path(self) -> Path:

@@ -18,7 +18,7 @@ from .setting_conflicts import check_conflicts
 class SeedsSpec(Spec):
     """Replications: every point is run with the same `count` seeds."""
 
-    set: SettingPaths
+    set: SettingPaths = Field([], description='default: "seeds" of the scenario')
     first: Integer = 1
     count: Integer = Field(ge=1)
 

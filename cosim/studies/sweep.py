@@ -51,11 +51,11 @@ class Sweep:
     design: Design
 
     @classmethod
-    def from_file(cls, file: str | Path, max_runs: int = MAX_RUNS) -> Sweep:
+    def from_file(cls, file: str | Path | Mapping[str, Any], max_runs: int = MAX_RUNS) -> Sweep:
         """Read a sweep file, or a shipped sweep by its name.
 
         Args:
-            file: path or name.
+            file: path, name, or content of the file.
             max_runs: largest accepted number of runs.
 
         Raises:

@@ -81,11 +81,11 @@ class Tuning:
     observed_kpis: ObservedKpis = field(default_factory=ObservedKpis)
 
     @classmethod
-    def from_file(cls, file: str | Path, max_runs: int = MAX_RUNS) -> Tuning:
+    def from_file(cls, file: str | Path | Mapping[str, Any], max_runs: int = MAX_RUNS) -> Tuning:
         """Read a tuning file, or a shipped tuning by its name.
 
         Args:
-            file: path or name.
+            file: path, name, or content of the file.
             max_runs: largest accepted number of runs.
 
         Raises:

@@ -14,7 +14,7 @@ from fmpy.validation import validate_fmu
 from lag_fmus import lag_fmu
 from peer_comparison import write_into
 
-import cosim
+from cosim.scenario import load
 
 PEERS = Path(__file__).with_name("peer_comparison.py")
 
@@ -36,7 +36,7 @@ def test_importer_and_c_limit_step_the_same_ring(version, tmp_path):
 
 def test_recorded_bullet_calls_can_be_replayed():
     """The replay checks that every call returns the same result."""
-    calls = record_calls(lambda: cosim.load("demo1_box", stop_time=2.0))
+    calls = record_calls(lambda: load("demo1_box", stop_time=2.0))
     assert calls.steps == 200
     assert {call.function.__name__ for call in calls.calls[calls.first : calls.last]} >= {"stepSimulation", "resetBaseVelocity"}
     assert calls.replay() > 0

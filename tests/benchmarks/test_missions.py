@@ -17,9 +17,9 @@ from bullet_calls import record_calls
 from cosim_contender import executor_label, executors
 from cost_measurement import Stopwatch, measure_rounds, print_heading, print_rows
 
-import cosim
 from cosim.engine import ExecutorKind
 from cosim.engine.run_loop import simulate
+from cosim.scenario import load
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 #: largest allowed ratio to the PyBullet calls (generous)
@@ -31,7 +31,7 @@ pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]
 
 def step_cost(scenario: str | Path, executor: ExecutorKind, **changes: Any) -> float:
     """Return the CPU time (us) per macro step of the stepping loop of one run."""
-    prepared = cosim.load(scenario)
+    prepared = load(scenario)
     watch = Stopwatch()
     run = simulate(prepared.system, replace(prepared.settings, executor=executor, **changes), [watch])
     if run.failure:
@@ -47,10 +47,10 @@ def contenders_of(scenario: str | Path) -> dict[str, Callable[[], float]]:
 
 def test_demo1_compared_with_its_pybullet_calls(monkeypatch):
     """The reference steps Bullet in every step; the second row contains only the calls that the plant makes."""
-    actual = record_calls(lambda: cosim.load("demo1_box"))
+    actual = record_calls(lambda: load("demo1_box"))
     (clearance,) = (module for name, module in sys.modules.items() if name.endswith("plant_src.physics.clearance"))
     monkeypatch.setattr(clearance, "NEAR_DISTANCE", 1e9)
-    in_every_step = record_calls(lambda: cosim.load("demo1_box"))
+    in_every_step = record_calls(lambda: load("demo1_box"))
     monkeypatch.undo()
     print_heading("demo1_box, 40 s")
     references = {"PyBullet in every step": in_every_step.replay, "actual PyBullet calls": actual.replay}
@@ -69,7 +69,7 @@ def test_pairs_of_vehicles(tmp_path):
     for pairs in (1, 2, 4):
         scenario = tmp_path / f"pairs{pairs}.json"
         scenario.write_text(json.dumps(with_pairs(pairs)))
-        calls = record_calls(lambda scenario=scenario: cosim.load(scenario))
+        calls = record_calls(lambda scenario=scenario: load(scenario))
         contenders = {"PyBullet calls only": calls.replay}
         contenders |= {executor_label(executor): lambda s=scenario, e=executor: step_cost(s, e) for executor in executors()}
         assert max(print_rows(f"pairs: {pairs}", measure_rounds(contenders)).values()) < LARGEST_RATIO

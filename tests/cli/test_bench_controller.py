@@ -37,7 +37,7 @@ SAIL = {
         {
             "name": "waypoints",
             "python": str(ROOT / "plant_src/kpis.py:waypoints"),
-            "arguments": {"vehicle": "vessel", "x": [4.0, 4.0], "y": [0.0, 4.0], "radius": 0.5},
+            "arguments": {"vehicle": "vessel", "waypoint_x": [4.0, 4.0], "waypoint_y": [0.0, 4.0], "acceptance_radius": 0.5},
         },
         {"name": "away", "python": "cosim.kpis:final", "arguments": {"signal": "usv.distance"}},
     ],

@@ -294,7 +294,9 @@ def test_openmodelica_requires_a_source_and_a_target(tmp_path):
 
 
 def test_the_schema_describes_scenarios():
-    schema = json.loads(cosim("schema").stdout)
+    printed = json.loads(cosim("schema").stdout)
+    assert printed["else"] == {"$ref": "#/$defs/Scenario"}
+    schema = printed["$defs"]["Scenario"]
     assert schema["additionalProperties"] is False
     assert {"name", "stop_time", "step_size", "components"} <= set(schema["required"])
 

@@ -14,7 +14,6 @@ from scipy.signal import butter, sosfilt, sosfilt_zi
 from scipy.spatial.transform import Rotation
 
 import cosim
-from cosim.api import evaluate_scenario_checks, execute
 from cosim.core import resources
 from cosim.results import Result
 
@@ -137,11 +136,9 @@ def test_the_profiles_are_their_closed_forms() -> None:
 
 @pytest.fixture(scope="module")
 def demo() -> Result:
-    assembly = cosim.load("demo3_inverse_kinematics")
-    result = execute(assembly)
-    outcomes = evaluate_scenario_checks(assembly, result)
-    assert len(outcomes) == 4
-    assert [outcome.check["kpi"] for outcome in outcomes if not outcome.passed] == []
+    result = cosim.run("demo3_inverse_kinematics")
+    assert len(result.checks) == 4
+    assert [outcome.check["kpi"] for outcome in result.checks if not outcome.passed] == []
     return result
 
 

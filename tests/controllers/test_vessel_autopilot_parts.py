@@ -129,9 +129,8 @@ def test_one_block_in_another_language_changes_nothing(tmp_path: Path, block: st
 def test_another_heading_controller_sails_demo1(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(RATE_DAMPED)
     system = with_block(tmp_path, "heading", {"python": str(tmp_path / "own.py:RateDamped")})
-    assembly = cosim.load("demo1_box", nested("demo1_box", system))
-    result = cosim.api.execute(assembly)
-    assert all(outcome.passed for outcome in cosim.api.evaluate_scenario_checks(assembly, result))
+    result = cosim.run("demo1_box", nested("demo1_box", system))
+    assert all(outcome.passed for outcome in result.checks)
     assert not np.array_equal(result["usv.rudder_angle"], cosim.run("demo1_box")["usv.rudder_angle"])
 
 

@@ -8,7 +8,6 @@ from fakes import FakeComponent, gain, inputs, integrator, outputs
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 from systems import connection, make_system, run_system
 
-from cosim.api import load
 from cosim.components.python_fmu import PythonFmuComponent
 from cosim.core import resources
 from cosim.core.component import StepResult
@@ -18,6 +17,7 @@ from cosim.core.time_grid import exact_fraction
 from cosim.engine import EXECUTORS
 from cosim.engine.run_loop import simulate
 from cosim.engine.settings import Settings
+from cosim.scenario import load
 
 TIGHT = Iteration(1e-13, 100)
 FMUS = resources.root() / "fmus"

@@ -155,7 +155,9 @@ def test_variables_follow_the_contract() -> None:
     assert variables["uav.rotor_speed"].scalar_names[0] == "uav.rotor_speed[1]"
     assert variables["usv.deck.velocity.z"].unit.name == "m/s"
     assert variables["usv.contact.touching"].type == "Boolean"
-    assert {v.causality for v in variables.values()} == {"input", "output"}
+    assert {v.causality for v in variables.values()} == {"input", "output", "local"}
+    assert variables["uav.mass"].variability == "constant"
+    assert variables["uav.mass"].start == trial.world.get("uav.mass") == 0.443892
     assert "uav.deck.position.x" not in variables
 
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from cosim.api import load
 from cosim.cli.commands.replay import command as replay
 from cosim.cli.commands.report import command as report
 from cosim.cli.commands.run import command as run
@@ -17,6 +16,7 @@ from cosim.core.errors import InputError
 from cosim.core.recording import Recording
 from cosim.report import pages
 from cosim.results import Result, write_run
+from cosim.scenario import load
 
 
 class Reader(HTMLParser):

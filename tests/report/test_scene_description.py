@@ -6,16 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from cosim.api import load
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.resources import root
 from cosim.report.scene import build_scene
+from cosim.scenario import load
+from cosim.scenario.extension import read_system_document
 
 SHIPPED = sorted((root() / "scenarios").glob("*.json"))
 
 
 def scene(file):
-    return build_scene({"scenario": json.loads(Path(file).read_text()), "scenario_file": str(file)})
+    return build_scene({"scenario": read_system_document(Path(file)).value, "scenario_file": str(file)})
 
 
 @pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)

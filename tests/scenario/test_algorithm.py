@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from cosim.api import load
 from cosim.core.errors import InputError
+from cosim.scenario import load
 
 
 def scenario(folder, probe, **algorithm):

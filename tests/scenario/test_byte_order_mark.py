@@ -7,6 +7,7 @@ from systems import connection
 
 import cosim
 from cosim.core import resources
+from cosim.scenario import load
 from cosim.studies.controller_bench.role import read_role
 from cosim.studies.regression import has_keys
 from cosim.studies.sweep import Sweep
@@ -36,13 +37,13 @@ def test_a_scenario_and_a_nested_system(folder, marked):
 
 def test_positions_do_not_count_the_mark(marked):
     with pytest.raises(cosim.InputError, match=r"scenario\.json:1:2: .*unknown key") as error:
-        cosim.load(marked('{"colour": 1}'))
+        load(marked('{"colour": 1}'))
     assert "\ufeff" not in str(error.value)
 
 
 def test_a_second_mark_is_no_json(marked):
     with pytest.raises(cosim.InputError, match=r"scenario\.json:1:1: expected a JSON value"):
-        cosim.load(marked("\ufeff{}"))
+        load(marked("\ufeff{}"))
 
 
 def test_a_sweep_and_a_tuning(marked):
@@ -67,5 +68,5 @@ def test_the_mark_of_utf_16_is_refused_in_one_line(folder):
     file = folder.path / "scenario.json"
     file.write_text("{}", encoding="utf-16")
     with pytest.raises(cosim.InputError, match="is not UTF-8 text") as error:
-        cosim.load(file)
+        load(file)
     assert len(error.value.problems) == 1

@@ -10,10 +10,11 @@ from systems import connection
 import cosim
 from cosim.cli.commands import check
 from cosim.core import size_limits
-from cosim.scenario import nested_systems
+from cosim.scenario import extension, load
 
 ARRAYS = """
 from cosim.core.component import Component, Variable
+from cosim.scenario import load
 
 
 class Arrays(Component):
@@ -35,7 +36,7 @@ class Arrays(Component):
 def refusal(scenario):
     """Return the only line with which a scenario is refused."""
     with pytest.raises(cosim.InputError) as error:
-        cosim.load(scenario)
+        load(scenario)
     (problem,) = error.value.problems
     return str(problem).replace(f"{scenario.parent}/", "")
 
@@ -68,13 +69,13 @@ def test_small_files_that_expand_to_many_components_are_refused_before(folder, l
 
 
 def test_a_file_is_read_once_however_often_it_is_used(folder, monkeypatch):
-    read, files = nested_systems.read_document, []
-    monkeypatch.setattr(nested_systems, "read_document", lambda file: files.append(file.name) or read(file))
+    read, files = extension.read_document, []
+    monkeypatch.setattr(extension, "read_document", lambda file: files.append(file.name) or read(file))
     (folder.path / "up").mkdir()
     folder.write({"components": {"x": folder.block("Gain")}}, "leaf.json")
     folder.write({"components": {"a": {"system": "leaf.json"}, "b": {"system": "up/../leaf.json"}}}, "pair.json")
     scenario = folder.scenario({"p": {"system": "pair.json"}, "q": {"system": "up/../pair.json"}, "x": {"system": "leaf.json"}})
-    loaded = cosim.load(scenario)
+    loaded = load(scenario)
     loaded.free()
     assert list(loaded.system.components) == ["p.a.x", "p.b.x", "q.a.x", "q.b.x", "x.x"]
     assert files == ["scenario.json", "pair.json", "leaf.json"]
@@ -88,7 +89,7 @@ def test_a_mistake_in_a_file_is_reported_once_however_often_it_is_used(folder):
 
 def test_deeply_nested_systems_are_refused_at_the_level_that_is_too_deep(folder):
     chain(folder, 99, 1, folder.block("Gain"))
-    cosim.load(folder.scenario({"a": {"system": "level0.json"}})).free()
+    load(folder.scenario({"a": {"system": "level0.json"}})).free()
     folder.write({"components": {"c0": {"system": "level0.json"}}}, "more.json")
     line = refusal(folder.scenario({"a": {"system": "level0.json"}, "b": {"system": "more.json"}}))
     assert line.endswith('$.components.c0.system: the nested system "level0.json" is nested more than 100 levels deep')
@@ -188,9 +189,9 @@ def ring(folder, groups):
 @pytest.mark.parametrize(
     "work",
     [
-        lambda file: cosim.load(file).free(),
+        lambda file: load(file).free(),
         lambda file: check.command.main([str(file), "--isolation", "none"], standalone_mode=False),
-        lambda file: cosim.load(file).metadata,
+        lambda file: load(file).metadata,
         lambda file: cosim.run(file),
     ],
     ids=["load", "check", "description", "run"],

@@ -5,6 +5,7 @@ from systems import connection
 
 import cosim
 from cosim.core import resources
+from cosim.scenario import load
 
 
 @pytest.mark.parametrize(
@@ -94,7 +95,7 @@ def test_periods_must_fit_step_size_and_duration(folder):
 
 
 def test_arguments_may_have_the_parameter_names_of_the_loader(folder):
-    cosim.load(folder.scenario({"a": folder.block("Gain", arguments={"kind": 1, "reference": "x"})})).free()
+    load(folder.scenario({"a": folder.block("Gain", arguments={"kind": 1, "reference": "x"})})).free()
 
 
 def test_the_instance_name_cannot_be_an_argument(folder):

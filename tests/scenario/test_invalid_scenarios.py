@@ -6,6 +6,7 @@ from systems import connection
 
 import cosim
 from cosim.core.errors import did_you_mean
+from cosim.scenario import load
 
 
 def test_all_problems_are_reported_at_once(folder):
@@ -142,7 +143,7 @@ def test_an_invalid_stop_time_does_not_hide_an_invalid_event(folder):
 
 def test_for_an_unknown_scenario_the_nearest_shipped_one_is_suggested():
     with pytest.raises(cosim.InputError, match='no shipped scenario "demo1_bx"; did you mean "demo1_box"'):
-        cosim.load("demo1_bx")
+        load("demo1_bx")
 
 
 def test_a_name_with_swapped_letters_is_suggested():
@@ -177,4 +178,4 @@ def test_settings_of_the_caller_may_be_arrays_and_must_be_finite(folder):
     ],
 )
 def test_steps_that_the_times_resolve_are_accepted(folder, times):
-    cosim.load(folder.scenario({"a": folder.block("Gain")}, **times)).free()
+    load(folder.scenario({"a": folder.block("Gain")}, **times)).free()

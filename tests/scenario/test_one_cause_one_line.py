@@ -7,6 +7,7 @@ import pytest
 from systems import connection
 
 import cosim
+from cosim.scenario import load
 
 NAN = float("nan")
 GAIN = {"python": f"{Path(__file__).parent}/pythonfmu_blocks.py:Gain"}
@@ -161,12 +162,12 @@ CASES = NAMES | NUMBERS | SURROGATES | CONSEQUENCES
 def refusal(folder, text):
     file = folder.write(text)
     with pytest.raises(cosim.InputError) as error:
-        cosim.load(file)
+        load(file)
     return [str(problem).replace(f"{folder.path}/", "") for problem in error.value.problems]
 
 
 def test_the_scenario_is_valid_without_the_mistakes(folder):
-    cosim.load(folder.write(TEXT)).free()
+    load(folder.write(TEXT)).free()
 
 
 @pytest.mark.parametrize("case", ROOTS)

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 import cosim
+from cosim.scenario import load
 
 
 @pytest.mark.parametrize("time", [Fraction(1, 10), Decimal("0.1"), np.float64(0.1), 0.1, "1/10"])
 def test_times(time):
-    prepared = cosim.load("free_flight", stop_time=time, step_size=Fraction(1, 100))
+    prepared = load("free_flight", stop_time=time, step_size=Fraction(1, 100))
     prepared.free()
     assert (prepared.settings.stop_time, prepared.settings.step_size) == (Fraction(1, 10), Fraction(1, 100))
 

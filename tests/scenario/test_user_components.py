@@ -62,7 +62,7 @@ def test_a_valid_component_runs_without_the_optional_methods(folder, own):
 
 
 def test_pythonfmu_is_not_imported_for_a_scenario_without_its_classes(folder, own):
-    program = "import sys, cosim; cosim.load(sys.argv[1]).free(); print('pythonfmu' in sys.modules)"
+    program = "import sys, cosim; cosim.load(sys.argv[1]).close(); print('pythonfmu' in sys.modules)"
     command = [sys.executable, "-c", program, folder.scenario(own())]
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "False\n"
 

@@ -3,8 +3,8 @@
 import pytest
 from systems import connection
 
-import cosim
 from cosim.core import resources
+from cosim.scenario import load
 from cosim.scenario.plausibility import find_warnings
 
 SHIPPED = sorted((resources.root() / "scenarios").glob("*.json"))
@@ -12,7 +12,7 @@ BOTH = [connection("plant.ship", "pilot.vehicle"), connection("pilot.motor", "pl
 
 
 def warnings_of(file):
-    prepared = cosim.load(file)
+    prepared = load(file)
     try:
         return [str(problem).partition(": $.")[2] for problem in find_warnings(prepared)]
     finally:

@@ -5,6 +5,7 @@ from systems import connection
 
 import cosim
 from cosim.core.time_grid import exact_fraction
+from cosim.scenario import load
 
 WHOLE_PLANT = """
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
@@ -31,7 +32,7 @@ def columns(file, **more):
 def test_prefixes_connect_the_inputs_that_the_target_declares(folder):
     pilot = folder.block("Controller", parameters={"gain": [1.0, 10.0]})
     file = folder.scenario({"pilot": pilot, "plant": folder.block("Plant")}, PAIR)
-    prepared = cosim.load(file)
+    prepared = load(file)
     pairs = [f"{c.source} > {c.target}" for c in prepared.system.connections]
     assert pairs == [
         "plant.ship.position.x > pilot.vehicle.position.x",
@@ -56,7 +57,7 @@ def test_components_step_in_the_listed_order_by_default(folder):
 def test_a_connection_of_single_variables_overrides_a_prefix(folder):
     components = {"pilot": folder.block("Controller"), "gain": folder.block("Gain"), "plant": folder.block("Plant")}
     file = folder.scenario(components, [*PAIR, connection("gain.y", "plant.ship.motor[2]")])
-    prepared = cosim.load(file)
+    prepared = load(file)
     fed = {str(c.target): str(c.source) for c in prepared.system.connections}
     prepared.free()
     assert fed["plant.ship.motor[1]"] == "pilot.motor[1]"
@@ -73,7 +74,7 @@ def test_a_component_alone_is_a_prefix_too(folder):
     folder.write({"components": {"head": folder.block("Controller")}, "ports": {"inputs": {"vehicle": "head.vehicle"}}}, "n.json")
     (folder.path / "plant.py").write_text(WHOLE_PLANT)
     components = {"plant": {"python": "plant.py:Whole"}, "pilot": {"system": "n.json"}}
-    prepared = cosim.load(folder.scenario(components, [connection("plant", "pilot.vehicle")]))
+    prepared = load(folder.scenario(components, [connection("plant", "pilot.vehicle")]))
     prepared.free()
     assert [f"{c.source} > {c.target}" for c in prepared.system.connections] == [
         "plant.position.x > pilot.head.vehicle.position.x"
@@ -87,7 +88,7 @@ def test_a_port_may_name_variables_that_only_some_inner_components_have(folder):
         {"plant": folder.block("Plant"), "pilot": {"system": "n.json"}},
         [connection("plant.ship.position.x", "pilot.vehicle.position.x")],
     )
-    prepared = cosim.load(file)
+    prepared = load(file)
     prepared.free()
     assert [str(c.target) for c in prepared.system.connections] == ["pilot.head.vehicle.position.x"]
 
@@ -137,7 +138,7 @@ def test_two_levels_of_nesting(folder):
 def test_a_period_of_a_nested_system_holds_for_all_inside(folder):
     components = nested(folder)
     components["pilot"]["period"] = 3
-    prepared = cosim.load(folder.scenario(components, PAIR))
+    prepared = load(folder.scenario(components, PAIR))
     prepared.free()
     assert {name: float(period) for name, period in prepared.system.periods.items()} == {"pilot.head": 3.0, "pilot.tail": 3.0}
 

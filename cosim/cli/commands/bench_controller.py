@@ -13,10 +13,11 @@ import click
 
 from ...core.errors import InputError, Problem
 from ...core.processors import available_processors
+from ...studies.regression_runs import check_unique_names, default_folder, find_scenario_files
 from .. import supervision
 from ..bench_trial import ControllerTrial, TrialResult, run_trials
 from ..messages import print_verdict
-from .regress import EXIT_CODE_SEVERITY, check_unique_names, default_folder, find_scenario_files
+from .regress import EXIT_CODE_SEVERITY
 
 if TYPE_CHECKING:
     from ...studies.controller_bench.score import KpiComparison

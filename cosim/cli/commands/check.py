@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
@@ -19,16 +20,20 @@ if TYPE_CHECKING:
 @click.argument("scenario")
 @click.option("--set", "settings", multiple=True, metavar="NAME=value", help="As for `cosim run`.")
 @click.option("--connections/--no-connections", default=True, help="List every connection.")
+@click.option("--expanded", is_flag=True, help="Print the scenario as JSON instead, with what it extends and --set applied.")
 @supervision.supervision_options
-def command(scenario: str, settings: tuple[str, ...], connections: bool, isolation: str, sandbox: str | None) -> None:
+def command(
+    scenario: str, settings: tuple[str, ...], connections: bool, expanded: bool, isolation: str, sandbox: str | None
+) -> None:
     """Check SCENARIO without running it and print the expanded system.
 
     SCENARIO is a JSON file or the name of a shipped scenario. Prints components, processes, stages, connections and unit
     conversions. Probable mistakes are warnings: a forgotten connection, a missing reference, an event after the end.
-    --isolation and --sandbox only affect the printed processes.
+    --isolation and --sandbox only affect the printed processes. The JSON of --expanded has absolute paths: a file with it is a
+    scenario that runs anywhere on this machine.
     """
-    from ...api import load
-    from ...scenario.nested_systems import parse_settings
+    from ...scenario import load
+    from ...scenario.nested_systems import load_scenario, parse_settings
     from ...scenario.plausibility import find_warnings
 
     fmu_isolation: Literal["fmu", "none"] = "fmu" if isolation == "fmu" else "none"
@@ -36,6 +41,9 @@ def command(scenario: str, settings: tuple[str, ...], connections: bool, isolati
     try:
         if problems := prepared.figure_problems():
             raise InputError(problems)
+        if expanded:
+            click.echo(json.dumps(load_scenario(scenario, parse_settings(settings)).expanded(), indent=2, ensure_ascii=False))
+            return
         _print_components(prepared)
         _print_processes(prepared, isolation, sandbox)
         _print_stages(prepared)
@@ -95,18 +103,13 @@ def _print_nested_stages(stages: Sequence[Stage], indent: str) -> None:
 
 
 def _print_connections(prepared: PreparedRun) -> None:
-    from ...engine.transfer_plan import unit_conversion
+    from ...scenario.overview import connection_notes
 
     system = prepared.system
     click.echo(f"\nconnections ({len(system.connections)})")
     for connection in system.connections:
-        source, target = system.find_element(connection.source).variable, system.find_element(connection.target).variable
-        notes = [f"delay {connection.delay}"] if connection.delay else []
-        if unit_conversion(source, target) != (1.0, 0.0) and source.unit and target.unit:
-            notes.append(f"{source.unit.name} to {target.unit.name}")
-        if source.type != target.type:
-            notes.append(f"{source.type} to {target.type}")
-        click.echo(f"  {connection.source} -> {connection.target}" + (f"  ({', '.join(notes)})" if notes else ""))
+        notes = connection_notes(system, connection)
+        click.echo(f"  {connection.source} -> {connection.target}" + (f"  ({notes})" if notes else ""))
 
 
 def _print_unconnected_inputs(prepared: PreparedRun) -> None:

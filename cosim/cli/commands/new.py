@@ -15,6 +15,7 @@ import click
 
 from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
+from . import new_scenario
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 #: name of the controller in the templates, as a file and as a class; the new controller's name replaces it
@@ -49,7 +50,10 @@ LANGUAGES = {
 
 @click.group()
 def command() -> None:
-    """Create a controller with a scenario in which it runs."""
+    """Create a controller with a scenario in which it runs, or a scenario."""
+
+
+command.add_command(new_scenario.command, "scenario")
 
 
 @command.command()

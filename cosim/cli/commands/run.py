@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...core.errors import CosimError, InputError, Problem
+from ...core.errors import InputError, Problem
 from ...core.json_values import parse_object
 from ...process.journal import STEP_COUNT
 from ...process.output_lock import LockKeeper
@@ -23,7 +23,8 @@ from ..unfinished_runs import OutputFiles
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-    from ...engine.run_loop import Observer
+    from ...api import Simulation
+    from ...engine.plan_run import Observer
     from ...process.supervisor import SupervisedOutcome
     from ...report.drawing_process import DrawingProcess
     from ...scenario import PreparedRun
@@ -101,27 +102,25 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
         locks: keeper of the lock of the output directory.
         link: connection to a live view; None: no live view.
     """
-    from ...api import executing
+    from ...process.float_mode import default_float_mode
     from ...process.run_files.folder import keeping_run_files
     from .. import messages
 
     warnings = messages.print_log()
     _require_packages(options)
     began = time.perf_counter()
-    with _drawing_process(options) as drawing:
-        prepared = _load(options, None if link else options.real_time)
+    with _drawing_process(options) as drawing, _load(options, None if link else options.real_time) as simulation:
+        prepared = simulation.prepared
         folder = options.output_folder(prepared.spec.name).absolute()
-        try:
-            _prepare_folder(prepared, options, locks)
-            control = live.create_control(prepared, link, options.real_time) if link else None
-        except CosimError:
-            prepared.free()  # from here on `executing` frees the components
-            raise
+        _prepare_folder(prepared, options, locks)
+        control = live.create_control(prepared, link, options.real_time) if link else None
         with (
             keeping_run_files(OutputFiles.of_folder(folder).unfinished, folder / "result.csv", prepared.metadata),
             _progress_observers(prepared) as observers,
-            executing(prepared, observers, control) as execution,
+            default_float_mode(),
+            simulation,
         ):
+            execution = simulation.execute(observers, control)
             execution.result.metadata["warnings"] = warnings
             if control:
                 execution.result.metadata["live_events"] = control.finish()
@@ -157,14 +156,14 @@ def _require_packages(options: RunOptions) -> None:
         require_mcap()
 
 
-def _load(options: RunOptions, real_time: float | None) -> PreparedRun:
+def _load(options: RunOptions, real_time: float | None) -> Simulation:
     """Load the scenario and print warnings about it."""
     from ...api import load
     from ...scenario.nested_systems import parse_settings
     from ...scenario.plausibility import find_run_warnings
     from .. import messages
 
-    prepared = load(
+    simulation = load(
         options.scenario,
         parse_settings(options.settings),
         stop_time=options.stop_time,
@@ -174,8 +173,8 @@ def _load(options: RunOptions, real_time: float | None) -> PreparedRun:
         isolation=options.isolation,
         sandbox=options.sandbox,
     )
-    messages.log_problems(find_run_warnings(prepared))
-    return prepared
+    messages.log_problems(find_run_warnings(simulation.prepared))
+    return simulation
 
 
 def _save_after_crash(outcome: SupervisedOutcome) -> None:

@@ -25,6 +25,6 @@ def _schema(kind: str | None) -> dict[str, Any]:
         from ...studies.schema import SweepSpec, TuneSpec, study_json_schema
 
         return study_json_schema(SweepSpec if kind == "sweep" else TuneSpec)
-    from ... import scenario
+    from ...scenario.extension_schema import editor_schema
 
-    return scenario.json_schema(kind == "nested")
+    return editor_schema(kind == "nested")

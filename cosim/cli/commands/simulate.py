@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,12 +16,8 @@ from ..unfinished_runs import OutputFiles, writing_results
 
 if TYPE_CHECKING:
     from ...components.fmi import Isolation
-    from ...core.component import Component
     from ...core.recording import Recording
-    from ...engine.plan import Plan
     from ...process.supervisor import SupervisedOutcome
-
-FMU_NAME, PROFILE_NAME = "fmu", "profile"
 
 
 @click.command(cls=strict_sandbox.SandboxCommand)
@@ -68,7 +63,8 @@ def _simulate(
     start_values: tuple[str, ...],
     input_file: Path | None,
 ) -> int:
-    from ...core.errors import InputError
+    from ...api.single_fmu import compile_fmu
+    from ...core.errors import InputError, Problem
     from ...engine.disk_space import find_space_problems
     from ...engine.run_loop import simulating
     from ...process.run_files.folder import keeping_run_files, remove_run_files, run_folder
@@ -81,7 +77,9 @@ def _simulate(
     messages.print_log()
     if output:
         check_writable(output.parent)
-    plan = _compile_system(fmu, fmu_isolation, stop_time, step_size, parse_settings(start_values), input_file)
+    settings = parse_settings(start_values)
+    plan, warning = compile_fmu(fmu, stop_time or None, step_size or None, input_file, settings, None, fmu_isolation)
+    messages.log_problems([Problem(warning)] if warning else [])
     if output and shown:
         locks.lock(OutputFiles.of_file(output).lock, shown)
         replaced = output.stat().st_size if output.is_file() else 0
@@ -133,82 +131,3 @@ def _isolation(isolation: str, sandbox: bool) -> Isolation | None:
     from ...components.fmi import Isolation
 
     return Isolation(sandbox=sandbox) if sandbox or isolation == "fmu" else None
-
-
-def _compile_system(
-    fmu: Path,
-    fmu_isolation: Isolation | None,
-    stop_time: str | None,
-    step_size: str | None,
-    start_values: dict[str, Any],
-    input_file: Path | None,
-) -> Plan:
-    """Compile the system of the FMU, and of the input file if there is one."""
-    from ...components.fmi import FmuFile, create_component
-    from ...core.errors import Problem
-    from ...core.system import Connection, Endpoint, System
-    from ...engine.plan import compile_plan
-    from ...engine.settings import Settings
-    from .. import messages
-
-    file = FmuFile(fmu)
-    messages.log_problems([Problem(file.run_warning)] if file.run_warning else [])
-    experiment = file.description.default_experiment
-    start = experiment.start_time or Fraction(0)
-    stop = _parse_seconds(stop_time) if stop_time else experiment.stop_time or start + 1
-    step = _parse_seconds(step_size) if step_size else experiment.step_size or (stop - start) / 100
-    components: dict[str, Component] = {FMU_NAME: create_component(file, file.description.model_name, isolation=fmu_isolation)}
-    connections, stages = [], [(FMU_NAME,)]
-    if input_file:
-        components[PROFILE_NAME] = _read_profile(input_file, components[FMU_NAME])
-        stages.append((PROFILE_NAME,))
-        connections = [
-            Connection(Endpoint(PROFILE_NAME, v.name), Endpoint(FMU_NAME, v.name)) for v in components[PROFILE_NAME].variables
-        ]
-    assigned = _check_start_values(components[FMU_NAME], start_values)
-    outputs = [slot for v in components[FMU_NAME].variables if v.causality == "output" for slot in v.scalar_names]
-    columns = {slot: Endpoint(FMU_NAME, slot) for slot in outputs}
-    system = System(components, connections, stages, start_values={FMU_NAME: assigned})
-    return compile_plan(system, Settings(start, stop, step, columns))
-
-
-def _read_profile(path: Path, component: Component) -> Component:
-    from ...components.input_table import read_input_table
-    from ...core.csv_text import read_rows
-    from ...core.errors import InputError, Problem, did_you_mean
-
-    columns = read_rows(path)[0][1:]
-    inputs = [slot for v in component.variables if v.causality == "input" for slot in v.scalar_names]
-    unknown = [column for column in columns if column not in inputs]
-    if unknown:
-        raise InputError(
-            Problem(f'the FMU has no input "{column}"{did_you_mean(column, inputs)}', str(path)) for column in unknown
-        )
-    return read_input_table(path, columns, "linear")
-
-
-def _check_start_values(component: Component, start_values: dict[str, Any]) -> dict[str, Any]:
-    from ...core.errors import InputError, Problem
-    from ...scenario.name_resolution import UnknownNameError, check_assignment
-
-    variables = {variable.name: variable for variable in component.variables}
-    values: dict[str, Any] = {}
-    problems = []
-    for name, value in start_values.items():
-        try:
-            values |= check_assignment(FMU_NAME, variables, name, value)
-        except (UnknownNameError, ValueError) as error:
-            problems.append(Problem(str(error), f"--start-value {name}"))
-    if problems:
-        raise InputError(problems)
-    return values
-
-
-def _parse_seconds(text: str) -> Fraction:
-    from ...core.errors import InputError
-    from ...core.time_grid import exact_fraction
-
-    try:
-        return exact_fraction(text)
-    except (ValueError, ZeroDivisionError):
-        raise InputError(f'expected seconds, found "{text}"') from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,7 +13,9 @@ from typing import Any
 from ...core.errors import InputError
 from ...process.journal import suspending_deadline
 from ...process.temporary_folders import FMU_PREFIX, LockedFolder
+from . import file_cache
 from .description import FmuDescription, build_description
+from .file_cache import ExtractedFolder, FileKey
 from .preflight import (
     DEFAULT_LIMITS,
     RUN_WARNINGS,
@@ -38,8 +41,9 @@ class _BorrowedFolder:
 class FmuFile:
     """FMU file with its extracted folder and its loaded library, shared by all instances.
 
-    Each instance calls `acquire` before it uses the folder and `release` afterwards; the last `release` unloads the library and
-    removes the folder. The FMU passes the preflight check before anything is extracted.
+    Each instance calls `acquire` before it uses the folder and `release` afterwards. The last `release` unloads the library, and
+    keeps the folder for the next run in this process. The FMU passes the preflight check before anything is extracted. Neither
+    is repeated in a process while the content of the file is the same.
     """
 
     def __init__(self, path: Path, limits: PreflightLimits = DEFAULT_LIMITS):
@@ -51,6 +55,7 @@ class FmuFile:
         """
         self.path, self.limits = path, limits
         self._folder: LockedFolder | _BorrowedFolder | None = None
+        self._extracted: ExtractedFolder | None = None
         self._reference_count = 0
         #: FMPy's slave object with the loaded library, None while no instance has loaded it
         self.library: Any = None
@@ -60,12 +65,36 @@ class FmuFile:
     @cached_property
     def examination(self) -> Examination:
         """Result of the preflight check."""
-        return examine(self.path, self.limits)
+        examination: Examination = self._remember("examination", lambda: examine(self.path, self.limits))
+        return examination
 
     @cached_property
     def description(self) -> FmuDescription:
         """Model description; InputError if the preflight check found errors."""
-        return build_description(self.path, self.examination)
+        description: FmuDescription = self._remember("description", lambda: build_description(self.path, self.examination))
+        return description
+
+    def _remember(self, part: str, read: Callable[[], Any]) -> Any:
+        """Return what is read from the file, which is read again only if its content has changed."""
+        if not (key := self._key):
+            return read()
+        if (known := file_cache.contents.get((part, self.limits, key))) is None:
+            known = read()
+            if self._find_key() == key:  # else the file has changed meanwhile
+                file_cache.contents.put((part, self.limits, key), known)
+        return known
+
+    @cached_property
+    def _key(self) -> FileKey | None:
+        return self._find_key()
+
+    def _find_key(self) -> FileKey | None:
+        """Return the path with the hash of the present content; None if the file cannot be read."""
+        try:
+            with open_regular_file(self.path) as file:
+                return FileKey(self.path, file_digest(file, "sha256").hexdigest())
+        except (OSError, InputError):
+            return None
 
     @property
     def run_warning(self) -> str:
@@ -79,6 +108,8 @@ class FmuFile:
     @cached_property
     def sha256(self) -> str:
         """SHA-256 of the file, in hexadecimal."""
+        if self._key:
+            return self._key.sha256
         with open_regular_file(self.path) as file:
             return file_digest(file, "sha256").hexdigest()
 
@@ -98,34 +129,43 @@ class FmuFile:
         """
         if self._folder is None:
             self.check_binary()
-            folder = LockedFolder(FMU_PREFIX)
-            try:
-                with suspending_deadline():  # extracting a large archive must not count as time of the component
-                    extract(self.path, self.examination, Path(folder.name), self.limits)
-            except OSError as error:
-                folder.cleanup()
-                raise InputError(f'"{self.path}" cannot be extracted: {error.strerror or error}') from None
-            except InputError:
-                folder.cleanup()
-                raise
-            self._folder = folder
+            with suspending_deadline():  # extracting a large archive must not count as time of the component
+                self._extracted = (file_cache.take_folder(self._key) if self._key else None) or self._extract()
+            self._folder = self._extracted.folder
         self._reference_count += 1
         return Path(self._folder.name)
+
+    def _extract(self) -> ExtractedFolder:
+        folder = LockedFolder(FMU_PREFIX)
+        try:
+            extract(self.path, self.examination, Path(folder.name), self.limits)
+            return ExtractedFolder(folder, file_cache.list_files(folder.name))
+        except OSError as error:
+            folder.cleanup()
+            raise InputError(f'"{self.path}" cannot be extracted: {error.strerror or error}') from None
+        except InputError:
+            folder.cleanup()
+            raise
 
     def share(self) -> FmuFile:
         """Return a copy for a worker process: it uses the same extracted folder but loads the library itself."""
         assert self._folder is not None
         other = copy(self)
-        other._folder, other._reference_count = _BorrowedFolder(self._folder.name), 0
+        other._folder, other._extracted, other._reference_count = _BorrowedFolder(self._folder.name), None, 0
         other.library, other.has_fatal_error = None, False
         return other
 
     def release(self) -> None:
-        """Give up one use of the folder; the last one unloads the library and removes the folder."""
+        """Give up one use of the folder; the last one unloads the library and keeps the folder for the next run."""
         self._reference_count -= 1
+        library = None
         if self._reference_count == 0 and self.library is not None and not self.has_fatal_error:
+            library = self.library.dll._name
             self.library.freeLibrary()
             self.library = None
         if self._reference_count == 0 and self._folder is not None:
-            self._folder.cleanup()
-            self._folder = None
+            if library and self._extracted and self._key and self._find_key() == self._key:
+                file_cache.keep_folder(self._key, self._extracted, library)
+            else:
+                self._folder.cleanup()
+            self._folder = self._extracted = None

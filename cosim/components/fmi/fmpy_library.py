@@ -12,6 +12,9 @@ from .description import FmuDescription
 from .file import FmuFile
 from .preflight.fmu_platform import current_platform
 
+#: argument names, argument types and result type of the functions of FMPy's classes, which it takes milliseconds to find out
+_prototypes: dict[type, dict[str, tuple[Any, Any, Any]]] = {}
+
 
 def load_library(file: FmuFile, folder: Path, slave_class: type) -> Any:
     """Load the library of an extracted FMU.
@@ -54,7 +57,13 @@ def _create_slave(slave_class: type, description: FmuDescription, folder: Path) 
         component=None,
         _functions={},
     )
-    slave._loadFunctions()
+    if (prototypes := _prototypes.get(slave_class)) is None:
+        slave._loadFunctions()
+        _prototypes[slave_class] = {name: (f.argnames, f.argtypes, f.restype) for name, f in slave._functions.items()}
+    else:
+        for name, prototype in prototypes.items():
+            function = slave._functions[name] = getattr(slave.dll, name)
+            function.argnames, function.argtypes, function.restype = prototype
     return slave
 
 

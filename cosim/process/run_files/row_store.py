@@ -44,6 +44,13 @@ class RowStore:
         self._chunk = np.zeros(self.chunk_rows, self.dtype)
         return self._chunk
 
+    def rewind(self, count: int) -> np.ndarray:
+        """Forget all but the first `count` rows, and return the chunk of the next row, shape (chunk_rows,)."""
+        kept = self._chunk[:count]
+        chunk = self.add_chunk()
+        chunk[:count] = kept
+        return chunk
+
     def read_first(self, count: int) -> np.ndarray:
         """Return the first `count` rows, shape (count,)."""
         return self._chunk[:count]
@@ -88,6 +95,11 @@ class FileRowStore(RowStore):
             raise write_error(f"cannot write {size / 1e6:.3g} MB of recorded rows to {where}: {error.strerror}", error) from None
         self._rows += self.chunk_rows
         return chunk
+
+    def rewind(self, count: int) -> np.ndarray:
+        """Forget all but the first `count` rows, and return the chunk of the next row, mapped to the file."""
+        self._rows = count - count % self.chunk_rows
+        return self.add_chunk()
 
     def read_first(self, count: int) -> np.ndarray:
         """Return the first `count` rows, shape (count,), mapped to the file."""

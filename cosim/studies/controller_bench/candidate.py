@@ -77,7 +77,10 @@ class CandidateInterface:
         return {*self.inputs, *self.outputs, *self.parameters, *self.inner_variables}
 
     def has_variables(self, name: str) -> bool:
-        """Return whether `name` is a variable, an array, or a prefix of variables."""
+        """Return whether `name` is a variable, an array, a prefix of variables, or a pattern with "*" that matches one."""
+        head, star, tail = name.partition("*")
+        if star:
+            return any(each.startswith(head) and each.endswith(tail) for each in self.names)
         return not name or any(each == name or each.startswith((f"{name}.", f"{name}[")) for each in self.names)
 
 

@@ -14,9 +14,10 @@ from typing import Any
 
 from ...core.errors import InputError, did_you_mean
 from ...results.files import write_json
-from ...scenario.json_document import read_document
+from ...scenario.extension import read_system_document
+from ...scenario.named_functions import declared_arguments
 from ...scenario.nested_systems import load_scenario
-from ...scenario.schema import SOURCES
+from ...scenario.schema import SOURCES, FunctionSpec
 from .candidate import CandidateInterface, CandidateSource
 from .role import Role
 
@@ -112,7 +113,7 @@ class ControllerSubstitution:
     def _substitute_nested(self, file: Path, full_name: str) -> tuple[Path, NameFilter] | None:
         """Write a nested system with the candidate; return its path and name filter, or None if no component has the role."""
         before = len(self.replaced_components)
-        value, known = self._substitute_system(read_document(file).value, file.parent, f"{full_name}.")
+        value, known = self._substitute_system(read_system_document(file).value, file.parent, f"{full_name}.")
         if len(self.replaced_components) == before:
             return None
         ports, lost = self._prune_ports(value.get("ports", {}), known)
@@ -147,7 +148,7 @@ class ControllerSubstitution:
             key: [
                 {**each, "python": absolute_reference(each["python"], folder)}
                 for each in value.get(key, [])
-                if self._all_known(known, each.get("arguments", {}), f'{key[:-1]} "{each["name"]}"')
+                if self._all_known(known, each, folder, f'{key[:-1]} "{each["name"]}"')
             ]
             for key in ("kpis", "figures")
         }
@@ -168,8 +169,13 @@ class ControllerSubstitution:
     def _known_settings(self, known: NameFilter, settings: Mapping[str, Any]) -> dict[str, Any]:
         return {name: value for name, value in settings.items() if self._is_kept(known, name)}
 
-    def _all_known(self, known: NameFilter, arguments: Any, what: str) -> bool:
-        missing = [text for text in _strings(arguments) if not known(text)]
+    def _all_known(self, known: NameFilter, function: Mapping[str, Any], folder: Path, what: str) -> bool:
+        spec = FunctionSpec.model_validate(function)
+        missing = [text for text in _strings(spec.arguments) if not known(text)]
+        if sources := [source for source in spec.sources if not source.startswith("/")]:
+            needed = [name for name, is_required in declared_arguments(spec, folder).items() if is_required]
+            absent = (name for name in needed if name not in spec.arguments)
+            missing += [f"{sources[0]}.{name}" for name in absent if not any(known(f"{source}.{name}") for source in sources)]
         if missing:
             self.notes.append(f'{what} is left out: the candidate has no "{missing[0]}"')
         return not missing

@@ -17,6 +17,7 @@ from ...components.fmi import FmuFile
 from ...core.errors import ComponentError, CosimError, InputError, Problem
 from ...core.json_values import parse_object
 from ...engine.run_loop import simulating
+from ...process.float_mode import default_float_mode
 from ...process.journal import EXIT_CODE, Phase, current_journal
 from ...process.run_files.folder import keeping_run_files
 from ...process.supervisor import SupervisedOutcome, run_supervised
@@ -111,11 +112,13 @@ def _run_job(context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[str
 
 
 def _run_with_replay(replay: ReplayRequest, context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[str]) -> None:
-    from ...api import executing
+    from ...api import Simulation
     from ...report.replay import write_replay
 
     _set_deadline(context)
-    with keeping_run_files(Path(tempfile.gettempdir()) / "run"), executing(_prepare_job(context, job, fmu_files)) as execution:
+    simulation = Simulation(lambda _: _prepare_job(context, job, fmu_files))
+    with keeping_run_files(Path(tempfile.gettempdir()) / "run"), default_float_mode(), simulation:
+        execution = simulation.execute()
         result = execution.result
         write_replay([replace(result, metadata={**result.metadata, "name": replay.title})], Path(replay.page))
         if execution.failure:

@@ -118,11 +118,11 @@ def test_an_inactive_body_is_no_obstacle() -> None:
 
 def flown(near: float | None, monkeypatch: pytest.MonkeyPatch) -> Result:
     """Run Demo 1 with another near distance (m)."""
-    assembly = cosim.load("demo1_box")
-    if near is not None:
-        world = assembly.system.components["plant"]
-        monkeypatch.setattr(sys.modules[type(world._fleet.clearance).__module__], "NEAR_DISTANCE", near)
-    return cosim.api.execute(assembly)
+    with cosim.load("demo1_box") as simulation:
+        if near is not None:
+            world = simulation.prepared.system.components["plant"]
+            monkeypatch.setattr(sys.modules[type(world._fleet.clearance).__module__], "NEAR_DISTANCE", near)
+        return simulation.run()
 
 
 def test_demo1_lands_at_the_same_place_with_bullet_in_every_step(

@@ -16,9 +16,8 @@ from cosim.core import resources
 
 @pytest.fixture(scope="module")
 def demo():
-    assembly = cosim.load("demo1_box")
-    result = cosim.api.execute(assembly)
-    return assembly, result
+    with cosim.load("demo1_box") as simulation:
+        return simulation.prepared, simulation.run()
 
 
 def test_every_check_is_met(demo):

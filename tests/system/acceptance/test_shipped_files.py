@@ -8,7 +8,6 @@ import pytest
 from systems import make_system, run_system
 
 import cosim
-from cosim.api import evaluate_scenario_checks, execute
 from cosim.components.fmi import FmuFile, create_component
 from cosim.core import resources
 from cosim.core.system import Endpoint
@@ -85,11 +84,9 @@ def test_the_manifest_lists_exactly_the_fmus():
 @pytest.mark.parametrize("path", SCENARIOS, ids=label)
 def test_scenarios_meet_their_checks_and_their_first_seconds_are_finite(path):
     """Later a measurement may be missing, as after a fault."""
-    assembly = cosim.load(path)
-    result = execute(assembly)
-    outcomes = evaluate_scenario_checks(assembly, result)
-    assert outcomes
-    assert [(outcome.check, outcome.value) for outcome in outcomes if not outcome.passed] == []
+    result = cosim.run(path)
+    assert result.checks
+    assert [(outcome.check, outcome.value) for outcome in result.checks if not outcome.passed] == []
     for name in result:
         if result[name].dtype.kind == "f":
             assert np.isfinite(result[name][result.time <= 2]).all(), name
@@ -103,6 +100,6 @@ def test_a_scenario_can_be_ended_earlier():
 def test_scenarios_satisfy_the_published_schema(path):
     import jsonschema
 
-    from cosim.scenario import json_schema
+    from cosim.scenario.extension_schema import editor_schema
 
-    jsonschema.validate(json.loads(path.read_text()), json_schema(nested=path.parent.name == "systems"))
+    jsonschema.validate(json.loads(path.read_text()), editor_schema(nested=path.parent.name == "systems"))

@@ -15,8 +15,8 @@ import pytest
 from complete_scenario import INNER_SYSTEM, SCENARIO, write_scenario_files
 from scenario_mutations import value_at
 
-import cosim
 from cosim import cli
+from cosim.scenario import load
 
 TEXT = json.dumps(SCENARIO, indent=1)
 PLACE = re.compile(r".*/(scenario|inner|iner)\.json:\d+:\d+: ")
@@ -144,7 +144,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, probes: dict[int, Path]) ->
     os.mkfifo(folder / "pipe")
     for circle in ("circle.fmu", "circle.py"):
         (folder / circle).symlink_to(circle)
-    cosim.load(folder / "scenario.json").free()  # what is imported later is no time of the scenarios
+    load(folder / "scenario.json").free()  # what is imported later is no time of the scenarios
     return folder
 
 

@@ -20,6 +20,7 @@ from scenario_mutations import mutants
 
 import cosim
 from cosim.core import resources
+from cosim.scenario import load
 from cosim.scenario.json_document import read_document
 
 #: what a problem may begin with: file, line and column, or what was set from outside
@@ -56,7 +57,7 @@ def judge(file: Path, text: str, limit: float = 2.0) -> bool:
     gc.disable()  # it would go through all that Hypothesis keeps, seconds long
     begin = time.process_time()
     try:
-        cosim.load(file).free()
+        load(file).free()
         accepted = True
     except cosim.InputError as error:
         accepted = False

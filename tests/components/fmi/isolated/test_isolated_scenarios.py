@@ -15,11 +15,11 @@ import pytest
 from probe_fmus import HEADERS, PROBE_SOURCES
 
 import cosim
-from cosim import api, cli
+from cosim import cli
 from cosim.components.fmi.isolated.isolated_fmu import IsolatedFmu
 from cosim.core.errors import InputError
 from cosim.process.sandbox import find_available_sandboxes
-from cosim.scenario import load
+from cosim.scenario import PreparedRun, load
 
 FMUS = Path(__file__).parents[4] / "fmus"
 
@@ -47,7 +47,7 @@ def test_shipped_fmus_give_identical_results_in_a_sandbox(name, tmp_path):
     )
 
 
-def isolated_names(prepared: api.PreparedRun) -> list[str]:
+def isolated_names(prepared: PreparedRun) -> list[str]:
     """Names of the isolated components."""
     prepared.free()
     return [name for name, component in prepared.system.components.items() if isinstance(component, IsolatedFmu)]
@@ -61,8 +61,8 @@ def test_a_scenario_isolates_one_component(probe, tmp_path):
 @pytest.mark.parametrize("arguments", [{"isolation": "fmu"}, {"sandbox": True}])
 def test_an_argument_isolates_all_components(probe, tmp_path, arguments):
     file = scenario(tmp_path, {"a": {"fmu": str(probe)}, "b": {"fmu": str(probe)}})
-    assert isolated_names(api.load(file, **arguments)) == ["a", "b"]
-    assert isolated_names(api.load(file)) == []
+    assert isolated_names(load(file, **arguments)) == ["a", "b"]
+    assert isolated_names(load(file)) == []
 
 
 @pytest.mark.parametrize(

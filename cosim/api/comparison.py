@@ -1,0 +1,108 @@
+"""Comparison of results with references that are given as results, files, run folders or scenarios."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from ..core.errors import InputError
+from ..results import Result
+from ..results.comparison import Comparison, Tolerance
+from ..results.comparison import compare as compare_results
+from ..scenario import find_scenario, load_scenario
+from .arguments import expect, is_number
+
+#: a result, a CSV file, or a folder that `cosim run` has written
+ResultSource = Result | str | Path
+
+
+class ComparisonTask(NamedTuple):
+    """A result, its reference, and the tolerances by patterns of signals."""
+
+    result: Result
+    reference: Result
+    tolerances: Mapping[str, Tolerance]
+
+    @classmethod
+    def read(
+        cls, result: ResultSource, reference: ResultSource, tolerance: Tolerance, signals: Sequence[str] = ()
+    ) -> ComparisonTask:
+        """Read a result and its reference.
+
+        Args:
+            result: A result, a CSV file, or a folder that `cosim run` has written.
+            reference: The same, or a scenario (JSON file or name of a shipped scenario) with its own reference and tolerances.
+            tolerance: Tolerance of all signals, unless the reference is a scenario.
+            signals: Patterns of the signals that are compared; all by default.
+
+        Raises:
+            InputError: A file cannot be read, or the scenario has no reference.
+        """
+        if not isinstance(reference, Result) and _is_scenario(Path(reference)):
+            file, tolerances = _scenario_reference(Path(reference))
+            return cls(_read_result(result), _read_result(file), tolerances)
+        return cls(_read_result(result), _read_result(reference), dict.fromkeys(signals or ("*",), tolerance))
+
+    def compare(self) -> Comparison:
+        """Return the verdict on each signal of the reference."""
+        return compare_results(*self)
+
+
+def compare(
+    result: ResultSource,
+    reference: ResultSource,
+    *,
+    absolute: float = 0.0,
+    relative: float = 0.0,
+    time: float = 0.0,
+    signals: Sequence[str] = (),
+) -> Comparison:
+    """Compare a result with a reference, signal by signal.
+
+    Every signal must stay within the larger of the absolute and the relative tolerance, and within the tolerance of time. Without
+    tolerances it must be equal.
+
+    Args:
+        result: A result, a CSV file, or a folder that `cosim run` has written.
+        reference: The same, or a scenario (JSON file or name of a shipped scenario) whose reference and tolerances are used.
+        absolute: Absolute tolerance, in the unit of each signal.
+        relative: Relative tolerance, a fraction of the range of the reference signal.
+        time: Tolerance along the time axis (s).
+        signals: Patterns of the signals of the reference that are compared; "*" matches any text. All by default.
+
+    Returns:
+        The comparison with `passed`, `failures` and one verdict for each signal.
+
+    Raises:
+        InputError: A file cannot be read, the scenario has no reference, or a tolerance is negative.
+    """
+    for name, source in (("result", result), ("reference", reference)):
+        expect(name, source, isinstance(source, Result | str | os.PathLike), "a result or a path")
+    for name, value in (("absolute", absolute), ("relative", relative), ("time", time)):
+        expect(name, value, is_number(value), "a number")
+    patterns = [signals] if isinstance(signals, str) else signals
+    expect("signals", signals, all(isinstance(each, str) for each in patterns), "a list of patterns")
+    return ComparisonTask.read(result, reference, Tolerance(absolute, relative, time), patterns).compare()
+
+
+def _read_result(source: ResultSource) -> Result:
+    if isinstance(source, Result):
+        return source
+    path = Path(source)
+    return Result.from_csv(path / "result.csv" if path.is_dir() else path)
+
+
+def _is_scenario(path: Path) -> bool:
+    """Return whether a path is a JSON file, or a name without a folder that is no existing file (a shipped scenario)."""
+    return path.suffix == ".json" or (path.name == str(path) and not path.suffix and not path.exists())
+
+
+def _scenario_reference(scenario: Path) -> tuple[Path, Mapping[str, Tolerance]]:
+    """Return the path of a scenario's reference, and its tolerances."""
+    path = find_scenario(scenario)
+    spec = load_scenario(path).spec.reference
+    if spec is None:
+        raise InputError(f'{path} has no "reference"')
+    return path.parent / spec.file, {name: Tolerance(**vars(part)) for name, part in spec.tolerances.items()}

@@ -1,0 +1,115 @@
+"""Evaluation of a run: its result with KPIs and checks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..core.errors import CosimError, InputError, Problem
+from ..engine.plan_run import SimulationOutcome
+from ..process.float_mode import default_float_mode
+from ..results import Kpis, Result
+from ..results.checks import CheckOutcome, evaluate_all_checks, evaluate_checks
+from ..results.kpi import evaluate_kpis, kpi_senses, kpi_units
+from ..results.non_finite import warn_non_finite
+from ..scenario import PreparedRun
+
+
+@dataclass(frozen=True)
+class Execution:
+    """A finished run.
+
+    Attributes:
+        result: Recorded signals, KPIs and checks, as far as they were computed.
+        failure: The error that ended the run early; None if there was none.
+    """
+
+    result: Result
+    failure: BaseException | None = None
+
+
+@default_float_mode()
+def evaluate_outcome(prepared: PreparedRun, outcome: SimulationOutcome, complete: bool) -> Execution:
+    """Return the result of a run.
+
+    Args:
+        prepared: The scenario.
+        outcome: What was recorded.
+        complete: Also evaluate all KPIs and checks, unless the run failed.
+    """
+    timing = _add_timings(prepared.timing, outcome.timing)
+    timing["simulate_seconds"] = sum(outcome.timing.values())
+    metadata = {**prepared.metadata, **_outcome_metadata(prepared, outcome)}
+    result = Result(outcome.recording, timing=timing, metadata=metadata)
+    return _evaluate_run(result, prepared) if complete and not outcome.failure else Execution(result, outcome.failure)
+
+
+def _add_timings(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, float]:
+    """Return the sum of the durations of each name."""
+    return {part: first.get(part, 0.0) + second.get(part, 0.0) for part in {**first, **second}}
+
+
+def _evaluate_run(result: Result, prepared: PreparedRun) -> Execution:
+    """Evaluate all KPIs and checks; the others are also evaluated if a KPI fails."""
+    kpis = Kpis()
+    failures: list[BaseException] = []
+    functions = prepared.kpis()
+    for kpi in functions:
+        try:
+            with _adding_location(prepared, "kpis", prepared.index_of_kpi(kpi[0])):
+                kpis.update(evaluate_kpis(result, [kpi]))
+        except (CosimError, KeyboardInterrupt) as error:
+            failures.append(error)
+    about = {"kpi_units": kpi_units(functions, kpis, result.units), "kpi_senses": kpi_senses(functions, kpis)}
+    checks = evaluate_all_checks(kpis, prepared.checks)
+    evaluated = replace(result, kpis=kpis, metadata={**result.metadata, **about}, checks=checks)
+    return Execution(evaluated, failures[0] if failures else None)
+
+
+def evaluate_scenario_checks(prepared: PreparedRun, result: Result) -> list[CheckOutcome]:
+    """Evaluate the checks of a scenario.
+
+    Args:
+        prepared: The scenario.
+        result: A result with KPIs.
+
+    Returns:
+        The outcome of each check, in the order of the scenario. A check of an optional KPI that was left out is not met.
+
+    Raises:
+        InputError: A check names a KPI that the result does not have.
+    """
+    outcomes = []
+    for i, check in enumerate(prepared.checks):
+        with _adding_location(prepared, "checks", i):
+            is_optional = check["kpi"].partition(".")[0] in prepared.optional_kpis
+            outcomes += (evaluate_all_checks if is_optional else evaluate_checks)(result.kpis, [check])
+    return outcomes
+
+
+@contextmanager
+def _adding_location(prepared: PreparedRun, *path: str | int) -> Iterator[None]:
+    """Add the JSON location to problems raised in this block."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError([Problem(str(problem), prepared.root.where(*path)) for problem in error.problems]) from error
+
+
+def _outcome_metadata(prepared: PreparedRun, outcome: SimulationOutcome) -> dict[str, Any]:
+    """Return the metadata that is known after the run: steps, timing, signals that are not finite, termination, failure."""
+    termination = outcome.termination
+    return {
+        "macro_steps": outcome.macro_steps,
+        "real_time": outcome.real_time,
+        "non_finite": {} if prepared.spec.non_finite == "allow" else warn_non_finite(outcome.recording),
+        "terminated_by": {"component": termination.component, "time": termination.time} if termination else None,
+        "failure": "interrupted" if isinstance(outcome.failure, KeyboardInterrupt) else _failure_text(outcome.failure),
+    }
+
+
+def _failure_text(failure: BaseException | None) -> str | None:
+    """Return the text of a failure, its class name if the text is empty."""
+    return None if failure is None else str(failure) or type(failure).__name__

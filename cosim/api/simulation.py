@@ -1,0 +1,297 @@
+"""A scenario that Python runs or steps."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from types import TracebackType
+from typing import Any
+from weakref import finalize
+
+from ..core.errors import CosimError, InputError
+from ..engine.component_states import SavedState
+from ..engine.plan_run import Observer, PlanRun, StepHook
+from ..results import Result
+from ..scenario import PreparedRun
+from .arguments import check_names, expect, is_integer
+from .execution import Execution, evaluate_outcome
+from .variable_access import VariableAccess
+
+#: prepares the scenario with changed values of variables and entries
+Prepare = Callable[[Mapping[str, Any]], PreparedRun]
+
+
+class Simulation:
+    """Simulation of a scenario, made by `cosim.load`: run it to the end, or step it from your own loop.
+
+        with cosim.load("demo1_box") as simulation:
+            while simulation.step():
+                print(simulation.time, simulation.get("plant.uav.position.z"))
+
+    The components are initialized by the first method that needs them. They are terminated and freed by `close`, at the end of a
+    `with` block, or when the object is garbage-collected. Several simulations may be alive in one process, also in several
+    threads; methods called from several threads wait for each other. Between two steps the process is in the state in which the
+    caller left it: what components change (working directory, environment, floating-point mode and others) is changed back.
+
+    After an error of a component, or an interrupt during a step, the components are in an unknown state. Then only `result`,
+    `reset` and `close` can be called.
+
+    Attributes:
+        prepared: The scenario with its system and settings.
+    """
+
+    prepared: PreparedRun
+
+    def __init__(self, prepare: Prepare):
+        """Prepare the scenario; see `cosim.load`."""
+        self._prepare = prepare
+        self._lock = threading.RLock()
+        self._open({})
+
+    def _open(self, settings: Mapping[str, Any]) -> None:
+        self.prepared = self._prepare(settings)
+        self._run: PlanRun | None = None
+        self._variables = VariableAccess(self.prepared)
+        self._execution: Execution | None = None
+        self._is_stepping = False
+        #: ends the components; a list, so that the finalizer does not refer to this object
+        self._ends: list[Callable[[], None]] = [self.prepared.free]
+        self._finalizer = finalize(self, _end_quietly, self._ends, os.getpid())
+
+    def __repr__(self) -> str:
+        state = "closed" if not self._ends else f"at t = {self.time:.12g} s"
+        return f"<Simulation {self.prepared!r}; {state}>"
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Terminate and free the components. Later calls do nothing; `result` and `reset` still work.
+
+        Raises:
+            ComponentError: A component failed to terminate or to be freed.
+        """
+        with self._lock:
+            self._refuse_recursion()
+            self._finalizer.detach()
+            while self._ends:
+                self._ends.pop()()
+
+    # -- time ------------------------------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Present time (s)."""
+        return self._run.executor.time if self._run else self.prepared.plan.grid.time_at(0)
+
+    @property
+    def is_finished(self) -> bool:
+        """True at the stop time, and after a component has requested the end."""
+        return self._run is not None and self._run.is_finished
+
+    def step(self, n: int = 1) -> bool:
+        """Advance by `n` macro steps, or to the end if it is nearer.
+
+        Args:
+            n: Number of macro steps, at least 1.
+
+        Returns:
+            True until the end is reached: `while simulation.step(): ...`
+
+        Raises:
+            InputError: The simulation has reached its end, or `n` is no positive integer.
+            ComponentError: A component failed; `result` of the error holds what was recorded until then.
+            LateError: The simulation fell behind real time and `late` is "fail".
+        """
+        if n.__class__ is not int or n < 1:
+            expect("n", n, is_integer(n) and n > 0, "a positive number of steps")
+        with self._lock:
+            run = self._running()
+            if run.is_finished:
+                raise InputError(f"the simulation has reached its end at t = {self.time:.12g} s; reset() starts it again")
+            self._advance(run, run.executor.completed_steps + n)
+            return not run.is_finished
+
+    def run(self, observers: Sequence[Observer] = ()) -> Result:
+        """Run from the present time to the end, and evaluate the KPIs and checks.
+
+        Args:
+            observers: Functions called about 100 times with the number of finished and of all macro steps.
+
+        Returns:
+            The result; see `cosim.run`.
+
+        Raises:
+            InputError: The simulation has already failed or was closed, or a KPI refuses its arguments.
+            ComponentError: A component or a KPI function failed; `result` of the error holds what was recorded until then.
+            LateError: The simulation fell behind real time and `late` is "fail".
+        """
+        return _result_or_failure(self.execute(observers))
+
+    def execute(self, observers: Sequence[Observer] = (), step_hook: StepHook | None = None) -> Execution:
+        """Like `run`, but return a failure with the result instead of raising it.
+
+        Args:
+            observers: See `run`.
+            step_hook: Called with n before the macro step that starts at communication point n; only before the first step.
+        """
+        expect("observers", observers, isinstance(observers, Sequence) and all(map(callable, observers)), "a list of functions")
+        with self._lock:
+            with suppress(Exception, KeyboardInterrupt):  # it is the failure of the run
+                self._advance(self._running(step_hook), self.prepared.plan.grid.count, observers)
+            if self._run is None:  # it could not be created
+                self._running(step_hook)
+            return self._evaluate()
+
+    @property
+    def result(self) -> Result:
+        """Result so far. At the end it includes the KPIs and checks.
+
+        Raises:
+            InputError: A KPI refuses its arguments.
+            ComponentError: A KPI function failed.
+        """
+        with self._lock:
+            if self._run is None and self._ends:
+                self._running()
+            execution = self._evaluate()
+            return execution.result if self._run and self._run.failure else _result_or_failure(execution)
+
+    def reset(self, seed: int | None = None, parameters: Mapping[str, Any] | None = None) -> None:
+        """Return to the start time with new components.
+
+        Args:
+            seed: Value of the entries that the key "seeds" of the scenario lists; None: as loaded.
+            parameters: Values that replace those of the scenario and of `load`, until the next reset.
+
+        Raises:
+            InputError: The scenario cannot be run with these values, it lists no seeds, or it contains a Python object, which
+                cannot be made again.
+            ComponentError: A component failed to terminate or to be freed.
+        """
+        check_names("parameters", parameters)
+        expect("seed", seed, seed is None or is_integer(seed), "an integer")
+        settings: dict[str, Any] = {}
+        if seed is not None:
+            if not self.prepared.spec.seeds:
+                raise InputError('the scenario has no key "seeds", which lists the JSON pointers that a seed sets')
+            settings = dict.fromkeys(self.prepared.spec.seeds, int(seed))
+        with self._lock:
+            self._refuse_recursion()
+            self.prepared.document.refuse_objects("expected a class, of which reset() makes a new object", classes=False)
+            self.close()
+            self._open({**settings, **(parameters or {})})
+
+    # -- variables -------------------------------------------------------------------------------------------------------
+
+    def get(self, name: str) -> Any:
+        """Return the present value of a variable.
+
+        Outputs have the values of the last step. A connected input has the value of its last transfer.
+
+        Args:
+            name: Name of a signal such as "plant.uav.position.z", of an input or a parameter. The name of an array, or of
+                variables with indices ("plant.uav.rotor_speed"), gives a list.
+
+        Raises:
+            InputError: There is no such variable.
+            ComponentError: The component failed.
+        """
+        with self._lock:
+            return self._variables.get(name, self._running())
+
+    def set(self, name: str, value: Any) -> None:
+        """Set an input without connection or a tunable parameter; it acts in the next step.
+
+        Args:
+            name: Name of the variable, or of a list of variables with indices.
+            value: The value, in the unit of the variable; a list for an array.
+
+        Raises:
+            InputError: There is no such variable, it cannot be set now, or it does not accept the value.
+            ComponentError: The component failed.
+        """
+        with self._lock:
+            self._variables.set(name, value, self._running())
+
+    # -- states ----------------------------------------------------------------------------------------------------------
+
+    def save(self) -> SavedState:
+        """Return the present state, for `restore`.
+
+        Raises:
+            InputError: A component cannot return to a state (FMI: canGetAndSetFMUState).
+            ComponentError: A component failed.
+        """
+        with self._lock:
+            return self._running().save()
+
+    def restore(self, state: SavedState) -> None:
+        """Return to a state, as often as needed; the result then ends there.
+
+        Raises:
+            InputError: The state belongs to another simulation, or to this one before it was reset.
+            ComponentError: A component failed.
+        """
+        expect("state", state, isinstance(state, SavedState), "a state that save() returned")
+        with self._lock:
+            self._execution = None
+            self._running().restore(state)
+
+    # -- internal --------------------------------------------------------------------------------------------------------
+
+    def _running(self, step_hook: StepHook | None = None) -> PlanRun:
+        """Return the run with its components in step mode."""
+        run = self._run
+        if run is None or not self._ends or run.failure or self._is_stepping:
+            self._refuse_recursion()
+            if not self._ends:
+                raise InputError("the simulation is closed; reset() opens it again")
+            if run is None:
+                run = self._run = PlanRun(self.prepared.plan, step_hook)
+                self._ends[:] = [run.close]
+                run.initialize()
+            elif run.failure:
+                raise InputError(f"the simulation failed: {str(run.failure) or 'interrupted'}; reset() starts it again")
+        return run
+
+    def _refuse_recursion(self) -> None:
+        if self._is_stepping:
+            raise InputError("the simulation is stepping; a component or an observer cannot step or change it meanwhile")
+
+    def _advance(self, run: PlanRun, end: int, observers: Sequence[Observer] = ()) -> None:
+        self._is_stepping, self._execution = True, None
+        try:
+            run.advance(min(end, self.prepared.plan.grid.count), observers)
+        except CosimError as error:
+            error.result = self._evaluate().result
+            raise
+        finally:
+            self._is_stepping = False
+
+    def _evaluate(self) -> Execution:
+        if self._execution is None:
+            if self._run is None:
+                raise InputError("the simulation was closed before it began; reset() opens it again")
+            self._execution = evaluate_outcome(self.prepared, self._run.outcome(), self._run.is_finished)
+        return self._execution
+
+
+def _result_or_failure(execution: Execution) -> Result:
+    """Return the result of a run, or raise its failure with the result."""
+    if execution.failure:
+        vars(execution.failure)["result"] = execution.result  # any exception has it, a KeyboardInterrupt too
+        raise execution.failure
+    return execution.result
+
+
+def _end_quietly(ends: list[Callable[[], None]], process: int) -> None:
+    """End the components of a simulation that was not closed, but not in a fork of its process."""
+    while ends and os.getpid() == process:
+        with suppress(CosimError):
+            ends.pop()()

@@ -1,0 +1,117 @@
+"""Access to the variables of a simulation by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ..core.component import Variable
+from ..core.errors import InputError, Problem, did_you_mean
+from ..core.system import Endpoint
+from ..engine.layout import Layout
+from ..engine.plan_run import PlanRun
+from ..engine.run_checks import not_settable_reason
+from ..scenario import PreparedRun
+from ..scenario.name_resolution import Target, UnknownNameError, check_assignment, resolve_name
+from .arguments import expect
+
+#: returns the present value of a variable of the run
+Reader = Callable[[PlanRun], Any]
+
+
+class VariableAccess:
+    """Reads and sets variables by name; each name is resolved once."""
+
+    def __init__(self, prepared: PreparedRun):
+        self._prepared, self._system, self._plan = prepared, prepared.system, prepared.plan
+        self._readers: dict[str, Reader] = {}
+        self._targets: dict[str, list[Target]] = {}
+        self._variables: dict[str, Mapping[str, Variable]] = {}
+        self._connected = {connection.target for connection in self._system.connections}
+
+    def get(self, name: str, run: PlanRun) -> Any:
+        """Return the value of a variable; see `Simulation.get`."""
+        try:
+            reader = self._readers[name]
+        except (KeyError, TypeError):
+            expect("name", name, isinstance(name, str), "the name of a variable")
+            reader = self._readers[name] = self._make_reader(self._find_signal(name))
+        return reader(run)
+
+    def set(self, name: str, value: Any, run: PlanRun) -> None:
+        """Set a variable; see `Simulation.set`."""
+        expect("name", name, isinstance(name, str), "the name of a variable")
+        for target in self._find_targets(name):
+            component = target.component
+            try:
+                values = check_assignment(component, self._variables_of(component), target.prefix, value, all_elements=True)
+            except (UnknownNameError, ValueError) as error:
+                raise InputError(Problem(str(error), f'set("{name}")')) from None
+            for variable in values:
+                if reason := not_settable_reason(component, self._variables_of(component)[variable], self._connected):
+                    hint = "" if "connection" in reason else "; load() and reset() take start values as `parameters`"
+                    raise InputError(Problem(f"{reason}, it cannot be set during the simulation{hint}", f'set("{name}")'))
+            with run.accessing(component, "set"):
+                for variable, each in values.items():
+                    self._system.components[component].set(variable, each)
+
+    def _variables_of(self, component: str) -> Mapping[str, Variable]:
+        if component not in self._variables:
+            self._variables[component] = {variable.name: variable for variable in self._system.components[component].variables}
+        return self._variables[component]
+
+    def _find_targets(self, name: str) -> list[Target]:
+        """Return the variables that an assignment sets."""
+        if name not in self._targets:
+            self._targets[name] = self._resolve(name, ("parameters", "inputs"))
+        return self._targets[name]
+
+    def _resolve(self, name: str, ports: tuple[str, ...]) -> list[Target]:
+        try:
+            return resolve_name(self._prepared.root, name, ports, include_inner=True)
+        except UnknownNameError as error:
+            raise InputError(f'no variable "{name}": {error}') from None
+
+    def _find_signal(self, name: str) -> Target:
+        """Return the component of a signal, and the name of its variable."""
+        parts = name.split(".")
+        for count in range(len(parts) - 1, 0, -1):
+            if (component := ".".join(parts[:count])) in self._system.components:
+                return Target(component, ".".join(parts[count:]))
+        if name in self._system.aliases:
+            return Target(*self._system.aliases[name])
+        return self._resolve(name, ("outputs", "inputs", "parameters"))[0]
+
+    def _make_reader(self, target: Target) -> Reader:
+        component, text = target
+        elements = self._system.slots[component]
+        if text in elements:
+            return self._make_scalar_reader(Endpoint(component, text))
+        variable = self._variables_of(component).get(text)
+        names = variable.scalar_names if variable else [slot for slot in elements if slot.startswith(f"{text}[")]
+        if not names:
+            raise InputError(f'component "{component}" has no variable "{text}"{did_you_mean(text, elements)}')
+        readers = [self._make_scalar_reader(Endpoint(component, slot)) for slot in names]
+        return lambda run: [read(run) for read in readers]
+
+    def _make_scalar_reader(self, endpoint: Endpoint) -> Reader:
+        variable, element = self._system.find_element(endpoint)
+        if endpoint in self._plan.outputs.positions:
+            return _make_array_reader(self._plan.outputs, endpoint, variable)
+        if endpoint in self._connected:
+            return _make_array_reader(self._plan.inputs, endpoint, variable)
+        component = self._system.components[endpoint.component]
+
+        def call_component(run: PlanRun) -> Any:
+            with run.accessing(endpoint.component, "get"):
+                value = component.get(variable.name)
+            return value[element] if variable.shape else value
+
+        return call_component
+
+
+def _make_array_reader(layout: Layout, endpoint: Endpoint, variable: Variable) -> Reader:
+    """Return a reader of a value in the arrays of the engine, without a call of the component."""
+    dtype, offset = layout.positions[endpoint]
+    read = layout.arrays[dtype].item
+    return (lambda _: bool(read(offset))) if variable.type == "Boolean" else (lambda _: read(offset))

@@ -1,0 +1,184 @@
+"""Functions that run studies from Python: `cosim.sweep`, `cosim.tune` and `cosim.regress`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..api.arguments import expect, is_integer
+from ..core.processors import available_processors
+from ..core.size_limits import MAX_RUNS
+from ..results.files import check_writable
+from .execution.local import LocalRunner
+from .execution.run_store import RunStore
+from .regression import RegressionOutcome
+from .regression_runs import default_folder, run_regressions
+from .summary.sweep_files import SweepSummary, write_sweep_files
+from .summary.tuning_files import write_tuning_files
+from .sweep import Sweep, SweepRow
+from .tune import Trial, Tuning
+
+#: a study file, the name of a shipped study, or the content of a study file
+StudySource = str | Path | Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """Finished sweep.
+
+    Attributes:
+        rows: The runs in the order of the design, each with `point` (labels and settings), `record` (KPIs or failure) and
+            `passed`.
+        summary: Statistics of the KPIs and success rates, by groups of runs.
+        folder: Folder of the files that `cosim sweep` writes.
+    """
+
+    rows: Sequence[SweepRow]
+    summary: SweepSummary
+    folder: Path
+
+    @property
+    def success_rate(self) -> float:
+        """Share of the runs that meet all criteria."""
+        return sum(row.passed for row in self.rows) / len(self.rows)
+
+    def to_dataframe(self) -> Any:
+        """Return a pandas DataFrame with a row for each run: labels of the factors, `passed`, `failure` and all KPIs.
+
+        Raises:
+            InputError: The package pandas is not installed.
+        """
+        from ..results.data_frame import require_pandas
+
+        rows = [{**row.point.labels, "passed": row.passed, "failure": row.record.failure, **row.record.kpis} for row in self.rows]
+        return require_pandas().DataFrame(rows)
+
+
+@dataclass(frozen=True)
+class TuningResult:
+    """Finished tuning.
+
+    Attributes:
+        best: The best point, with its `parameters`, its `value` and whether it is `feasible`.
+        trials: All evaluated points.
+        folder: Folder of the files that `cosim tune` writes.
+    """
+
+    best: Trial
+    trials: Sequence[Trial]
+    folder: Path
+
+
+def sweep(
+    study: StudySource,
+    *,
+    output_dir: str | Path | None = None,
+    workers: int | None = None,
+    max_runs: int = MAX_RUNS,
+    retry_failed: bool = False,
+) -> SweepResult:
+    """Run a scenario at many points, as `cosim sweep`.
+
+    Runs that an earlier call has finished in the same folder are not repeated.
+
+    Args:
+        study: Path of a sweep file, name of a shipped sweep, or the content of a sweep file as a dict.
+        output_dir: Folder of the results; None: runs/NAME.
+        workers: Number of runs at a time; None: one for each processor.
+        max_runs: Largest accepted number of runs.
+        retry_failed: Repeat the runs that failed in an earlier call.
+
+    Returns:
+        All runs and their statistics. A run that failed raises no error.
+
+    Raises:
+        InputError: The sweep cannot be run, or an argument is of a wrong type.
+    """
+    _check_arguments(study, output_dir, workers, max_runs)
+    loaded = Sweep.from_file(study, max_runs)
+    folder = Path(output_dir) if output_dir else Path("runs") / loaded.study_file.spec.name
+    check_writable(folder)
+    run_store = RunStore(folder, retry_failed)
+    if any(key not in run_store for key in loaded.keys):
+        with LocalRunner(loaded.study.context, workers or available_processors()) as runner:
+            loaded.run(run_store, runner, lambda _: None)
+    loaded.check_names(run_store)
+    return SweepResult(list(loaded.rows(run_store)), write_sweep_files(loaded, run_store, folder, parquet=False), folder)
+
+
+def tune(
+    study: StudySource,
+    *,
+    output_dir: str | Path | None = None,
+    workers: int | None = None,
+    max_runs: int = MAX_RUNS,
+    retry_failed: bool = False,
+) -> TuningResult:
+    """Find the parameters that minimise a KPI, as `cosim tune`.
+
+    Args:
+        study: Path of a tuning file, name of a shipped tuning, or the content of a tuning file as a dict.
+        output_dir: Folder of the results; None: runs/NAME.
+        workers: Number of runs at a time; None: one for each processor.
+        max_runs: Largest accepted number of runs.
+        retry_failed: Repeat the runs that failed in an earlier call.
+
+    Returns:
+        The best point and all evaluated points.
+
+    Raises:
+        InputError: The tuning cannot be run, or an argument is of a wrong type.
+    """
+    _check_arguments(study, output_dir, workers, max_runs)
+    loaded = Tuning.from_file(study, max_runs)
+    folder = Path(output_dir) if output_dir else Path("runs") / loaded.spec.name
+    check_writable(folder)
+    with LocalRunner(loaded.study.context, workers or available_processors()) as runner:
+        best = loaded.run(RunStore(folder, retry_failed), runner, lambda _: None)
+    write_tuning_files(loaded, folder)
+    return TuningResult(best, loaded.trials, folder)
+
+
+def regress(
+    scenarios: str | Path | Sequence[str | Path] = (),
+    *,
+    update: bool = False,
+    output_dir: str | Path = "runs",
+    jobs: int | None = None,
+) -> list[RegressionOutcome]:
+    """Run all scenarios that have checks or a reference, and compare their results with these, as `cosim regress`.
+
+    Args:
+        scenarios: Scenario files, names of shipped scenarios, and folders; none: the folder scenarios/.
+        update: Write the references instead of comparing with them.
+        output_dir: Folder of the results.
+        jobs: Number of scenarios that run at a time; None: one for each processor.
+
+    Returns:
+        The outcome of each scenario, with `code` (0: passed, otherwise the exit code of the command), `summary` and `details`.
+
+    Raises:
+        InputError: There is no such scenario, two files have the same name, or an argument is of a wrong type.
+    """
+    given = [scenarios] if isinstance(scenarios, str | os.PathLike) else scenarios
+    accepted = isinstance(given, Sequence) and all(isinstance(each, str | os.PathLike) for each in given)
+    expect("scenarios", scenarios, accepted, "a path, the name of a shipped scenario, or a list of them")
+    expect("output_dir", output_dir, isinstance(output_dir, str | os.PathLike), "a path")
+    _check_count("jobs", jobs)
+    paths = [Path(each) for each in given] or [default_folder()]
+    return list(run_regressions(paths, update, Path(output_dir), jobs or available_processors()))
+
+
+def _check_arguments(study: Any, output_dir: Any, workers: Any, max_runs: Any) -> None:
+    accepted = isinstance(study, str | os.PathLike | Mapping)
+    expect("study", study, accepted, "the path of a study file, the name of a shipped study, or a dict")
+    expect("output_dir", output_dir, output_dir is None or isinstance(output_dir, str | os.PathLike), "a path")
+    _check_count("workers", workers)
+    _check_count("max_runs", max_runs)
+
+
+def _check_count(name: str, value: Any) -> None:
+    expect(name, value, value is None or (is_integer(value) and value > 0), "a positive number")

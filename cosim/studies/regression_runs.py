@@ -1,0 +1,79 @@
+"""Regression tests of several scenarios, run side by side."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+from ..core import resources
+from ..core.errors import InputError
+from ..scenario import find_scenario
+from .regression import EXPECTATION_KEYS, Regression, RegressionOutcome, has_keys
+
+T = TypeVar("T")
+
+
+def run_regressions(paths: Iterable[Path], update: bool, output_dir: Path, jobs: int) -> Iterator[RegressionOutcome]:
+    """Run all scenarios that have checks or a reference, and yield their outcomes in order.
+
+    Args:
+        paths: Scenario files, names of shipped scenarios, and folders of scenario files.
+        update: Write the references instead of comparing with them.
+        output_dir: Folder of the folders of results.
+        jobs: Number of scenarios that run at a time.
+
+    Raises:
+        InputError: There is no such scenario, or two files have the same name.
+    """
+    expected = ("reference",) if update else EXPECTATION_KEYS
+    files = [file for file in find_scenario_files(paths) if has_keys(file, expected)]
+    if not files:
+        raise InputError('found no scenario with a "reference" (or, without --update, with "checks")')
+    check_unique_names(files)
+    yield from run_in_parallel([Regression(file, output_dir / file.stem, update).run for file in files], jobs)
+
+
+def default_folder() -> Path:
+    """Return the folder scenarios/ of the working directory if it exists, else that of the shipped scenarios."""
+    folder = Path("scenarios")
+    return folder if folder.is_dir() else resources.root() / folder
+
+
+def find_scenario_files(paths: Iterable[Path]) -> Iterator[Path]:
+    """Yield the scenario files for files, names of shipped scenarios and folders.
+
+    Raises:
+        InputError: if a file does not exist or a folder has no scenarios.
+    """
+    for path in paths:
+        if not path.is_dir():
+            yield find_scenario(path)
+        elif files := sorted(path.glob("*.json")):
+            yield from files
+        else:
+            raise InputError(f'the folder "{path}" contains no scenario (*.json)')
+
+
+def check_unique_names(files: Iterable[Path]) -> None:
+    """Raise InputError if two files have the same name: the results of both would have the same folder."""
+    counts = Counter(file.stem for file in files)
+    if repeated := [name for name, count in counts.items() if count > 1]:
+        raise InputError(
+            [f'{counts[name]} scenarios are called "{name}.json": their results would go to one folder' for name in repeated]
+        )
+
+
+def run_in_parallel(work: Sequence[Callable[[], T]], jobs: int) -> Iterator[T]:
+    """Call functions on `jobs` threads and yield their return values, in order.
+
+    After an interrupt, functions that have not started are not called.
+    """
+    from concurrent.futures import ThreadPoolExecutor
+
+    pool = ThreadPoolExecutor(jobs)
+    try:
+        yield from pool.map(lambda function: function(), work)
+    finally:
+        pool.shutdown(cancel_futures=True)
