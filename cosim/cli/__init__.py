@@ -146,6 +146,8 @@ def report_error(error: BaseException, command_line: CommandLine) -> int:
         text = str(error)
     elif isinstance(error, OSError):
         text = f"operating system error: {error}"
+    elif isinstance(error, MemoryError):
+        text = "the memory of the process is used up"
     else:
         text = f"internal error: {type(error).__name__}: {error}  (`cosim --debug ...` prints the traceback)"
     click.echo(text, err=True)
@@ -158,7 +160,7 @@ def exit_code_of(error: BaseException) -> int:
         return 130
     if isinstance(error, click.ClickException | CosimError):
         return error.exit_code
-    return 1 if isinstance(error, OSError) else 70
+    return 1 if isinstance(error, OSError | MemoryError) else 70
 
 
 def _exit_code(value: Any) -> int:

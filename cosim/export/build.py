@@ -133,7 +133,7 @@ def _build_in_cache(source: Path, model: str | None, target: Path) -> None:
 def _is_intact(fmu: Path) -> bool:
     """Return whether a cached FMU exists and has the digest with which it was written."""
     try:
-        return file_hash(fmu).encode() == _digest_file(fmu).read_bytes()
+        return fmu.is_file() and file_hash(fmu).encode() == _digest_file(fmu).read_bytes()
     except OSError:
         return False
 

@@ -23,7 +23,7 @@ from tempfile import TemporaryFile
 from ..core.errors import ComponentError
 from .failure_attribution import attribute_failure, describe_exit_status, unattributed_failure
 from .foreign_output import ForeignOutput
-from .journal import CALL_NUMBER, CHANGE_COUNT, EXIT_CODE, JOURNAL_SIZE, ROW_COUNT, STEP_COUNT, Journal, Phase
+from .journal import CALL_NUMBER, CHANGE_COUNT, EXIT_CODE, JOURNAL_SIZE, OVERWRITTEN, ROW_COUNT, STEP_COUNT, Journal, Phase
 from .python_stack import innermost_line, request_stack
 from .run_files.live_csv_writer import LiveCsvWriter
 from .supervised_child import run_child
@@ -234,7 +234,7 @@ class _Supervisor:
         journal = self.journal
         if not journal.is_valid:
             journal.restore(self._last_contents)
-            failure = unattributed_failure(journal, "it wrote over memory of the process that is not its own")
+            failure = unattributed_failure(journal, OVERWRITTEN)
             return SupervisedOutcome(1, journal[ROW_COUNT], journal, failure)
         code, rows, phase = journal[EXIT_CODE], journal[ROW_COUNT], journal.phase
         if phase == Phase.DONE:

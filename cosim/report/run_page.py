@@ -8,6 +8,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..core.errors import InputError
 from ..core.text import count_noun
 from ..results import Result
 from ..results.checks import CheckOutcome, Number
@@ -65,6 +66,8 @@ def render_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Ite
     Raises:
         InputError: The result has no rows.
     """
+    if not len(result.time):
+        raise InputError(f"the result {result.metadata.get('name', '')} has no rows, so there is nothing to report")
     about, units = _metadata_with_defaults(result), result.metadata.get("kpi_units", {})
     return render_page(
         "report.html",

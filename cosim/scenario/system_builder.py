@@ -18,7 +18,7 @@ from ..core.system import Connection, Endpoint, System
 from ..engine.pacer import LatePolicy
 from ..engine.plan import Plan, compile_plan
 from ..engine.settings import Event, Settings
-from ..process.journal import Deadlines
+from ..process.journal import Deadlines, current_journal
 from .component_factory import ComponentFactory
 from .function_arguments import FunctionResolver, without_placeholders
 from .name_resolution import SlotIndex, UnknownNameError, check_assignment, resolve_name
@@ -44,6 +44,8 @@ class SystemBuilder:
         self.root, self.spec, self.assignments = scenario.root, scenario.spec, scenario.assignments
         self.problems: list[Problem] = list(scenario.problems)
         deadlines = Deadlines(**self.spec.deadlines.model_dump())
+        if journal := current_journal():
+            journal.deadlines = deadlines
         self.component_factory = ComponentFactory(Isolation(deadlines, sandbox), isolate_fmus or sandbox, loaded_fmus)
         self.components: dict[str, Component] = {}
         self._variables_by_component: dict[str, Mapping[str, Variable]] = {}

@@ -162,7 +162,7 @@ def _require_packages(options: RunOptions) -> None:
 
 
 def _load(options: RunOptions, real_time: float | None) -> Simulation:
-    """Load the scenario, announce its deadlines to the supervisor and print warnings about it."""
+    """Load the scenario and print warnings about it."""
     from ...api import load
     from ...scenario.nested_systems import parse_settings
     from ...scenario.plausibility import find_run_warnings
@@ -178,7 +178,6 @@ def _load(options: RunOptions, real_time: float | None) -> Simulation:
         isolation=options.isolation,
         sandbox=options.sandbox,
     )
-    supervision.set_deadlines(simulation.prepared.spec.deadlines)
     messages.log_problems(find_run_warnings(simulation.prepared))
     return simulation
 
